@@ -116,15 +116,14 @@ def test_tasks_of_other_packages_are_told_with_their_module(monkeypatch):
     assert setup == Setup.of("queen", "steer") == Setup.from_dict(setup.to_dict())
 
 
-def test_policies_are_evaluated_without_the_curriculum():
-    settings = {"curriculum": True, "level": 2, "time_limit": 4.0}
-    setup = Setup.of("tick", "gaps", settings)
-    assert setup.validation(10) == Setup.of("tick", "gaps", {"time_limit": 4.0})
-    assert Setup.of("queen,tick", "rough", settings).validation(1).task_kwargs == {"time_limit": 4.0}
-    easier = Setup.of("tick", "gaps", {"difficulty": 0.2, "curriculum": True})
-    assert easier.validation(10).task_kwargs == {"difficulty": 0.2}
-    fixed = Setup.of("tick", "gaps", {"difficulty": 0.2, "curriculum": False})
-    assert fixed.validation(10) == fixed
+def test_settings_of_a_setup_change_and_go():
+    setup = Setup.of("tick", "gaps", {"difficulty": 0.2, "exclude_blocks": ["contact_forces"]})
+    assert setup.validation(10) == setup and setup.with_settings({}) == setup
+    assert setup.with_settings({"difficulty": 0.3, "friction": 1.0}, without=["exclude_blocks"]) == Setup.of(
+        "tick", "gaps", {"friction": 1.0, "difficulty": 0.3}
+    )
+    assert setup.judging() == Setup.of("tick", "gaps", {"difficulty": 0.2})
+    assert Setup.of("queen,tick", "rough").judging() == Setup.of("queen,tick", "rough")
 
 
 def test_names_of_several_bodies():

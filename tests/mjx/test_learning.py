@@ -14,7 +14,6 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import collecting, inputs, on_policy, worlds
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.learning.agents.learner import RunContext
 from arc_suite.learning.agents.normaliser import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import policy
@@ -30,7 +29,7 @@ def leaves(tree):
 def test_a_rollout_of_jax_gives_the_update_of_numpy():
     """The same transitions, once as NumPy's arrays and once as JAX's: batch, update and moments."""
     run = Configuration.of(Setup.of("leaper"), "ppo", SMALL)
-    hp, context = run.hyperparameters, RunContext(run.setup, 0, 100, 100, pathlib.Path())
+    hp, context = run.hyperparameters, run.context(pathlib.Path())
     environments = collecting.Environments(hp, context)
     task, architecture = environments.task, environments.architecture
     state = ppo.begin(hp, architecture, np.random.default_rng(0))
@@ -53,7 +52,7 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
     run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | {"horizon": 12, "simulation": "mjx"})
-    hp, context = run.hyperparameters, RunContext(run.setup, 0, 100, 100, pathlib.Path())
+    hp, context = run.hyperparameters, run.context(pathlib.Path())
     collector = worlds.Worlds(hp, context)
     state = ppo.begin(hp, collector.architecture, np.random.default_rng(0))
     normalise = Moments.none(collector.task.size).normalizer()
@@ -77,10 +76,10 @@ def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path):
     run = Configuration.of(setup, "ppo", SMALL | {"simulation": "mjx"}, steps=48, evaluate_every=48)
     assert train(run, tmp_path / "whole")
     assert not train(run, tmp_path / "parts", minutes=1e-9)  # stops before the first slice
-    slices = on_policy.learn(run.hyperparameters, RunContext(setup, 0, 48, 48, tmp_path))
+    slices = on_policy.learn(run.hyperparameters, run.context(tmp_path))
     first = next(slices)
     assert_array_equal(first.step, 16)
-    context = RunContext(setup, 0, 48, 48, tmp_path, checkpoint=first.checkpoint)
+    context = run.context(tmp_path, checkpoint=first.checkpoint)
     resumed = on_policy.learn(run.hyperparameters, context)
     for _ in range(2):
         ours, theirs = next(slices), next(resumed)

@@ -2,15 +2,18 @@
 
 import dataclasses
 import json
+import os
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from arc_suite import checks, evaluation, files, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
-from arc_suite.learning.agents.learner import MOST_SEEDS
+from arc_suite.learning.agents.learner import MOST_SEEDS, RunContext
 from arc_suite.tasks.contract import CURRICULUM
 
 # Names in the file of a configuration.
@@ -131,6 +134,19 @@ class Configuration:
     def definition(self) -> algorithms.Algorithm:
         """The algorithm, with these hyperparameters."""
         return algorithms.algorithm(self.algorithm)._replace(hyperparameters=self.hyperparameters)
+
+    def context(
+        self, folder: str | os.PathLike, threads: int = 1, checkpoint: Mapping[str, np.ndarray] | None = None
+    ) -> RunContext:
+        """Return what the learner is given; see `RunContext`.
+
+        Raises:
+            ValueError: as `training_setup`.
+        """
+        own = {name: getattr(self, name) for name in ("setup", "seed", "steps", "evaluate_every", "prior")}
+        return RunContext(
+            **own, training=self.training_setup, folder=Path(folder), threads=threads, checkpoint=checkpoint
+        )
 
     @property
     def name(self) -> str:

@@ -14,7 +14,7 @@ from arc_suite import checks, evaluation, files, seed_ranges
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import priors, run_folder
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
-from arc_suite.learning.agents.learner import NOT_LEARNED, Damaged, Diverged, RunContext, Slice
+from arc_suite.learning.agents.learner import NOT_LEARNED, Damaged, Diverged, Slice
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
@@ -59,15 +59,12 @@ def train(
     training_seeds = _training_seeds(configuration, Path(folder))
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
     evaluation.check_ends(setup.definition.step_limit)
-    training_setup, policy_setup = configuration.training_setup, configuration.policy_setup
+    policy_setup = configuration.policy_setup
     growing = ("steps",) if definition.extends else ()
     with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
         run_folder.check_evaluated(folder, state["evaluated"])
-        own = {name: getattr(configuration, name) for name in ("setup", "seed", "steps", "evaluate_every", "prior")}
-        context = RunContext(
-            **own, training=training_setup, folder=Path(folder), threads=threads, checkpoint=run_files.arrays
-        )
+        context = configuration.context(folder, threads, run_files.arrays)
         slices = stack.enter_context(contextlib.closing(definition.learn(definition.hyperparameters, context)))
         options = {"num_threads": threads, "autoreset_mode": AutoresetMode.DISABLED}
         vector = configuration.validation.make_vec(evaluation.CURVE_EPISODES, **options)

@@ -86,12 +86,13 @@ def run(
     prior: Prior | None = None,
     evaluate_every: int | None = None,
     label: str = "",
+    training: Mapping[str, Any] | None = None,
 ) -> Run:
     """Return a run.
 
     Args:
         robot: name of a robot, or `module:name`.
-        algorithm, steps, seed, hyperparameters, evaluate_every: see `Configuration.of`.
+        algorithm, steps, seed, hyperparameters, evaluate_every, training: see `Configuration.of`.
         task: name of the task.
         task_kwargs: its settings, as in `arc_suite.load`.
         prior: prior data; None for none.
@@ -102,7 +103,7 @@ def run(
     """
     setup = Setup.of(robot, task, task_kwargs)
     dataset = None if prior is None else prior.dataset_id(setup)
-    configuration = Configuration.of(setup, algorithm, hyperparameters, seed, steps, evaluate_every, dataset)
+    configuration = Configuration.of(setup, algorithm, hyperparameters, seed, steps, evaluate_every, dataset, training)
     return Run(configuration, label, prior)
 
 
@@ -162,6 +163,13 @@ _PARTS = {
     "sac_parallel-one-step": {"n_step": 1},
 }
 
+
+def _wide(robot, steps, seed=0, task="walk", label="ppo", training=None) -> Run:
+    """A run of `ppo` that sees contact forces, with 256 units."""
+    own = {"hyperparameters": {"exclude_blocks": [], "hidden": 256}, "training": training}
+    return run(robot, "ppo", steps, seed, task, label=f"{label}-forces", **own)
+
+
 # `sac_parallel` with prior data, or with phases.
 _ADDED = (
     ("sac_parallel", {}, None),
@@ -214,11 +222,11 @@ STUDIES = {
     ),
     # Steps as on the division `top`.
     "from-nothing": Study(
-        "PPO from nothing in the other tasks, Tick; uneven ground and pillars three million steps",
+        "PPO from nothing in the other tasks, Tick; uneven ground and pillars three million steps; with contact forces",
         (
-            *(run("tick", "ppo", DIVISIONS["top"].steps_in(task), task=task) for task in TASKS if task not in _LATER),
+            *(_wide("tick", DIVISIONS["top"].steps_in(task), task=task) for task in TASKS if task not in _LATER),
             # Without a curriculum it learns to stand at the first trench.
-            run("tick", "ppo", DIVISIONS["top"].far_steps, 0, "gaps", {"curriculum": True}, label="ppo-curriculum"),
+            _wide("tick", DIVISIONS["top"].far_steps, 0, "gaps", "ppo-curriculum", {"curriculum": True}),
         ),
     ),
     # Four to six minutes of a core a run. One-step returns learn faster on some seeds, and fall on others.
@@ -249,7 +257,14 @@ STUDIES = {
         "beyond the paper: imitation of the demonstrators by DAgger, and PPO from nothing",
         (
             *(run(robot, "dagger", 25_600) for robot in ROBOTS),
-            *(run(robot, "ppo", 1_000_000, seed) for seed, robot in itertools.product(range(3), ROBOTS)),
+            *(_wide(robot, 1_000_000, seed) for seed, robot in itertools.product(range(3), ROBOTS)),
+        ),
+    ),
+    "ppo-forces": Study(
+        "division top of the benchmark: PPO with contact forces and 256 units",
+        tuple(
+            _wide(robot, DIVISIONS["top"].steps_in(task), seed, task)
+            for seed, (robot, task) in itertools.product(range(SEEDS), PLACES)
         ),
     ),
 }

@@ -13,7 +13,7 @@ import pytest
 from arc_suite import data
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
-from arc_suite.learning.agents.learner import RunContext
+from arc_suite.learning.agents.configuration import Configuration
 
 SMALL = {"hidden": 16, "batch": 8, "start_steps": 20}
 SHORT = {"time_limit": 2.0}  # s: episodes of 40 steps
@@ -50,9 +50,9 @@ class Learning:
 
 def learning(algorithm, hyperparameters, folder, setup, steps=10_000, evaluate_every=1, **context):
     """Begin to learn; slices end after every step unless told otherwise."""
-    definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters)
-    fields = {"seed": 0, "steps": steps, "evaluate_every": evaluate_every, "folder": folder} | context
-    return Learning(definition.learn(definition.hyperparameters, RunContext(setup, **fields)))
+    of_run = {name: context.pop(name) for name in ("seed", "prior", "training") if name in context}
+    run = Configuration.of(setup, algorithm, hyperparameters, steps=steps, evaluate_every=evaluate_every, **of_run)
+    return Learning(run.definition.learn(run.hyperparameters, run.context(folder, **context)))
 
 
 @pytest.fixture(autouse=True)

@@ -1,16 +1,15 @@
-"""Inputs of networks: excluded blocks, running moments, mirrored transitions."""
+"""Inputs of networks: running moments, mirrored transitions, privileged blocks of critics."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents.inputs import Inputs
+from arc_suite.learning.agents.inputs import Inputs, privileged_columns, symmetry
 from arc_suite.learning.agents.replay import Transitions
 from arc_suite.robots import generator
 
 TASK = Setup.of("tick").definition
-CONTACTS = ("contact_forces",)
 
 
 def drawn(count, size=TASK.size):
@@ -18,34 +17,39 @@ def drawn(count, size=TASK.size):
 
 
 def test_raw_observations():
-    inputs = Inputs.of(TASK, (), normalize=False, mirror=False)
+    inputs = Inputs.of(TASK, normalize=False, mirrored=False)
     assert inputs.after(drawn(4)) is inputs
     assert_array_equal(inputs(drawn(4)), drawn(4))
 
 
-def test_excluded_blocks_and_moments():
-    inputs = Inputs.of(TASK, CONTACTS, normalize=True, mirror=False).after(drawn(300))
-    parts = [block for name, block in TASK.split(drawn(300)).items() if name not in CONTACTS]
-    seen = np.concatenate(parts, axis=-1)
-    assert seen.shape == (300, TASK.size - TASK.sizes["contact_forces"])
+def test_moments_normalise():
+    inputs, seen = Inputs.of(TASK, normalize=True, mirrored=False).after(drawn(300)), drawn(300)
     expected = (seen - seen.mean(axis=0)) / seen.std(axis=0)
     assert_allclose(inputs(drawn(300)), expected.clip(-5.0, 5.0), atol=1e-5)
 
 
-def test_a_task_without_the_block_has_all_its_inputs():
-    assert len(Inputs.of(TASK, ("nothing",), normalize=False, mirror=False).columns) == TASK.size
-    with pytest.raises(ValueError, match=r"^exclude_blocks: expected to leave a block, got all of them: posture, "):
-        Inputs.of(TASK, tuple(TASK.blocks), normalize=False, mirror=False)
+def test_privileged_blocks_of_critics_are_mirrored_behind_the_observation():
+    names = ("ground", "velocity")
+    places, maps = privileged_columns(TASK, names), symmetry(TASK, names)
+    assert places.tolist() == [6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5]
+    vectors = drawn(3, TASK.size + 12)
+    found, own = maps.observation(vectors), TASK.symmetry.observation(vectors[:, : TASK.size])
+    assert_array_equal(found[:, : TASK.size], own)
+    assert_array_equal(found[:, -6:], vectors[:, -6:] * [1, -1, 1, -1, 1, -1])
+    assert_array_equal(np.sort(found[:, -12:-6]), np.sort(vectors[:, -12:-6]))
+    assert_array_equal(maps.observation(found), vectors)
+    with pytest.raises(ValueError, match=r"^unknown block 'speed' \(there are: velocity, ground\)$"):
+        privileged_columns(TASK, ("speed",))
 
 
 def test_moments_see_as_much_of_the_left_as_of_the_right():
-    inputs = Inputs.of(TASK, (), normalize=True, mirror=True).after(drawn(50))
+    inputs = Inputs.of(TASK, normalize=True, mirrored=True).after(drawn(50))
     assert inputs.moments.count == 100
     assert_allclose(inputs.symmetry.observation(inputs.moments.mean), inputs.moments.mean, atol=1e-9)
 
 
 def test_every_other_transition_is_mirrored():
-    inputs = Inputs.of(TASK, (), normalize=False, mirror=True)
+    inputs = Inputs.of(TASK, normalize=False, mirrored=True)
     joints = len(TASK.scene.body.joint_names)
     batch = Transitions(drawn(6), drawn(6, joints), drawn(6, 1)[:, 0], np.ones(6, np.float32), drawn(12)[6:])
     found, maps = inputs.of_batch(batch), inputs.symmetry
@@ -60,13 +64,13 @@ def test_every_other_transition_is_mirrored():
 
 def test_a_body_without_symmetry_has_no_mirrored_transitions():
     task = Setup.of(generator.random_body(10)).definition
-    assert Inputs.of(task, (), normalize=False, mirror=True).symmetry is None
+    assert Inputs.of(task, normalize=False, mirrored=True).symmetry is None
 
 
 @pytest.mark.parametrize("normalize", [False, True])
-def test_exported_layers_take_whole_observations(normalize):
-    inputs = Inputs.of(TASK, CONTACTS, normalize, mirror=False).after(3.0 + 2.0 * drawn(50))
-    weight = drawn(len(inputs.columns), 4)
+def test_exported_layers_take_observations(normalize):
+    inputs = Inputs.of(TASK, normalize, mirrored=False).after(3.0 + 2.0 * drawn(50))
+    weight = drawn(TASK.size, 4)
     layers = ({"weight": weight, "bias": np.ones(4, np.float32)},)
     observations = 3.0 + 2.0 * drawn(60)[50:]
     expected = np.tanh(inputs(observations) @ weight + 1.0)

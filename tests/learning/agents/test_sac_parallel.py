@@ -61,7 +61,7 @@ def test_what_an_update_sees(learner, drawn, n_step, discounts):
     agent = learner(NAME, small(NAME, batch=64, start_steps=0, n_step=n_step))
     agent.until(200)
     task, (batch, _) = agent.task, drawn[-1]
-    assert batch.observations.shape == (64, task.size - task.sizes["contact_forces"])
+    assert batch.observations.shape == (64, task.size) and "contact_forces" not in task.sizes
     places = off_policy.generator(0, "update", agent.updates - 1).integers(0, 200, size=64)
     raw = agent.buffer.at(places, n_step, 0.97)
     assert_array_equal(batch.rewards, np.float32(0.1) * raw.rewards)

@@ -192,15 +192,15 @@ def test_prior_data_are_those_of_the_study(tmp_path, monkeypatch):
         runner.prepare([each], tmp_path / "runs", 1)
 
 
-def test_a_curriculum_is_judged_at_the_difficulty(tmp_path):
-    settings = tiny_studies.SHORT | {"curriculum": True, "level": 3}
-    each = run("tick", "tiny_studies:CLIMB", 100, task="gaps", task_kwargs=settings, evaluate_every=100)
+def test_a_run_is_judged_without_its_settings_of_training(tmp_path):
+    own = {"task_kwargs": tiny_studies.SHORT, "training": {"curriculum": True, "level": 3}}
+    each = run("tick", "tiny_studies:CLIMB", 100, task="gaps", evaluate_every=100, **own)
     assert each.place == 'tick, gaps, {"time_limit": 2.0}'
     folder, published = tmp_path / "runs", tmp_path / "results"
     assert train(each.configuration, folder / each.name)
     publication.publish([each], folder, published)
     (row,) = csv_files.read(published / results.RUNS)
-    assert json.loads(row["task_kwargs"]) == settings
+    assert {name: json.loads(row[name]) for name in own} == own
     table = run_folder.table(folder / each.name, "evaluations")
     assert "distance" in table and "level" not in table
     assert results.demonstrators(published).keys() == {each.place}

@@ -213,7 +213,9 @@ def test_committed_configurations_are_those_of_the_studies(name):
     runs = {each.name: each for each in tables.study(name).runs}
     for row in csv_files.read(COMMITTED / name / results.RUNS, results.RUN_COLUMNS):
         fields = {field: row[field] or None for field in CONFIGURATION}
-        fields |= {each: json.loads(row[each]) for each in ("task_kwargs", "hyperparameters", "seed", "steps")}
+        fields |= {
+            each: json.loads(row[each]) for each in ("task_kwargs", "hyperparameters", "training", "seed", "steps")
+        }
         fields["evaluate_every"] = int(row["evaluate_every"])
         assert Configuration.from_dict(fields) == runs[row["run"]].configuration
         assert row["kind"] == runs[row["run"]].kind
@@ -232,7 +234,7 @@ for command in json.loads(sys.argv[1]):
 
 def test_commands_repeat_runs():
     """Those of all runs of all studies, with settings, hyperparameters and prior data."""
-    studies = [*tables.STUDIES.values(), tables.study("top-ppo"), tables.study("demonstrations-sope")]
+    studies = [*tables.STUDIES.values(), tables.study("demonstrations-sope")]
     runs = [each.configuration for study in studies for each in study.runs]
     commands = json.dumps([each.command for each in runs])
     for each, line in zip(runs, interpreters.printed(REPEATED, commands), strict=True):
