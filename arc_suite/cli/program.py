@@ -82,16 +82,6 @@ def termination() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGTERM, before)
 
 
-# One thread a run: two runs on two cores learn twice as much, two threads in a run hardly more than one.
-_ONE_THREAD = {"NPROC": "1", "OMP_NUM_THREADS": "1", "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
-
-
-def use_one_thread() -> None:
-    """Have JAX compute on one thread, unless the environment says otherwise; before it is imported."""
-    for name, value in _ONE_THREAD.items():
-        os.environ.setdefault(name, value)
-
-
 def run(main: Callable[..., int | None], name: str | None = None, arguments: Sequence[str] | None = None) -> NoReturn:
     """Parse arguments into absl's flags, call `main` and exit the process, with errors as `guard` shows them.
 

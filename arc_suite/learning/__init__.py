@@ -1,1 +1,67 @@
 """Learning: learners, studies and the benchmark, tuning, transfer between bodies; nothing of the core imports it."""
+
+import contextlib
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from arc_suite.envs.setup import Setup
+from arc_suite.policies import network
+from arc_suite.robots.spec import Body
+from arc_suite.simulation import cores
+
+__all__ = ["train"]
+
+
+def train(
+    robot: str | Body,
+    task: str = "walk",
+    algorithm: str = "ppo",
+    *,
+    task_kwargs: Mapping[str, Any] | None = None,
+    hyperparameters: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    steps: int | None = None,
+    evaluate_every: int | None = None,
+    prior: str | None = None,
+    training: Mapping[str, Any] | None = None,
+    minutes: float | None = None,
+    folder: str | Path | None = None,
+    progress: Callable = tqdm,
+    on_metrics: Callable[[int, Mapping[str, float]], None] = lambda step, metrics: None,
+) -> network.Network:
+    """Train a policy, as `arc-suite train` does, and return it; the same call resumes what was interrupted.
+
+    The policy plays wherever one is taken: in `arc_suite.evaluation`, `arc_suite.style` and `arc_suite.animation.show`.
+    Its `setup.load()` and `setup.make_vec(num_envs)` make environments for it.
+
+    Args:
+        robot, task, task_kwargs: see `arc_suite.load`.
+        algorithm, hyperparameters, seed, steps, evaluate_every, prior, training: see
+            `agents.configuration.Configuration.of`.
+        minutes: of CPU time of the run to stop after, yet not before its first evaluation; None to train to the end.
+        folder: of the run; None for one that is deleted at the end.
+        progress, on_metrics: see `agents.training.train`.
+
+    Returns:
+        The policy of the latest evaluation.
+
+    Raises:
+        ValueError: as `agents.training.train`, or a part of the run that does not fit.
+        OSError: as `agents.training.train`.
+    """
+    setup = Setup.of(robot, task, task_kwargs)
+    cores.use_one_thread()
+    from arc_suite.learning.agents import configuration, training  # not before: programs without learners are light
+
+    own = (algorithm, hyperparameters, seed, steps, evaluate_every, prior, training)
+    run = configuration.Configuration.of(setup, *own)
+    with contextlib.ExitStack() as stack:
+        place = Path(folder or Path(stack.enter_context(tempfile.TemporaryDirectory()), run.name))
+        training.train(run, place, minutes, progress=progress, on_metrics=on_metrics)
+        if not (policy := place / network.FILE).exists():
+            training.train(run, place, progress=progress, on_metrics=on_metrics, stop=policy.exists)
+        return network.load(policy)

@@ -4,7 +4,7 @@ import functools
 import time
 from collections.abc import Iterator
 
-from arc_suite.cli.program import use_one_thread
+from arc_suite.simulation.cores import use_one_thread
 
 use_one_thread()
 

@@ -29,11 +29,12 @@ from arc_suite.animation.design.genes import Around, Budget, Made, extent
 from arc_suite.animation.design.search import BATCH, RANDOM, Candidates, Search
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, walk
 from arc_suite.cli.flags import MOST, ROBOT_HELP, named_values
-from arc_suite.cli.program import progress, resumable, say, use_one_thread
+from arc_suite.cli.program import progress, resumable, say
 from arc_suite.journal import Journal
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import MAX_LENGTH, MAX_NAME, Body
 from arc_suite.robots.spec_files import body_to_json
+from arc_suite.simulation.cores import use_one_thread
 
 MASS, SPAN = 12.0, 1.5  # of a budget, kg and m
 _BOUNDS = {"mass": (1e-6, 1e6), "span": (0.05, MAX_LENGTH), "height": (0.02, MAX_LENGTH), "power": (0.0, 1e6)}

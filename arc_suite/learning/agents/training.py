@@ -35,12 +35,12 @@ def train(
     Args:
         configuration: of the run.
         folder: of the run.
-        minutes: of wall clock to stop after; None to train to the end.
+        minutes: of CPU time of the run to stop after, all its processes together; None to train to the end.
         threads: of the simulation; results do not depend on it.
         progress: makes a progress bar as `tqdm` does.
         on_metrics: called after each line of training.csv, and after each evaluation, with the environment step and
             metrics by name; the metric of an evaluation is `return`.
-        stop: returns whether to stop; the next checkpoint is still written.
+        stop: returns whether to stop; asked before the first slice and after each checkpoint.
 
     Returns:
         Whether the run is finished.
@@ -50,7 +50,6 @@ def train(
         Diverged: a value of the learner is not finite; the checkpoint before stays.
         OSError: the disk is full, or the like; the checkpoint before stays.
     """
-    began = time.monotonic()
     if minutes is not None:
         checks.number("minutes", minutes, 0.0)
     record, definition, setup = configuration.record(), configuration.definition, configuration.setup
@@ -76,7 +75,7 @@ def train(
         )
         stack.enter_context(bar)
         while state["evaluated"] < context.steps:
-            if minutes is not None and time.monotonic() - began > 60.0 * minutes:
+            if stop() or (minutes is not None and time.process_time() - cpu > 60.0 * minutes):
                 return False
             try:
                 found = next(slices)
@@ -100,8 +99,6 @@ def train(
                 seconds = {f"{name}_seconds": round(state[name], 3) for name in ("wall", "cpu")}
                 run_files.append("times", {"step": found.step, **seconds})
             run_files.save(found.checkpoint, state)
-            if stop():
-                return state["evaluated"] >= context.steps
     return True
 
 

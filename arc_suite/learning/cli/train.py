@@ -6,6 +6,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --robot tick
   arc-suite train --robot queen --task steer --algorithm dagger
   arc-suite train --robot tick --algorithm sac_parallel --minutes 5
+  arc-suite train --robot tick --seed 0,1,2 --jobs 3 --until_score .9
   arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
   arc-suite train --robot tick --task steer --train_set kicks=1.5
@@ -18,21 +19,24 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
 import contextlib
 import functools
 import importlib.util
-from collections.abc import Callable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from absl import flags
 
-from arc_suite import evaluation, files, registry, versions
+from arc_suite import checks, evaluation, files, registry, versions
 from arc_suite.cli.flags import define_body, define_task, made_body, named_values, only_body, task
-from arc_suite.cli.program import TERMINATED, progress, resumable, say, termination, use_one_thread
+from arc_suite.cli.program import TERMINATED, progress, resumable, say, termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
-from arc_suite.learning import onnx_file
+from arc_suite.learning import onnx_file, outcomes, processes
 from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
+from arc_suite.simulation.cores import usable_cores, use_one_thread
 
 FLAGS = flags.FLAGS
 define_body(more="; or several with commas, such as varied:0-127,queen, for a policy of any body")
@@ -46,15 +50,27 @@ flags.DEFINE_multi_string(
     "train_set", [], "Setting of the task in training alone, name=value, in place of that of --set."
 )
 flags.DEFINE_multi_string("hp", [], "Hyperparameter of the algorithm, name=value; repeat it for several.")
-flags.DEFINE_integer("seed", 0, "Seed of the run.", lower_bound=0)
+flags.DEFINE_list("seed", ["0"], "Seed of the run; several with commas are as many runs, each a process.")
 flags.DEFINE_integer("steps", None, "Environment steps. [default: the algorithm's]", lower_bound=1)
 flags.DEFINE_string("prior", None, "Id of a dataset of prior data, for algorithms that take any.")
 flags.DEFINE_integer("evaluate_every", None, "Steps between evaluations. [default: the algorithm's]", lower_bound=1)
 flags.DEFINE_string("config", None, "JSON file with the configuration of the run, in place of all flags above.")
-flags.DEFINE_float("minutes", None, "Stop after so many minutes; the same command resumes.", lower_bound=0.0)
+flags.DEFINE_float(
+    "minutes",
+    None,
+    "Stop after so many minutes of CPU time, over all processes that the run has had; more minutes resume it.",
+    lower_bound=0.0,
+)
+flags.DEFINE_float("until_score", None, "Stop after an evaluation with this score; see docs/benchmark.md.")
+flags.DEFINE_integer("jobs", None, "Runs of several seeds at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_integer("threads", 1, "Threads of the simulation; results do not depend on it.", lower_bound=1)
 flags.DEFINE_bool("tensorboard", False, "Write metrics for TensorBoard too, into the folder of the run.")
-flags.DEFINE_string("output", None, "Folder of the run. [default: runs/ROBOT-TASK-ALGORITHM-SEED]", short_name="o")
+flags.DEFINE_string(
+    "output",
+    None,
+    "Folder of the run, or of the runs of several seeds. [default: runs/ROBOT-TASK-ALGORITHM-SEED, or runs]",
+    short_name="o",
+)
 
 # Flags that make up the configuration.
 _OF_THE_RUN = (
@@ -76,8 +92,23 @@ _OF_THE_RUN = (
 def main() -> int:
     """Train, print the return at the end, and return the exit status."""
     use_one_thread()
-    run = configured()
+    runs = configured()
+    level = None if FLAGS.until_score is None else outcomes.level(runs[0], FLAGS.until_score)
+    return several(runs) if len(runs) > 1 else only(runs[0], level)
+
+
+def only(run: Configuration, level: float | None) -> int:
+    """Train a run, print its result, and return the exit status.
+
+    Args:
+        run: to train.
+        level: mean return of an evaluation to stop after; None to train to the end.
+    """
     folder = Path(FLAGS.output or Path("runs", run.name))
+
+    def reached():
+        return None if level is None else outcomes.reached(folder, level)
+
     with contextlib.ExitStack() as stack:
         listeners = [functools.partial(draw, run, folder)]
         if FLAGS.tensorboard:
@@ -95,15 +126,62 @@ def main() -> int:
 
         limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
         with resumable(folder), termination() as terminated:
-            finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics, stop=terminated)
-    if finished and importlib.util.find_spec("onnx") and not run.setup.several:
+
+            def stop():
+                return terminated() or reached() is not None
+
+            finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics, stop=stop)
+            step, killed = reached(), terminated()
+    done = finished or step is not None
+    if done and importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
-    print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
-    return TERMINATED if not finished and terminated() else 0
+    if step is not None:
+        how = f"score {FLAGS.until_score:g} reached {outcomes.when(folder, step)}"
+    elif finished:
+        how = "finished"
+    elif killed:
+        how = "stopped; the same command resumes it"
+    else:
+        how = f"stopped after {FLAGS.minutes:g} minutes of CPU time; more minutes resume it"
+    print(f"{folder}: {how}, {outcomes.earned(run, folder)}")
+    return TERMINATED if killed and not done else 0
 
 
-def configured() -> Configuration:
-    """Return the configuration that the flags give.
+def several(runs: Sequence[Configuration]) -> int:
+    """Train runs of several seeds, each by this command with one of them, and print their results and their mean."""
+    folder = files.folder(FLAGS.output or "runs")
+    given = sys.argv[sys.argv.index("train") + 1 :]
+
+    def command(run):
+        return ["train", *given, f"--seed={run.seed}", f"--output={folder / run.name}"]
+
+    def result(name):
+        return processes.last_line(processes.log(folder, name))
+
+    commands = {run.name: functools.partial(command, run) for run in runs}
+    with contextlib.ExitStack() as stack, resumable(folder):
+        bars = {}
+        for position, run in enumerate(runs):
+            bar = progress(total=run.steps, desc=run.name, position=position, unit="step", unit_scale=True)
+            bars[run.name] = stack.enter_context(bar)
+        jobs, watch = FLAGS.jobs or usable_cores(), functools.partial(watched, folder, bars)
+        failed = processes.run(commands, folder, jobs, result, watch)
+    print(f"{folder}: {outcomes.mean([run for run in runs if run.name not in failed], folder)}")
+    return int(bool(failed))
+
+
+def watched(folder: Path, bars: Mapping[str, Any]) -> None:
+    """Bring progress bars, by name of a run, to what the folders of the runs hold."""
+    for name, bar in bars.items():
+        with contextlib.suppress(ValueError, OSError):  # it is for its process to say what is damaged
+            if lines := run_folder.lines(folder / name, "times", ("step",)):
+                bar.update(int(lines[-1]["step"]) - bar.n)
+            if "return" in (state := run_folder.progress_of(folder / name)):
+                bar.set_postfix_str(f"return {state['return']:.4g}", refresh=False)
+
+
+def configured() -> list[Configuration]:
+    """Return the configurations that the flags give, one for each seed.
 
     Raises:
         ValueError: a flag that does not fit.
@@ -113,22 +191,24 @@ def configured() -> Configuration:
         for name in (*_OF_THE_RUN, "evaluate_every"):
             if FLAGS[name].present:
                 raise ValueError(f"--{name}: expected none with --config, which has the whole configuration")
-        return configuration.read(Path(FLAGS.config))
+        return [configuration.read(Path(FLAGS.config))]
     hyperparameters = named_values("hp", FLAGS.hp)
-    run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior, named_values("train_set", FLAGS.train_set)
+    run = FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior, named_values("train_set", FLAGS.train_set)
     several = registry.names_several(FLAGS.robot) and made_body() is None
     setup = Setup.of(FLAGS.robot if several else only_body(), *task())
-    return Configuration.of(setup, FLAGS.algorithm, hyperparameters, *run)
+    return [Configuration.of(setup, FLAGS.algorithm, hyperparameters, seed, *run) for seed in seeds(FLAGS.seed)]
 
 
-def earned(run: Configuration, folder: Path) -> str:
-    """Return the result of a finished run, for people."""
-    returns = run_folder.latest_returns(run_folder.table(folder, "evaluations"))
-    result, scale = returns.mean(), anchors.anchors(run.validation)
-    levels = f"standing still {scale.zero:.1f}"
-    if scale.demonstrator is not None:
-        levels = f"score {scale.score(result):z.2f} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
-    return f"finished, return {result:.1f} +- {returns.std():.1f}, {levels}"
+def seeds(texts: Sequence[str]) -> list[int]:
+    """Return the seeds of --seed.
+
+    Raises:
+        ValueError: something else, or one twice.
+    """
+    found = [int(text) for text in texts if text.isdecimal()]
+    if not texts or len(set(found)) < len(texts):
+        raise ValueError(f"--seed={checks.quoted(','.join(texts))}: expected different integers, such as 0,1,2")
+    return found
 
 
 def draw(run: Configuration, folder: Path, step: int, metrics: Mapping[str, float]) -> None:

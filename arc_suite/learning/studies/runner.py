@@ -1,22 +1,16 @@
-"""Makes the runs of a study on this machine, a process for each.
+"""Makes the runs of a study on this machine, a process for each."""
 
-Submitit serves clusters alone, see `cluster`: its local executor starts all jobs at once, and its jobs ignore SIGTERM.
-"""
-
-import subprocess
-import sys
-import time
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
 from arc_suite import checks, data, files
+from arc_suite.learning import processes
 from arc_suite.learning.agents import run_folder
 from arc_suite.learning.agents.configuration import OF_DATA
 from arc_suite.learning.studies.tables import Run
-
-_PAUSE = 0.2  # s between two looks at the processes
 
 
 def make(runs: Sequence[Run], folder: Path, jobs: int, progress: Callable = tqdm) -> int:
@@ -32,26 +26,8 @@ def make(runs: Sequence[Run], folder: Path, jobs: int, progress: Callable = tqdm
         ValueError, OSError: as `prepare`, or a file cannot be written.
     """
     waiting = prepare(runs, folder, jobs, progress)
-    running: dict[str, subprocess.Popen] = {}
-    failed = 0
-    try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                run = waiting.pop(0)
-                running[run.name] = _process(run, folder)
-                print(f"{run.name}: running", flush=True)
-            for name, process in list(running.items()):
-                if process.poll() is not None:
-                    del running[name]
-                    failed += bool(process.returncode)
-                    print(f"{name}: {'failed' if process.returncode else 'finished'}", flush=True)
-                    if process.returncode:
-                        print(_reason(folder / f"{name}.log"), file=sys.stderr)
-            time.sleep(_PAUSE)
-    finally:
-        for end in (subprocess.Popen.terminate, subprocess.Popen.wait):
-            for process in running.values():
-                end(process)
+    commands = {run.name: functools.partial(_command, run, folder / run.name) for run in waiting}
+    failed = len(processes.run(commands, folder, jobs))
     print(f"{len(runs) - failed} of {len(runs)} finished" + (f", {failed} failed" if failed else ""))
     return int(failed > 0)
 
@@ -85,18 +61,9 @@ def is_finished(run: Run, folder: Path) -> bool:
     return run_folder.progress_of(folder).get("evaluated", 0) >= run.configuration.steps
 
 
-def _process(run: Run, folder: Path) -> subprocess.Popen:
-    output = files.folder(folder / run.name)
-    config = output / run_folder.CONFIG
+def _command(run: Run, output: Path) -> list[str]:
+    config = files.folder(output) / run_folder.CONFIG
     if not run_folder.is_begun(output):
         with files.writing_json(config) as file:
             file.update(run.configuration.to_dict())
-    command = [sys.executable, "-m", "arc_suite", "train", f"--config={config}", f"--output={output}"]
-    with (folder / f"{run.name}.log").open("ab") as log:
-        return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
-
-
-def _reason(log: Path) -> str:
-    """Return why a run failed: its log, and the last line in it."""
-    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-    return f"{log}: {lines[-1] if lines else 'says nothing'}"
+    return ["train", f"--config={config}", f"--output={output}"]

@@ -5,17 +5,19 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 
+import numpy as np
 import programs
 import pytest
 from refusals import refused
 
 from arc_suite import registry
-from arc_suite.learning.agents import configuration
+from arc_suite.learning.agents import configuration, run_folder
 
 HAS_JAX = importlib.util.find_spec("jax") is not None
 ROOT = pathlib.Path(__file__).parents[3]
@@ -52,6 +54,9 @@ def run(*arguments, cwd):
         (["--algorithm=sac", "--hp=batsch=3"], "arc-suite train: unknown hyperparameter 'batsch'; did you mean 'b"),
         (["--hp=batch"], "arc-suite train: --hp batch: expected name=value"),
         (["--config=a.json", "--seed=3"], "arc-suite train: --seed: expected none with --config, which has the whole "),
+        (["--seed=0,a"], "arc-suite train: --seed=0,a: expected different integers, such as 0,1,2\n"),
+        (["--seed=1,1"], "arc-suite train: --seed=1,1: expected different integers, such as 0,1,2\n"),
+        (["--until_score=nan"], "arc-suite train: score: expected a finite number, got nan\n"),
         (["--seed=40001"], "arc-suite train: seed: expected an integer from 0 to 40000, got 40001"),
         (["--set=time_limit=Infinity"], "arc-suite train: time_limit: expected a finite number, as every"),
         (["--minutes=nan"], "arc-suite train: minutes: expected a finite number of at least 0, got nan"),
@@ -94,6 +99,47 @@ def test_configurations_that_do_not_fit_are_one_line(text, line, tmp_path):
 )
 def test_export_of_what_is_no_run(tmp_path, arguments, message):
     programs.refused(run("export", *arguments, cwd=tmp_path), f"arc-suite export: {message}")
+
+
+CLIMB = ["--robot=tick", "--algorithm=tiny_studies:CLIMB", "--set", "time_limit=0.2", "--steps=40"]
+CLIMB += ["--evaluate_every=20"]
+REACHED = r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+ \+- \S+, score \S+ \(.*"
+STOPPED = "other: stopped after 0 minutes of CPU time; more minutes resume it, no evaluation yet\n"
+
+
+def test_until_a_score(tmp_path):
+    """A run stops at the first evaluation that reaches it, and the same command has nothing left to do."""
+    shutil.copy(ROOT / "tests" / "fixtures" / "tiny_studies.py", tmp_path)
+    for _ in range(2):
+        done = run("train", *CLIMB, "--until_score=-100", "-o", "run", cwd=tmp_path)
+        last = done.stdout.splitlines()[-1]
+        assert done.returncode == 0 and re.fullmatch(REACHED, last), done
+        assert run_folder.table(tmp_path / "run", "evaluations")["step"].tolist() == [20] * 10
+    done = run("train", *CLIMB, "--minutes=0", "-o", "other", cwd=tmp_path)
+    assert done.stdout.endswith(STOPPED)
+
+
+@pytest.mark.long
+def test_several_seeds(tmp_path):
+    """Each is the run that it is alone; one that fails does not stop the others."""
+    shutil.copy(ROOT / "tests" / "fixtures" / "tiny_studies.py", tmp_path)
+    name = "tick-walk-tiny_studies.CLIMB"
+    foreign = tmp_path / "runs" / f"{name}-1" / "mine.txt"
+    foreign.parent.mkdir(parents=True), foreign.write_text("")
+    done = run("train", *CLIMB, "--seed=0,1,2", "--jobs=3", cwd=tmp_path)
+    lines = done.stdout.splitlines()
+    assert done.returncode == 1 and lines[:3] == [f"{name}-{seed}: running" for seed in range(3)]
+    assert f"{name}-1: failed" in lines
+    assert f"runs/{name}-1.log: arc-suite train: runs/{name}-1: no folder of a run, and not empty: " in done.stderr
+    returns = [run_folder.table(tmp_path / "runs" / f"{name}-{seed}", "evaluations")["return"][-10:] for seed in (0, 2)]
+    for seed, each in zip((0, 2), returns, strict=True):
+        (line,) = (line for line in lines if line.startswith(f"runs/{name}-{seed}: finished"))
+        assert f", return {each.mean():.1f} +- {each.std():.1f}, score " in line
+    means = [each.mean() for each in returns]
+    assert lines[-1].startswith(f"runs: mean of 2 seeds, return {np.mean(means):.1f} +- {np.std(means):.1f}, score ")
+    assert run("train", *CLIMB, "--seed=2", "-o", "alone", cwd=tmp_path).returncode == 0
+    tables = [(tmp_path / each / "evaluations.csv").read_text() for each in ("alone", f"runs/{name}-2")]
+    assert tables[0] == tables[1]
 
 
 @pytest.fixture(scope="module")
