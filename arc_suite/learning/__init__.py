@@ -55,13 +55,14 @@ def train(
     """
     setup = Setup.of(robot, task, task_kwargs)
     cores.use_one_thread()
-    from arc_suite.learning.agents import configuration, training  # not before: programs without learners are light
+    from arc_suite.learning.agents import training as trainer  # not before: programs without learners are light
+    from arc_suite.learning.agents.configuration import Configuration
 
     own = (algorithm, hyperparameters, seed, steps, evaluate_every, prior, training)
-    run = configuration.Configuration.of(setup, *own)
+    run = Configuration.of(setup, *own)
     with contextlib.ExitStack() as stack:
         place = Path(folder or Path(stack.enter_context(tempfile.TemporaryDirectory()), run.name))
-        training.train(run, place, minutes, progress=progress, on_metrics=on_metrics)
+        trainer.train(run, place, minutes, progress=progress, on_metrics=on_metrics)
         if not (policy := place / network.FILE).exists():
-            training.train(run, place, progress=progress, on_metrics=on_metrics, stop=policy.exists)
+            trainer.train(run, place, progress=progress, on_metrics=on_metrics, stop=policy.exists)
         return network.load(policy)
