@@ -2,7 +2,7 @@
 
 python tests/engines/make_files.py FOLDER [few|bones]
 
-few: the robots; bones: also an example with eight legs, and idle of the other examples and of 30 random bodies.
+All of them also with few triangles, places in a texture and few keys. few: the robots; bones: also an example with eight legs, and idle of the other examples and of 30 random bodies.
 """
 
 import json
@@ -52,6 +52,8 @@ def main(folder: str, kind: str = "") -> None:
         for rig in export.RIGS if name in ROBOTS or body.source else ("skin",):
             (out / f"{name}-{rig}.glb").write_bytes(export.glb(body, clips, rig))
             (out / f"{name}-{rig}.clips.json").write_text(json.dumps(export.sidecar(body, clips)))
+        if not kind:
+            (out / f"{name}-low.glb").write_bytes(export.glb(body, clips, triangles=3000, uv=True, reduced=True))
         if not body.source:  # whose bones stand at the joints, not where MuJoCo's bodies do
             np.savez(out / f"{name}.npz", **truth(body, clips))
             np.savez(out / f"{name}.bound.npz", **bound(body, clips))

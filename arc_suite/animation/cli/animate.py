@@ -36,6 +36,9 @@ flags.DEFINE_string(
 )
 flags.DEFINE_bool("straight", False, "Loops that do not turn go exactly where they are to, and do not veer.")
 flags.DEFINE_bool("plant", False, "Feet in stance stay where they are, by inverse kinematics, and do not slide.")
+flags.DEFINE_integer("triangles", None, "At most so many, for creatures far away: 3000 fits most bodies.", 1)
+flags.DEFINE_bool("uv", False, "Faces have places in a texture, to be painted.")
+flags.DEFINE_bool("reduce", False, "Leave out keys that lines between others replace within 0.1 degrees.")
 flags.DEFINE_string("output", None, "File to write, .glb. Required.", short_name="o")
 
 
@@ -57,7 +60,8 @@ def main() -> None:
         recording = functools.partial(progress, desc="recording", unit="clip", leave=False)
         policy = policy_name(FLAGS.policy), FLAGS.preset
         clips = export.clips(setup, names, *policy, FLAGS.fps, recording, FLAGS.straight, FLAGS.plant)
-        temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
+        look = FLAGS.triangles, FLAGS.uv, FLAGS.reduce
+        temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION, *look))
         metrics |= export.sidecar(setup.body, clips, FLAGS.root_motion)
     print_table(clips)
     print(f"wrote {FLAGS.output} and {sidecar}")

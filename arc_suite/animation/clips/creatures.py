@@ -3,15 +3,17 @@
 glTF's y axis points up and its z axis ahead: its (x, y, z) are our (y, z, x), a proper rotation.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bones, shapes
+from arc_suite.animation.clips import bones, keys, shapes
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.gltf import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
+from arc_suite.animation.clips.meshes import body_meshes
 from arc_suite.animation.clips.metadata import ROOT_MOTIONS, animations, metadata
 from arc_suite.animation.clips.shapes import Mesh
 from arc_suite.animation.parts import Material, Part, frames
@@ -21,16 +23,26 @@ from arc_suite.robots.spec import Body
 RIGS = ("skin", "nodes")
 
 _AXES = (1, 2, 0)  # of ours, that are glTF's x, y and z
-_TOLERANCE = 0.004  # of the standing height, by which a face may cut into a round shape
+_ANGLE, _LENGTH = math.radians(0.1), 0.001  # rad, and standing heights, by which reduced keys may be off
 
 
-def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str = "both", generator: str = "") -> bytes:
+def glb(
+    body: Body,
+    clips: Sequence[Clip],
+    rig: str = "skin",
+    root_motion: str = "both",
+    generator: str = "",
+    triangles: int | None = None,
+    uv: bool = False,
+    reduced: bool = False,
+) -> bytes:
     """Return a body and its clips as a binary glTF file.
 
     Its scene has the node `root`, on the ground below the torso, with the parts of the body under it as in the body
-    tree; as a skin, also a node with the mesh, whose skeleton they are. An animation is called after its clip, with
-    `_in_place` where the root stays although the clip moves, and `_loop` at the end where it loops; its extras are
-    those of the `sidecar`.
+    tree; as a skin, also a node with the mesh, whose skeleton they are. A bone of the skin lies in its limb; see
+    `bones.limbs`. The body is bound in the first pose of idle. An animation is called after its clip, with `_in_place`
+    where the root stays although the clip moves, and `_loop` at the end where it loops; its extras are those of the
+    `sidecar`.
 
     Args:
         body: any body.
@@ -38,34 +50,55 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         rig: skin, or nodes, each with the mesh of its part.
         root_motion: moving, in_place, or both, two animations of each clip that moves.
         generator: what the file says that it was made by.
+        triangles: that the mesh has at most; see `meshes.body_meshes`.
+        uv: whether faces have places in a texture.
+        reduced: whether keys are left out that lines between others replace within 0.1 degrees and 0.001 standing
+            heights.
+
+    Raises:
+        ValueError: no mesh has so few triangles.
     """
-    document, (parts, looks) = Document(generator), described(body)
+    document, (parts, looks), height = Document(generator), described(body), body.torso.standing_height
     if rig == "skin":
         parts = bones.limbs(parts)
-    meshes = [part_meshes(part, _TOLERANCE * body.torso.standing_height) for part in parts]
+    meshes = body_meshes(parts, height, triangles, uv)
     bound = _bound(parts, meshes, clips)
-    materials = {name: document.add("materials", _material(name, look)) for name, look in looks.items()}
+    root, nodes = _hierarchy(document, bound)
+    shown = {name for own in meshes for name in own}
+    materials = {
+        name: document.add("materials", _material(name, look)) for name, look in looks.items() if name in shown
+    }
+    scene = [root]
+    if rig == "skin":
+        scene.append(_skinned(document, body.name, bound, meshes, [root, *nodes], materials))
+    else:
+        _add_meshes(document, bound, meshes, nodes, materials)
+    document.json |= {"scene": document.add("scenes", {"name": body.name, "nodes": scene})}
+    bounds = {"rotation": _ANGLE, "translation": _LENGTH * height} if reduced else None
+    for clip in clips:
+        _animations(document, clip, parts, root, nodes, ROOT_MOTIONS[root_motion], bounds)
+    return document.glb()
+
+
+def _hierarchy(document: Document, parts: Sequence[Part]) -> tuple[int, list[int]]:
+    """Add the nodes of the root and of parts, and return them."""
     root = document.add("nodes", {"name": "root"})
-    nodes = [document.add("nodes", _node(part)) for part in bound]
+    nodes = [document.add("nodes", _node(part)) for part in parts]
     children: dict[int, list[int]] = {}
     for part, node in zip(parts, nodes, strict=True):
         children.setdefault(root if part.parent is None else nodes[part.parent], []).append(node)
     for node, below in children.items():
         document.json["nodes"][node]["children"] = below
-    scene = [root]
-    if rig == "skin":
-        scene.append(_skinned(document, body.name, bound, meshes, [root, *nodes], materials))
-    else:
-        for part, own, node in zip(parts, meshes, nodes, strict=True):
-            if not own:  # a link of an imported body may show nothing
-                continue
+    return root, nodes
+
+
+def _add_meshes(document: Document, parts: Sequence[Part], meshes, nodes: list[int], materials) -> None:
+    """Give each node the mesh of its part; a link of an imported body may show nothing."""
+    for part, own, node in zip(parts, meshes, nodes, strict=True):
+        if own:
             primitives = [_primitive(document, mesh, materials[name]) for name, mesh in own.items()]
             mesh = document.add("meshes", {"name": part.name, "primitives": primitives})
             document.json["nodes"][node]["mesh"] = mesh
-    document.json |= {"scene": document.add("scenes", {"name": body.name, "nodes": scene})}
-    for clip in clips:
-        _animations(document, clip, parts, root, nodes, ROOT_MOTIONS[root_motion])
-    return document.glb()
 
 
 def _bound(parts: list[Part], meshes: list[dict[str, Mesh]], clips: Sequence[Clip]) -> list[Part]:
@@ -79,15 +112,6 @@ def _bound(parts: list[Part], meshes: list[dict[str, Mesh]], clips: Sequence[Cli
         for mesh in own.values()
     )
     return [part if part.parent is not None else part._replace(place=part.place - (0.0, 0.0, low)) for part in parts]
-
-
-def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
-    """Return the shapes of a part by material, those of one as one mesh in the part's frame."""
-    meshes: dict[str, list[Mesh]] = {}
-    for shape in part.shapes:
-        mesh = shapes.polyhedron(*shape.hull) if shape.hull else shapes.shape(shape.kind, shape.size, tolerance)
-        meshes.setdefault(shape.material, []).append(mesh.moved(shape.place, rotations.matrix(shape.quaternion)))
-    return {material: shapes.joined(several) for material, several in meshes.items()}
 
 
 def _material(name: str, material: Material) -> dict:
@@ -146,40 +170,66 @@ def _skinned(document: Document, name: str, parts, meshes, joints: list[int], ma
 
 def _primitive(document: Document, mesh: Mesh, material: int) -> dict:
     indices = mesh.triangles.astype("<u2" if len(mesh.points) < 2**16 else "<u4").reshape(-1)
+    attributes = {
+        "POSITION": document.accessor(_float32(mesh.points[:, _AXES]), ARRAY_BUFFER, bounds=True),
+        "NORMAL": document.accessor(_float32(mesh.normals[:, _AXES]), ARRAY_BUFFER),
+    }
+    if mesh.uv is not None:
+        attributes["TEXCOORD_0"] = document.accessor(_float32(mesh.uv), ARRAY_BUFFER)
     return {
-        "attributes": {
-            "POSITION": document.accessor(_float32(mesh.points[:, _AXES]), ARRAY_BUFFER, bounds=True),
-            "NORMAL": document.accessor(_float32(mesh.normals[:, _AXES]), ARRAY_BUFFER),
-        },
+        "attributes": attributes,
         "indices": document.accessor(indices, ELEMENT_ARRAY_BUFFER),
         "material": material,
     }
 
 
-def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[int], moving: Sequence[bool]) -> None:
-    """Add a clip, moving, in place or both, which share all but the root."""
-    motion = clip.motion
-    times = document.accessor(_float32(clip.times), bounds=True)
-    tracks = []
+def _animations(
+    document: Document,
+    clip: Clip,
+    parts: Sequence[Part],
+    root: int,
+    nodes: list[int],
+    moving: Sequence[bool],
+    bounds: Mapping[str, float] | None,
+) -> None:
+    """Add a clip, moving, in place or both, which share all but the root.
+
+    Args:
+        document: of the file.
+        clip: to add.
+        parts: of the body.
+        root: its node.
+        nodes: those of the parts.
+        moving: whether the root moves, for each animation.
+        bounds: by which tracks of each target may be off for fewer keys; None for a key in each frame.
+    """
+    motion, inputs = clip.motion, {}
+
+    def track(node: int, target: str, values: np.ndarray, at: np.ndarray | None = None):
+        """Add a track, and return its node and target, and the accessors of its times and values."""
+        if at is None:
+            at = np.arange(len(values)) if bounds is None else keys.needed(values, bounds[target])
+            values = values[at]
+        if (key := at.tobytes()) not in inputs:  # tracks with the same keys share them
+            inputs[key] = document.accessor(_float32(clip.times[at]), bounds=True)
+        stored = _float32(values[:, _AXES]) if target == "translation" else _turn(values)
+        return node, target, inputs[key], document.accessor(stored)
+
+    shared = []
     for part, node in zip(parts, nodes, strict=True):
         if part.parent is None:
-            tracks.append((node, "translation", _float32(motion.positions[:, _AXES])))
-            tracks.append((node, "rotation", _turn(motion.quaternions)))
+            shared.append(track(node, "translation", motion.positions))
+            shared.append(track(node, "rotation", motion.quaternions))
         elif part.joint is not None:
-            tracks.append((node, "rotation", _turn(bones.hinged(part, motion.joints[:, part.joint]))))
-    shared = [(node, target, times, document.accessor(values)) for node, target, values in tracks]
+            shared.append(track(node, "rotation", bones.hinged(part, motion.joints[:, part.joint])))
+    ends = np.array((0, len(motion.joints) - 1))
     for name, moves in animations(clip, moving).items():
         # A root that stays has keys too: in players it would otherwise be wherever the clip before left it.
-        path = motion.root if moves else np.zeros((2, 3))
-        own = times if moves else document.accessor(_float32(clip.times[[0, -1]]), bounds=True)
+        path, at = (motion.root, None) if moves else (np.zeros((2, 3)), ends)
         ground = np.concatenate([path[:, :2], np.zeros((len(path), 1))], axis=-1)
         heading = rotations.turned(np.array((1.0, 0.0, 0.0, 0.0)), path[:, 2])
-        channels = [
-            (root, "translation", own, document.accessor(_float32(ground[:, _AXES]))),
-            (root, "rotation", own, document.accessor(_turn(heading))),
-            *shared,
-        ]
-        samplers = [{"input": keys, "output": output} for _, _, keys, output in channels]
+        channels = [track(root, "translation", ground, at), track(root, "rotation", heading, at), *shared]
+        samplers = [{"input": times, "output": output} for _, _, times, output in channels]
         targets = [{"node": node, "path": target} for node, target, _, _ in channels]
         own = {"channels": [{"sampler": index, "target": target} for index, target in enumerate(targets)]}
         document.add("animations", own | {"name": name, "samplers": samplers, "extras": metadata(clip)})

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 KINDS = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
-_SEGMENTS = (8, 32)  # least and most, around a shape
+FEWEST, _MOST = 8, 32  # segments around a shape
 
 
 class Mesh(NamedTuple):
@@ -16,11 +16,13 @@ class Mesh(NamedTuple):
         points: (n, 3)
         normals: (n, 3) of unit length.
         triangles: (m, 3) indices of points.
+        uv: (n, 2) places in a texture, to the right and down; None for a mesh without.
     """
 
     points: np.ndarray
     normals: np.ndarray
     triangles: np.ndarray
+    uv: np.ndarray | None = None
 
     def moved(self, place: np.ndarray, rotation: np.ndarray) -> "Mesh":
         """Return the mesh turned by a matrix (3, 3), then moved by a vector (3,)."""
@@ -31,22 +33,24 @@ def joined(meshes: list[Mesh]) -> Mesh:
     """Return several meshes as one."""
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
-    points, normals, _ = zip(*meshes, strict=True)
-    return Mesh(np.concatenate(points), np.concatenate(normals), np.concatenate(triangles))
+    points, normals, _, uv = zip(*meshes, strict=True)
+    places = None if uv[0] is None else np.concatenate(uv)
+    return Mesh(np.concatenate(points), np.concatenate(normals), np.concatenate(triangles), places)
 
 
-def shape(kind: str, size, tolerance: float) -> Mesh:
+def shape(kind: str, size, tolerance: float, fewest: int = FEWEST) -> Mesh:
     """Return a shape about its centre.
 
     Args:
         kind: of `KINDS`.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
         tolerance: m, by which a face may cut into a round shape.
+        fewest: segments around it.
     """
     if kind == "box":
         return _box(size)
     radius = sorted(size)[1] if kind == "ellipsoid" else size[0]
-    count = segments(radius, tolerance)
+    count = segments(radius, tolerance, fewest)
     if kind == "cylinder":
         return _cylinder(size[0], size[1], count)
     if kind == "ellipsoid":
@@ -62,11 +66,10 @@ def polyhedron(points: np.ndarray, triangles: np.ndarray) -> Mesh:
     return Mesh(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.arange(corners[..., 0].size).reshape(-1, 3))
 
 
-def segments(radius: float, tolerance: float) -> int:
+def segments(radius: float, tolerance: float, fewest: int = FEWEST) -> int:
     """Return into how many segments, an even number, a circle is cut for a chord to be within a tolerance of it."""
     count = math.pi / math.acos(max(1.0 - tolerance / radius, 0.0))
-    low, high = _SEGMENTS
-    return 2 * math.ceil(min(max(count, low), high) / 2.0)
+    return 2 * math.ceil(min(max(count, fewest), _MOST) / 2.0)
 
 
 def _ball(count: int, radii: np.ndarray, half_length: float) -> Mesh:

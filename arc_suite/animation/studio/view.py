@@ -8,7 +8,7 @@ import viser
 
 from arc_suite import rotations
 from arc_suite.animation.clips import shapes
-from arc_suite.animation.clips.creatures import part_meshes
+from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.clips.shapes import Mesh
 from arc_suite.animation.scenery import ground
 from arc_suite.animation.studio.creature import Creature

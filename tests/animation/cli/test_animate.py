@@ -35,8 +35,13 @@ def test_both_files_and_a_row_for_each_clip(tmp_path):
 @pytest.mark.long
 def test_any_body_as_rigid_parts(tmp_path):
     flags = ("--legs=4", "--links=2", "--rig=nodes", "--root_motion=moving", "--clips=walk", "-o", "walker.glb")
-    programs.passed(animate(*flags, cwd=tmp_path))
+    programs.passed(animate(*flags, "--triangles=1500", "--uv", "--reduce", cwd=tmp_path))
     file = gltf_reader.read((tmp_path / "walker.glb").read_bytes())
+    primitives = [primitive for mesh in file.json["meshes"] for primitive in mesh["primitives"]]
+    assert sum(len(file.arrays[each["indices"]]) for each in primitives) <= 3 * 1500
+    assert all("TEXCOORD_0" in each["attributes"] for each in primitives)
+    inputs = [len(file.arrays[each["input"]]) for each in file.json["animations"][0]["samplers"]]
+    assert min(inputs) < 0.5 * max(inputs)
     assert "skins" not in file.json and len(file.json["animations"]) == 1
 
 

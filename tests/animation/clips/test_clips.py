@@ -185,6 +185,24 @@ def test_a_loop_closes_in_the_bytes(robot):
             assert (values[0] == values[-1]).all()
 
 
+@pytest.mark.slow
+def test_reduced_keys_move_it_the_same():
+    """Within what a tenth of a degree in each joint of a leg and 0.001 standing heights of the torso amount to."""
+    clips, body = list(made("tick").values()), ROBOTS["tick"]
+    files = [gltf_reader.read(export.glb(body, clips, reduced=reduced)) for reduced in (False, True)]
+    counts = [
+        sum(len(file.arrays[each["input"]]) for a in file.json["animations"] for each in a["samplers"])
+        for file in files
+    ]
+    assert counts[1] < 0.5 * counts[0]
+    for clip in ("walk_loop", "stop"):
+        times = files[0].arrays[files[0].animation(clip)["samplers"][-1]["input"]]
+        one, other = (gltf_reader.played(file, clip, times) for file in files)
+        for foot in body.foot_names:
+            assert abs(one[foot][:, :3, 3] - other[foot][:, :3, 3]).max() < 0.01 * body.torso.standing_height
+        assert (one["root"][-1] == other["root"][-1]).all()
+
+
 @pytest.mark.parametrize("robot", EACH)
 def test_the_root_goes_as_fast_as_is_told(robot):
     file = read(robot)
