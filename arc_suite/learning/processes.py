@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from tqdm import tqdm
+
 from arc_suite.cli.program import say
 
 _PAUSE, _WATCH = 0.2, 1.0  # s between two looks at the processes, and between two calls of `watch`
@@ -49,7 +51,7 @@ def run(
                     if process.returncode:
                         failed.append(name)
                         say(f"{name}: failed")
-                        print(f"{log(logs, name)}: {last_line(log(logs, name))}", file=sys.stderr)
+                        tqdm.write(f"{log(logs, name)}: {last_line(log(logs, name))}", file=sys.stderr)
                     else:
                         say(result(name))
             if time.monotonic() >= due:
