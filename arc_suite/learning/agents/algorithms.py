@@ -69,6 +69,24 @@ class Algorithm(NamedTuple):
 _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 
+_PARALLEL = SoftActorCritic(
+    learning_rate=5e-4,
+    discount=0.97,
+    n_step=3,
+    tau=0.01,
+    num_envs=32,
+    utd_ratio=0.375,
+    start_steps=0,
+    reward_scale=0.1,
+    initial_std=0.3,
+    last_gain=0.01,
+    initial_temperature=0.003,
+    target_entropy=-0.6,
+    symmetry_augmentation=True,
+    normalize=True,
+    exclude_blocks=("contact_forces",),
+)
+
 
 def _learn(hp, context) -> Iterator[Any]:
     """Learn by the learner of this package that has such hyperparameters.
@@ -111,24 +129,14 @@ ALGORITHMS = {
     ),
     # What each part gives: docs/algorithms.md.
     "sac_parallel": _off_policy(
-        SoftActorCritic(
-            learning_rate=5e-4,
-            discount=0.97,
-            n_step=3,
-            tau=0.01,
-            num_envs=32,
-            utd_ratio=0.375,
-            start_steps=0,
-            reward_scale=0.1,
-            initial_std=0.3,
-            last_gain=0.01,
-            initial_temperature=0.003,
-            target_entropy=-0.6,
-            symmetry_augmentation=True,
-            normalize=True,
-            exclude_blocks=("contact_forces",),
-        ),
+        _PARALLEL,
         "SAC from nothing in 32 environments, with 3-step returns and a short horizon",
+        evaluate_every=20_000,
+        steps=100_000,
+    ),
+    "xqc": _off_policy(
+        dataclasses.replace(_PARALLEL, critics="categorical", reward_scale=0.03, initial_temperature=0.001),
+        "SAC as sac_parallel, whose critics learn distributions over returns, with batch and weight norm",
         evaluate_every=20_000,
         steps=100_000,
     ),

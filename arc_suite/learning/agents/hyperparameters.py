@@ -25,6 +25,8 @@ class SoftActorCritic:
         batch: transitions of an update from each source of data.
         buffer_size: latest online transitions that are kept.
         dropout: share of units that the critics drop.
+        critics: what they learn: "squared", values by squared errors; or "categorical", distributions over returns by
+            cross-entropy, with batch norm and weights on the unit sphere; see `categorical`.
         prior: use of prior data: "none"; "protected", in one buffer with online data, never overwritten; or
             "symmetric_sampling", a second batch in every update.
         num_envs: environments, which step together.
@@ -58,6 +60,7 @@ class SoftActorCritic:
     batch: int = 256
     buffer_size: int = 1_000_000
     dropout: float = 0.0
+    critics: str = "squared"
     prior: str = "none"
     num_envs: int = 1
     utd_ratio: float = 1.0
@@ -91,6 +94,9 @@ class SoftActorCritic:
                 f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, of each if "
                 f"it is above 1, got {checks.shown(self.utd_ratio)}"
             )
+        checks.name(self.critics, ("squared", "categorical"), "critics")
+        if self.dropout and self.critics == "categorical":
+            raise ValueError(f"dropout: expected 0 with categorical critics, got {self.dropout}")
         checks.name(self.prior, ("none", "protected", "symmetric_sampling"), "prior")
         checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
         if self.buffer_size <= self.start_steps and self.prior != "protected":  # prior data in the same buffer count

@@ -1,7 +1,8 @@
 """Networks as plain pytrees of JAX: a network is a tuple of layers, a layer a dictionary of arrays.
 
-A layer has `weight` (inputs, outputs) and `bias` (outputs,), and `scale` and `offset` (outputs,) where a
-layer norm follows. NumPy draws the weights, so they depend on a seed alone.
+A layer has `weight` (inputs, outputs) and `bias` (outputs,), and `scale` and `offset` (outputs,) where a norm follows:
+a batch norm if it has `mean` and `variance` (outputs,), too, and no bias, else a layer norm. NumPy draws the weights,
+so they depend on a seed alone.
 """
 
 import math
@@ -11,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-EPSILON = 1e-5  # of a layer norm
+EPSILON = 1e-5  # of a norm
 
 ACTIVATIONS = {"relu": jax.nn.relu, "elu": jax.nn.elu}
 
@@ -64,8 +65,8 @@ def mlp(
 
 
 def linear(layer: Mapping, x):
-    """Return weight and bias applied to x (..., inputs)."""
-    return x @ layer["weight"] + layer["bias"]
+    """Return weight and bias, if there is one, applied to x (..., inputs)."""
+    return x @ layer["weight"] + layer.get("bias", 0.0)
 
 
 def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0):
@@ -94,8 +95,9 @@ def dropped(x, kept, dropout: float):
 def activated(layer: Mapping, x, activation: str):
     """Return x (..., outputs) after a layer's norm, if it has one, and an activation."""
     if "scale" in layer:
-        x = x - x.mean(axis=-1, keepdims=True)
-        x = x * jax.lax.rsqrt((x * x).mean(axis=-1, keepdims=True) + EPSILON) * layer["scale"] + layer["offset"]
+        x = x - (layer["mean"] if "mean" in layer else x.mean(axis=-1, keepdims=True))
+        variance = layer["variance"] if "mean" in layer else (x * x).mean(axis=-1, keepdims=True)
+        x = x * jax.lax.rsqrt(variance + EPSILON) * layer["scale"] + layer["offset"]
     return ACTIVATIONS[activation](x)
 
 

@@ -21,6 +21,7 @@ STYLES = {
     "sope": ("#56B4E9", "P"),
     "ppo": ("#000000", "o"),
     "sac_parallel": ("#882255", "X"),
+    "xqc": ("#CC6677", "<"),
     "dagger": ("#999933", "*"),
     "droq": ("#332288", "h"),
     "finetune": ("#44AA99", "p"),
@@ -28,7 +29,7 @@ STYLES = {
     "dagger_bodies": ("#AA4499", "*"),
     "finetune_bodies": ("#117733", "p"),
 }
-_OTHERS = (("#CC6677", "<"), ("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other packages, in order
+_OTHERS = (("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other packages, in order
 # Line and hollow marker of further kinds of runs of one algorithm in a study; the first has the algorithm's own.
 _VARIANTS = (("--", "o"), (":", "s"), ("-.", "^"), ((0, (8, 2)), "D"), ((0, (1, 4)), "v"))
 _MARKERS = 15  # of a curve, at most

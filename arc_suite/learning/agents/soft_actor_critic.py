@@ -9,7 +9,7 @@ Noise and dropout masks are inputs, so an update is a pure function.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import jax
@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from arc_suite.learning.agents import networks
+from arc_suite.learning.agents import categorical, networks
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.replay import Transitions
 
@@ -31,7 +31,7 @@ _LOG_TWO_PI = math.log(2.0 * math.pi)
 
 def core(hp: SoftActorCritic) -> SoftActorCritic:
     """Return hyperparameters that differ only where updates do, so that compiled programs are shared."""
-    names = "hidden", "learning_rate", "discount", "tau", "dropout", "target_entropy"
+    names = "hidden", "learning_rate", "discount", "tau", "dropout", "target_entropy", "critics"
     return SoftActorCritic(**{name: getattr(hp, name) for name in names})
 
 
@@ -75,7 +75,7 @@ def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: i
     log_std = networks.layer(networks.xavier(random, hp.hidden, joints, hp.last_gain))
     log_std["bias"] += np.float32(math.log(hp.initial_std))
     policy = {"trunk": tuple(trunk), "mean": mean, "log_std": log_std}
-    critics = tuple(networks.mlp(random, (size + joints, *hidden, 1), layer_norm=True) for _ in range(CRITICS))
+    critics = tuple(KINDS[hp.critics].draw(random, (size + joints, *hidden)) for _ in range(CRITICS))
     adam, log_alpha = optax.adam(hp.learning_rate), np.array(math.log(hp.initial_temperature), np.float32)
     moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
     return jax.tree.map(jnp.array, SacState(policy, critics, critics, log_alpha, moments))
@@ -120,7 +120,7 @@ def sample(mean, log_std, noise):
     return jnp.tanh(raw), density.sum(axis=-1)
 
 
-def values(critics, observations, actions, kept=None, dropout: float = 0.0):
+def values(hp: SoftActorCritic, critics, observations, actions, kept=None):
     """Return the values of actions, (...) of each critic.
 
     The first layer multiplies observations and actions apart, so the products with observations serve two losses
@@ -130,34 +130,65 @@ def values(critics, observations, actions, kept=None, dropout: float = 0.0):
     for index, (first, *others, last) in enumerate(critics):
         split = first["weight"][:size], first["weight"][size:]
         masks = None if kept is None else kept[index]
-        x = observations @ split[0] + actions @ split[1] + first["bias"]
+        x = observations @ split[0] + actions @ split[1] + first.get("bias", 0.0)
         if masks is not None:
-            x = networks.dropped(x, masks[0], dropout)
+            x = networks.dropped(x, masks[0], hp.dropout)
         x = networks.activated(first, x, "relu")
-        x = networks.hidden(others, x, "relu", None if masks is None else masks[1:], dropout)
-        results.append(networks.linear(last, x)[..., 0])
+        x = networks.hidden(others, x, "relu", None if masks is None else masks[1:], hp.dropout)
+        results.append(KINDS[hp.critics].value(networks.linear(last, x)))
     return results
 
 
-def targets(hp: SoftActorCritic, state: SacState, batch: Transitions, noise: Noise, next_actions=None):
-    """Return the targets of the critics, (batch,); `next_actions` as in `update`."""
-    next_actions = distribution(state.policy, batch.next_observations) if next_actions is None else next_actions
-    action, density = sample(*next_actions, noise.next_action)
-    kept = None if noise.kept is None else noise.kept[0]
-    least = jnp.minimum(*values(state.targets, batch.next_observations, action, kept, hp.dropout))
-    return batch.rewards + hp.discount * batch.goes_on * (least - jnp.exp(state.log_alpha) * density)
+def targets(hp: SoftActorCritic, critics, batch: Transitions, next_actions, bonus, kept):
+    """Return what critics of values learn, (batch,), from the target networks."""
+    least = jnp.minimum(*values(hp, critics, batch.next_observations, next_actions, kept))
+    return batch.rewards + hp.discount * batch.goes_on * (least - bonus)
 
 
-def critics_loss(hp: SoftActorCritic, critics, batch: Transitions, target, kept):
-    """Return the sum over the critics of the mean squared error, and the mean of their values."""
-    found = values(critics, batch.observations, batch.actions, kept, hp.dropout)
-    return sum(jnp.mean((value - target) ** 2) for value in found), sum(found).mean() / CRITICS
+def critics_loss(hp: SoftActorCritic, critics, batch: Transitions, next_actions, target, kept):
+    """Return the sum over the critics of the mean squared error; the mean of their values, and nothing that settles."""
+    found = values(hp, critics, batch.observations, batch.actions, kept)
+    return sum(jnp.mean((value - target) ** 2) for value in found), (sum(found).mean() / CRITICS, None)
+
+
+class Kind(NamedTuple):
+    """A kind of critics.
+
+    Attributes:
+        draw: a critic, from a random generator and the sizes of the input and of the hidden layers.
+        value: (...) from the output of a critic (..., outputs).
+        targets: what critics learn, from hyperparameters, target networks, batch, the policy's next actions, the
+            weighted logarithm of their density, and dropout masks.
+        loss: of the critics, from hyperparameters, critics, batch, next actions, targets and dropout masks; with the
+            mean value, and what `settled` takes.
+        settled: the critics after a step of Adam, from them and what the loss found.
+    """
+
+    draw: Callable
+    value: Callable
+    targets: Callable
+    loss: Callable
+    settled: Callable
+
+
+KINDS = {
+    "squared": Kind(
+        lambda random, sizes: networks.mlp(random, (*sizes, 1), layer_norm=True),
+        lambda outputs: outputs[..., 0],
+        targets,
+        critics_loss,
+        lambda critics, found: critics,
+    ),
+    "categorical": Kind(
+        categorical.draw, categorical.value, categorical.targets, categorical.loss, categorical.settled
+    ),
+}
 
 
 def policy_loss(hp: SoftActorCritic, policy, state: SacState, observations, noise, kept):
     """Return the mean of alpha log pi minus the mean of the critics, and the mean of log pi."""
     action, density = sample(*distribution(policy, observations), noise)
-    value = sum(values(state.critics, observations, action, kept, hp.dropout)) / CRITICS
+    value = sum(values(hp, state.critics, observations, action, kept)) / CRITICS
     return jnp.mean(jnp.exp(state.log_alpha) * density - value), density.mean()
 
 
@@ -174,10 +205,14 @@ def update(
         next_actions: the policy's `distribution` at the next observations, if it is known; else None.
     """
     masks = (None, None, None) if noise.kept is None else noise.kept
-    target = targets(hp, state, batch, noise, next_actions)
-    critic_gradient = jax.value_and_grad(critics_loss, argnums=1, has_aux=True)
-    (critic_loss, value), gradient = critic_gradient(hp, state.critics, batch, target, masks[1])
+    next_actions = distribution(state.policy, batch.next_observations) if next_actions is None else next_actions
+    next_actions, density = sample(*next_actions, noise.next_action)
+    kind = KINDS[hp.critics]
+    target = kind.targets(hp, state.targets, batch, next_actions, jnp.exp(state.log_alpha) * density, masks[0])
+    critic_gradient = jax.value_and_grad(kind.loss, argnums=1, has_aux=True)
+    (critic_loss, (value, found)), gradient = critic_gradient(hp, state.critics, batch, next_actions, target, masks[1])
     critics, moments = _stepped(hp, "critics", state.critics, gradient, state.moments)
+    critics = kind.settled(critics, found)
     metrics = {"critic_loss": critic_loss, "q": value}
     if noise.action is not None:
         policy_gradient = jax.value_and_grad(policy_loss, argnums=1, has_aux=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from soft_actor_critic_by_hand import ByHand
+from soft_actor_critic_by_hand import ByHand, CategoricalByHand
 from tiers import tiers
 
 jax = pytest.importorskip("jax", reason="of the extra learn: make check-agents")
@@ -21,8 +21,10 @@ STEPS = 3
 def by_hand(layers, heads=1):
     """A network of ours as one of the computation by hand, in float64."""
     hidden = layers[:-heads]
-    plain = {"w": [each["weight"] for each in layers], "b": [each["bias"] for each in layers]}
+    plain = {"w": [each["weight"] for each in layers], "b": [each.get("bias", 0.0) for each in layers]}
     plain |= {"g": [each["scale"] for each in hidden], "h": [each["offset"] for each in hidden]}
+    if "mean" in layers[0]:
+        plain |= {"m": [each["mean"] for each in hidden], "v": [each["variance"] for each in hidden]}
     return {name: [np.asarray(array, float) for array in arrays] for name, arrays in plain.items()}
 
 
@@ -48,7 +50,8 @@ def begun_by_hand(hp, state):
     """A learner by hand from the state before the first update."""
     numbers = hp.dropout, hp.learning_rate, hp.discount, hp.tau, hp.target_entropy
     alpha = np.exp(np.asarray(state.log_alpha, float))
-    return ByHand(of_policy(state.policy), [by_hand(critic) for critic in state.critics], *numbers, alpha)
+    kind = {"squared": ByHand, "categorical": CategoricalByHand}[hp.critics]
+    return kind(of_policy(state.policy), [by_hand(critic) for critic in state.critics], *numbers, alpha)
 
 
 def differences(ours, reference):
@@ -71,7 +74,7 @@ def cast(parts, kind):
 
 
 @pytest.mark.parametrize(
-    "name", tiers(NAMES, lambda name: name in ("sac", "sope"), lambda name: name == "sac_parallel")
+    "name", tiers(NAMES, lambda name: name in ("sac", "sope", "xqc"), lambda name: name == "sac_parallel")
 )
 def test_first_three_updates(name, learner, recorded):
     """What it learns, in single precision, and the text of an update in double precision.
@@ -81,7 +84,8 @@ def test_first_three_updates(name, learner, recorded):
     hp = algorithms.algorithm(name).hyperparameters
     # Three transitions are too few for a validation set.
     phases = {"phase_every": STEPS, "phase_updates": STEPS, "early_stop": "none"} if hp.phase_updates else {}
-    agent = learner(name, phases)
+    few = {"num_envs": 8} if hp.num_envs > 1 else {}  # a step of all, with three updates
+    agent = learner(name, phases | few)
     agent.until(STEPS)
     first = recorded[0][0]
     recorded = [parts for _, parts in recorded]
@@ -104,9 +108,10 @@ def test_first_three_updates(name, learner, recorded):
                 assert float(ours["policy_loss"]) == pytest.approx(reference.policy_loss, rel=1e-9)
         assert of_state(state, reference).max() < 1e-6
         assert float(state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-12)
-    if len(recorded) <= 2 * STEPS:  # more steps of Adam make of rounding what they like
+    # More steps of Adam make of rounding what they like, and so do its first ones where a probability is near 0.
+    if len(recorded) <= 2 * STEPS and hp.critics == "squared":
         assert of_state(agent.state, reference).max() < 1e-5
-    assert float(agent.state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-6)
+    assert float(agent.state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), rel=1e-6)
 
 
 def test_losses_in_single_precision(learner, recorded):

@@ -116,3 +116,10 @@ def test_values_that_do_not_fit(changes, line):
 def test_blocks_may_come_from_a_list():
     hp = algorithms.algorithm(NAME).with_hyperparameters({"exclude_blocks": ["posture"]}).hyperparameters
     assert hp.exclude_blocks == ("posture",)
+
+
+def test_categorical_critics_take_no_dropout():
+    with pytest.raises(ValueError, match=r"^dropout: expected 0 with categorical critics, got 0\.1$"):
+        algorithms.algorithm("xqc").with_hyperparameters({"dropout": 0.1})
+    with pytest.raises(ValueError, match=r"^unknown critics 'ranked'"):
+        algorithms.algorithm("xqc").with_hyperparameters({"critics": "ranked"})

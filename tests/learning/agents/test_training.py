@@ -75,7 +75,7 @@ def fragile(method):
     return broken
 
 
-@pytest.mark.parametrize("name", tiers(NAMES, lambda name: name in ("sac", "sope", "sac_parallel")))
+@pytest.mark.parametrize("name", tiers(NAMES, lambda name: name in ("sac", "sope", "sac_parallel", "xqc")))
 def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     """It writes what it should, and goes on to the same bits wherever it is broken off."""
     run = tiny(name)
