@@ -135,16 +135,19 @@ def only(run: Configuration, level: float | None) -> int:
     done = finished or step is not None
     if done and importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
-    if step is not None:
-        how = f"score {FLAGS.until_score:g} reached {outcomes.when(folder, step)}"
-    elif finished:
-        how = "finished"
-    elif killed:
-        how = "stopped; the same command resumes it"
-    else:
-        how = f"stopped after {FLAGS.minutes:g} minutes of CPU time; more minutes resume it"
-    print(f"{folder}: {how}, {outcomes.earned(run, folder)}")
+    print(f"{folder}: {end(folder, step, finished, killed)}, {outcomes.earned(run, folder)}")
     return TERMINATED if killed and not done else 0
+
+
+def end(folder: Path, step: int | None, finished: bool, killed: bool) -> str:
+    """Return why a run has ended: at a score, after its last step, by SIGTERM, or after minutes."""
+    if step is not None:
+        return f"score {FLAGS.until_score:g} reached {outcomes.when(folder, step)}"
+    if finished:
+        return "finished"
+    if killed:
+        return "stopped; the same command resumes it"
+    return f"stopped after {FLAGS.minutes:g} minutes of CPU time; more minutes resume it"
 
 
 def several(runs: Sequence[Configuration]) -> int:
