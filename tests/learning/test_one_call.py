@@ -47,8 +47,9 @@ def test_without_a_folder_nothing_stays(monkeypatch, tmp_path):
 
 
 def test_minutes_that_are_over_before_the_first_evaluation(tmp_path):
-    """Training goes on to that evaluation, and the next call to the end."""
-    train(steps=60, folder=tmp_path / "run", minutes=0.0)
+    """Training goes on to that evaluation; the same call does no more, and one with more minutes ends the run."""
+    for _ in range(2):
+        train(steps=60, folder=tmp_path / "run", minutes=0.0)
     assert run_folder.table(tmp_path / "run", "evaluations")["step"].max() == 20
     train(steps=60, folder=tmp_path / "run", minutes=5.0)
     assert run_folder.table(tmp_path / "run", "evaluations")["step"].max() == 60
