@@ -44,7 +44,8 @@ _GATHER = 4  # cycles on the spot before it walks on; it may leap after each
 _AROUND = 1.6 * footholds.AROUND
 _PROBE = 0.1  # standing heights between the points ahead of a foot that are looked at
 _SUNK = 0.15  # standing heights below the others, at which a foot does not stand
-_STEPS = 3  # of it in a control step
+_STEPS = 3  # of inverse kinematics in a control step
+_TURNING = np.array((0.0, 0.0, 1.0))  # of a motion, what remains on the spot
 
 
 class LeapingState(NamedTuple):
@@ -72,6 +73,8 @@ class Leaping(Sighted):
         flight: what it does on level ground.
     """
 
+    around = np.array((-0.24, -0.12, 0.0, 0.12))  # feet come late, and so land short
+
     def __init__(self, task: Task, parameters: LeapingParameters):
         """Fit the law to a task, and warn of a body that cannot leap; see `CommandLaw`."""
         super().__init__(task, parameters.walk)
@@ -93,7 +96,7 @@ class Leaping(Sighted):
 
     def planned(self, paths: LeapingState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
-        request = request._replace(motion=_where(paths.step < 0, 0.0 * request.motion, request.motion))
+        request = request._replace(motion=_where(paths.step < 0, _TURNING * request.motion, request.motion))
         walk, targets, change = super().planned(paths.walk, request, observation)
         if not self._leaps:
             return paths._replace(walk=walk), targets, change
@@ -108,7 +111,9 @@ class Leaping(Sighted):
         shifts = _where(leaps_on, _where(flies[:, None] & safe, found, paths.shifts), 0.0 * found)
         leapt = self._leapt(paths.walk, walk, step, shifts)
         walk = walk._replace(**{name: _where(leaps_on, each, getattr(walk, name)) for name, each in leapt.items()})
-        return LeapingState(walk, step, shifts, moved), targets, self.legs.by_joint(walk.angles) - targets
+        # Not to the state's angles, from which inverse kinematics would bend legs the other way.
+        targets, later = targets + self._driven(paths.step), self.legs.by_joint(walk.angles) + self._driven(step)
+        return LeapingState(walk, step, shifts, moved), targets, later - targets
 
     def _next(self, step, ready):
         """The next step (environments,) of a state, given whether (environments,) all is ready for a leap."""
@@ -116,7 +121,7 @@ class Leaping(Sighted):
         onward = (step + 1) * (step != last + self._cycle)
         onward = where(step == -1, last + 1, onward * (step != last))
         gathered = (step < 0) & (step % self._cycle == self._cycle - 1)
-        onward = where(ready & (gathered | (step == last)), 1, onward)
+        onward = where(ready & gathered, 1, onward)
         return where(step == 0, -_GATHER * self._cycle * ready, onward)
 
     def _landings(self, view: footholds.View, moved) -> tuple:
@@ -161,9 +166,12 @@ class Leaping(Sighted):
         feet = _where(step > made.stretched, flying, planted)
         aims = numpy.broadcast_to(leaps.aims(len(self.places)), (*feet.shape, 3))
         angles = self.legs.reached(before.angles, feet, aims, posture.DAMPING * height, _STEPS)
-        driven = before.angles + (step == made.crouched + 1)[:, None, None] * made.driven
-        stretches = _within(step, made.crouched + 1, made.stretched)
-        return {"feet": feet, "angles": _where(stretches, driven, angles), "shifts": 0.0 * shifts}
+        return {"feet": feet, "angles": angles, "shifts": 0.0 * shifts}
+
+    def _driven(self, step):
+        """What a control step (environments,) of a leap adds to the angles of all joints, rad."""
+        stretches = _within(step, self._movement.crouched + 1, self._movement.stretched)
+        return stretches[:, None] * self.legs.by_joint(self._movement.driven)
 
 
 def _within(step, first: int, last: int):

@@ -78,8 +78,10 @@ class Sighted(CommandLaw):
     Attributes:
         legs: their kinematics.
         places: (legs, 3) of the soles at ease, m.
+        around: ground that a foot needs, standing heights along its path.
     """
 
+    around = footholds.AROUND
     reads = (*CommandLaw.reads, "scan")
 
     def __init__(self, task: Task, parameters: SightedParameters):
@@ -162,6 +164,7 @@ class Sighted(CommandLaw):
         half = 0.5 * self.stance * flows(motion, self.places)
         along = half / numpy.maximum(numpy.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
         landing, view = self.places[:, :2] + half, footholds.View(paths.heights, paths.moved, self._reach)
-        found = footholds.shifts(view, landing + moved, along, self.places[:, :2], self.pose.height)
+        near, height = self.places[:, :2], self.pose.height
+        found, _ = footholds.landings(view, landing + moved, along, near, height, self.around)
         shifts = numpy.where(held, paths.shifts, found)
         return landing + shifts[..., None] * along, shifts

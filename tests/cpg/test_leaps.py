@@ -32,13 +32,16 @@ def test_a_jump_leaves_the_ground_and_lands():
 def test_queen_leaps_over_a_trench():
     """In the lane that seed 0 draws; by steps alone she falls."""
     environment = VectorEnv("queen", "leap", 1, 1, "Disabled", task_kwargs={"width": 0.75})
-    policy, far = Demonstrator(environment, "leaping"), 0.0
+    law, leapt = Demonstrator(environment, "leaping").law, False
     observation, _ = environment.reset(seed=0)
+    legs, state = law.legs, law.initial(1)
     for _ in range(370):
-        observation, _, ended, *_ = environment.step(policy.act(environment.task.split(observation)))
-        far = environment.batch.data.qpos[0, 0]
-    assert not ended.any() and policy.law.flight.landed
-    assert far > 12.5 * ROBOTS["queen"].torso.standing_height
+        state, actions = law(state, environment.task.split(observation))
+        observation, _, ended, *_ = environment.step(actions)
+        angles, leapt = state.paths.walk.angles, leapt or state.paths.step[0] > 1
+        assert (angles >= legs.low).all() and (angles <= legs.high).all(), "legs would bend the other way"
+    assert not ended.any() and leapt and law.flight.landed
+    assert environment.batch.data.qpos[0, 0] > 12.5 * ROBOTS["queen"].torso.standing_height
 
 
 def test_who_cannot_leap_is_told():
