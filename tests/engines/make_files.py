@@ -2,7 +2,9 @@
 
 python tests/engines/make_files.py FOLDER [few|bones]
 
-All of them also with few triangles, places in a texture and few keys. few: the robots; bones: also an example with eight legs, and idle of the other examples and of 30 random bodies.
+Without a word: robots, examples, 100 random and the imported bodies, each also with few triangles, places in a texture
+and few keys. few: the robots. bones: also an example with eight legs, and idle of the other examples and of 30 random
+bodies.
 """
 
 import json
