@@ -138,14 +138,14 @@ def main():
     found = ", ".join(f"{name} {versions.installed(name)}" for name in packages)
     rows = [speed(robot, impl, int(count), FLAGS.steps) for robot in robots for impl in impls for count in FLAGS.worlds]
     header = ["robot", "impl", "worlds", "control steps/s", "compiling", "peak memory", "overflows"]
-    parts = [f"{jax.devices()[0].device_kind}; {found}.", table(header, rows)]
+    parts = [f"{jax.devices()[0].device_kind}; {found}.", "<!-- table -->", table(header, rows)]
     if FLAGS.episodes:
         rows = [episodes(robot, impl, FLAGS.episodes) for robot in robots for impl in impls]
         parts.append(table(["robot", "impl", "return", "on a processor", "apart", "falls"], rows))
     if learners := [name for name in FLAGS.learn if name]:
         rows = [minutes(robot, simulation) for robot in robots for simulation in learners]
         parts.append(table(["robot", "simulation", "`medium`", "PPO", "control steps", "minutes"], rows))
-    text = "\n\n".join(parts)
+    text = "\n\n".join([*parts, "<!-- end -->"])
     print(text)
     if FLAGS.document:
         path = pathlib.Path(FLAGS.document)
