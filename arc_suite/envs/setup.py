@@ -155,13 +155,13 @@ class Setup:
         shared = self.with_settings({"actions": "position"} if self.several else {})
         return tuple(dataclasses.replace(shared, domain=body) for body in self.bodies)
 
-    def with_settings(self, changes: Mapping[str, Any], without: Iterable[str] = ()) -> "Setup":
+    def with_settings(self, changes: Mapping[str, Any], dropped: Iterable[str] = ()) -> "Setup":
         """Return the setup with some settings changed, and without others.
 
         Raises:
             ValueError: a setting that JSON cannot hold.
         """
-        kept = {name: value for name, value in self.task_kwargs.items() if name not in without}
+        kept = {name: value for name, value in self.task_kwargs.items() if name not in dropped}
         return Setup._checked(self.domain, self.task, kept | dict(changes))
 
     def validation(self, count: int) -> "Setup":
@@ -173,7 +173,7 @@ class Setup:
 
     def judging(self) -> "Setup":
         """Return the setup that judges a policy of this one: with all blocks, as a policy leaves out the others."""
-        return self.with_settings({}, without=["exclude_blocks"])
+        return self.with_settings({}, dropped=["exclude_blocks"])
 
     def load(self, seed: int | None = None, **options) -> dm.Environment:
         """Open a dm_env.

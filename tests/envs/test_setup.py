@@ -119,7 +119,7 @@ def test_tasks_of_other_packages_are_told_with_their_module(monkeypatch):
 def test_settings_of_a_setup_change_and_go():
     setup = Setup.of("tick", "gaps", {"difficulty": 0.2, "exclude_blocks": ["contact_forces"]})
     assert setup.validation(10) == setup and setup.with_settings({}) == setup
-    assert setup.with_settings({"difficulty": 0.3, "friction": 1.0}, without=["exclude_blocks"]) == Setup.of(
+    assert setup.with_settings({"difficulty": 0.3, "friction": 1.0}, dropped=["exclude_blocks"]) == Setup.of(
         "tick", "gaps", {"friction": 1.0, "difficulty": 0.3}
     )
     assert setup.judging() == Setup.of("tick", "gaps", {"difficulty": 0.2})

@@ -51,15 +51,17 @@ class Inputs(NamedTuple):
     symmetry: Symmetry | None
 
     @classmethod
-    def of(cls, task: Task, normalize: bool, mirrored: bool) -> Self:
+    def of(cls, task: Task, normalize: bool, symmetry_augmentation: bool) -> Self:
         """Return the inputs before the first observation.
 
         Args:
             task: whose observations they are.
             normalize: whether running moments normalise the inputs.
-            mirrored: whether to mirror transitions, if the task is symmetric.
+            symmetry_augmentation: whether to mirror transitions, if the task is symmetric.
         """
-        return cls(task.size, Moments.none(task.size) if normalize else None, symmetry(task) if mirrored else None)
+        return cls(
+            task.size, Moments.none(task.size) if normalize else None, symmetry(task) if symmetry_augmentation else None
+        )
 
     def __call__(self, observations: np.ndarray) -> np.ndarray:
         """Return the inputs for observations, both (..., size)."""

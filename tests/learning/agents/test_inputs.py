@@ -17,13 +17,13 @@ def drawn(count, size=TASK.size):
 
 
 def test_raw_observations():
-    inputs = Inputs.of(TASK, normalize=False, mirrored=False)
+    inputs = Inputs.of(TASK, normalize=False, symmetry_augmentation=False)
     assert inputs.after(drawn(4)) is inputs
     assert_array_equal(inputs(drawn(4)), drawn(4))
 
 
 def test_moments_normalise():
-    inputs, seen = Inputs.of(TASK, normalize=True, mirrored=False).after(drawn(300)), drawn(300)
+    inputs, seen = Inputs.of(TASK, normalize=True, symmetry_augmentation=False).after(drawn(300)), drawn(300)
     expected = (seen - seen.mean(axis=0)) / seen.std(axis=0)
     assert_allclose(inputs(drawn(300)), expected.clip(-5.0, 5.0), atol=1e-5)
 
@@ -43,13 +43,13 @@ def test_privileged_blocks_of_critics_are_mirrored_behind_the_observation():
 
 
 def test_moments_see_as_much_of_the_left_as_of_the_right():
-    inputs = Inputs.of(TASK, normalize=True, mirrored=True).after(drawn(50))
+    inputs = Inputs.of(TASK, normalize=True, symmetry_augmentation=True).after(drawn(50))
     assert inputs.moments.count == 100
     assert_allclose(inputs.symmetry.observation(inputs.moments.mean), inputs.moments.mean, atol=1e-9)
 
 
 def test_every_other_transition_is_mirrored():
-    inputs = Inputs.of(TASK, normalize=False, mirrored=True)
+    inputs = Inputs.of(TASK, normalize=False, symmetry_augmentation=True)
     joints = len(TASK.scene.body.joint_names)
     batch = Transitions(drawn(6), drawn(6, joints), drawn(6, 1)[:, 0], np.ones(6, np.float32), drawn(12)[6:])
     found, maps = inputs.of_batch(batch), inputs.symmetry
@@ -64,12 +64,12 @@ def test_every_other_transition_is_mirrored():
 
 def test_a_body_without_symmetry_has_no_mirrored_transitions():
     task = Setup.of(generator.random_body(10)).definition
-    assert Inputs.of(task, normalize=False, mirrored=True).symmetry is None
+    assert Inputs.of(task, normalize=False, symmetry_augmentation=True).symmetry is None
 
 
 @pytest.mark.parametrize("normalize", [False, True])
 def test_exported_layers_take_observations(normalize):
-    inputs = Inputs.of(TASK, normalize, mirrored=False).after(3.0 + 2.0 * drawn(50))
+    inputs = Inputs.of(TASK, normalize, symmetry_augmentation=False).after(3.0 + 2.0 * drawn(50))
     weight = drawn(TASK.size, 4)
     layers = ({"weight": weight, "bias": np.ones(4, np.float32)},)
     observations = 3.0 + 2.0 * drawn(60)[50:]

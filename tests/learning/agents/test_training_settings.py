@@ -159,7 +159,11 @@ def test_a_privileged_critic_resumes_bit_exactly(begun):
 @pytest.mark.parametrize(
     ("setup", "blocks", "line"),
     [
-        (STEER, ["velocities"], r"^unknown block 'velocities'; did you mean 'velocity'\? \(there are: velocity, ground, "),
+        (
+            STEER,
+            ["velocities"],
+            r"^unknown block 'velocities'; did you mean 'velocity'\? \(there are: velocity, ground, ",
+        ),
         (Setup.of("random:0-1"), ["velocity"], "^critic_blocks: expected none with several bodies, got velocity$"),
     ],
 )
