@@ -1,4 +1,5 @@
-// The player's command [forward, left, turning] and pose from keys, a gamepad and a stick on the screen.
+// The player's command [forward, left, turning] and pose from keys, a gamepad, and a stick and buttons on the screen.
+import { walks } from "./link.js";
 
 const KEYS = {
   ArrowUp: [1, 0, 0], KeyW: [1, 0, 0],
@@ -18,6 +19,8 @@ const POSES = {
 };
 const LEAST = [-0.5, -0.5, -1], MOST = [1, 0.5, 1]; // of a command, as the tasks draw them
 const SHOWN = [0.8, 0, 0.2]; // a wide circle, where the page's address ends in #walk, until somebody plays
+const BUTTONS = { 0: "kick", 1: "restart", 2: "leap", 9: "pause" }; // of a gamepad
+const CAMERA = [-2.5, 1.2]; // rad/s, by the right stick
 const DEAD = 0.15; // share of a gamepad's stick that counts as nothing
 
 const sum = (vectors, zero) => vectors.reduce((total, vector) => total.map((value, i) => value + vector[i]), zero);
@@ -31,22 +34,30 @@ export function bounded(command) {
 
 const live = (value = 0) => (Math.abs(value) > DEAD ? value : 0);
 
-const gamepads = () => (navigator.getGamepads?.() ?? []).filter((pad) => pad?.connected);
-const walks = ({ axes }) => [-live(axes[1]), -live(axes[0]), -live(axes[2])];
+// Others have axes and buttons in places of their own, some of which rest at an end.
+const gamepads = () => (navigator.getGamepads?.() ?? []).filter((pad) => pad?.connected && pad.mapping === "standard");
+const values = ({ buttons }, ...numbers) => numbers.map((number) => buttons[number]?.value ?? 0);
 
-// Triggers crouch and rise, shoulder buttons lean, and the right stick looks up and down.
-function poses({ axes, buttons }) {
-  const [left, right, crouch, rise] = [4, 5, 6, 7].map((button) => buttons?.[button]?.value ?? 0);
-  return [rise - crouch, 0, 0, right - left, live(axes[3]), 0];
+// The left stick walks and turns, the cross steps to a side.
+function commanded(pad) {
+  const [left, right] = values(pad, 14, 15);
+  return [-live(pad.axes[1]), left - right, -live(pad.axes[0])];
+}
+
+// Triggers crouch and rise, shoulder buttons lean, and the cross looks up and down.
+function poses(pad) {
+  const [left, right, crouch, rise, up, down] = values(pad, 4, 5, 6, 7, 12, 13);
+  return [rise - crouch, 0, 0, right - left, down - up, 0];
 }
 
 export class Inputs {
-  // Takes the element of the stick, whose first child is its knob.
-  constructor(stick) {
+  // Takes the element of the stick, whose first child is its knob, and the buttons for steps to the left and right.
+  constructor(stick, sides) {
     this.held = new Set();
     this.stick = [0, 0, 0];
-    this.pushed = false; // the first button of a gamepad
-    this.shows = window.location.hash === "#walk";
+    this.side = [0, 0, 0];
+    this.pushed = []; // buttons of a gamepad
+    this.shows = walks();
     window.addEventListener("keydown", (event) => {
       if (!(event.code in KEYS || event.code in POSES) || event.ctrlKey || event.metaKey || event.altKey) return;
       const keyed = event.code.startsWith("Arrow") ? "select, input" : "select";
@@ -57,6 +68,11 @@ export class Inputs {
     window.addEventListener("keyup", (event) => this.held.delete(event.code));
     window.addEventListener("blur", () => this.held.clear()); // keys that are let go elsewhere
     this.follow(stick);
+    sides.forEach((button, index) => {
+      button.addEventListener("pointerdown", () => (this.side = [0, index ? -1 : 1, 0]));
+      for (const end of ["pointerup", "pointercancel", "pointerleave"])
+        button.addEventListener(end, () => (this.side = [0, 0, 0]));
+    });
   }
 
   follow(stick) {
@@ -80,11 +96,16 @@ export class Inputs {
     return [...this.held].filter((code) => code in keys).map((code) => keys[code]);
   }
 
-  // Whether the first button of a gamepad went down since the last question.
-  leaps() {
+  // Names of the actions whose buttons of a gamepad went down since the last question.
+  pushes() {
     const before = this.pushed;
-    this.pushed = gamepads().some(({ buttons }) => buttons?.[0]?.pressed);
-    return this.pushed && !before;
+    this.pushed = Object.keys(BUTTONS).filter((number) => gamepads().some(({ buttons }) => buttons[number]?.pressed));
+    return this.pushed.filter((number) => !before.includes(number)).map((number) => BUTTONS[number]);
+  }
+
+  // Rates at which the camera is to turn and rise, rad/s.
+  get camera() {
+    return sum(gamepads().map(({ axes }) => CAMERA.map((rate, i) => rate * live(axes[2 + i]))), [0, 0]);
   }
 
   get pose() {
@@ -94,7 +115,7 @@ export class Inputs {
   }
 
   get command() {
-    const command = bounded(sum([...this.pressed(KEYS), ...gamepads().map(walks)], this.stick));
+    const command = bounded(sum([...this.pressed(KEYS), ...gamepads().map(commanded), this.side], this.stick));
     if (command.some(Boolean)) this.shows = false;
     return this.shows ? SHOWN : command;
   }

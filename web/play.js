@@ -1,9 +1,11 @@
 // A page to play in: MuJoCo steps a body, a policy drives it, the player commands it.
 import loadMujoco from "@mujoco/mujoco";
 import * as THREE from "three";
+import { Chase } from "./chase.js";
 import { bytes, unpacked } from "./data.js";
 import { grounds, triangles } from "./ground.js";
 import { Inputs } from "./inputs.js";
+import { follow, keep } from "./link.js";
 import { Panel } from "./panel.js";
 import { Figure, materials, quaternion } from "./parts.js";
 import { Simulation } from "./simulation.js";
@@ -36,12 +38,20 @@ class Play {
     this.pace = 1; // share of real time
     this.pose();
     this.view.place(this.target());
+    this.chase = new Chase(this.view);
+    this.chase.follow(this.heading);
+  }
+
+  // rad
+  get heading() {
+    return this.simulation.task.place[2];
   }
 
   restart() {
     this.simulation.release();
     this.simulation.restart();
     this.lain = this.debt = 0;
+    this.chase.on = true;
   }
 
   // Steps through some seconds of real time, as far as some milliseconds allow.
@@ -56,7 +66,7 @@ class Play {
     }
     if (this.debt >= body.timestep) this.debt = 0;
     if (seconds > 0) this.pace += 0.05 * (Math.min(stepped / seconds, 1) - this.pace);
-    this.lain = simulation.task.fell ? this.lain + stepped : 0;
+    this.lain = simulation.fell ? this.lain + stepped : 0;
     if (this.lain >= RESTART) this.restart();
   }
 
@@ -75,10 +85,13 @@ class Play {
     return new THREE.Vector3(x, y, this.simulation.task.ground(x, y) + 0.45 * this.body.height);
   }
 
-  draw() {
+  // Draws some seconds after the last time, with the rates at which the player turns the camera.
+  draw(seconds = 0, camera = [0, 0]) {
     this.pose();
     const target = this.target(), { height } = this.body;
     this.view.follow(target);
+    if (!this.simulation.pull) this.chase.follow(this.heading, seconds);
+    this.chase.steer(camera, seconds);
     // A plane goes along by whole tiles.
     if (!this.simulation.field) for (const axis of ["x", "y"]) this.floor.position[axis] = Math.round(target[axis] / height) * height;
     this.view.draw();
@@ -140,12 +153,19 @@ function pulls(canvas, current) {
 }
 
 function shown({ simulation, body, pace }, command, gait, playing) {
-  const { motion, fell } = simulation.task, { units } = body.task;
+  const { motion } = simulation.task, { units } = body.task;
   const speed = Math.hypot(motion[0] * units[0], motion[1] * units[1]);
   const asked = body.task.headed
     ? `forward ${command[0].toFixed(1)}, left ${command[1].toFixed(1)}, turn ${command[2].toFixed(1)}`
     : `course ${((simulation.task.course * 180) / Math.PI).toFixed(0)} degrees`;
-  const state = playing ? (fell ? "fallen" : pace < 0.9 ? `slow motion, ${pace.toFixed(1)} of real time` : "") : "paused";
+  const states = {
+    paused: !playing,
+    held: simulation.pull,
+    landing: simulation.landing,
+    fallen: simulation.fell,
+    [`slow motion, ${pace.toFixed(1)} of real time`]: pace < 0.9,
+  };
+  const state = Object.keys(states).find((name) => states[name]);
   return [`${speed.toFixed(2)} m/s`, asked, gait, state].filter(Boolean).join(" \u00b7 ");
 }
 
@@ -155,7 +175,7 @@ async function main() {
     bytes(byId("engine").textContent),
   ]);
   const mujoco = await loadMujoco({ wasmBinary });
-  const inputs = new Inputs(byId("stick")), panel = new Panel(byId("direction"));
+  const inputs = new Inputs(byId("stick"), [byId("left"), byId("right")]), panel = new Panel(byId("direction"));
   const state = { playing: true, play: null, stale: true }; // a page at rest draws only what changes
   const choice = byId("body"), ground = byId("ground");
   bodies.forEach(({ name }, index) => choice.append(new Option(name, index)));
@@ -200,7 +220,10 @@ async function main() {
       act();
       if (event.detail) event.target.blur(); // by a pointer: keys are the body's
     });
-  for (const list of [choice, ground]) list.addEventListener("change", () => (list.blur(), change()));
+  for (const list of [choice, ground]) {
+    follow(list);
+    list.addEventListener("change", () => (list.blur(), keep([choice, ground]), change()));
+  }
   window.addEventListener("keydown", (event) => {
     const act = keys[event.code];
     const used = event.code === "Space" && event.target.closest("button, select, summary"); // pressed by the space bar
@@ -215,18 +238,20 @@ async function main() {
     const seconds = last === null ? 0 : Math.min(now - last, 100) / 1000;
     last = now;
     const asked = panel.asked(inputs.command, inputs.pose);
-    if (inputs.leaps()) actions.leap();
+    for (const name of inputs.pushes()) actions[name]();
     if (state.playing) state.play.advance(seconds, asked);
     panel.tell(asked);
-    if (state.playing || state.stale) {
+    const { camera } = inputs;
+    if (state.playing || state.stale || camera.some(Boolean)) {
       state.stale = false;
-      state.play.draw();
+      state.play.draw(seconds, camera);
       byId("state").textContent = shown(state.play, asked.command, panel.gait, state.playing);
     }
     requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);
+  document.body.classList.remove("loading");
   window.play = { state, inputs, panel, pause }; // for tests
 }
 
-main();
+main().catch((error) => (byId("loading").textContent = `This browser cannot play: ${error.message}`));

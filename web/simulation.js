@@ -5,6 +5,8 @@ import { Task } from "./task.js";
 
 const STIFFNESS = 4, STRONGEST = 3; // of a pull, in the body's weight for a distance of h, and at most
 const GRAVITY = 9.81; // m/s^2
+const LANDING = 0.6, TOUCH = 0.02; // s that a landing takes, share of the weight under a body that has touched down
+const CROUCH = 0.6; // of a body's room, as it lands
 const AHEAD = 0.3; // of the command: a body that is to walk faster leaps, others jump
 const STILL = { command: [0, 0, 0], pose: [0, 0, 0, 0, 0, 0] };
 
@@ -68,6 +70,7 @@ export class Simulation {
     this.task.begin(data);
     this.driver = new POLICIES[this.policy.kind](this.policy.constants);
     this.count = 0; // substeps
+    this.landing = 0; // s that are left; endless until a body that was let go touches the ground
   }
 
   // Takes one substep, at the start of a control step with a new action and the commands: a velocity [forward,
@@ -76,13 +79,35 @@ export class Simulation {
     const { mujoco, model, data, task, body: { substeps } } = this;
     if (this.count % substeps === 0) {
       const action = this.driver.act(task.observe(data));
-      task.command(this.driver.leap ? { ...asked, ...STILL } : asked); // it leaps upright
+      task.command(this.allowed(asked));
       data.ctrl.set(action);
     }
     if (this.pull) this.drag(this.pull);
     mujoco.mj_step(model, data);
     this.count += 1;
-    if (this.count % substeps === 0) task.after(data);
+    if (this.count % substeps !== 0) return;
+    task.after(data);
+    if (this.landing === Infinity && this.touches()) this.landing = LANDING;
+    this.landing = Math.max(this.landing - task.constants.step, 0);
+  }
+
+  // The commands that a body can follow: it leaps upright, and lands on bent legs.
+  allowed(asked) {
+    if (this.driver.leap) return { ...asked, ...STILL };
+    if (!this.landing) return asked;
+    const low = this.landing === Infinity ? 0 : CROUCH * (this.body.task.direction?.room[0][0] ?? 0);
+    return { ...asked, ...STILL, pose: [low, 0, 0, 0, 0, 0] };
+  }
+
+  // Whether something holds the body up.
+  touches() {
+    const { data: { cfrc_ext: forces }, body: { task: { parts, weight } } } = this;
+    return parts.some((part) => forces[6 * part + 5] > TOUCH * weight);
+  }
+
+  // Whether the body lies; neither in the player's hand nor on its way down from there.
+  get fell() {
+    return this.task.fell && !this.pull && this.landing !== Infinity;
   }
 
   // Leaps ahead, or jumps where the body is slow; a body that can do only one of them does that.
@@ -115,8 +140,9 @@ export class Simulation {
     data.xfrc_applied.set([...force, ...cross(arm, force)], 6 * pull.body);
   }
 
-  // Lets go of what is held.
+  // Lets go of what is held, which lands.
   release() {
+    if (this.pull) this.landing = Infinity;
     this.pull = null;
     this.data.xfrc_applied.fill(0);
   }

@@ -1,6 +1,7 @@
 """Pages to play in, in a browser: keys, sticks and pointers move a body, and everything is in reach."""
 
 import itertools
+import math
 
 import nodes
 import pytest
@@ -101,8 +102,7 @@ def test_keys_buttons_and_gamepads_jump(tab):
     """The torso rises; a trained policy does not jump, and nothing says that it does."""
     height = ROBOTS["tick"].torso.standing_height
     assert tab.text_content("#leap") == tab.text_content("#leaps") == "jump"
-    pad = "navigator.getGamepads = () => [{ connected: true, axes: [0, 0, 0, 0], buttons: [{ pressed: true }] }]"
-    ways = lambda: tab.keyboard.press("Space"), lambda: tab.click("#leap"), lambda: tab.evaluate(pad)
+    ways = lambda: tab.keyboard.press("Space"), lambda: tab.click("#leap"), lambda: padded(tab, {2: 1})
     for way in ways:
         (_, _, before, *_), _ = advanced(tab, 2.0)
         way()
@@ -116,6 +116,16 @@ def test_keys_buttons_and_gamepads_jump(tab):
     assert not any(each.is_visible() for each in tab.locator(".leaping").all())
     tab.keyboard.press("Space")
     assert tab.evaluate("!play.state.play.simulation.driver.leap")
+
+
+def padded(tab, buttons, axes=(0, 0, 0, 0), mapping="standard"):
+    """Connects a gamepad with values of axes and of some buttons by number."""
+    values = [buttons.get(number, 0) for number in range(16)]
+    tab.evaluate(
+        """([values, axes, mapping]) => { const buttons = values.map((value) => ({ value, pressed: value > 0.5 }));
+        navigator.getGamepads = () => [null, { connected: true, mapping, axes, buttons }]; }""",
+        [values, axes, mapping],
+    )
 
 
 def posed(tab):
@@ -246,16 +256,82 @@ def test_a_fallen_body_restarts(tab):
 
 
 def test_a_gamepad_steers(tab):
-    tab.evaluate("navigator.getGamepads = () => [null, { connected: true, axes: [0.05, -0.8, 0.4, 0] }]")
+    padded(tab, {}, (0.4, -0.8, 0.05, 0))
     forward, left, turn = tab.evaluate("play.inputs.command")
     assert (forward, left, turn) == pytest.approx((0.8 / 1.2, 0.0, -0.4 / 1.2))
-    tab.evaluate(
-        """navigator.getGamepads = () => [{ connected: true, axes: [0, 0, 0, -1],
-        buttons: Array.from({ length: 8 }, (_, button) => ({ value: button === 6 ? 0.5 : 0 })) }]"""
-    )
-    assert tab.evaluate("play.inputs.pose") == [-0.5, 0, 0, 0, -1, 0]  # a trigger, and the right stick
-    tab.evaluate("delete navigator.getGamepads")
-    assert tab.evaluate("play.inputs.command") == [0, 0, 0]
+    padded(tab, {6: 0.5, 12: 1, 15: 1})
+    assert tab.evaluate("play.inputs.pose") == [-0.5, 0, 0, 0, -1, 0]  # a trigger, and the cross
+    assert tab.evaluate("play.inputs.command") == [0, -0.5, 0]
+    padded(tab, {0: 1})
+    tab.wait_for_function("Math.hypot(...play.state.play.simulation.data.qvel.subarray(0, 2)) > 0.5")
+    padded(tab, {1: 1})
+    tab.wait_for_function("play.state.play.simulation.data.qvel.every((value) => value === 0)")
+    padded(tab, {}, (-1, -1, 1, 1), mapping="")  # axes of a wheel, whose pedals rest at -1
+    assert tab.evaluate("play.inputs.command") == [0, 0, 0] and tab.evaluate("play.inputs.camera") == [0, 0]
+
+
+def looks(tab):
+    """The angle between the directions of the camera and of the heading, rad."""
+    return tab.evaluate("Math.sin(play.state.play.chase.look - play.state.play.heading)")
+
+
+def test_the_camera_stays_behind_until_it_is_turned(tab):
+    """A wheel zooms and leaves it behind; a gamepad's stick turns it as a pointer does, and a restart calls it back."""
+    assert looks(tab) == pytest.approx(0.0, abs=1e-6)
+    tab.keyboard.down("a")
+    advanced(tab, 2.0)
+    tab.keyboard.up("a")
+    assert abs(looks(tab)) > 0.5
+    tab.mouse.move(10, 140)
+    tab.mouse.wheel(0, 100)
+    tab.wait_for_function("play.state.play.chase.dragged === null")
+    tab.evaluate("play.state.play.draw(3)")
+    assert looks(tab) == pytest.approx(0.0, abs=0.01)
+    tab.evaluate("play.state.play.draw(0.5, [1, 0.2])")
+    assert looks(tab) == pytest.approx(math.sin(0.5), abs=0.01)
+    tab.evaluate("play.state.play.draw(3)")
+    assert looks(tab) == pytest.approx(math.sin(0.5), abs=0.01)
+    tab.keyboard.press("r")
+    tab.evaluate("play.state.play.draw(3)")
+    assert looks(tab) == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_body_that_is_held_does_not_fall_and_then_lands(tab):
+    """Even upside down it stays in the hand; let go in the air it lands on bent legs, and rises."""
+    height = ROBOTS["tick"].torso.standing_height
+    (_, _, rest, *_), _ = advanced(tab, 1.0)
+    tab.evaluate("play.state.play.simulation.grab(0, [0, 0, play.state.play.simulation.data.qpos[2]])")
+    tab.evaluate(f"play.state.play.simulation.pull.target = [0, 0, {3 * height}]")
+    (_, _, held, *_), _ = advanced(tab, 3.0)
+    assert held > 2.0 * height
+    tab.evaluate("play.state.play.simulation.data.qpos.set([0, 1, 0, 0], 3)")
+    advanced(tab, 0.2)
+    assert tab.evaluate("play.state.play.simulation.task.fell && !play.state.play.simulation.fell")
+    tab.evaluate("play.state.play.simulation.data.qpos.set([1, 0, 0, 0], 3)")
+    tab.evaluate("play.state.play.simulation.data.qvel.fill(0); play.state.play.simulation.release()")
+    assert tab.evaluate("play.state.play.simulation.landing") == math.inf
+    heights = [advanced(tab, 0.05)[0][2] for _ in range(50)]
+    assert tab.evaluate("play.state.play.simulation.landing") == 0
+    assert min(heights) < 0.8 * rest < 0.9 * rest < heights[-1] and tab.evaluate("!play.state.play.simulation.fell")
+
+
+def test_an_address_names_body_and_ground(browser, page):
+    tab = browser.new_page(viewport={"width": 320, "height": 256})
+    shown = "window.shown = document.getElementById('loading').checkVisibility()"
+    tab.add_init_script(f"document.addEventListener('DOMContentLoaded', () => {{ {shown}; }})")
+    tab.goto(f"{page.as_uri()}#walk&body=walker_6x3&ground=bumps")
+    tab.wait_for_function("window.play", timeout=60_000)
+    assert tab.evaluate("shown")
+    tab.evaluate("play.pause(false)")
+    assert not tab.is_visible("#loading") and tab.evaluate("play.inputs.command") != [0, 0, 0]
+    assert tab.locator("canvas").get_attribute("aria-label") == "walker_6x3 on bumps ground"
+    tab.select_option("#body", "2")
+    assert tab.evaluate("location.hash") == "#walk=&body=queen&ground=bumps"
+    tab.goto("about:blank")
+    tab.goto(f"{page.as_uri()}#body=nobody&ground=<b>")
+    tab.wait_for_function("window.play", timeout=60_000)
+    assert tab.locator("canvas").get_attribute("aria-label") == "tick on level ground"
+    tab.close()
 
 
 def boxes(tab):
@@ -288,9 +364,9 @@ def test_everything_has_its_place(browser, page, width, height):
     tab.evaluate("document.getElementById('direction').open = true")
     panel = tab.locator("#direction > div").bounding_box()
     assert panel["x"] >= 0 and panel["y"] + panel["height"] <= height
-    for control in tab.locator("button, select, input").all():
+    for control in tab.locator("button, select, input").filter(visible=True).all():
         box = control.bounding_box()
-        assert min(box["width"], box["height"]) >= 24
+        assert min(box["width"], box["height"]) >= (40 if touch else 24)
         named = control.evaluate("each => (each.labels?.[0] ?? each).textContent.trim()")
         assert named
     tab.evaluate("document.getElementById('direction').open = false")
@@ -302,5 +378,11 @@ def test_everything_has_its_place(browser, page, width, height):
         tab.mouse.move(x, y - box["height"] / 2)
         assert tab.evaluate("play.inputs.command") == pytest.approx([1, 0, 0])
         tab.mouse.up()
+        assert tab.evaluate("play.inputs.command") == [0, 0, 0]
+        for button, aside in (("#left", 0.5), ("#right", -0.5)):
+            tab.hover(button)
+            tab.mouse.down()
+            assert tab.evaluate("play.inputs.command") == [0, aside, 0]
+            tab.mouse.up()
         assert tab.evaluate("play.inputs.command") == [0, 0, 0]
     context.close()
