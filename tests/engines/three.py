@@ -12,7 +12,7 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 NEAR = 1e-5  # m
-STILL = "idle", "hit", "limp", "rise", "death"  # clips without foot contact events
+STILL = "idle", "lean", "look", "hit", "limp", "rise", "jump", "leap", "death"  # clips without foot contact events
 TIMES = (0.0, 0.25, 0.5, 0.75)  # of a clip
 
 
