@@ -135,6 +135,19 @@ def _hull(model: mujoco.MjModel, index: int) -> Hull:
     return Hull(points, triangles.reshape(-1, 3))
 
 
+def simplified(hull: Hull, most: int) -> Hull:
+    """Return the hull of the outermost of a hull's points, at most a number of them."""
+    if len(hull.points) <= most:
+        return hull
+    spec = mujoco.MjSpec()
+    spec.add_mesh(name="hull", uservert=hull.points.ravel(), maxhullvert=most)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull")
+    model = spec.compile()
+    found = _hull(model, 0)
+    # MuJoCo moves a mesh into the frame of its inertia.
+    return found._replace(points=found.points @ rotations.matrix(model.mesh_quat[0]).T + model.mesh_pos[0])
+
+
 def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:
     """Return the parts of an imported body, with the shapes of its model as it stands.
 

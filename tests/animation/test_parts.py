@@ -62,3 +62,15 @@ def test_a_mesh_is_a_closed_hull_seen_from_outside():
     assert np.linalg.det(corners).sum() / 6.0 == pytest.approx(0.2 * 0.1 * 0.1 / 2.0, rel=1e-5)
     (drawn,) = [each for each in pages.drawn(imports.with_arm())["parts"][0]["shapes"] if each["kind"] == "hull"]
     assert drawn["hull"]["triangles"] == triangles.tolist()
+
+
+def test_a_simple_hull_is_nearly_as_large():
+    sphere = np.random.default_rng(0).normal(size=(300, 3))
+    points = sphere / np.linalg.norm(sphere, axis=-1, keepdims=True) * (0.3, 0.1, 0.05) + (1.0, 2.0, 3.0)
+    found = parts.simplified(parts.Hull(points, np.empty((0, 3), int)), 32)
+    assert len(found.points) == 32 and len(found.triangles) == 60
+    assert abs(points[:, None] - found.points).sum(axis=-1).min(axis=0).max() < 1e-6  # they are some of the points
+    corners = found.points[found.triangles] - points.mean(axis=0)
+    assert 0.7 < np.linalg.det(corners).sum() / 6.0 / (4.0 / 3.0 * np.pi * 0.3 * 0.1 * 0.05) < 1.0
+    few = parts.Hull(points[:20], np.empty((0, 3), int))
+    assert parts.simplified(few, 32) is few

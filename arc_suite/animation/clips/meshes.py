@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from arc_suite import checks, rotations
 from arc_suite.animation.clips import shapes, unwrapping
 from arc_suite.animation.clips.shapes import Mesh
-from arc_suite.animation.parts import Part, Shape
+from arc_suite.animation.parts import Part, Shape, simplified
 
 _TOLERANCE = 0.004  # of the standing height, by which a face may cut into a round shape
 _COARSER = 1.1  # ratio of two tolerances that are tried
 _COARSEST = 0.2  # of the largest shape
 _FEWEST = 6  # segments around a shape of a coarse mesh
+_HULL = 32  # points of a hull in a coarse mesh
 
 
 def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
@@ -26,15 +27,15 @@ def body_meshes(
     Args:
         parts: of a body.
         height: at which the body stands, m.
-        triangles: that all meshes may have together: round shapes are coarser, and the smallest are left out. None for
-            as many as look round.
+        triangles: that all meshes may have together; None for as many as look round. Where these are more, round
+            shapes and hulls become coarser, and the smallest are left out.
         uv: whether faces have places in a texture.
 
     Raises:
         ValueError: the coarsest meshes have more triangles.
     """
     drawn = [[(shape, _mesh(shape, _TOLERANCE * height)) for shape in part.shapes] for part in parts]
-    if triangles is not None:
+    if triangles is not None and _count(drawn) > checks.integer("triangles", triangles, 1):
         drawn = _coarse(parts, height, triangles)
     if uv:
         places = iter(unwrapping.unwrapped([mesh for own in drawn for _, mesh in own]))
@@ -47,7 +48,7 @@ def body_meshes(
 
 def _coarse(parts: Sequence[Part], height: float, most: int) -> list[list[tuple[Shape, Mesh]]]:
     """Return the shapes of parts with meshes that have at most a number of triangles together."""
-    checks.integer("triangles", most, 1)
+    parts = [part._replace(shapes=tuple(_simple(shape) for shape in part.shapes)) for part in parts]
     tolerance = _TOLERANCE * height
     coarsest = _COARSEST * max(max(shape.size) for part in parts for shape in part.shapes)
     while True:
@@ -55,12 +56,19 @@ def _coarse(parts: Sequence[Part], height: float, most: int) -> list[list[tuple[
             [(each, _mesh(each, tolerance, _FEWEST)) for each in part.shapes if max(each.size) >= 2.0 * tolerance]
             for part in parts
         ]
-        count = sum(len(mesh.triangles) for own in drawn for _, mesh in own)
-        if count <= most:
+        if (count := _count(drawn)) <= most:
             return drawn
         if tolerance >= coarsest:
             raise ValueError(f"triangles: expected at least {count}, got {most}")
         tolerance = min(tolerance * _COARSER, coarsest)
+
+
+def _count(drawn: Sequence[Sequence[tuple[Shape, Mesh]]]) -> int:
+    return sum(len(mesh.triangles) for own in drawn for _, mesh in own)
+
+
+def _simple(shape: Shape) -> Shape:
+    return shape._replace(hull=simplified(shape.hull, _HULL)) if shape.hull else shape
 
 
 def _mesh(shape: Shape, tolerance: float, fewest: int = shapes.FEWEST) -> Mesh:
