@@ -5,7 +5,7 @@ Needs Blender's `bpy` in an environment of its own, for Python 3.11:
   .venv-blender/bin/python tools/to_fbx.py queen.glb queen.fbx
 
 The extension of the second file says what is written:
-  .fbx    all clips as takes under their names, at scale 1, without leaf bones
+  .fbx    all clips as takes under their names, at scale 1, without leaf bones; foot contacts are a property
   .bvh    a file for each clip, such as queen_walk_loop.bvh
   .blend  actions that repeat where clips loop, with frame ranges and markers at foot contacts, and one curve a joint
 """
@@ -28,6 +28,8 @@ FPS = 60  # clips last whole frames at this rate
 LARGEST = 64 * 2**20  # bytes of a .clips.json
 HINGED = 1e-4  # by which a quaternion may turn about other axes than that of a hinge
 ARMATURE = "Armature"  # a name that importers of engines leave out of the skeleton
+
+CONTACTS = "foot_contacts"  # the property of the armature
 
 _ROTATION = re.compile(r'pose\.bones\["(.+)"\]\.rotation_quaternion')
 
@@ -65,7 +67,7 @@ def converted(glb: pathlib.Path, output: pathlib.Path) -> list[pathlib.Path]:
         try:  # Blender's importers and exporters tell their progress, and the tracebacks of what they cannot read
             with contextlib.redirect_stdout(silent), contextlib.redirect_stderr(silent):
                 armature = opened(glb)
-                annotate(clips)
+                annotate(armature, clips)
                 one_curve_a_joint(armature)
                 write(armature, pathlib.Path(folder) / output.name)
         except (RuntimeError, LookupError, TypeError):
@@ -113,16 +115,20 @@ def opened(path: pathlib.Path) -> bpy.types.Object:
     return armatures[0]
 
 
-def annotate(clips: dict[str, dict[str, Any]]) -> None:
-    """Give actions what Blender's importer drops: whether they repeat, their frames, and markers at foot contacts."""
+def annotate(armature: bpy.types.Object, clips: dict[str, dict[str, Any]]) -> None:
+    """Give actions what Blender's importer drops: whether they repeat, their frames, and markers at foot contacts.
+
+    Takes of FBX have no markers: there, a property of the armature has them as JSON, pairs of a name and a frame.
+    """
+    markers = {name: [_marker(contact) for contact in clip["foot_contacts"]] for name, clip in clips.items()}
+    armature[CONTACTS] = json.dumps(markers)
     for action in bpy.data.actions:
-        if (clip := clips.get(action.name)) is None:
+        if action.name not in clips:
             continue
         action.use_frame_range = True
         action.frame_start, action.frame_end = action.curve_frame_range
-        action.use_cyclic = bool(clip["loops"])
-        for contact in clip["foot_contacts"]:
-            name, frame = _marker(contact)
+        action.use_cyclic = bool(clips[action.name]["loops"])
+        for name, frame in markers[action.name]:
             action.pose_markers.new(name).frame = frame
 
 
@@ -172,6 +178,7 @@ def write_fbx(armature: bpy.types.Object, path: pathlib.Path) -> None:
         object_types={"ARMATURE", "MESH"},
         apply_scale_options="FBX_SCALE_ALL",
         add_leaf_bones=False,
+        use_custom_props=True,
         bake_anim_use_nla_strips=True,  # whose names are those of clips
         bake_anim_use_all_actions=False,
         bake_anim_simplify_factor=0.0,

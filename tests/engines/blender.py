@@ -110,8 +110,15 @@ def converted(path: pathlib.Path, truth, parts) -> str:
         folder = pathlib.Path(name)
         for kind in to_fbx.WRITERS:
             to_fbx.converted(path, folder / f"body{kind}")
-        told = [f"{kind} within {read(folder / f'body{kind}', truth, parts):.1e} m" for kind in (".fbx", ".blend")]
-        marked(clips)
+        markers = {
+            name: [[f"{each['foot']} {each['event']}", round(60.0 * each["time"])] for each in clip["foot_contacts"]]
+            for name, clip in clips.items()
+        }
+        told = []
+        for kind in (".fbx", ".blend"):
+            told.append(f"{kind} within {read(folder / f'body{kind}', truth, parts):.1e} m")
+            assert json.loads(only("ARMATURE")["foot_contacts"]) == markers
+        marked(clips, markers)
         walk = "walk_loop"
         bpy.ops.wm.read_factory_settings(use_empty=True)
         bpy.ops.import_anim.bvh(filepath=str(folder / f"body_{walk}.bvh"), update_scene_fps=True)
@@ -135,14 +142,13 @@ def read(path: pathlib.Path, truth, parts) -> float:
     return posed(armature, truth, parts)
 
 
-def marked(clips) -> None:
+def marked(clips, markers) -> None:
     """Assert that actions of the open file repeat and have markers as the metadata says, and one curve a joint."""
     for action in bpy.data.actions:
         clip = clips[action.name]
         assert action.use_cyclic == clip["loops"]
         assert action.use_frame_range and action.frame_end - action.frame_start == round(60.0 * clip["seconds"])
-        wanted = [(f"{each['foot']} {each['event']}", round(60.0 * each["time"])) for each in clip["foot_contacts"]]
-        assert sorted((marker.name, marker.frame) for marker in action.pose_markers) == sorted(wanted)
+        assert sorted([each.name, each.frame] for each in action.pose_markers) == sorted(markers[action.name])
         curves = [curve.data_path for curve in action.layers[0].strips[0].channelbags[0].fcurves]
         for pose in bpy.data.objects[to_fbx.ARMATURE].pose.bones:
             if pose.rotation_mode == "XYZ":
