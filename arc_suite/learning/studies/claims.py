@@ -1,6 +1,6 @@
 """Claims of the paper, checked on its own curves and on results of studies at equal steps."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation.published import CURVES as PAPER
 from arc_suite.evaluation.published import STEPS, at
+from arc_suite.learning.agents.algorithms import ALGORITHMS
 from arc_suite.learning.studies import results
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.learning.studies.results import RunResult
@@ -104,6 +105,38 @@ def checked(found: Sequence[RunResult]) -> str:
         paper = {robot: claim.compared(robot, told) for robot in PAPER if claim.metric is None}
         lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
     return table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
+
+
+def beside(studies: Iterable[Sequence[RunResult]], steps: int) -> str:
+    """Return a table in Markdown of returns after environment steps, ours / those of the paper's curves.
+
+    Args:
+        studies: results of each study; where several have an algorithm and a robot, the first counts.
+        steps: of the runs; a cell tells where they are fewer, and where hyperparameters are not the published ones.
+    """
+    cells: dict[tuple[str, str], str] = {}
+    for found in studies:
+        own: dict[tuple[str, str], list[RunResult]] = {}
+        for each in filter(is_papers, found):
+            own.setdefault((each.run.configuration.algorithm, each.run.configuration.setup.body.name), []).append(each)
+        cells = {key: _after(runs, steps) for key, runs in own.items()} | cells
+    robots = tuple(PAPER)
+    told = {(name, robot): at(robot, name, steps) for name in (*ONLINE, *WITH_PRIOR) for robot in robots}
+    lines = [
+        (name, *(f"{cells.get((name, robot), 'not run')} / {told[name, robot]:.0f}" for robot in robots))
+        for name in (*ONLINE, *WITH_PRIOR)
+    ]
+    return table(("algorithm", *robots), lines)
+
+
+def _after(runs: Sequence[RunResult], steps: int) -> str:
+    """The mean return of runs after as many steps, or after what they have."""
+    last = min(int(each.steps[each.steps <= steps].max()) for each in runs)
+    mean = np.mean([each.returns[each.steps == last].mean() for each in runs])
+    run = runs[0].run.configuration
+    published = ALGORITHMS[run.algorithm].hyperparameters
+    notes = [f"at {last:,}"] * (last < steps) + ["short phases"] * (run.hyperparameters != published)
+    return f"{mean:.0f}" + f" ({', '.join(notes)})" * bool(notes)
 
 
 def is_papers(result: RunResult) -> bool:
