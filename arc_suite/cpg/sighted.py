@@ -108,10 +108,21 @@ class Sighted(CommandLaw):
         predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
         feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
         aims = weights(flows(motion, feet), _ACROSS)
-        angles = self.legs.reached(paths.angles, feet, aims, posture.DAMPING * height, _STEPS)
+        angles = self.righted(self.legs.reached(paths.angles, feet, aims, posture.DAMPING * height, _STEPS))
         targets = self.legs.by_joint(paths.angles)
         change = self.legs.by_joint(angles) - targets
         return paths._replace(feet=feet, angles=angles, shifts=shifts), targets, change
+
+    def righted(self, angles):
+        """Return angles (environments, legs, links), with those at ease of legs that bend the other way.
+
+        Legs of three links, stretched out to a place that they do not reach, may bend either way next, and stay so.
+        """
+        if angles.shape[-1] != 3:
+            return angles
+        numpy = angles.__array_namespace__()
+        bent, at_ease = (numpy.linalg.det(self.legs.soles(each)[1]) for each in (angles, self._first.angles))
+        return numpy.where((bent * at_ease < 0.0)[..., None], self._first.angles, angles)
 
     def _looked(self, paths: Paths, scan, velocity) -> Paths:
         """The paths with one more scan (environments, points), given the torso's velocity (environments, 2), m/s."""
