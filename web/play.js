@@ -2,13 +2,18 @@
 import loadMujoco from "@mujoco/mujoco";
 import * as THREE from "three";
 import { Chase } from "./chase.js";
+import { breadth, contact } from "./contact.js";
 import { bytes, unpacked } from "./data.js";
+import { Goals } from "./goals.js";
 import { grounds, triangles } from "./ground.js";
 import { Inputs } from "./inputs.js";
 import { follow, keep } from "./link.js";
 import { Panel } from "./panel.js";
 import { Figure, materials, quaternion } from "./parts.js";
 import { Simulation } from "./simulation.js";
+import { Sound } from "./sound.js";
+import { Steps } from "./steps.js";
+import { Traces } from "./traces.js";
 import { View } from "./view.js";
 
 const RESTART = 1.5; // s that a fallen body lies
@@ -20,7 +25,7 @@ const byId = (id) => document.getElementById(id);
 
 // A body on some ground, as it is simulated and drawn.
 class Play {
-  constructor(mujoco, body, ground, canvas) {
+  constructor(mujoco, body, ground, canvas, sound) {
     this.simulation = new Simulation(mujoco, body, ground);
     const { height } = body, { field } = this.simulation;
     this.body = body;
@@ -29,10 +34,17 @@ class Play {
     this.figure = new Figure(body.parts, materials(body.materials));
     this.parts = this.figure.parts;
     this.floor = made(field ? triangles(field) : new THREE.PlaneGeometry(100 * height, 100 * height), 1);
+    this.spheres = contact(this.floor.material, 1 + body.feet.length, 3 * body.reach);
+    this.spheres[0].w = 0.8 * breadth(this.parts[0]);
+    const ground_at = (x, y) => this.simulation.task.ground(x, y);
+    this.steps = new Steps(body, this.parts);
+    this.traces = new Traces(height, ground_at);
+    this.goals = new Goals(height, body.reach, ground_at);
+    this.sound = sound;
     const rope = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(1, 1, 1)]);
     this.rope = new THREE.Line(rope, new THREE.LineBasicMaterial({ color: "#ffd23f", depthTest: false }));
     this.rope.frustumCulled = false;
-    this.view.scene.add(this.figure.torso, this.floor, this.rope);
+    this.view.scene.add(this.figure.torso, this.floor, this.rope, this.traces.group, this.goals.group);
     this.debt = 0; // s of simulation that are due
     this.lain = 0; // s since a fall
     this.pace = 1; // share of real time
@@ -52,6 +64,16 @@ class Play {
     this.simulation.restart();
     this.lain = this.debt = 0;
     this.chase.on = true;
+    this.steps.begin();
+    this.traces.clear();
+    if (this.goals.number !== null) this.goals.begin();
+  }
+
+  // Starts anew with goals, or ends them.
+  seek() {
+    if (this.goals.runs) return this.goals.end();
+    this.goals.begin();
+    this.restart();
   }
 
   // Steps through some seconds of real time, as far as some milliseconds allow.
@@ -66,6 +88,7 @@ class Play {
     }
     if (this.debt >= body.timestep) this.debt = 0;
     if (seconds > 0) this.pace += 0.05 * (Math.min(stepped / seconds, 1) - this.pace);
+    if (!simulation.pull) this.goals.advance(stepped, simulation.task.place);
     this.lain = simulation.fell ? this.lain + stepped : 0;
     if (this.lain >= RESTART) this.restart();
   }
@@ -78,6 +101,19 @@ class Play {
     const { pull } = this.simulation;
     this.rope.visible = pull !== null;
     if (pull) this.rope.geometry.setFromPoints([pull.point, pull.target].map((point) => new THREE.Vector3(...point)));
+    this.goals.show(qpos);
+  }
+
+  // Shows the steps of some seconds.
+  walk(seconds) {
+    const { simulation, steps, traces, body: { height } } = this, [torso, ...feet] = this.spheres;
+    for (const { place, radius, strength } of steps.read(simulation, seconds)) {
+      traces.add(place, radius, strength);
+      this.sound.step(strength, height);
+    }
+    traces.advance(seconds);
+    torso.set(...this.parts[0].position, torso.w);
+    feet.forEach((sphere, index) => sphere.set(...steps.feet[index].place, 1.5 * steps.feet[index].radius));
   }
 
   target() {
@@ -88,6 +124,7 @@ class Play {
   // Draws some seconds after the last time, with the rates at which the player turns the camera.
   draw(seconds = 0, camera = [0, 0]) {
     this.pose();
+    this.walk(seconds);
     const target = this.target(), { height } = this.body;
     this.view.follow(target);
     if (!this.simulation.pull) this.chase.follow(this.heading, seconds);
@@ -152,7 +189,7 @@ function pulls(canvas, current) {
     });
 }
 
-function shown({ simulation, body, pace }, command, gait, playing) {
+function shown({ simulation, body, pace, goals }, command, gait, playing) {
   const { motion } = simulation.task, { units } = body.task;
   const speed = Math.hypot(motion[0] * units[0], motion[1] * units[1]);
   const asked = body.task.headed
@@ -166,7 +203,7 @@ function shown({ simulation, body, pace }, command, gait, playing) {
     [`slow motion, ${pace.toFixed(1)} of real time`]: pace < 0.9,
   };
   const state = Object.keys(states).find((name) => states[name]);
-  return [`${speed.toFixed(2)} m/s`, asked, gait, state].filter(Boolean).join(" \u00b7 ");
+  return [String(goals), `${speed.toFixed(2)} m/s`, asked, gait, state].filter(Boolean).join(" \u00b7 ");
 }
 
 async function main() {
@@ -175,7 +212,7 @@ async function main() {
     bytes(byId("engine").textContent),
   ]);
   const mujoco = await loadMujoco({ wasmBinary });
-  const inputs = new Inputs(byId("stick"), [byId("left"), byId("right")]), panel = new Panel(byId("direction"));
+  const inputs = new Inputs(byId("stick"), [byId("left"), byId("right")]), panel = new Panel(byId("direction")), sound = new Sound();
   const state = { playing: true, play: null, stale: true }; // a page at rest draws only what changes
   const choice = byId("body"), ground = byId("ground");
   bodies.forEach(({ name }, index) => choice.append(new Option(name, index)));
@@ -188,7 +225,7 @@ async function main() {
     const old = document.querySelector("canvas"), canvas = old.cloneNode(); // with a context of its own
     old.replaceWith(canvas);
     const body = bodies[choice.value];
-    state.play = new Play(mujoco, body, body.grounds[ground.value], canvas);
+    state.play = new Play(mujoco, body, body.grounds[ground.value], canvas, sound);
     canvas.setAttribute("aria-label", `${body.name} on ${ground.value} ground`);
     pulls(canvas, () => state.play);
     panel.offer(body.task.direction);
@@ -210,8 +247,14 @@ async function main() {
     kick: () => state.play.kick(),
     restart: () => (state.play.restart(), (state.stale = true)),
     pause: () => pause(),
+    goals: () => (state.play.seek(), (state.stale = true)),
+    sound: () => {
+      sound.on = !sound.on;
+      byId("sound").textContent = sound.on ? "mute" : "sound";
+    },
   };
   const keys = { Space: actions.leap, KeyB: actions.kick, KeyR: actions.restart, KeyP: actions.pause };
+  Object.assign(keys, { KeyO: actions.goals, KeyM: actions.sound });
   Object.assign(keys, { Digit0: () => panel.reset(), Comma: () => panel.quicken(-1), Period: () => panel.quicken(1) });
   for (let number = 1; number < 10; number += 1) keys[`Digit${number}`] = () => panel.choose(number);
   window.addEventListener("resize", () => (state.stale = true));
@@ -251,7 +294,7 @@ async function main() {
   };
   requestAnimationFrame(frame);
   document.body.classList.remove("loading");
-  window.play = { state, inputs, panel, pause }; // for tests
+  window.play = { state, inputs, panel, pause, sound }; // for tests
 }
 
 main().catch((error) => (byId("loading").textContent = `This browser cannot play: ${error.message}`));

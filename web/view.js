@@ -16,7 +16,8 @@ export class View {
     this.scene.add(new THREE.HemisphereLight("#dfe8f2", "#56606c", 1.6));
     this.sun = new THREE.DirectionalLight("#fff4e6", 2.4);
     this.sun.castShadow = true;
-    this.sun.shadow.mapSize.set(2048, 2048);
+    this.sun.shadow.mapSize.set(1024, 1024);
+    this.sun.shadow.radius = 2.5;
     const side = 2.5 * reach;
     Object.assign(this.sun.shadow.camera, { left: -side, right: side, top: side, bottom: -side, far: 20 * side });
     this.sun.shadow.normalBias = 0.01 * height;

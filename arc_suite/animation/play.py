@@ -81,6 +81,9 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         "name": body.name,
         "timestep": commanded.scene.control_timestep / commanded.scene.substeps,
         "substeps": commanded.scene.substeps,
+        "feet": [
+            {"part": body.part_names.index(leg.full_name(leg.foot)), "radius": leg.foot.radius} for leg in body.legs
+        ],
         "grounds": {name: _ground(setup, arena) for name, arena in GROUNDS.items()},
         "task": pages.plain(_task(task, commanded), digits=None),
         "policy": pages.plain(driver, digits=None),

@@ -255,6 +255,7 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     assert data_of(page) == [creature]
     assert page == play.page([creature])
     assert all('integrator="Euler"' in ground["xml"] for ground in creature["grounds"].values())
+    assert [creature["parts"][foot["part"]]["name"] for foot in creature["feet"]] == list(ROBOTS["leaper"].foot_names)
     choices = creature["task"]["direction"]
     assert choices["names"] == ["height", "forward", "left", "roll", "pitch", "yaw"] and len(choices["room"]) == 6
     assert list(choices["gaits"]) == ["own", "trot", "pace", "bound", "walk", "wave"]

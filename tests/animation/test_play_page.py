@@ -235,6 +235,14 @@ def test_bodies_and_grounds_are_chosen(tab):
     tab.select_option("#body", "1")
     assert tab.evaluate("play.state.play.body.name") == "walker_6x3"
     assert tab.evaluate("play.state.play.simulation.field !== null")
+    red, _, blue = tab.evaluate(
+        """(() => { const { color, position } = play.state.play.floor.geometry.attributes;
+        const heights = Array.from({ length: position.count }, (_, index) => position.getZ(index));
+        const colors = [Math.min, Math.max].map((most) => heights.indexOf(most(...heights)))
+          .map((index) => [color.getX(index), color.getY(index), color.getZ(index)]);
+        return colors[0].map((value, i) => colors[1][i] / value); })()"""
+    )
+    assert red > 1.5 and blue < 0.8  # the tops of bumps are of another colour than level ground
     assert tab.locator("canvas").count() == 1
     tab.evaluate("play.state.play.draw()")
     assert tab.evaluate("play.state.play.view.camera.aspect") == pytest.approx(320 / 256)
@@ -332,6 +340,48 @@ def test_an_address_names_body_and_ground(browser, page):
     tab.wait_for_function("window.play", timeout=60_000)
     assert tab.locator("canvas").get_attribute("aria-label") == "tick on level ground"
     tab.close()
+
+
+def test_steps_leave_prints_and_dust_and_are_heard(tab):
+    tab.keyboard.press("m")
+    assert tab.text_content("#sound") == "sound"
+    tab.click("#sound")
+    assert tab.text_content("#sound") == "mute"
+    drawn = f"for (let i = 0; i < 90; i++) {{ p.advance(1 / 60, {ASKED}, Infinity); p.pose(); p.walk(1 / 60); }}"
+    shown = "[p.traces.prints.count, play.sound.heard, p.traces.grains.filter(({ age, alpha }) => age < 0.8).length]"
+    walk = f"(() => {{ const p = play.state.play; {drawn} return {shown}; }})()"
+    prints, before, grains = tab.evaluate(walk)
+    assert prints == grains == 0  # it stands
+    tab.keyboard.down("w")
+    prints, heard, grains = tab.evaluate(walk)
+    tab.keyboard.up("w")
+    assert 6 <= prints <= 30 and heard - before == prints and grains > 8
+    spheres = tab.evaluate("play.state.play.spheres.map((sphere) => sphere.toArray())")
+    feet = tab.evaluate("play.state.play.steps.feet.map(({ place }) => place)")
+    for (*place, radius), foot in zip(spheres[1:], feet, strict=True):
+        assert place == foot and foot[2] > 0.9 * ROBOTS["tick"].legs[0].foot.radius and radius > 0
+    tab.keyboard.press("r")
+    assert tab.evaluate("play.state.play.traces.prints.count") == 0
+
+
+def test_goals_are_reached_in_a_time(tab):
+    goal = "play.state.play.goals"
+    tab.click("#goals")
+    places = [[0, 0]]
+    while tab.evaluate(f"{goal}.runs"):
+        assert tab.evaluate(f"String({goal})").startswith(f"goal {len(places)} of 5, ")
+        places.append(tab.evaluate(f"{goal}.place"))
+        tab.evaluate("place => play.state.play.simulation.data.qpos.set(place)", places[-1])
+        advanced(tab, 0.1)
+    away = [math.dist(first, second) for first, second in itertools.pairwise(places)]
+    assert len(places) == 6 and min(away) > 4.0 * ROBOTS["tick"].torso.standing_height
+    assert tab.evaluate(f"String({goal})") == "5 goals in 0.5 s, best 0.5 s"
+    tab.keyboard.press("o")
+    advanced(tab, 0.2)
+    tab.keyboard.press("r")
+    assert tab.evaluate(f"String({goal})") == "goal 1 of 5, 0.0 s"
+    tab.keyboard.press("o")
+    assert tab.evaluate(f"String({goal})") == ""
 
 
 def boxes(tab):

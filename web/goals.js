@@ -1,0 +1,65 @@
+// Goals to reach one after another, and the time that it takes.
+import * as THREE from "three";
+
+const PLACES = [[7, 2], [11, -4], [6, -9], [-1, -6], [0, 0]]; // standing heights from the start
+const COLOR = "#ffd23f";
+
+export class Goals {
+  // Takes the standing height of a body and how far it reaches, m, and the height of the ground at [x, y].
+  constructor(height, reach, ground) {
+    Object.assign(this, { height, reach, ground, best: Infinity });
+    const look = new THREE.MeshBasicMaterial({ color: COLOR, transparent: true, opacity: 0.75 });
+    const faint = new THREE.MeshBasicMaterial({ color: COLOR, transparent: true, opacity: 0.14, depthWrite: false });
+    const beam = new THREE.CylinderGeometry(reach, reach, 4 * height, 48, 1, true).rotateX(Math.PI / 2);
+    this.goal = new THREE.Group().add(
+      new THREE.Mesh(new THREE.TorusGeometry(reach, 0.06 * height, 8, 64), look),
+      new THREE.Mesh(beam, faint),
+    );
+    this.arrow = new THREE.Mesh(new THREE.ConeGeometry(0.15 * height, 0.5 * height, 16).rotateZ(-Math.PI / 2), look);
+    this.group = new THREE.Group().add(this.goal, this.arrow);
+    this.end();
+  }
+
+  begin() {
+    Object.assign(this, { number: 0, time: 0 });
+  }
+
+  end() {
+    this.number = null;
+  }
+
+  get runs() {
+    return this.number !== null && this.number < PLACES.length;
+  }
+
+  // [x, y] of the next goal, m
+  get place() {
+    return PLACES[this.number].map((value) => value * this.height);
+  }
+
+  // Takes seconds of a body on its feet that has come to [x, y].
+  advance(seconds, [x, y]) {
+    if (!this.runs) return;
+    this.time += seconds;
+    if (Math.hypot(this.place[0] - x, this.place[1] - y) > this.reach) return;
+    this.number += 1;
+    if (!this.runs) this.best = Math.min(this.best, this.time);
+  }
+
+  // Shows the next goal, and the way to it over a body at [x, y, z].
+  show([x, y, z]) {
+    this.group.visible = this.runs;
+    if (!this.runs) return;
+    const [goalX, goalY] = this.place;
+    this.goal.position.set(goalX, goalY, this.ground(goalX, goalY));
+    this.arrow.position.set(x, y, z + 0.8 * this.height);
+    this.arrow.rotation.z = Math.atan2(goalY - y, goalX - x);
+  }
+
+  toString() {
+    if (this.number === null) return "";
+    const time = `${this.time.toFixed(1)} s`;
+    if (this.runs) return `goal ${this.number + 1} of ${PLACES.length}, ${time}`;
+    return `${PLACES.length} goals in ${time}, best ${this.best.toFixed(1)} s`;
+  }
+}
