@@ -7,7 +7,7 @@ adds kicks, and changes fields of the model. Its memory holds that of the other.
 import dataclasses
 import functools
 import math
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, reaches, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots import mirror
-from arc_suite.tasks import noise, overruled, privileged, randomization
+from arc_suite.tasks import mirrors, noise, overruled, privileged, randomization
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
@@ -48,6 +48,8 @@ class Changes(NamedTuple):
         speeds: (..., joints) of the joints at the latest reading, rad/s.
         hidden: what the episode has drawn of the body.
         pushes: forces on the torso.
+        now: (..., size) the latest observation without the history; empty for no history.
+        recent: (..., history, size + joints) earlier observations and the actions after them, the newest first.
     """
 
     elapsed: np.ndarray
@@ -63,6 +65,8 @@ class Changes(NamedTuple):
     speeds: np.ndarray
     hidden: Hidden
     pushes: Pushes
+    now: np.ndarray
+    recent: np.ndarray
 
 
 class ModifiedMemory(NamedTuple):
@@ -146,7 +150,7 @@ class Modified(Wrapper):
         """Which modifiers there are, and the shape of their memory."""
         own = self.changes
         switches = own.kicks > 0.0, own.delay[1], own.actuator_failure is False, own.actions, own.exclude_blocks
-        return (*switches, own.force > 0.0, own.joint_offset > 0.0, *self.noises)
+        return (*switches, own.force > 0.0, own.joint_offset > 0.0, own.history, *self.noises)
 
     @property
     def actions(self) -> str:
@@ -167,7 +171,12 @@ class Modified(Wrapper):
 
     @property
     def blocks(self) -> Mapping[str, Block]:
-        """The other task's blocks without the excluded ones."""
+        """The other task's blocks without the excluded ones, and the history of these."""
+        count, kept = self.changes.history, self._kept
+        return {**kept, "history": history(kept.values(), len(self.scene.body.joint_names), count)} if count else kept
+
+    @property
+    def _kept(self) -> dict[str, Block]:
         return {name: block for name, block in self.task.blocks.items() if name not in self.changes.exclude_blocks}
 
     @functools.cached_property
@@ -204,6 +213,7 @@ class Modified(Wrapper):
         drawn = draw(random, len(body.legs))
         joints = len(body.joint_names)
         later = randomization.draw(drawn.noise_key, joints)
+        size = sum(block.size for block in self._kept.values()) * (changes.history > 0)
         directions = np.stack([np.cos(drawn.kick_directions), np.sin(drawn.kick_directions)], axis=-1)
         unit = changes.kicks * math.sqrt(GRAVITY * body.torso.standing_height)
         low, high = changes.delay
@@ -223,6 +233,8 @@ class Modified(Wrapper):
             speeds=np.zeros(joints),
             hidden=hidden,
             pushes=randomization.pushes(changes.force * self.weight, later),
+            now=np.zeros(size),
+            recent=np.zeros((changes.history, size + joints)),
         )
         model = randomization.changed_model(self.scene, changes, hidden, start.model)
         return start._replace(memory=ModifiedMemory(start.memory, own), model=model)
@@ -233,8 +245,16 @@ class Modified(Wrapper):
         return GRAVITY * standing(self.scene.body).mass
 
     def begin(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
-        """Return the other task's memory, and the state of the joints."""
-        return ModifiedMemory(self.task.begin(memory.task, readings), self._sensed(memory.changes, readings))
+        """Return the other task's memory, the state of the joints, and a history that repeats the start."""
+        begun = ModifiedMemory(self.task.begin(memory.task, readings), self._sensed(memory.changes, readings))
+        begun = self._observed(begun, readings)
+        if not self.changes.history:
+            return begun
+        own = begun.changes
+        numpy, recent = own.recent.__array_namespace__(), own.recent[..., : own.now.shape[-1]]
+        held = numpy.broadcast_to(own.now[..., None, :], recent.shape)
+        recent = numpy.concatenate([held, 0.0 * own.recent[..., own.now.shape[-1] :]], axis=-1)
+        return begun._replace(changes=own._replace(recent=recent))
 
     def before(self, memory: ModifiedMemory, action) -> tuple[ModifiedMemory, Inputs]:
         """Return the memory, and what the other task writes as motors and kicks change it.
@@ -243,6 +263,8 @@ class Modified(Wrapper):
         arrive; weak and failing motors give less.
         """
         changes, own = self.changes, memory.changes
+        if changes.history:
+            own = _remembered(own, action)
         if changes.delay[1]:
             own, action = _delayed(own, action)
         if self._controls:
@@ -290,10 +312,26 @@ class Modified(Wrapper):
         inner, own = self.task.after(memory.task, readings), self._sensed(memory.changes, readings)
         terminated, _ = self.task.ended(inner, readings)
         # With the leading axes of the memory, even where the task returns one boolean for all environments.
-        return ModifiedMemory(inner, own._replace(terminated=(own.terminated & False) | terminated))
+        memory = ModifiedMemory(inner, own._replace(terminated=(own.terminated & False) | terminated))
+        return self._observed(memory, readings)
 
     def observe(self, memory: ModifiedMemory, readings: Readings) -> dict:
         """Return the other task's blocks with offsets of sensors and noise, without those that are left out."""
+        blocks, own = self._sensed_blocks(memory, readings), memory.changes
+        if self.changes.history:
+            blocks["history"] = own.recent.reshape(*own.recent.shape[:-2], -1)
+        return blocks
+
+    def _observed(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
+        """The memory with what the task observes now."""
+        if not self.changes.history:
+            return memory
+        blocks = list(self._sensed_blocks(memory, readings).values())
+        now = blocks[0].__array_namespace__().concatenate(blocks, axis=-1)
+        return memory._replace(changes=memory.changes._replace(now=now))
+
+    def _sensed_blocks(self, memory: ModifiedMemory, readings: Readings) -> dict:
+        """The other task's blocks as sensors give them."""
         own = memory.changes
         observed = self.task.observe(memory.task, self._displaced(own, readings))
         blocks = {name: observed[name] for name in observed if name not in self.changes.exclude_blocks}
@@ -395,6 +433,26 @@ class Modified(Wrapper):
         rest = numpy.zeros((*push.shape[:-1], self.scene.standing.shape[-1] - 3))
         push = numpy.concatenate([push, rest], axis=-1)
         return push if kick is None else kick + push
+
+
+def history(blocks: Iterable[Block], joints: int, steps: int) -> Block:
+    """Return the block of earlier observations, of given blocks, and of the actions (joints,) after them."""
+    blocks = tuple(blocks)
+
+    def mirrored(image):
+        if undeclared := [block for block in blocks if block.mirror is None]:
+            raise ValueError(f"history: {len(undeclared)} of its blocks declare no mirror")
+        once = mirrors.joined([*(block.map(image) for block in blocks), mirrors.joints(image)])
+        return mirrors.of_each(np.arange(steps), once)
+
+    return Block(steps * (sum(block.size for block in blocks) + joints), mirrored)
+
+
+def _remembered(changes: Changes, action) -> Changes:
+    """The memory with an observation and the action after it as the newest."""
+    numpy = changes.recent.__array_namespace__()
+    newest = numpy.concatenate([changes.now, action], axis=-1)[..., None, :]
+    return changes._replace(recent=numpy.concatenate([newest, changes.recent[..., :-1, :]], axis=-2))
 
 
 def _delayed(changes: Changes, action):

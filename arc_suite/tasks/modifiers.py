@@ -14,6 +14,7 @@ from arc_suite.tasks.blocks import Block
 
 FAILS_FROM = 40  # control steps after which the motors of a leg fail
 LONGEST_DELAY = 100  # control steps
+LONGEST_HISTORY = 50  # control steps
 ACTIONS = ("torque", "position")
 _DELAYS = (0, LONGEST_DELAY)
 
@@ -46,6 +47,8 @@ class Modifiers(NamedTuple):
         armature: multiple of the armatures of all joints, or two of them.
         force: the greatest force on the torso, of the body's weight: each of a schedule is uniform from 0 up to it, in
             any horizontal direction, lasts 1 to 4 control steps, and begins 40 to 120 after the one before.
+        history: number of earlier control steps whose observations and actions the block `history` holds, the newest
+            first; before the start they are those of the start, and 0.
     """
 
     kicks: float = 0.0
@@ -64,6 +67,7 @@ class Modifiers(NamedTuple):
     gains: tuple[float, float] = (1.0, 1.0)
     armature: tuple[float, float] = (1.0, 1.0)
     force: float = 0.0
+    history: int = 0
 
 
 NAMES = Modifiers._fields
@@ -83,6 +87,7 @@ BOUNDS = {
     "gains": (0.01, 10.0),
     "armature": (0.01, 100.0),
     "force": (0.0, 100.0),
+    "history": (0, LONGEST_HISTORY),
 }
 _NUMBERS = ("kicks", "centre_of_mass", "joint_offset", "force")
 _SPANS = ("motor_strength", "friction", "mass", "payload", "joint_strength", "gains", "armature")
@@ -108,6 +113,7 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]
             values["observation_noise"], [name for name in blocks if blocks[name].noise is not None]
         ),
         delay=_delay(values["delay"]),
+        history=checks.integer("history", values["history"], *BOUNDS["history"]),
         actions=_actions(values["actions"], body),
         exclude_blocks=_exclude_blocks(values["exclude_blocks"], blocks),
         **{name: checks.number(name, values[name], *BOUNDS[name]) for name in _NUMBERS},

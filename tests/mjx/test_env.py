@@ -73,7 +73,7 @@ def test_models_of_episodes_are_those_of_the_suite():
 
 
 def test_privileged_observations_are_those_of_the_suite():
-    settings = {"payload": (0.1, 0.4), "force": 0.3, "joint_offset": 0.05}
+    settings = {"payload": (0.1, 0.4), "force": 0.3, "joint_offset": 0.05, "history": 2}
     env = mjx.load(ROBOT, "walk", settings, num_starts=3, privileged=True)
     envs = VectorEnv(ROBOT, "walk", 3, 1, task_kwargs=settings, privileged=True)
     state, (_, info) = jax.jit(jax.vmap(env.start))(jnp.arange(3)), envs.reset(seed=0)

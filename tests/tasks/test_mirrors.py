@@ -86,7 +86,14 @@ def mirror_of_hidden(task):
 
 
 DRAWN = {"payload": (0.1, 0.4), "centre_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0)}
-DRAWN |= {"gains": (0.8, 1.2), "actions": "position", "kicks": 0.3, "force": 0.3, "actuator_failure": True}
+DRAWN |= {
+    "gains": (0.8, 1.2),
+    "actions": "position",
+    "kicks": 0.3,
+    "force": 0.3,
+    "actuator_failure": True,
+    "history": 2,
+}
 
 
 def test_what_modifiers_draw_has_a_mirror_image():

@@ -49,6 +49,7 @@ EACH = {
     "gains": {"gains": (0.7, 1.3), "actions": "position"},
     "armature": {"armature": (0.8, 1.5)},
     "force": {"force": 0.3},
+    "history": {"history": 2},
 }
 ALL = {name: value for setting in EACH.values() for name, value in setting.items()}
 CASES = EACH | {"all": ALL}
@@ -76,9 +77,8 @@ def test_a_modified_task_conforms(case, task_name, body):
     timestep, _ = one.reset(), plain.reset()
     blocks = {name: (size,) for name, size in one.task.sizes.items()}
     assert {name: block.shape for name, block in timestep.observation.items()} == blocks
-    assert set(plain.task.definition.blocks) - set(blocks) == (
-        {"contact_forces"} if case in ("exclude_blocks", "all") else set()
-    )
+    changed = {"contact_forces": ("exclude_blocks", "all"), "history": ("history", "all")}
+    assert set(plain.task.definition.blocks) ^ set(blocks) == {n for n, cases in changed.items() if case in cases}
     assert one.action_spec() == plain.action_spec()
     assert_array_equal(flat(timestep), flat(two.reset()))
     assert_same_steps(one, two, random_actions(one, 3))
@@ -95,7 +95,7 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
     own = {"kicks": 0.0, "actuator_failure": False}
     neutral = {"motor_strength": 1, "friction": 1.0, "mass": [1, 1], "observation_noise": 0, "delay": 0}
     neutral |= {"payload": 0, "centre_of_mass": 0, "joint_offset": 0, "joint_strength": 1, "gains": 1, "armature": 1}
-    neutral["force"] = 0
+    neutral |= {"force": 0, "history": 0}
     plain = load(BODIES[body], task_name, **(own if TASKS[task_name].modifiers else {}))
     one = load(BODIES[body], task_name, **neutral, **own, exclude_blocks=(), actions="torque")
     assert_array_equal(flat(one.reset()), flat(plain.reset()))
@@ -589,3 +589,22 @@ def test_a_leg_whose_motors_have_failed_is_dark():
     assert not np.array_equal(environment.physics.render(60, 80, "profile"), before)
     environment.physics.failed_legs, lit = None, environment.physics.render(60, 80)
     assert not np.array_equal(environment.physics.render(60, 80), lit)
+
+
+def test_a_history_holds_earlier_observations_and_the_actions_after_them():
+    settings = {"history": 2, "exclude_blocks": "contact_forces", "observation_noise": 1.0, "delay": 2}
+    env = VectorEnv("tick", "steer", 3, 1, task_kwargs=settings)
+    (observation, _), actions = env.reset(seed=0), np.random.default_rng(0).uniform(-1.0, 1.0, (4, 3, 18))
+    size, sizes = sum(env.task.sizes.values()) - env.task.sizes["history"], env.task.sizes
+    assert sizes["history"] == 2 * (size + 18) and list(sizes)[-1] == "history"
+    seen = [observation[:, :size]]
+    entries = observation[:, size:].reshape(3, 2, size + 18)
+    assert_array_equal(entries[..., :size], np.stack([seen[0]] * 2, axis=1), err_msg="the start repeats")
+    assert not entries[..., size:].any()
+    for step, action in enumerate(actions):
+        observation, *_ = env.step(action)
+        entries = observation[:, size:].reshape(3, 2, size + 18)
+        for place, before in enumerate(range(step, max(step - 2, -1), -1)):
+            assert_array_equal(entries[:, place, :size], seen[before], err_msg="with its noise")
+            assert_allclose(entries[:, place, size:], actions[before], atol=1e-7, err_msg="as it was sent")
+        seen.append(observation[:, :size])
