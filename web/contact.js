@@ -7,8 +7,8 @@ const SHADE = `
 float hidden = 0.0;
 if (distance(place.xy, spheres[0].xy) < far) for (int i = 0; i < COUNT; i++) {
   vec3 way = spheres[i].xyz - place;
-  float near = max(length(way), spheres[i].w);
-  hidden += max(way.z, 0.0) / near * pow(spheres[i].w / near, 2.0);
+  float within = spheres[i].w * spheres[i].w, near = max(dot(way, way), within);
+  hidden += max(way.z, 0.0) * within * inversesqrt(near) / near;
 }
 outgoingLight *= 1.0 - ${DEPTH} * min(hidden, 1.0);
 #include <opaque_fragment>`;

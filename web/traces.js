@@ -3,6 +3,7 @@ import * as THREE from "three";
 
 const PRINTS = 160, GRAINS = 120, BURST = 8; // at most; grains of a step
 const LIFE = 0.8, DRAG = 4; // s, 1/s
+const COLOR = [0.62, 0.58, 0.52]; // of dust
 const GOLDEN = 2.39996; // rad from grain to grain
 
 // A disc that fades towards its rim.
@@ -64,16 +65,18 @@ export class Traces {
     }
   }
 
-  // Moves the dust.
+  // Moves the dust, and draws what is still in the air.
   advance(seconds) {
     const { position, color } = this.dust.geometry.attributes, slower = Math.exp(-DRAG * seconds);
-    this.grains.forEach((grain, index) => {
-      grain.age = Math.min(grain.age + seconds, LIFE);
+    for (const grain of this.grains) grain.age += seconds;
+    const flying = this.grains.filter(({ age }) => age < LIFE);
+    flying.forEach((grain, index) => {
       grain.place = grain.place.map((value, i) => value + seconds * grain.speed[i]);
       grain.speed = grain.speed.map((value) => value * slower);
       position.setXYZ(index, ...grain.place);
-      color.setXYZW(index, 0.62, 0.58, 0.52, grain.alpha * (1 - grain.age / LIFE));
+      color.setXYZW(index, ...COLOR, grain.alpha * (1 - grain.age / LIFE));
     });
+    this.dust.geometry.setDrawRange(0, flying.length);
     position.needsUpdate = color.needsUpdate = true;
   }
 }
