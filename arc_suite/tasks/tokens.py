@@ -226,6 +226,8 @@ class Tokens(NamedTuple):
 
     @classmethod
     def _of_one(cls, task: Task) -> tuple:
+        if "history" in task.blocks:
+            raise ValueError("history: expected 0 for different bodies, as tokens of legs hold the present alone")
         if not set(BLOCKS) <= task.blocks.keys():
             raise ValueError(f"task {task.name}: expected the blocks {', '.join(BLOCKS)}, got {', '.join(task.blocks)}")
         body, parameters, pose = task.scene.body, task.parameters, standing(task.scene.body)
