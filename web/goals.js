@@ -17,15 +17,11 @@ export class Goals {
     );
     this.arrow = new THREE.Mesh(new THREE.ConeGeometry(0.15 * height, 0.5 * height, 16).rotateZ(-Math.PI / 2), look);
     this.group = new THREE.Group().add(this.goal, this.arrow);
-    this.end();
+    this.number = null;
   }
 
   begin() {
     Object.assign(this, { number: 0, time: 0 });
-  }
-
-  end() {
-    this.number = null;
   }
 
   get runs() {

@@ -1,13 +1,15 @@
 // Ground with tiles on it.
 import * as THREE from "three";
 
-const LEVEL = new THREE.Color(1, 1, 1), HIGHEST = new THREE.Color(1.9, 1.25, 0.62), LOWEST = new THREE.Color(0.45, 0.65, 0.9);
+const LEVEL = new THREE.Color(1, 1, 1);
+const HIGHEST = new THREE.Color(1.9, 1.25, 0.62), LOWEST = new THREE.Color(0.45, 0.65, 0.9);
 
 // Tints of a field's rows by height: as they are at 0, warm above and cold below it.
 function tints(heights) {
   const [low, high] = [Math.min, Math.max].map((most) => heights.reduce((found, row) => most(found, ...row), 0));
   const tint = new THREE.Color();
-  return (row) => row.flatMap((z) => tint.lerpColors(LEVEL, ...(z < 0 ? [LOWEST, z / low] : [HIGHEST, z / (high || 1)])).toArray());
+  const shares = (z) => (z < 0 ? [LOWEST, z / low] : [HIGHEST, z / (high || 1)]);
+  return (row) => row.flatMap((z) => tint.lerpColors(LEVEL, ...shares(z)).toArray());
 }
 
 // A height field, in whose cells MuJoCo's triangles meet from the corner of lowest to that of highest x and y.
@@ -53,7 +55,8 @@ export function grounds(height) {
     const tile = Array.from({ length: places.count }, (_, index) => [places.getX(index) + x, places.getY(index) + y]);
     shape.setAttribute("uv", new THREE.Float32BufferAttribute(tile.flat().map((side) => side / height), 2));
     const color = new THREE.Color().setScalar(shade);
-    const mesh = new THREE.Mesh(shape, new THREE.MeshStandardMaterial({ map: floor, color, roughness: 0.95, vertexColors: "color" in shape.attributes }));
+    const look = { map: floor, color, roughness: 0.95, vertexColors: "color" in shape.attributes };
+    const mesh = new THREE.Mesh(shape, new THREE.MeshStandardMaterial(look));
     mesh.position.set(x, y, z);
     mesh.receiveShadow = true;
     return mesh;

@@ -21,32 +21,44 @@ const BUSY = 20; // ms of a picture's time for physics: a slower machine shows s
 const KICK = 0.8; // sqrt(g h), the velocity that a kick adds
 const GRAVITY = 9.81; // m/s^2
 
+const TINTS = ["#ffffff", "#5f8dcf"]; // of the player's body and of the other
+
 const byId = (id) => document.getElementById(id);
+
+function tinted(looks, tint) {
+  const made = materials(looks);
+  for (const { color } of Object.values(made)) color.multiply(new THREE.Color(tint));
+  return made;
+}
 
 // A body on some ground, as it is simulated and drawn.
 class Play {
-  constructor(mujoco, body, ground, canvas, sound) {
-    this.simulation = new Simulation(mujoco, body, ground);
+  constructor(mujoco, body, ground, mode, canvas, sound) {
+    this.simulation = new Simulation(mujoco, body, ground, mode === "rival" ? 2 : 1);
     const { height } = body, { field } = this.simulation;
     this.body = body;
     this.view = new View(canvas, height, body.reach, (field ? 20 : 34) * height);
     const made = grounds(height);
-    this.figure = new Figure(body.parts, materials(body.materials));
+    const looks = this.simulation.shares.map((_, number) => tinted(body.materials, TINTS[number]));
+    this.figures = looks.map((each) => new Figure(body.parts, each));
+    [this.figure] = this.figures;
     this.parts = this.figure.parts;
     this.floor = made(field ? triangles(field) : new THREE.PlaneGeometry(100 * height, 100 * height), 1);
     this.spheres = contact(this.floor.material, 1 + body.feet.length, 3 * body.reach);
     this.spheres[0].w = 0.8 * breadth(this.parts[0]);
-    const ground_at = (x, y) => this.simulation.task.ground(x, y);
     this.steps = new Steps(body, this.parts);
-    this.traces = new Traces(height, ground_at);
-    this.goals = new Goals(height, body.reach, ground_at);
+    this.traces = new Traces(height, this.simulation.task.ground);
+    this.goals = new Goals(height, body.reach, this.simulation.task.ground);
+    if (mode === "goals") this.goals.begin();
     this.sound = sound;
     const rope = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(1, 1, 1)]);
     this.rope = new THREE.Line(rope, new THREE.LineBasicMaterial({ color: "#ffd23f", depthTest: false }));
     this.rope.frustumCulled = false;
-    this.view.scene.add(this.figure.torso, this.floor, this.rope, this.traces.group, this.goals.group);
+    const added = [this.floor, this.rope, this.traces.group, this.goals.group];
+    this.view.scene.add(...this.figures.map(({ torso }) => torso), ...added);
     this.debt = 0; // s of simulation that are due
     this.lain = 0; // s since a fall
+    this.down = 0; // s since that of the other body
     this.pace = 1; // share of real time
     this.pose();
     this.view.place(this.target());
@@ -62,18 +74,11 @@ class Play {
   restart() {
     this.simulation.release();
     this.simulation.restart();
-    this.lain = this.debt = 0;
+    this.lain = this.down = this.debt = 0;
     this.chase.on = true;
     this.steps.begin();
     this.traces.clear();
     if (this.goals.number !== null) this.goals.begin();
-  }
-
-  // Starts anew with goals, or ends them.
-  seek() {
-    if (this.goals.runs) return this.goals.end();
-    this.goals.begin();
-    this.restart();
   }
 
   // Steps through some seconds of real time, as far as some milliseconds allow.
@@ -90,18 +95,23 @@ class Play {
     if (seconds > 0) this.pace += 0.05 * (Math.min(stepped / seconds, 1) - this.pace);
     if (!simulation.pull) this.goals.advance(stepped, simulation.task.place);
     this.lain = simulation.fell ? this.lain + stepped : 0;
+    this.down = simulation.minds[1]?.task.fell ? this.down + stepped : 0;
+    if (this.down >= RESTART) simulation.raise();
     if (this.lain >= RESTART) this.restart();
   }
 
   pose() {
-    const { qpos } = this.simulation.data, { torso } = this.figure, { joints, home } = this.body.task;
-    torso.position.fromArray(qpos);
-    torso.quaternion.copy(quaternion(qpos.subarray(3, 7)));
-    this.figure.bend(joints.map((place, joint) => qpos[place] - home[joint]));
+    const { joints, home } = this.body.task;
+    this.figures.forEach(({ torso }, number) => {
+      const { qpos } = this.simulation.shares[number]();
+      torso.position.fromArray(qpos);
+      torso.quaternion.copy(quaternion(qpos.subarray(3, 7)));
+      this.figures[number].bend(joints.map((place, joint) => qpos[place] - home[joint]));
+    });
     const { pull } = this.simulation;
     this.rope.visible = pull !== null;
     if (pull) this.rope.geometry.setFromPoints([pull.point, pull.target].map((point) => new THREE.Vector3(...point)));
-    this.goals.show(qpos);
+    this.goals.show(this.simulation.data.qpos);
   }
 
   // Shows the steps of some seconds.
@@ -212,9 +222,11 @@ async function main() {
     bytes(byId("engine").textContent),
   ]);
   const mujoco = await loadMujoco({ wasmBinary });
-  const inputs = new Inputs(byId("stick"), [byId("left"), byId("right")]), panel = new Panel(byId("direction")), sound = new Sound();
+  const inputs = new Inputs(byId("stick"), [byId("left"), byId("right")]);
+  const panel = new Panel(byId("direction")), sound = new Sound();
   const state = { playing: true, play: null, stale: true }; // a page at rest draws only what changes
-  const choice = byId("body"), ground = byId("ground");
+  const choice = byId("body"), ground = byId("ground"), mode = byId("mode");
+  const lists = [choice, ground, mode];
   bodies.forEach(({ name }, index) => choice.append(new Option(name, index)));
   choice.parentElement.hidden = bodies.length === 1;
   byId("help").open = window.innerWidth > 700 && window.innerHeight > 500;
@@ -225,7 +237,7 @@ async function main() {
     const old = document.querySelector("canvas"), canvas = old.cloneNode(); // with a context of its own
     old.replaceWith(canvas);
     const body = bodies[choice.value];
-    state.play = new Play(mujoco, body, body.grounds[ground.value], canvas, sound);
+    state.play = new Play(mujoco, body, body.grounds[ground.value], mode.value, canvas, sound);
     canvas.setAttribute("aria-label", `${body.name} on ${ground.value} ground`);
     pulls(canvas, () => state.play);
     panel.offer(body.task.direction);
@@ -247,14 +259,13 @@ async function main() {
     kick: () => state.play.kick(),
     restart: () => (state.play.restart(), (state.stale = true)),
     pause: () => pause(),
-    goals: () => (state.play.seek(), (state.stale = true)),
     sound: () => {
       sound.on = !sound.on;
       byId("sound").textContent = sound.on ? "mute" : "sound";
     },
   };
-  const keys = { Space: actions.leap, KeyB: actions.kick, KeyR: actions.restart, KeyP: actions.pause };
-  Object.assign(keys, { KeyO: actions.goals, KeyM: actions.sound });
+  const { leap, kick, restart, sound: hush } = actions;
+  const keys = { Space: leap, KeyB: kick, KeyR: restart, KeyP: actions.pause, KeyM: hush };
   Object.assign(keys, { Digit0: () => panel.reset(), Comma: () => panel.quicken(-1), Period: () => panel.quicken(1) });
   for (let number = 1; number < 10; number += 1) keys[`Digit${number}`] = () => panel.choose(number);
   window.addEventListener("resize", () => (state.stale = true));
@@ -263,9 +274,9 @@ async function main() {
       act();
       if (event.detail) event.target.blur(); // by a pointer: keys are the body's
     });
-  for (const list of [choice, ground]) {
+  for (const list of lists) {
     follow(list);
-    list.addEventListener("change", () => (list.blur(), keep([choice, ground]), change()));
+    list.addEventListener("change", () => (list.blur(), keep(lists), change()));
   }
   window.addEventListener("keydown", (event) => {
     const act = keys[event.code];

@@ -1,19 +1,16 @@
-// A body on some ground in MuJoCo's simulation, driven by a policy in a task.
-import { Law } from "./law.js";
-import { Graph } from "./graph.js";
-import { Task } from "./task.js";
+// A body on some ground in MuJoCo's simulation, driven by a policy in a task; another one may stand before it.
+import { Mind, doubled, shareOf } from "./mind.js";
 
 const STIFFNESS = 4, STRONGEST = 3; // of a pull, in the body's weight for a distance of h, and at most
 const GRAVITY = 9.81; // m/s^2
 const LANDING = 0.6, TOUCH = 0.02; // s that a landing takes, share of the weight under a body that has touched down
+const APART = 2.5; // reaches between two bodies
 const CROUCH = 0.6; // of a body's room, as it lands
 const AHEAD = 0.3; // of the command: a body that is to walk faster leaps, others jump
 const STILL = { command: [0, 0, 0], pose: [0, 0, 0, 0, 0, 0] };
 
 const dot = (first, second) => first.reduce((sum, value, index) => sum + value * second[index], 0);
 const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
-
-const POLICIES = { law: Law, graph: Graph };
 
 // A height field, in whose cells two triangles meet from the corner of lowest to that of highest x and y.
 export class Field {
@@ -46,15 +43,15 @@ export class Field {
 }
 
 export class Simulation {
-  // Takes the module of MuJoCo, a body of a page's data, and one of its grounds.
-  constructor(mujoco, body, ground) {
+  // Takes the module of MuJoCo, a body of a page's data, one of its grounds, and how many bodies there are.
+  constructor(mujoco, body, ground, count = 1) {
     this.mujoco = mujoco;
     this.body = body;
-    this.model = mujoco.MjModel.from_xml_string(ground.xml);
+    this.model = mujoco.MjModel.from_xml_string(count > 1 ? doubled(ground.xml) : ground.xml);
     this.data = new mujoco.MjData(this.model);
     this.field = this.model.nhfield ? new Field(this.model) : null;
-    this.policy = body.policy;
     this.start = ground.start;
+    this.shares = Array.from({ length: count }, (_, number) => () => shareOf(this.data, number, count));
     this.pull = null; // of the player
     this.restart();
   }
@@ -63,32 +60,66 @@ export class Simulation {
   restart(qpos = this.start, qvel = []) {
     const { mujoco, model, data } = this;
     mujoco.mj_resetData(model, data);
-    data.qpos.set(qpos);
+    this.shares.forEach((share, number) => this.put(share(), [number * APART * this.body.reach, 0], qpos));
     data.qvel.set(qvel);
     mujoco.mj_forward(model, data);
-    this.task = new Task(this.body.task, (x, y) => (this.field ? this.field.height(x, y) : 0));
-    this.task.begin(data);
-    this.driver = new POLICIES[this.policy.kind](this.policy.constants);
+    this.minds = this.shares.map((share) => this.mind(share));
     this.count = 0; // substeps
     this.landing = 0; // s that are left; endless until a body that was let go touches the ground
+  }
+
+  // Puts a body in a pose of the start, moved by [x, y].
+  put({ qpos }, [x, y], pose = this.start) {
+    qpos.set(pose);
+    qpos[0] += x;
+    qpos[1] += y;
+    if (x || y) qpos[2] += this.ground(qpos[0], qpos[1]);
+  }
+
+  mind(share) {
+    return new Mind(this.body, (x, y) => this.ground(x, y), share);
+  }
+
+  // m
+  ground(x, y) {
+    return this.field ? this.field.height(x, y) : 0;
+  }
+
+  // The player's.
+  get task() {
+    return this.minds[0].task;
+  }
+
+  get driver() {
+    return this.minds[0].driver;
   }
 
   // Takes one substep, at the start of a control step with a new action and the commands: a velocity [forward,
   // left, turning], and for some bodies a pose and a gait.
   substep(asked) {
-    const { mujoco, model, data, task, body: { substeps } } = this;
+    const { mujoco, model, data, task, minds: [own, rival], body: { substeps } } = this;
     if (this.count % substeps === 0) {
-      const action = this.driver.act(task.observe(data));
-      task.command(this.allowed(asked));
-      data.ctrl.set(action);
+      own.act(() => this.allowed(asked));
+      rival?.act(() => ({ ...asked, ...STILL }));
     }
     if (this.pull) this.drag(this.pull);
     mujoco.mj_step(model, data);
     this.count += 1;
     if (this.count % substeps !== 0) return;
-    task.after(data);
+    own.after();
+    rival?.after();
     if (this.landing === Infinity && this.touches()) this.landing = LANDING;
     this.landing = Math.max(this.landing - task.constants.step, 0);
+  }
+
+  // Sets the other body on its feet where it lies, once there is room.
+  raise() {
+    const [own, rival] = this.minds.map(({ task }) => task.place), share = this.shares[1];
+    if (Math.hypot(own[0] - rival[0], own[1] - rival[1]) < APART * this.body.reach) return;
+    this.put(share(), [rival[0] - this.start[0], rival[1] - this.start[1]]);
+    share().qvel.fill(0);
+    this.mujoco.mj_forward(this.model, this.data);
+    this.minds[1] = this.mind(share);
   }
 
   // The commands that a body can follow: it leaps upright, and lands on bent legs.
@@ -112,7 +143,7 @@ export class Simulation {
 
   // Leaps ahead, or jumps where the body is slow; a body that can do only one of them does that.
   leap() {
-    const leaps = this.policy.constants.leaps ?? {}, ahead = this.task.desired[0] > AHEAD;
+    const leaps = this.body.policy.constants.leaps ?? {}, ahead = this.task.desired[0] > AHEAD;
     const [name] = (ahead ? ["leap", "jump"] : ["jump", "leap"]).filter((each) => leaps[each]);
     if (name) this.driver.play(name);
   }

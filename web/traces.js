@@ -23,7 +23,7 @@ export class Traces {
     Object.assign(this, { height, ground, printed: 0, thrown: 0 });
     const soft = { map: disc(), transparent: true, depthWrite: false };
     const lifted = { polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -2 };
-    const dark = new THREE.MeshBasicMaterial({ ...soft, ...lifted, color: "#14181d", opacity: 0.4 });
+    const dark = new THREE.MeshBasicMaterial({ ...soft, ...lifted, color: "#14181d", opacity: 0.36 });
     this.prints = new THREE.InstancedMesh(new THREE.PlaneGeometry(2, 2), dark, PRINTS);
     const grains = new THREE.BufferGeometry();
     for (const [name, size] of [["position", 3], ["color", 4]])
@@ -48,7 +48,7 @@ export class Traces {
     const normal = new THREE.Vector3(-slope[0], -slope[1], 2 * step).normalize();
     const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
     const place = new THREE.Vector3(x, y, z).addScaledVector(normal, 2e-3 * height);
-    const print = new THREE.Matrix4().compose(place, turn, new THREE.Vector3().setScalar(1.5 * radius));
+    const print = new THREE.Matrix4().compose(place, turn, new THREE.Vector3().setScalar(1.2 * radius));
     this.prints.setMatrixAt(this.printed % PRINTS, print);
     this.prints.instanceMatrix.needsUpdate = true;
     this.printed += 1;

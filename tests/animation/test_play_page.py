@@ -41,6 +41,8 @@ def opened(browser, page):
 def tab(opened):
     """The page, paused, with a body that has just started: tests step it without pictures."""
     opened.evaluate("play.pause(false); play.inputs.held.clear(); delete navigator.getGamepads")
+    if opened.input_value("#mode") != "free":
+        opened.select_option("#mode", "free")
     opened.select_option("#ground", "level")
     opened.select_option("#body", "0")
     opened.click("#restart")
@@ -334,7 +336,7 @@ def test_an_address_names_body_and_ground(browser, page):
     assert not tab.is_visible("#loading") and tab.evaluate("play.inputs.command") != [0, 0, 0]
     assert tab.locator("canvas").get_attribute("aria-label") == "walker_6x3 on bumps ground"
     tab.select_option("#body", "2")
-    assert tab.evaluate("location.hash") == "#walk=&body=queen&ground=bumps"
+    assert tab.evaluate("location.hash") == "#walk=&body=queen&ground=bumps&mode=free"
     tab.goto("about:blank")
     tab.goto(f"{page.as_uri()}#body=nobody&ground=<b>")
     tab.wait_for_function("window.play", timeout=60_000)
@@ -366,7 +368,7 @@ def test_steps_leave_prints_and_dust_and_are_heard(tab):
 
 def test_goals_are_reached_in_a_time(tab):
     goal = "play.state.play.goals"
-    tab.click("#goals")
+    tab.select_option("#mode", "goals")
     places = [[0, 0]]
     while tab.evaluate(f"{goal}.runs"):
         assert tab.evaluate(f"String({goal})").startswith(f"goal {len(places)} of 5, ")
@@ -376,12 +378,34 @@ def test_goals_are_reached_in_a_time(tab):
     away = [math.dist(first, second) for first, second in itertools.pairwise(places)]
     assert len(places) == 6 and min(away) > 4.0 * ROBOTS["tick"].torso.standing_height
     assert tab.evaluate(f"String({goal})") == "5 goals in 0.5 s, best 0.5 s"
-    tab.keyboard.press("o")
-    advanced(tab, 0.2)
     tab.keyboard.press("r")
     assert tab.evaluate(f"String({goal})") == "goal 1 of 5, 0.0 s"
-    tab.keyboard.press("o")
+    tab.select_option("#mode", "free")
     assert tab.evaluate(f"String({goal})") == ""
+
+
+def other(tab):
+    """Where the other body is, and whether it lies."""
+    return tab.evaluate("(({ task: { place, fell } }) => [...place, fell])(play.state.play.simulation.minds[1])")
+
+
+def test_another_body_is_pushed_and_rises_where_it_lies(tab):
+    tab.select_option("#mode", "rival")
+    advanced(tab, 1.0)
+    start = other(tab)
+    assert start[0] > 2.0 * tab.evaluate("play.state.play.body.reach") and not start[-1]
+    tab.keyboard.down("w")
+    (x, *_), _ = advanced(tab, 5.0)
+    tab.keyboard.up("w")
+    pushed = other(tab)
+    assert pushed[0] > start[0] + 0.05 and x < pushed[0]
+    tab.evaluate("play.state.play.simulation.shares[1]().qpos.set([3, 0.5, 0.1, 0, 1, 0, 0])")
+    advanced(tab, 1.0)
+    assert other(tab)[-1]
+    advanced(tab, 1.5)
+    x, y, _, fell = other(tab)
+    assert (x, y) == pytest.approx((3.0, 0.5), abs=0.15) and not fell
+    tab.evaluate("play.state.play.draw()")
 
 
 def boxes(tab):

@@ -7,7 +7,7 @@
   arc-suite play --spec spider --policy universal -o universal.html
 
 The page holds MuJoCo itself and requests nothing: open it from disk, or send it. Arrows or WASD walk and turn, Q and
-E step to a side; dragging the body pulls it, B kicks it, R restarts, O sets goals. Bodies are chosen among those that the
+E step to a side; dragging the body pulls it, B kicks it and R restarts. Bodies are chosen among those that the
 command names. The demonstrator also takes a pose and a gait, by keys and by sliders. A policy of a task with a command,
 such as steer, is given the keys' command; one of walk keeps walking, and left and right turn its course.
 """

@@ -1,0 +1,46 @@
+// A body's task and policy, on its share of the data of a model with several like bodies.
+import { Graph } from "./graph.js";
+import { Law } from "./law.js";
+import { Task } from "./task.js";
+
+const POLICIES = { law: Law, graph: Graph };
+
+export class Mind {
+  // Takes a body of a page's data, the height of the ground at [x, y], and a function that returns its share of data.
+  constructor({ task, policy }, ground, share) {
+    this.share = share;
+    this.task = new Task(task, ground);
+    this.task.begin(share());
+    this.driver = new POLICIES[policy.kind](policy.constants);
+  }
+
+  // Starts a control step with a new action, and with the commands that a function returns.
+  act(asked) {
+    const data = this.share(), action = this.driver.act(this.task.observe(data));
+    this.task.command(asked());
+    data.ctrl.set(action);
+  }
+
+  after() {
+    this.task.after(this.share());
+  }
+}
+
+// The share of one of several like bodies by number: without the world, which is the first of MuJoCo's bodies.
+export function shareOf(data, number, count) {
+  const own = (values) => values.subarray((number * values.length) / count, ((number + 1) * values.length) / count);
+  const from = (values, size) => values.subarray((number * (values.length - size)) / count);
+  const { qpos, qvel, ctrl, xpos, cfrc_ext } = data;
+  return { qpos: own(qpos), qvel: own(qvel), ctrl: own(ctrl), xpos: from(xpos, 3), cfrc_ext: from(cfrc_ext, 6) };
+}
+
+// The MJCF of two bodies that meet, given that of one: it touches what touches it, as the ground does.
+export function doubled(xml) {
+  const part = (from, to) => xml.slice(xml.indexOf(from), xml.lastIndexOf(to) + to.length);
+  const named = (text) => text.replace(/ (name|joint)="/g, ' $1="rival_');
+  const touched = (text) => text.replace(/contype="1"([^>]*?)conaffinity="0"/g, 'contype="0"$1conaffinity="1"');
+  return xml
+    .replace(/<keyframe>.*<\/keyframe>/s, "") // of one body
+    .replace("</worldbody>", `${named(touched(part("<body ", "</body>")))}</worldbody>`)
+    .replace("</mujoco>", `${named(part("<actuator>", "</actuator>"))}</mujoco>`);
+}
