@@ -12,7 +12,18 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 NEAR = 1e-5  # m
-STILL = "idle", "lean", "look", "hit", "limp", "rise", "jump", "leap", "death"  # clips without foot contact events
+STILL = (
+    "idle_loop",
+    "idle_look",
+    "lean",
+    "look",
+    "hit",
+    "limp_loop",
+    "rise",
+    "jump",
+    "leap",
+    "death",
+)  # clips without foot contact events
 TIMES = (0.0, 0.25, 0.5, 0.75)  # of a clip
 
 

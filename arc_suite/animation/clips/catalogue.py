@@ -1,10 +1,11 @@
 """The clips that a body can have, by name."""
 
 import functools
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from arc_suite.animation.clips import acting
+from arc_suite.animation.clips import acting, gestures
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
 
@@ -35,8 +36,14 @@ class Passage(NamedTuple):
     cycles: int
 
 
-class Idle(NamedTuple):
-    """Rest: a breath."""
+class Turn(NamedTuple):
+    """A turn on the spot, from rest to rest.
+
+    Attributes:
+        angle: degrees, to the left.
+    """
+
+    angle: float
 
 
 class Acted(NamedTuple):
@@ -45,10 +52,26 @@ class Acted(NamedTuple):
     Attributes:
         play: makes it of the body and its pose at rest.
         ends: those at which it has the first pose of idle: 0 and -1.
+        loops: whether it is a loop.
+        steps: whether feet step in it.
     """
 
     play: Callable[[Body, Pose], Motion]
     ends: tuple[int, ...]
+    loops: bool = False
+    steps: bool = False
+
+
+class Difference(NamedTuple):
+    """How a loop differs from another, added to the first pose of idle.
+
+    Attributes:
+        loop: its name.
+        base: name of the other.
+    """
+
+    loop: str
+    base: str
 
 
 class Showcase(NamedTuple):
@@ -62,10 +85,11 @@ class Showcase(NamedTuple):
 
 
 WALK = WalkLoop((1.0, 0.0, 0.0))
-CLIPS: dict[str, WalkLoop | Passage | Idle | Acted | Showcase] = {
+CLIPS: dict[str, WalkLoop | Passage | Turn | Acted | Difference | Showcase] = {
     "walk": WALK,
     "slow": WalkLoop((0.6, 0.0, 0.0)),
     "fast": WalkLoop((1.25, 0.0, 0.0)),
+    "run": WalkLoop((1.75, 0.0, 0.0)),
     "turn_left": WalkLoop((0.5, 0.0, 0.5)),
     "turn_right": WalkLoop((0.5, 0.0, -0.5)),
     "forward_left": WalkLoop((0.7, 0.0, 0.3)),
@@ -77,14 +101,19 @@ CLIPS: dict[str, WalkLoop | Passage | Idle | Acted | Showcase] = {
     "back": WalkLoop((-0.5, 0.0, 0.0)),
     "start": Passage(starts=True, cycles=3),
     "stop": Passage(starts=False, cycles=3),
-    "idle": Idle(),
+    "turn_180": Turn(180.0),
+    "idle": Acted(gestures.idle, (0,), loops=True),
+    "idle_look": Acted(gestures.look, (0, -1), loops=True),
+    "idle_settle": Acted(gestures.settle, (0, -1), loops=True, steps=True),
     "crouch_walk": WalkLoop((0.6, 0.0, 0.0), crouch=0.3),
-    "lean_left": Acted(functools.partial(acting.turned, number="roll", sign=-1.0), (0, -1)),
-    "lean_right": Acted(functools.partial(acting.turned, number="roll", sign=1.0), (0, -1)),
-    "look_up": Acted(functools.partial(acting.turned, number="pitch", sign=-1.0), (0, -1)),
-    "look_down": Acted(functools.partial(acting.turned, number="pitch", sign=1.0), (0, -1)),
-    "hit": Acted(acting.hit, (0, -1)),
-    "limp": WalkLoop((1.0, 0.0, 0.0), failing=0),
+    "lean_left": Acted(functools.partial(gestures.turned, number="roll", sign=-1.0), (0, -1)),
+    "lean_right": Acted(functools.partial(gestures.turned, number="roll", sign=1.0), (0, -1)),
+    "look_up": Acted(functools.partial(gestures.turned, number="pitch", sign=-1.0), (0, -1)),
+    "look_down": Acted(functools.partial(gestures.turned, number="pitch", sign=1.0), (0, -1)),
+    "limp_walk": WalkLoop((1.0, 0.0, 0.0), failing=0),
+    "limp": Difference("limp_walk", "walk"),
+    **{f"hit_{side}": Acted(functools.partial(gestures.hit, side=side), (0, -1)) for side in gestures.HITS},
+    "attack": Acted(gestures.strike, (0, -1), steps=True),
     "rise": Acted(acting.rise, (-1,)),
     "jump": Acted(acting.jump, (0, -1)),
     "leap": Acted(acting.leap, (0, -1)),
@@ -93,8 +122,8 @@ CLIPS: dict[str, WalkLoop | Passage | Idle | Acted | Showcase] = {
     "refined": Showcase("refined"),
 }
 DEFAULT = ("walk", "slow", "fast", "turn_left", "turn_right", "start", "stop", "idle")
-ADDITIVE = ("hit", "limp")  # to the first pose of idle
-FASTER = {"slow": -1.0, "fast": 1.0}  # than the walk; the sign of the difference that their names promise
+ADDITIVE = ("limp", *(f"hit_{side}" for side in gestures.HITS))  # to the first pose of idle
+PACES = {"slow": (0.0, 1.0 / 1.1), "fast": (1.1, math.inf), "run": (1.4, math.inf)}  # speeds, of that of the walk
 ALL = "all"  # in place of all names
 REST = "rest"  # the recording of a stop, of rest and of a start
 
@@ -103,10 +132,17 @@ def sources(names: Sequence[str]) -> dict[str, list[str]]:
     """Return the names of the recordings that clips are made of, each with the clips that cannot be made without it."""
     found: dict[str, list[str]] = {}
     for name in names:
-        recorded = isinstance(CLIPS[name], WalkLoop | Showcase)
-        found.setdefault(name if recorded else REST, []).append(name)
-        if isinstance(CLIPS[name], Passage) or name in FASTER or name == "limp":
+        match CLIPS[name]:
+            case Difference() as spec:
+                needs = spec.loop, REST
+            case Turn():
+                needs = name, REST
+            case WalkLoop() | Showcase():
+                needs = (name,)
+            case _:
+                needs = (REST,)
+        for source in needs:
+            found.setdefault(source, []).append(name)
+        if isinstance(CLIPS[name], Passage | Difference) or name in PACES:
             found.setdefault("walk", [])
-        if name == "limp":
-            found.setdefault(REST, []).append(name)
     return found

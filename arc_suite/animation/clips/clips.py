@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.animation.clips.catalogue import CLIPS
+from arc_suite.animation.clips import additive, planting
+from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS
 from arc_suite.animation.clips.drafts import Draft, drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
 from arc_suite.animation.clips.recorder import Recorder
@@ -30,6 +31,8 @@ class Clip(NamedTuple):
         cycles: of the gait.
         foot_contacts: events, in the order of time.
         feet: names of all feet.
+        slip: path of a sole near the ground, m a metre of the root, as a mean over the feet; None if the root stays.
+        additive_over: names of the clips that an additive clip can be added to; None for a clip that is not additive.
     """
 
     name: str
@@ -38,6 +41,8 @@ class Clip(NamedTuple):
     cycles: int
     foot_contacts: tuple[FootContact, ...]
     feet: tuple[str, ...]
+    slip: float | None = None
+    additive_over: tuple[str, ...] | None = None
 
     @property
     def times(self) -> np.ndarray:
@@ -107,7 +112,13 @@ def clips(
         raise ValueError(f"{told[name]}: {left_out[name]}")
     for name, clip in told.items():
         warnings.warn(f"{clip} is left out: {left_out[name]}", stacklevel=2)
-    return [_framed(name, setup.body, made[name], fps) for name in names if name not in left_out]
+    framed = {name: _framed(name, setup.body, made[name], fps) for name in names if name not in left_out}
+    motions = {name: clip.motion for name, clip in framed.items()}
+    loops = {name: clip.loops for name, clip in framed.items()}
+    for name in framed.keys() & set(ADDITIVE):
+        over = additive.bases(setup.body, name, motions, loops, made["idle"].start)
+        framed[name] = framed[name]._replace(additive_over=tuple(over))
+    return list(framed.values())
 
 
 def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
@@ -117,4 +128,5 @@ def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     draft = draft._replace(motion=draft.motion.stretched(seconds), cycle=cycle)
     frames = max(1, round(seconds * fps))
     motion, contacts = draft.motion.at(np.linspace(0.0, seconds, frames + 1)), tuple(draft.contacts(body)[1])
-    return Clip(name, motion, draft.loops, draft.cycles, contacts, body.foot_names)
+    slip = planting.slip(body, motion) if draft.loops else None
+    return Clip(name, motion, draft.loops, draft.cycles, contacts, body.foot_names, slip)

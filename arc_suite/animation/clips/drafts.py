@@ -7,10 +7,22 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import acting, loops, planting, root_motion
-from arc_suite.animation.clips.catalogue import CLIPS, FASTER, REST, WALK, Acted, Passage, Showcase, WalkLoop, sources
-from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
-from arc_suite.animation.clips.recorder import Recorded, Recorder, Transition
+from arc_suite.animation.clips import loops, planting, root_motion
+from arc_suite.animation.clips.catalogue import (
+    CLIPS,
+    PACES,
+    REST,
+    WALK,
+    Acted,
+    Difference,
+    Passage,
+    Showcase,
+    Turn,
+    WalkLoop,
+    sources,
+)
+from arc_suite.animation.clips.foot_contacts import LEAST_LIFT, TOUCH_DOWN, FootContact, foot_contacts, sole_heights
+from arc_suite.animation.clips.recorder import Recorded, Recorder, Transition, Turned
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compiled
@@ -18,8 +30,9 @@ from arc_suite.simulation.model import compiled
 _MOST_CYCLES = 4  # of loops that stay in step
 _MOST_ALONE = 12  # of a loop with a gait of its own
 _FOLLOWS = 0.25  # of its command's velocity, that a loop has at least
+_DEEPEST = 0.025  # of the standing height, that a sole is below the ground where others are on it
+_RAISED = 0.05  # of the standing height, that a foot which steps rises in a gesture
 _FAR = np.radians(20.0)  # from the pose of a clip, from which a stop or a start is not made to meet it
-_APART = 1.1  # ratio of the speeds of two clips, one of which is called faster
 
 
 class Draft(NamedTuple):
@@ -49,7 +62,8 @@ class Draft(NamedTuple):
         heights = sole_heights(compiled(body), body, self.motion.poses())
         if self.stands:
             return float(np.median(heights)), []
-        found, stance = foot_contacts(self.motion, body, heights, self.cycle, self.loops)
+        least = LEAST_LIFT if self.cycles else _RAISED
+        found, stance = foot_contacts(self.motion, body, heights, self.cycle, self.loops, least)
         return float(np.median(heights[stance])) if stance.any() else 0.0, found
 
     def planted(self, body: Body) -> "Draft":
@@ -57,8 +71,10 @@ class Draft(NamedTuple):
         return self._replace(motion=planting.planted(body, self.motion, self.cycle, self.loops))
 
     def grounded(self, body: Body) -> "Draft":
-        """Return the draft with soles in stance on the ground."""
-        return self._replace(motion=self.motion.lowered(self.contacts(body)[0]))
+        """Return the draft with soles in stance on the ground, and none deep in it."""
+        lowest = float(sole_heights(compiled(body), body, self.motion.poses()).min())
+        height = min(self.contacts(body)[0], lowest + _DEEPEST * body.torso.standing_height)
+        return self._replace(motion=self.motion.lowered(height))
 
 
 def drafts(
@@ -93,15 +109,18 @@ def drafts(
     if plant:
         found = {name: draft.planted(body) for name, draft in found.items()}
     if isinstance(transition := recorded.get(REST), Transition):
-        found |= _connected(body, transition, names, found.get("walk"), plant, left_out)
-    if "limp" in found and not {"walk", "idle"} <= found.keys():
-        left_out.setdefault("limp", "there is no walk that it differs from")
-    elif "limp" in found:
-        found["limp"] = _difference(found["limp"], found["walk"], found["idle"].start)
+        turns = {name: each for name, each in recorded.items() if isinstance(each, Turned)}
+        found |= _connected(body, transition, turns, names, found.get("walk"), plant, left_out)
+    for name in names:
+        if isinstance(spec := CLIPS[name], Difference) and name not in left_out:
+            if {spec.loop, spec.base, "idle"} <= found.keys():
+                found[name] = _difference(found[spec.loop], found[spec.base], found["idle"].start)
+            else:
+                left_out[name] = left_out.get(spec.loop, f"there is no {spec.base} that it differs from")
     return found
 
 
-def _recordings(recorder: Recorder, names, progress, left_out) -> dict[str, Recorded | Transition]:
+def _recordings(recorder: Recorder, names, progress, left_out) -> dict[str, Recorded | Transition | Turned]:
     """Return recordings by name; reasons of failures go to `left_out`."""
     found = {}
     for source, needed_by in progress(list(sources(names).items())):
@@ -112,9 +131,11 @@ def _recordings(recorder: Recorder, names, progress, left_out) -> dict[str, Reco
     return found
 
 
-def _recording(recorder: Recorder, source: str) -> Recorded | Transition:
+def _recording(recorder: Recorder, source: str) -> Recorded | Transition | Turned:
     if source == REST:
         return recorder.transition(WALK.command)
+    if isinstance(turn := CLIPS[source], Turn):
+        return recorder.turn(math.radians(turn.angle))
     spec = cast(WalkLoop | Showcase, CLIPS[source])  # `sources` names no others
     if isinstance(spec, Showcase):
         return recorder.showcase(spec.preset)
@@ -158,25 +179,34 @@ def _unfit(name: str, draft: Draft, units: np.ndarray | None, walk: Draft | None
         share = command @ (draft.motion.twist / units) / (command @ command)
         if share < _FOLLOWS:
             return f"the policy moves at {round(100.0 * share)} % of its command"
-    if name in FASTER and walk is not None:
-        speed, usual = (np.hypot(*each.motion.twist[:2]) for each in (draft, walk))
-        if (speed / usual) ** FASTER[name] < _APART:
+    if name in PACES and walk is not None:
+        (low, high), (speed, usual) = PACES[name], (np.hypot(*each.motion.twist[:2]) for each in (draft, walk))
+        if not low <= speed / usual <= high:
             return f"its speed is {speed:.3f} m/s, and that of the walk {usual:.3f}"
     return ""
 
 
 def _connected(
-    body: Body, transition: Transition, names: Sequence[str], walk: Draft | None, plant: bool, left_out
+    body: Body,
+    transition: Transition,
+    turns: Mapping[str, Turned],
+    names: Sequence[str],
+    walk: Draft | None,
+    plant,
+    left_out,
 ) -> dict[str, Draft]:
     """Return the draft of idle, and of the clips that connect to it where they are asked for."""
     rest = root_motion.standing(transition.recorded.recording, transition.start, 1).pose(0)
-    idle = Draft(acting.idle(body, rest), stands=True).grounded(body)
+    idle = _played(body, cast(Acted, CLIPS["idle"]), rest).grounded(body)
     found = {"idle": idle}
     for name in names:
         try:
             match CLIPS[name]:
-                case Acted() as spec:
+                case Acted() as spec if name != "idle":
                     found[name] = _acted(body, spec, rest, idle.start)
+                case Turn() as spec if name in turns:
+                    draft = _turn(body, math.radians(spec.angle), turns[name], idle.start)
+                    found[name] = draft.planted(body) if plant else draft
                 case Passage() as spec:
                     draft = _passage(body, spec, transition, idle.start, walk)
                     found[name] = draft.planted(body) if plant else draft
@@ -185,12 +215,30 @@ def _connected(
     return found
 
 
+def _played(body: Body, spec: Acted, rest: Pose) -> Draft:
+    """Return a motion from the pose at rest."""
+    return Draft(spec.play(body, rest), loops=spec.loops, stands=not spec.steps)
+
+
 def _acted(body: Body, spec: Acted, rest: Pose, idle: Pose) -> Draft:
-    """Return a motion simulated from the pose at rest, which meets idle; see `Acted`."""
-    motion = spec.play(body, rest).lowered(rest.position[2] - idle.position[2])
+    """Return a motion from the pose at rest, which meets idle; see `Acted`."""
+    draft = _played(body, spec, rest)
+    motion = draft.motion.lowered(rest.position[2] - idle.position[2])
     for end in spec.ends:
         motion = motion.ending(idle, end, len(motion.joints) // 3)
-    return Draft(motion, loops=False, stands=True)
+    return draft._replace(motion=motion)
+
+
+def _turn(body: Body, angle: float, turned: Turned, idle: Pose) -> Draft:
+    """Return a turn from idle to idle by exactly an angle, rad, which the root takes up."""
+    recorded = turned.recorded
+    cycle = round(recorded.cycle / recorded.recording.step)
+    motion = root_motion.passage(recorded.recording, turned.first, turned.samples, cycle)
+    draft = Draft(motion, round(turned.samples / cycle), recorded.cycle, loops=False).grounded(body)
+    motion = draft.motion.meeting(idle, 0, cycle).meeting(idle, -1, cycle)
+    missing = (angle - motion.root[-1, 2]) * np.linspace(0.0, 1.0, len(motion.root))
+    root = motion.root + missing[:, None] * (0.0, 0.0, 1.0)
+    return draft._replace(motion=motion._replace(root=root, twist=root_motion.logarithm(root[-1]) / motion.seconds))
 
 
 def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk: Draft | None) -> Draft:

@@ -16,7 +16,7 @@ TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
 # lower one.
 _RISES, _LASTS = 0.5, 0.2
 _BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
-_LEAST_LIFT = 0.005  # of the standing height: a foot that rises less never leaves the ground
+LEAST_LIFT = 0.005  # of the standing height: a foot that rises less never leaves the ground
 _NEAR = 0.005  # of the standing height: a sole that is lower touches
 
 
@@ -109,7 +109,7 @@ def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def foot_contacts(
-    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool
+    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, least: float = LEAST_LIFT
 ) -> tuple[list[FootContact], np.ndarray]:
     """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
 
@@ -119,12 +119,13 @@ def foot_contacts(
         heights: (samples, feet) of the soles, m.
         cycle: of the gait, s.
         loops: whether the motion is a loop; its last sample is its first one then, and has no events.
+        least: standing heights; a foot that rises less stays on the ground.
     """
     height, end = body.torso.standing_height, len(heights) - 1 if loops else len(heights)
     found, swing = [], np.zeros(heights.shape, bool)
 
     for leg, foot in enumerate(body.foot_names):
-        up = swings(heights[:end, leg], _LEAST_LIFT * height, _BOUNCE * cycle / motion.step, loops)
+        up = swings(heights[:end, leg], least * height, _BOUNCE * cycle / motion.step, loops)
         down = touching(heights[:end, leg], up, _NEAR * height, loops)
         before = np.roll(down, 1) if loops else np.concatenate([down[:1], down[:-1]])
         for event, at in ((LIFT_OFF, ~down & before), (TOUCH_DOWN, down & ~before)):

@@ -4,7 +4,7 @@ import collections
 from collections.abc import Sequence
 from typing import Any
 
-from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS, Idle, WalkLoop
+from arc_suite.animation.clips.catalogue import CLIPS, WalkLoop
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
 from arc_suite.robots.spec import Body
@@ -37,7 +37,9 @@ def metadata(clip: Clip) -> dict[str, Any]:
     """Return the metadata of a clip.
 
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
-    `additive_to` is the animation whose first frame is the reference of an additive clip.
+    `slip` is the path of a sole near the ground, m a metre of the root. `additive_to` is the animation whose first
+    frame is the reference of an additive clip, and `additive_over` names the clips that it can be added to: no sole
+    then sinks deeper than 0.03 standing heights.
     """
     found: dict[str, Any] = {"seconds": clip.motion.seconds, "frames": len(clip.times)}
     found |= {"loops": clip.loops, "cycles": clip.cycles}
@@ -45,8 +47,10 @@ def metadata(clip: Clip) -> dict[str, Any]:
     found |= {name: round(speed, 6) for name, speed in speeds}
     contacts = ({"foot": each.foot, "event": each.event, "time": round(each.time, 6)} for each in clip.foot_contacts)
     found["foot_contacts"] = list(contacts)
-    if clip.name in ADDITIVE:
-        return found | {"additive_to": "idle_loop"}
+    if clip.slip is not None:
+        found["slip"] = round(clip.slip, 3)
+    if clip.additive_over is not None:
+        return found | {"additive_to": "idle_loop", "additive_over": list(clip.additive_over)}
     return found | ({"missing_steps": missing_steps(clip)} if clip.loops else {})
 
 
@@ -71,8 +75,8 @@ def _spaces(clips: Sequence[Clip], moving: Sequence[bool]) -> dict[str, Any]:
         points = []
         for clip in clips:
             spec = CLIPS[clip.name]
-            walks = isinstance(spec, WalkLoop) and clip.name not in ADDITIVE and spec.command[zero] == 0.0
-            if walks or isinstance(spec, Idle):
+            walks = isinstance(spec, WalkLoop) and spec.failing is None and spec.command[zero] == 0.0
+            if walks or clip.name == "idle":
                 figures = metadata(clip)
                 animation = next(iter(animations(clip, moving)))
                 points.append({"animation": animation, "at": [figures[axis] for axis in axes]})

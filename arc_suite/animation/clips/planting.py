@@ -45,6 +45,17 @@ def planted(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     return motion
 
 
+def slip(body: Body, motion: Motion) -> float | None:
+    """Return the path of a sole in stance, m a metre of the root, as a mean over the feet; None if the root stays."""
+    legs, path = Legs.of(body), np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=-1).sum()
+    if path < _STANDS * body.torso.standing_height:
+        return None
+    feet = _feet(legs, motion)
+    low = feet[..., 2] - legs.radii < _STANDS * body.torso.standing_height
+    paths = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1) * (low[1:] & low[:-1])
+    return float(paths.sum(axis=0).mean() / path)
+
+
 def _nearer(legs: Legs, height: float, motion: Motion, stances, fastest: np.ndarray, loops: bool) -> Motion:
     """Return the motion with feet in stance nearer to a place on the ground that is the same throughout the stance.
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.animation.clips import loops
 from arc_suite.animation.clips.recordings import Recording, record
 from arc_suite.cpg.selection import presets_of
@@ -17,6 +18,7 @@ _LONG = 700  # control steps without a command: a speed that varies is that of m
 _CYCLES = 20  # of the gait in a recording under a command, to choose loops from
 _UNDRAWN = {"poses": 0.0, "gaits": ()}  # of a task whose pose and gait are by command
 _OF_ROOM, _LEAST_CROUCH = 0.7, 0.05  # share of the room in which a body crouches, and least crouch, standing heights
+_TRIES, _LEAST_TURN = 3, 0.25  # recordings of a turn, for one by the angle; its least share of the angle
 _BEFORE, _REST, _AFTER = 2, 5, 4  # gait cycles before a stop, at rest, and after the start
 
 
@@ -54,6 +56,20 @@ class Transition(NamedTuple):
     stop: int
     start: int
     late: int
+
+
+class Turned(NamedTuple):
+    """A body that stands, turns on the spot, and stands.
+
+    Attributes:
+        recorded: the recording.
+        first: sample at which it begins to turn.
+        samples: until it stands again.
+    """
+
+    recorded: Recorded
+    first: int
+    samples: int
 
 
 class Recorder:
@@ -153,6 +169,30 @@ class Recorder:
         late = round(substeps * steps * phase(stop))
         stop, start = (substeps * (count - _SETTLE) for count in (stop, start))
         return Transition(Recorded(recording, cycle, phase(_SETTLE)), stop - late, start, late)
+
+    def turn(self, angle: float) -> Turned:
+        """Return a recording of a turn on the spot by about an angle, rad.
+
+        Raises:
+            ValueError: the episode ends, the task has no command, or the policy does not turn.
+        """
+        cycle, _, step = self._gait()
+        around, rest = round(cycle / step), round(_REST * cycle / step)
+        rate = float(np.copysign(self.units[2], angle))
+        count = round(angle / rate / step)
+        for _ in range(_TRIES):
+            commands = [(0, (0.0, 0.0, 0.0)), (_SETTLE + around, (0.0, 0.0, np.sign(angle)))]
+            commands.append((_SETTLE + around + count, (0.0, 0.0, 0.0)))
+            recording = self._recorded(self._setup, _SETTLE, 2 * around + count + rest, commands)
+            first, samples = recording.substeps * around, recording.substeps * (count + rest)
+            turned = np.ptp(np.unwrap(rotations.yaw(recording.poses[first : first + samples + 1, 3:7]))[[0, -1]])
+            if turned < _LEAST_TURN * abs(angle):
+                raise ValueError(f"the policy turns by {np.degrees(turned):.0f} degrees")
+            missing = round((abs(angle) - turned) / abs(rate) / step)
+            if not missing:
+                break
+            count += missing
+        return Turned(Recorded(recording, cycle), first, samples)
 
     def _directed(self) -> Setup:
         """The setup with a pose by command."""

@@ -53,14 +53,14 @@ def test_any_body_as_rigid_parts(tmp_path):
         (("-o", "a.fbx"), "a.fbx: this program writes .glb; tools/to_fbx.py makes .fbx of it, by Blender"),
         (("-o", "a.glb", "--rig=bones"), "unknown rig 'bones'; did you mean 'nodes'?"),
         (("-o", "a.glb", "--root_motion=none"), "unknown root_motion 'none'"),
-        (("-o", "a.glb", "--clips=walk,run"), "unknown clip 'run'"),
+        (("-o", "a.glb", "--clips=walk,fly"), "unknown clip 'fly'"),
         (("-o", "a.glb", "--robot=all"), "--robot=all: expected one robot"),
         pytest.param(
             ("-o", "a.glb", "--robot=tick", "--clips=walk,stop", "--policy=zero"),
             "tick, clip walk: the policy moves at 0 % of its command",
             marks=pytest.mark.slow,
         ),
-        (("-o", "a.glb", "--clips="), "clips: expected one or more of walk, slow, fast, turn_left, "),
+        (("-o", "a.glb", "--clips="), "clips: expected one or more of walk, slow, fast, run, turn_left, "),
         (("-o", "nowhere/a.glb"), "cannot write nowhere/a.glb: no such file or directory"),
     ],
 )

@@ -13,10 +13,11 @@ from refusals import refused
 from tiers import never, tiers
 
 import arc_suite
-from arc_suite import policies
+from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import drafts, foot_contacts, recordings
-from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS, WalkLoop
+from arc_suite.animation.clips.catalogue import CLIPS, WalkLoop
+from arc_suite.animation.clips.gestures import HITS
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS, spec_files
@@ -311,18 +312,34 @@ def test_the_sidecar_has_blend_spaces_and_tells_missing_steps(robot):
 
 @pytest.mark.slow
 def test_what_is_played_from_rest_begins_or_ends_with_idle():
-    clips = made("tick", "idle", "hit", "limp", "rise", "jump", "death")
+    clips = made("tick", "walk", "idle", "hit_front", "limp", "rise", "jump", "death", "turn_180", "attack")
     rest, body = clips["idle"].motion.pose(0), ROBOTS["tick"]
-    for name, ends in (("hit", (0, -1)), ("rise", (-1,)), ("jump", (0, -1)), ("death", (0,))):
+    for name, ends in (
+        ("hit_front", (0, -1)),
+        ("attack", (0, -1)),
+        ("rise", (-1,)),
+        ("jump", (0, -1)),
+        ("death", (0,)),
+    ):
         for end in ends:
             for one, other in zip(clips[name].motion.pose(end), rest, strict=True):
                 np.testing.assert_allclose(one, other, atol=1e-6)
         assert not clips[name].loops and not clips[name].moves
     heights = {name: clip.motion.positions[:, 2] / rest.position[2] for name, clip in clips.items()}
     assert heights["death"][-1] < 0.6 and heights["rise"][0] < 0.6 < 1.3 < heights["jump"].max()
-    assert np.ptp(clips["hit"].motion.positions[:, 0]) > 0.05 * body.torso.standing_height
+    assert (
+        np.ptp(feet_of(body, clips["attack"].motion.poses())[..., 2], axis=0).max() > 0.3 * body.torso.standing_height
+    )
+    downs = [each for each in clips["attack"].foot_contacts if each.event == foot_contacts.TOUCH_DOWN]
+    assert len({each.foot for each in downs}) == 1
     told = export.sidecar(body, list(clips.values()))["clips"]
-    assert {name for name, figures in told.items() if "additive_to" in figures} == {"hit", "limp_loop"}
+    over = {name: figures["additive_over"] for name, figures in told.items() if "additive_to" in figures}
+    assert over == {"hit_front": ["idle"], "limp_loop": ["walk"]}
+    assert clips["turn_180"].motion.root[-1, 2] == pytest.approx(np.pi, abs=1e-9)
+    for end in (0, -1):
+        for one, other in zip(clips["turn_180"].motion.pose(end), rest, strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-6)
+    assert 0.0 < told["walk_loop"]["slip"] < 0.15 and "slip" not in told["idle_loop"]
     # The failing leg moves less than it does in the walk, so that the difference undoes its steps.
     walk, limp = made("tick")["walk"].motion.joints, clips["limp"].motion.joints
     swing = [np.ptp(joints[:, :3], axis=0).max() for joints in (walk, walk + limp[: len(walk)] - rest.joints)]
@@ -366,6 +383,32 @@ def test_idle_breathes_on_its_feet(robot):
     assert (clip.motion.joints >= ranges[:, 0] - 1e-9).all() and (clip.motion.joints <= ranges[:, 1] + 1e-9).all()
 
 
+@pytest.mark.slow
+def test_a_blow_tilts_the_torso_over_planted_feet():
+    body, clips = ROBOTS["tick"], made("tick", "idle", *(f"hit_{side}" for side in HITS))
+    height, rest = body.torso.standing_height, clips["idle"].motion.pose(0)
+    for side, way in HITS.items():
+        motion = clips[f"hit_{side}"].motion
+        tilts = (rotations.matrix(motion.quaternions) - rotations.matrix(rest.quaternion))[:, :2, 2] @ way
+        assert np.degrees(np.arcsin(tilts.max())) == pytest.approx(11.0, abs=1.5)
+        assert np.ptp(motion.positions[:, 2]) > 0.08 * height
+        assert np.ptp(feet_of(body, motion.poses()), axis=0).max() < 0.03 * height
+
+
+@pytest.mark.slow
+def test_variants_of_idle_look_around_and_set_feet_anew():
+    body, clips = ROBOTS["tick"], made("tick", "idle", "idle_look", "idle_settle")
+    for clip in clips.values():
+        for one, other in zip(clip.motion.pose(-1), clips["idle"].motion.pose(0), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-6)
+    assert np.ptp(rotations.yaw(clips["idle_look"].motion.quaternions)) > 0.3
+    rises = np.ptp(feet_of(body, clips["idle_settle"].motion.poses())[..., 2], axis=0)
+    stepping = {
+        foot for foot, rise in zip(body.foot_names, rises, strict=True) if rise > 0.1 * body.torso.standing_height
+    }
+    assert len(stepping) == 2 and {contact.foot for contact in clips["idle_settle"].foot_contacts} == stepping
+
+
 @pytest.mark.parametrize("robot", EACH)
 def test_a_stop_walks_and_then_stands(robot):
     motion = made(robot)["stop"].motion
@@ -406,7 +449,7 @@ def test_the_recording_is_the_episode_to_the_bit():
     ("arguments", "message"),
     [
         ({"names": ["wlak"]}, "unknown clip 'wlak'; did you mean 'walk'?"),
-        ({"names": []}, "clips: expected one or more of walk, slow, fast, turn_left, turn_right, forward_left, "),
+        ({"names": []}, "clips: expected one or more of walk, slow, fast, run, turn_left, turn_right, forward_left, "),
         ({"names": ["walk", "walk"]}, "clips: expected each once"),
         ({"names": ["idle"]}, "tick, clip idle: the task walk has no command"),
         ({"names": ["refined"], "setup": Setup.of("spider", "steer")}, "spider, clip refined: spider has no preset "),
@@ -428,12 +471,12 @@ def test_every_clip_can_be_made(robot):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         clips = {clip.name: clip for clip in export.clips(Setup.of(body, "steer"), list(CLIPS))}
-    # Leaper cannot walk faster than it does, jump or leap; the strides of Bastion to a side alternate.
-    assert len(clips) + len(caught) == len(CLIPS) and len(caught) <= 3
+    # Leaper cannot walk faster than it does, jump, leap or sway; the strides of Bastion to a side alternate.
+    assert len(clips) + len(caught) == len(CLIPS) and len(caught) <= 6
     gltf_reader.read(export.glb(body, list(clips.values())))
     units = arc_suite.load(body, "steer").task.definition.context.units
     for name, clip in clips.items():
-        if isinstance(spec := CLIPS[name], WalkLoop) and name not in ("fast", *ADDITIVE):
+        if isinstance(spec := CLIPS[name], WalkLoop) and name not in ("fast", "run", "limp_walk"):
             missed = (clip.motion.twist - spec.command * units) / units
             assert abs(missed).max() < 0.25, name
     speeds = [clips[name].motion.twist[0] for name in ("slow", "walk", "fast") if name in clips]

@@ -9,12 +9,12 @@ import pytest
 from poses import placed
 
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import acting
+from arc_suite.animation.clips import acting, gestures
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.envs.setup import Setup
 
 BODIES = {"four legs": imports.quadruped, "six legs": imports.hexapod}
-NAMES = ("walk", "idle", "hit", "rise", "death")
+NAMES = ("walk", "idle", "hit_front", "rise", "death")
 
 
 @functools.cache
@@ -28,7 +28,7 @@ def test_clips_are_in_the_bytes_as_the_simulation_moves(name):
     body, clips = BODIES[name](), made(name)
     assert set(clips) == set(NAMES)
     file = gltf_reader.read(export.glb(body, list(clips.values())))
-    for animation, clip in zip(("walk_loop", "idle_loop", "hit", "rise", "death"), clips.values(), strict=True):
+    for animation, clip in zip(("walk_loop", "idle_loop", "hit_front", "rise", "death"), clips.values(), strict=True):
         world, feet = gltf_reader.played(file, animation), placed(body, clip.motion.poses(), body.foot_names)[0]
         for leg, foot in enumerate(body.foot_names):
             places = np.broadcast_to(world[foot][..., :3, 3], (len(feet), 3))
@@ -44,8 +44,8 @@ def test_servos_walk_hold_and_let_go(name):
     assert {contact.foot for contact in clips["walk"].foot_contacts} == set(body.foot_names)
     heights = {name: clip.motion.positions[:, 2] / rest.position[2] for name, clip in clips.items()}
     assert heights["death"][-1] < 0.6 and heights["rise"][0] < 0.6
-    assert np.ptp(clips["hit"].motion.positions[:, 0]) > 0.05 * height
-    for clip, end in (("hit", -1), ("rise", -1), ("death", 0)):
+    assert np.ptp(clips["hit_front"].motion.positions[:, 0]) > 0.05 * height
+    for clip, end in (("hit_front", -1), ("rise", -1), ("death", 0)):
         for one, other in zip(clips[clip].motion.pose(end), rest, strict=True):
             np.testing.assert_allclose(one, other, atol=1e-6)
 
@@ -61,6 +61,6 @@ def test_a_body_with_an_arm_stands_and_dies():
     """The servo of the arm is not taken for a release of one of the legs."""
     body = imports.with_arm()
     rest = Pose(np.array((0.0, 0.0, body.torso.standing_height)), np.array((1.0, 0.0, 0.0, 0.0)), np.zeros(12))
-    hit, death = acting.hit(body, rest), acting.death(body, rest)
+    hit, death = gestures.hit(body, rest, "front"), acting.death(body, rest)
     assert abs(hit.joints[-1]).max() < 0.2
     assert death.positions[-1, 2] < 0.5 * rest.position[2]
