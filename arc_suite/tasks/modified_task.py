@@ -7,7 +7,7 @@ adds kicks, and changes fields of the model. Its memory holds that of the other.
 import dataclasses
 import functools
 import math
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from arc_suite.tasks import mirrors, noise, overruled, privileged, randomization
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
-from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, checked
+from arc_suite.tasks.modifiers import FAILS_FROM, REMEMBERED, Modifiers, checked
 from arc_suite.tasks.randomization import LONGEST, SCHEDULE, SHORTEST, Hidden, Pushes
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.wrapper import Wrapper
@@ -48,8 +48,8 @@ class Changes(NamedTuple):
         speeds: (..., joints) of the joints at the latest reading, rad/s.
         hidden: what the episode has drawn of the body.
         pushes: forces on the torso.
-        now: (..., size) the latest observation without the history; empty for no history.
-        recent: (..., history, size + joints) earlier observations and the actions after them, the newest first.
+        now: (..., size) the latest observation of the blocks of a history; empty for none.
+        recent: (..., history, size + joints) earlier ones and the actions after them, the newest first.
     """
 
     elapsed: np.ndarray
@@ -171,13 +171,16 @@ class Modified(Wrapper):
 
     @property
     def blocks(self) -> Mapping[str, Block]:
-        """The other task's blocks without the excluded ones, and the history of these."""
-        count, kept = self.changes.history, self._kept
-        return {**kept, "history": history(kept.values(), len(self.scene.body.joint_names), count)} if count else kept
+        """The other task's blocks without the excluded ones, and the history of some."""
+        count, joints = self.changes.history, len(self.scene.body.joint_names)
+        kept = {name: block for name, block in self.task.blocks.items() if name not in self.changes.exclude_blocks}
+        return {**kept, "history": history(self._remembered, joints, count)} if count else kept
 
     @property
-    def _kept(self) -> dict[str, Block]:
-        return {name: block for name, block in self.task.blocks.items() if name not in self.changes.exclude_blocks}
+    def _remembered(self) -> tuple[Block, ...]:
+        """The blocks of a history."""
+        names = [name for name in REMEMBERED if name not in self.changes.exclude_blocks]
+        return tuple(self.task.blocks[name] for name in names if name in self.task.blocks)
 
     @functools.cached_property
     def members(self) -> np.ndarray:
@@ -213,7 +216,7 @@ class Modified(Wrapper):
         drawn = draw(random, len(body.legs))
         joints = len(body.joint_names)
         later = randomization.draw(drawn.noise_key, joints)
-        size = sum(block.size for block in self._kept.values()) * (changes.history > 0)
+        size = sum(block.size for block in self._remembered) * (changes.history > 0)
         directions = np.stack([np.cos(drawn.kick_directions), np.sin(drawn.kick_directions)], axis=-1)
         unit = changes.kicks * math.sqrt(GRAVITY * body.torso.standing_height)
         low, high = changes.delay
@@ -323,10 +326,11 @@ class Modified(Wrapper):
         return blocks
 
     def _observed(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
-        """The memory with what the task observes now."""
+        """The memory with what a history takes of the present."""
         if not self.changes.history:
             return memory
-        blocks = list(self._sensed_blocks(memory, readings).values())
+        found = self._sensed_blocks(memory, readings)
+        blocks = [found[name] for name in REMEMBERED if name in found]
         now = blocks[0].__array_namespace__().concatenate(blocks, axis=-1)
         return memory._replace(changes=memory.changes._replace(now=now))
 
@@ -435,13 +439,10 @@ class Modified(Wrapper):
         return push if kick is None else kick + push
 
 
-def history(blocks: Iterable[Block], joints: int, steps: int) -> Block:
-    """Return the block of earlier observations, of given blocks, and of the actions (joints,) after them."""
-    blocks = tuple(blocks)
+def history(blocks: Sequence[Block], joints: int, steps: int) -> Block:
+    """Return the block of earlier observations, of blocks with mirrors, and of the actions (joints,) after them."""
 
     def mirrored(image):
-        if undeclared := [block for block in blocks if block.mirror is None]:
-            raise ValueError(f"history: {len(undeclared)} of its blocks declare no mirror")
         once = mirrors.joined([*(block.map(image) for block in blocks), mirrors.joints(image)])
         return mirrors.of_each(np.arange(steps), once)
 

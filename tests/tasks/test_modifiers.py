@@ -595,15 +595,22 @@ def test_a_history_holds_earlier_observations_and_the_actions_after_them():
     settings = {"history": 2, "exclude_blocks": "contact_forces", "observation_noise": 1.0, "delay": 2}
     env = VectorEnv("tick", "steer", 3, 1, task_kwargs=settings)
     (observation, _), actions = env.reset(seed=0), np.random.default_rng(0).uniform(-1.0, 1.0, (4, 3, 18))
-    size, sizes = sum(env.task.sizes.values()) - env.task.sizes["history"], env.task.sizes
-    assert sizes["history"] == 2 * (size + 18) and list(sizes)[-1] == "history"
+    sizes = env.task.sizes
+    size = sizes["posture"] + sizes["velocities"]
+    assert sizes["history"] == 2 * (size + 18) and list(sizes) == [
+        "posture",
+        "velocities",
+        "gait_clock",
+        "command",
+        "history",
+    ]
     seen = [observation[:, :size]]
-    entries = observation[:, size:].reshape(3, 2, size + 18)
+    entries = observation[:, -sizes["history"] :].reshape(3, 2, size + 18)
     assert_array_equal(entries[..., :size], np.stack([seen[0]] * 2, axis=1), err_msg="the start repeats")
     assert not entries[..., size:].any()
     for step, action in enumerate(actions):
         observation, *_ = env.step(action)
-        entries = observation[:, size:].reshape(3, 2, size + 18)
+        entries = observation[:, -sizes["history"] :].reshape(3, 2, size + 18)
         for place, before in enumerate(range(step, max(step - 2, -1), -1)):
             assert_array_equal(entries[:, place, :size], seen[before], err_msg="with its noise")
             assert_allclose(entries[:, place, size:], actions[before], atol=1e-7, err_msg="as it was sent")

@@ -81,16 +81,12 @@ class Environments:
             noise = correlated(self._hp, noise, random.standard_normal(mean.shape, np.float32))
             action = mean + np.float32(std) * noise
             observation, rewards, terminated, truncated, info = self.environment.step(action)
-            after, ended, resampled = (
-                self._seen(observation, info),
-                terminated | truncated,
-                self.environment.resampled(),
-            )
+            after = self._seen(observation, info)
+            ended, resampled = terminated | truncated, self.environment.resampled()
             next_observation = after.copy()
             next_observation[resampled] = self.observation[resampled]
             for index in np.flatnonzero(ended):
-                last = {name: array[index] for name, array in info["final_info"].items() if name == "privileged"}
-                next_observation[index] = self._seen(info["final_obs"][index], last)
+                next_observation[index] = self._seen(info["final_obs"][index], info["final_info"], index)
             ended = ended | resampled
             values = self.observation, action, mean, rewards, terminated, ended, next_observation
             for array, value in zip(rollout.values(), values, strict=True):
@@ -107,8 +103,8 @@ class Environments:
         learner.restore_environment(self.environment, arrays)
         self.observation = arrays[f"{ENVIRONMENT}seen"]
 
-    def _seen(self, observation: np.ndarray, info: Mapping) -> np.ndarray:
-        """Observations (..., size) with the critic's privileged blocks after them."""
+    def _seen(self, observation: np.ndarray, info: Mapping, place: int | slice = slice(None)) -> np.ndarray:
+        """Observations (..., size) of environments with the critic's privileged blocks after them."""
         if not self._names:
             return observation
-        return np.concatenate([observation, info["privileged"][..., self._columns]], axis=-1)
+        return np.concatenate([observation, info["privileged"][place][..., self._columns]], axis=-1)

@@ -77,6 +77,9 @@ class Configuration:
         if setup.several and not definition.several:
             those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
             raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
+        left_out = getattr(definition.hyperparameters, "exclude_blocks", ())
+        if setup.several and set(left_out) - {"contact_forces"}:
+            raise ValueError(f"exclude_blocks: expected none with several bodies, got {', '.join(left_out)}")
         steps = definition.steps_of(setup) if steps is None else steps
         evaluate_every = definition.evaluate_every if evaluate_every is None else evaluate_every
         checks.integer("seed", seed, 0, MOST_SEEDS)
@@ -117,7 +120,7 @@ class Configuration:
     def _excluded(self) -> dict[str, Any]:
         """Setting of the blocks that networks do not see: those of the task, then those of the hyperparameters."""
         names = getattr(self.hyperparameters, "exclude_blocks", ())
-        if not names or self.setup.several:  # networks of many bodies see tokens, without contact forces
+        if not names or self.setup.several:  # the inputs of several bodies are always the same
             return {}
         there = self.setup.judging().definition.sizes
         kept = self.setup.task_kwargs.get("exclude_blocks", ())

@@ -107,7 +107,7 @@ def checked(found: Sequence[RunResult]) -> str:
     return table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
 
 
-def beside(studies: Iterable[Sequence[RunResult]], steps: int) -> str:
+def next_to_the_papers(studies: Iterable[Sequence[RunResult]], steps: int) -> str:
     """Return a table in Markdown of returns after environment steps, ours / those of the paper's curves.
 
     Args:

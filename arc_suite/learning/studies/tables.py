@@ -164,10 +164,11 @@ _PARTS = {
 }
 
 
-def _wide(robot, steps, seed=0, task="walk", label="ppo", training=None) -> Run:
-    """A run of `ppo` that sees contact forces, with 256 units."""
-    own = {"hyperparameters": {"exclude_blocks": [], "hidden": 256}, "training": training}
-    return run(robot, "ppo", steps, seed, task, label=f"{label}-forces", **own)
+def _seeing_forces(robot, algorithm, steps, seed=0, task="walk", label="", **fields) -> Run:
+    """A run whose networks see contact forces, as all did once; those of `ppo` have 256 units."""
+    own = {"exclude_blocks": []} | ({"hidden": 256} if algorithm == "ppo" else {})
+    label = f"{label or algorithm}-forces"
+    return run(robot, algorithm, steps, seed, task, hyperparameters=own, label=label, **fields)
 
 
 # `sac_parallel` with prior data, or with phases.
@@ -214,19 +215,27 @@ STUDIES = {
     "imitation": Study(
         "imitation of the demonstrators by DAgger in tasks in which feedback pays",
         (
-            *(run("tick", "dagger", 38_400, task=task, evaluate_every=38_400) for task in _FEEDBACK),
+            *(_seeing_forces("tick", "dagger", 38_400, task=task, evaluate_every=38_400) for task in _FEEDBACK),
             # A foot misses a trench in a few steps of an episode alone: that takes more episodes.
-            run("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
-            run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
+            _seeing_forces("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
+            _seeing_forces("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
         ),
     ),
     # Steps as on the division `top`.
     "from-nothing": Study(
         "PPO from nothing in the other tasks, Tick; uneven ground and pillars three million steps; with contact forces",
         (
-            *(_wide("tick", DIVISIONS["top"].steps_in(task), task=task) for task in TASKS if task not in _LATER),
+            *(
+                _seeing_forces("tick", "ppo", DIVISIONS["top"].steps_in(task), task=task)
+                for task in TASKS
+                if task not in _LATER
+            ),
             # Without a curriculum it learns to stand at the first trench.
-            _wide("tick", DIVISIONS["top"].far_steps, 0, "gaps", "ppo-curriculum", {"curriculum": True}),
+            _seeing_forces(
+                *("tick", "ppo", DIVISIONS["top"].far_steps, 0, "gaps"),
+                label="ppo-curriculum",
+                training={"curriculum": True},
+            ),
         ),
     ),
     # Four to six minutes of a core a run. One-step returns learn faster on some seeds, and fall on others.
@@ -256,14 +265,14 @@ STUDIES = {
     "beyond": Study(
         "beyond the paper: imitation of the demonstrators by DAgger, and PPO from nothing",
         (
-            *(run(robot, "dagger", 25_600) for robot in ROBOTS),
-            *(_wide(robot, 1_000_000, seed) for seed, robot in itertools.product(range(3), ROBOTS)),
+            *(_seeing_forces(robot, "dagger", 25_600) for robot in ROBOTS),
+            *(_seeing_forces(robot, "ppo", 1_000_000, seed) for seed, robot in itertools.product(range(3), ROBOTS)),
         ),
     ),
     "ppo-forces": Study(
         "division top of the benchmark: PPO with contact forces and 256 units",
         tuple(
-            _wide(robot, DIVISIONS["top"].steps_in(task), seed, task)
+            _seeing_forces(robot, "ppo", DIVISIONS["top"].steps_in(task), seed, task)
             for seed, (robot, task) in itertools.product(range(SEEDS), PLACES)
         ),
     ),

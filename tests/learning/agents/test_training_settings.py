@@ -64,6 +64,8 @@ def test_settings_that_do_not_fit(setup, algorithm, training, line):
 
 
 def test_all_blocks_cannot_be_left_out():
+    with pytest.raises(ValueError, match="^exclude_blocks: expected none with several bodies, got posture$"):
+        Configuration.of(Setup.of("random:0-1"), "ppo", {"exclude_blocks": ["posture"]})
     run = Configuration.of(STEER, "ppo", {"exclude_blocks": list(STEER.definition.sizes)})
     with pytest.raises(ValueError, match=r"^exclude_blocks: expected to leave a block, got all of them: posture, "):
         _ = run.training_setup.definition

@@ -262,7 +262,7 @@ def test_the_papers_table_has_every_robot_and_algorithm():
 def test_the_page_holds_our_returns_next_to_the_papers():
     found = [results.results(tables.study(name).runs, COMMITTED / name) for name in ("exact-tick", "short")]
     page = (COMMITTED.parent / "docs" / "study.md").read_text()
-    text = claims.beside(found, 100_000)
+    text = claims.next_to_the_papers(found, 100_000)
     assert f"<!-- table -->\n\n{text}\n\n<!-- end -->" in page
     assert "| speq_o2o | 2977 (short phases) / 1410 | not run / 2850 | not run / 2310 |" in text
     assert "| 2242 (at 90,000) / 1780 |" in text
