@@ -106,11 +106,12 @@ def drafts(
     found = {name: draft for name, draft in found.items() if not reasons[name]}
     if straight:
         found = {name: draft._replace(motion=_straight(name, draft.motion)) for name, draft in found.items()}
+    walk = found.get("walk")
     if plant:
         found = {name: draft.planted(body) for name, draft in found.items()}
     if isinstance(transition := recorded.get(REST), Transition):
         turns = {name: each for name, each in recorded.items() if isinstance(each, Turned)}
-        found |= _connected(body, transition, turns, names, found.get("walk"), plant, left_out)
+        found |= _connected(body, transition, turns, names, walk, found.get("walk") if plant else None, left_out)
     for name in names:
         if isinstance(spec := CLIPS[name], Difference) and name not in left_out:
             if {spec.loop, spec.base, "idle"} <= found.keys():
@@ -192,10 +193,20 @@ def _connected(
     turns: Mapping[str, Turned],
     names: Sequence[str],
     walk: Draft | None,
-    plant,
+    planted: Draft | None,
     left_out,
 ) -> dict[str, Draft]:
-    """Return the draft of idle, and of the clips that connect to it where they are asked for."""
+    """Return the draft of idle, and of the clips that connect to it where they are asked for.
+
+    Args:
+        body: the spec.
+        transition: from which rest is taken, and stops and starts.
+        turns: recordings by name.
+        names: of the clips.
+        walk: that stops and starts connect to, with feet as in the physics.
+        planted: the same with planted feet; None if feet are not to be planted.
+        left_out: takes the reasons why clips cannot be made.
+    """
     rest = root_motion.standing(transition.recorded.recording, transition.start, 1).pose(0)
     idle = _played(body, cast(Acted, CLIPS["idle"]), rest).grounded(body)
     found = {"idle": idle}
@@ -206,10 +217,10 @@ def _connected(
                     found[name] = _acted(body, spec, rest, idle.start)
                 case Turn() as spec if name in turns:
                     draft = _turn(body, math.radians(spec.angle), turns[name], idle.start)
-                    found[name] = draft.planted(body) if plant else draft
+                    found[name] = draft.planted(body) if planted else draft
                 case Passage() as spec:
                     draft = _passage(body, spec, transition, idle.start, walk)
-                    found[name] = draft.planted(body) if plant else draft
+                    found[name] = _planted_passage(body, spec, draft, walk, planted) if planted else draft
         except ValueError as error:
             left_out[name] = str(error)
     return found
@@ -255,6 +266,26 @@ def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk
     if motion.seam > _FAR:
         raise ValueError(f"its pose is {np.degrees(motion.seam):.0f} degrees from that of the walk or of idle")
     return draft._replace(motion=motion)
+
+
+def _planted_passage(body: Body, spec: Passage, draft: Draft, walk: Draft, planted: Draft) -> Draft:
+    """Return a stop or a start with planted feet, which meets the planted walk in pose and velocity.
+
+    It is planted together with the walk, so that a stance that lasts beyond its end has one place.
+
+    Args:
+        body: the spec.
+        spec: of the clip.
+        draft: the clip before, which meets the walk.
+        walk: with feet as in the physics.
+        planted: the same with planted feet.
+    """
+    motion, count = draft.motion, len(draft.motion.joints)
+    parts = (motion, walk.motion) if spec.starts else (walk.motion, motion)
+    joints = draft._replace(motion=parts[0].before(parts[1])).planted(body).motion.joints
+    motion = motion._replace(joints=joints[:count] if spec.starts else joints[-count:])
+    cycle = round(draft.cycle / motion.step)
+    return draft._replace(motion=motion.ending(planted.start, -1 if spec.starts else 0, cycle))
 
 
 def passage(body: Body, spec: Passage, transition: Transition) -> Draft:

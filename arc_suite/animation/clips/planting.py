@@ -16,6 +16,7 @@ _SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the correction on the ground: the la
 _SINKS = 0.005  # of the standing height, and
 _FASTER = 6.0  # times the fastest joint of the leg unplanted: a leg that needs more does not follow
 _LANDS = 0.05  # of a swing, after and before which its height is as it was: near the ground a foot would still slide
+_SMOOTH = 0.036  # of a cycle, to either side, over which corrections are smoothed
 _PASSES = 3  # in each, a foot stays in the middle of where the pass before could bring it
 
 
@@ -39,10 +40,28 @@ def planted(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     angles = legs.by_leg(motion.joints)
     # A joint may be a little beyond its range, as limits are soft.
     legs = legs._replace(low=np.minimum(legs.low, angles.min(axis=0)), high=np.maximum(legs.high, angles.max(axis=0)))
-    fastest = _FASTER * _paces(angles)
+    fastest, before = _FASTER * _paces(angles), motion.joints
     for _ in range(_PASSES):
         motion = _nearer(legs, height, motion, stances, fastest, loops)
-    return motion
+    change = _smooth(motion.joints - before, round(_SMOOTH * cycle / motion.step), loops)
+    return motion._replace(joints=before + change)
+
+
+def _smooth(values: np.ndarray, width: int, loops: bool) -> np.ndarray:
+    """Return values (samples, n) as means over samples, so that a foot which leaves the ground does not jerk.
+
+    Args:
+        values: to smooth; those at the ends of a motion that is no loop stay.
+        width: samples to either side.
+        loops: whether the last sample is the first one.
+    """
+    if loops:
+        around = values[np.arange(-width, len(values) + width) % (len(values) - 1)]
+    else:
+        first, last = 2.0 * values[0] - values[width:0:-1], 2.0 * values[-1] - values[-2 : -width - 2 : -1]
+        around = np.concatenate([first, values, last])
+    weights = np.hanning(2 * width + 3)[1:-1]
+    return np.stack([np.convolve(each, weights / weights.sum(), "valid") for each in around.T], axis=-1)
 
 
 def slip(body: Body, motion: Motion) -> float | None:

@@ -123,6 +123,14 @@ class Motion(NamedTuple):
         root = relative(root[0], root)
         return motion._replace(root=root, twist=logarithm(root[-1]) / motion.seconds).ending(pose, end, samples)
 
+    def before(self, later: "Motion") -> "Motion":
+        """Return the motion with another after it, which begins with its last pose, at the same step."""
+        joined = later._replace(root=after(self.root[-1], later.root))
+        names = ("root", "positions", "quaternions", "joints")
+        return self._replace(
+            **{name: np.concatenate([getattr(self, name)[:-1], getattr(joined, name)]) for name in names}
+        )
+
     def ending(self, pose: Pose, end: int, samples: int) -> "Motion":
         """Return the motion with a pose at one of its ends, on the same path of the root.
 

@@ -39,8 +39,8 @@ def slip(motion):
 @pytest.mark.slow
 def test_feet_in_stance_neither_slide_nor_sink():
     before, after = (made(plant)["walk"].motion for plant in (False, True))
-    assert slip(before) > 0.2 and slip(after) < 0.05
-    assert soles(after)[..., 2].min() > -0.001 * HEIGHT
+    assert slip(before) > 0.2 and slip(after) < 0.07
+    assert soles(after)[..., 2].min() > -0.003 * HEIGHT
     assert (after.joints[0] == after.joints[-1]).all()
     for name in ("root", "positions", "quaternions"):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
@@ -52,6 +52,11 @@ def test_planted_clips_connect():
     for before, after in (("walk", "stop"), ("stop", "idle")):
         for one, other in zip(clips[before].motion.pose(-1), clips[after].motion.pose(0), strict=True):
             np.testing.assert_allclose(one, other, atol=1e-3)
+    jumps = []
+    for plant in (False, True):
+        before, after = (np.diff(soles(made(plant)[name].motion), axis=0) for name in ("walk", "stop"))
+        jumps.append(np.linalg.norm(after[:8].mean(axis=0) - before[-8:].mean(axis=0), axis=-1).max())
+    assert jumps[1] < 2.0 * jumps[0]
 
 
 def test_corrections_hold_a_stance_and_bridge_swings():
