@@ -33,6 +33,7 @@ export class Chase {
     const height = clamp(Math.asin(away.z / size) + rise, ...RISES);
     away.set(Math.cos(height) * Math.cos(azimuth), Math.cos(height) * Math.sin(azimuth), Math.sin(height));
     position.copy(target).addScaledVector(away, size);
+    this.view.controls.update();
   }
 
   // Turns towards a heading, rad, for some seconds.

@@ -15,7 +15,8 @@ export class Goals {
       new THREE.Mesh(new THREE.TorusGeometry(reach, 0.06 * height, 8, 64), look),
       new THREE.Mesh(beam, faint),
     );
-    this.arrow = new THREE.Mesh(new THREE.ConeGeometry(0.15 * height, 0.5 * height, 16).rotateZ(-Math.PI / 2), look);
+    const flat = new THREE.ConeGeometry(0.22 * height, 0.9 * height, 16).rotateZ(-Math.PI / 2).scale(1, 1, 0.15);
+    this.arrow = new THREE.Mesh(flat, look);
     this.group = new THREE.Group().add(this.goal, this.arrow);
     this.number = null;
   }

@@ -44,7 +44,7 @@ class Play {
     [this.figure] = this.figures;
     this.parts = this.figure.parts;
     this.floor = made(field ? triangles(field) : new THREE.PlaneGeometry(100 * height, 100 * height), 1);
-    this.spheres = contact(this.floor.material, 1 + body.feet.length, 3 * body.reach);
+    this.spheres = contact(this.floor.material, 1 + body.feet.length, 2 * body.reach);
     this.spheres[0].w = 0.8 * breadth(this.parts[0]);
     this.steps = new Steps(body, this.parts);
     this.traces = new Traces(height, this.simulation.task.ground);

@@ -1,7 +1,7 @@
 // What steps leave behind: footprints, and dust that settles.
 import * as THREE from "three";
 
-const PRINTS = 160, GRAINS = 120, BURST = 8; // at most; grains of a step
+const PRINTS = 300, GRAINS = 120, BURST = 8; // at most; grains of a step
 const LIFE = 0.8, DRAG = 4; // s, 1/s
 const COLOR = [0.62, 0.58, 0.52]; // of dust
 const GOLDEN = 2.39996; // rad from grain to grain

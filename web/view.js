@@ -25,7 +25,7 @@ export class View {
     this.scene.add(this.sun, this.sun.target);
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.shadowMap.enabled = true;
-    this.renderer.setPixelRatio(window.devicePixelRatio);
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2)); // more cannot be told apart
     this.camera = new THREE.PerspectiveCamera(35, 1, 0.02 * height, 100 * height);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
