@@ -15,38 +15,38 @@ _DEEPEST = 0.03  # standing heights, that a sole may be below the ground
 _STARTS = 4  # phases of a loop in which a clip that is not in step with it begins
 
 
-def bases(body: Body, name: str, motions: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose) -> list[str]:
+def bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose) -> list[str]:
     """Return the names of the loops over which an additive clip brings no sole deeper than 0.03 standing heights.
 
     Args:
         body: the spec.
         name: of the additive clip, of `catalogue.ADDITIVE`.
-        motions: of the clips, by name, with frames of one rate.
+        motion: of each clip, by name, with frames of one rate.
         loops: whether each of them loops.
         idle: first pose of the idle clip, which engines subtract.
     """
     return [
         base
-        for base in motions
-        if loops[base] and base not in ADDITIVE and _depth(body, name, base, motions, idle) <= _DEEPEST
+        for base in motion
+        if loops[base] and base not in ADDITIVE and _depth(body, name, base, motion, idle) <= _DEEPEST
     ]
 
 
-def added(clip: Motion, idle: Pose, base: Motion, rows: np.ndarray) -> np.ndarray:
-    """Return the poses (frames, 7 + joints) of a clip added to given samples (frames,) of another, over a root at 0."""
+def added(clip: Motion, idle: Pose, base: Motion, indices: np.ndarray) -> np.ndarray:
+    """Return the poses (frames, 7 + joints) of a clip added to samples (frames,) of another, over a root at 0."""
     turns = rotations.product(clip.quaternions, idle.quaternion * (1.0, -1.0, -1.0, -1.0))
-    positions = base.positions[rows] + clip.positions - idle.position
-    joints = base.joints[rows] + clip.joints - idle.joints
-    return np.concatenate([positions, rotations.product(turns, base.quaternions[rows]), joints], axis=-1)
+    positions = base.positions[indices] + clip.positions - idle.position
+    joints = base.joints[indices] + clip.joints - idle.joints
+    return np.concatenate([positions, rotations.product(turns, base.quaternions[indices]), joints], axis=-1)
 
 
-def _depth(body: Body, name: str, base: str, motions: Mapping[str, Motion], idle: Pose) -> float:
+def _depth(body: Body, name: str, base: str, motion: Mapping[str, Motion], idle: Pose) -> float:
     """Return how deep a sole is below the ground, standing heights."""
-    clip, under = motions[name], motions[base]
+    clip, under = motion[name], motion[base]
     frames, around = np.arange(len(clip.joints)), len(under.joints) - 1
     if name == "limp" and isinstance(CLIPS[base], WalkLoop):  # in step
         starts = np.round(frames * around / frames[-1]).astype(int)[None]
     else:
         starts = frames + np.arange(_STARTS)[:, None] * around // _STARTS
-    poses = np.concatenate([added(clip, idle, under, rows % around) for rows in starts])
+    poses = np.concatenate([added(clip, idle, under, each % around) for each in starts])
     return -float(sole_heights(compiled(body), body, poses).min()) / body.torso.standing_height

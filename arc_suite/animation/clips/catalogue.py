@@ -103,7 +103,7 @@ CLIPS: dict[str, WalkLoop | Passage | Turn | Acted | Difference | Showcase] = {
     "stop": Passage(starts=False, cycles=3),
     "turn_180": Turn(180.0),
     "idle": Acted(gestures.idle, (0,), loops=True),
-    "idle_look": Acted(gestures.look, (0, -1), loops=True),
+    "idle_look": Acted(gestures.glance, (0, -1), loops=True),
     "idle_settle": Acted(gestures.settle, (0, -1), loops=True, steps=True),
     "crouch_walk": WalkLoop((0.6, 0.0, 0.0), crouch=0.3),
     "lean_left": Acted(functools.partial(gestures.turned, number="roll", sign=-1.0), (0, -1)),

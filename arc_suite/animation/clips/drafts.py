@@ -21,7 +21,7 @@ from arc_suite.animation.clips.catalogue import (
     WalkLoop,
     sources,
 )
-from arc_suite.animation.clips.foot_contacts import LEAST_LIFT, TOUCH_DOWN, FootContact, foot_contacts, sole_heights
+from arc_suite.animation.clips.foot_contacts import LEAST_RISE, TOUCH_DOWN, FootContact, foot_contacts, sole_heights
 from arc_suite.animation.clips.recorder import Recorded, Recorder, Transition, Turned
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
@@ -62,7 +62,7 @@ class Draft(NamedTuple):
         heights = sole_heights(compiled(body), body, self.motion.poses())
         if self.stands:
             return float(np.median(heights)), []
-        least = LEAST_LIFT if self.cycles else _RAISED
+        least = LEAST_RISE if self.cycles else _RAISED
         found, stance = foot_contacts(self.motion, body, heights, self.cycle, self.loops, least)
         return float(np.median(heights[stance])) if stance.any() else 0.0, found
 

@@ -16,7 +16,7 @@ TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
 # lower one.
 _RISES, _LASTS = 0.5, 0.2
 _BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
-LEAST_LIFT = 0.005  # of the standing height: a foot that rises less never leaves the ground
+LEAST_RISE = 0.005  # of the standing height: a foot that rises less never leaves the ground
 _NEAR = 0.005  # of the standing height: a sole that is lower touches
 
 
@@ -109,7 +109,7 @@ def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def foot_contacts(
-    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, least: float = LEAST_LIFT
+    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, least: float = LEAST_RISE
 ) -> tuple[list[FootContact], np.ndarray]:
     """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
 

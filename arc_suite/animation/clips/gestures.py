@@ -82,7 +82,7 @@ def idle(body: Body, rest: Pose) -> Motion:
     return _looped(_posed(body, rest, poses, over_feet(body, rest, poses)[0]))
 
 
-def look(body: Body, rest: Pose) -> Motion:
+def glance(body: Body, rest: Pose) -> Motion:
     """Return a standing body that looks to either side and down, as a loop.
 
     Raises:
