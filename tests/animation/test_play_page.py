@@ -438,7 +438,7 @@ def test_everything_has_its_place(browser, page, width, height):
     tab.evaluate("document.getElementById('direction').open = true")
     panel = tab.locator("#direction > div").bounding_box()
     assert panel["x"] >= 0 and panel["y"] + panel["height"] <= height
-    for control in tab.locator("button, select, input").filter(visible=True).all():
+    for control in tab.locator("button, select, input, summary").filter(visible=True).all():
         box = control.bounding_box()
         assert min(box["width"], box["height"]) >= (40 if touch else 24)
         named = control.evaluate("each => (each.labels?.[0] ?? each).textContent.trim()")
