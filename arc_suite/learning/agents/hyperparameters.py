@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from arc_suite import checks
 
 _POSITIVE = (1e-6, 1e3)
-# Contact forces are 114 to 150 numbers, without which every learner is better: docs/algorithms.md.
+# Contact forces are 114 to 150 numbers, without which learners that act are better: docs/algorithms.md.
 UNSEEN = ("contact_forces",)
 
 
@@ -161,7 +161,7 @@ class BehaviourCloning:
     batch: int = 256
     hidden: int = 256
     learning_rate: float = 1e-3
-    exclude_blocks: tuple[str, ...] = UNSEEN
+    exclude_blocks: tuple[str, ...] = ()
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""

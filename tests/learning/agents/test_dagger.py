@@ -99,12 +99,12 @@ def test_a_run_of_any_body(tmp_path):
     setup, folder = Setup.of(generator.random_body(0), "walk", {"time_limit": 1.0}), tmp_path / "run"
     assert train(Configuration.of(setup, "dagger", SMALL, steps=160, evaluate_every=160), folder)
     assert len(run_folder.table(folder, "evaluations")["return"]) == 10
-    assert network.load(folder).setup == setup
+    assert network.load(folder).setup == setup.with_settings({"exclude_blocks": ["contact_forces"]})
 
 
 def test_a_run_on_trenches(tmp_path):
     """The demonstrator remembers the ground as it saw it: at -inf where it has seen none yet."""
     setup, folder = Setup.of("tick", "gaps", {"time_limit": 1.0}), tmp_path / "run"
-    assert train(Configuration.of(setup, "dagger", SMALL, steps=160, evaluate_every=160), folder)
+    assert train(Configuration.of(setup, "dagger", SMALL, steps=40, evaluate_every=40), folder)
     with np.load(folder / run_folder.CHECKPOINT) as checkpoint:
         assert any(np.isneginf(array).any() for name, array in checkpoint.items() if name.startswith("teacher/"))

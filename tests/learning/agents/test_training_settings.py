@@ -28,7 +28,7 @@ def test_a_configuration_holds_both():
     assert run.command.endswith(" --set=time_limit=1.0 '--train_set=friction=[0.5, 1.0]' --train_set=kicks=1.5")
 
 
-@pytest.mark.parametrize("name", ["ppo", "finetune", "dagger", "bc", "sac_parallel"])
+@pytest.mark.parametrize("name", ["ppo", "finetune", "dagger", "sac_parallel", "xqc"])
 def test_networks_leave_out_contact_forces_by_default(name):
     run = Configuration.of(STEER, name)
     assert "contact_forces" in run.setup.definition.sizes
