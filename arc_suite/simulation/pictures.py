@@ -64,8 +64,17 @@ class Decorated(dm_mujoco.Physics):
     markers: Iterable[Marker] = ()
 
     @classmethod
-    def from_body(cls, body: Body, arena: Arena = FLAT, quality: Quality = QUALITIES["fast"]) -> "Decorated":
-        """Compile the decorated body in an arena, for pictures of a quality."""
+    def from_body(
+        cls, body: Body, arena: Arena = FLAT, quality: Quality = QUALITIES["fast"], ground: tuple | None = None
+    ) -> "Decorated":
+        """Compile the decorated body in an arena, for pictures of a quality.
+
+        Args:
+            body: the spec.
+            arena: where it stands.
+            quality: of the pictures.
+            ground: red, green, blue and alpha of a ground without a grid; None keeps the grid.
+        """
         decorated = cls.from_model(wrapper.MjModel(models.parsed(body, arena, decorated=True).compile()))
         drawing = decorated.model.vis.quality
         drawing.shadowsize, drawing.offsamples = quality.shadows, quality.samples
@@ -74,6 +83,9 @@ class Decorated(dm_mujoco.Physics):
         if not quality.ornaments:
             groups = decorated.model.geom_group
             groups[groups > 0] = mujoco.mjNGROUP - 1  # which pictures leave out
+        if ground is not None:
+            still = decorated.model.geom_bodyid == 0
+            decorated.model.geom_matid[still], decorated.model.geom_rgba[still] = -1, ground
         decorated._legs = _legs(body, decorated.model.ptr)
         decorated._colours = decorated.model.geom_rgba.copy()
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()

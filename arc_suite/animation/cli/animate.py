@@ -1,13 +1,16 @@
-"""Make animation clips for game engines (.glb), and their metrics (.clips.json).
+"""Make animation clips for game engines (.glb) with their metrics (.clips.json), films and sheets of sprites.
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
   arc-suite animate --legs 8 --links 3 --rig nodes --clips all --output spider.glb
   arc-suite animate --policy runs/queen-steer-dagger-0 --output queen.glb
+  arc-suite animate --robot queen --clips walk --turntable --transparent --output queen.webp
+  arc-suite animate --spec spider --clips walk --fps 12 --size 128 --directions 8 --output sprites.png
 
 One policy makes all clips, each under a command of its own. Loops begin at the same phase of the gait and hold the same
 number of cycles. start and stop connect idle and walk. tuned and refined are presets of the four robots' demonstrators,
-with a gait of their own. A clip that cannot be made is left out with a line.
+with a gait of their own. A clip that cannot be made is left out with a line. A film (.mp4, .gif, .webp) shows one
+clip, in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction.
 """
 
 import functools
@@ -18,10 +21,22 @@ from absl import flags
 
 from arc_suite import checks, files
 from arc_suite.animation import clips as export
+from arc_suite.animation.clips import filming
 from arc_suite.cli.flags import define_walk, only_setup, policy_name
 from arc_suite.cli.program import VERSION, progress
+from arc_suite.envs.setup import Setup
+from arc_suite.models.visuals.scene import MAX_HEIGHT
+from arc_suite.simulation import films
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
+_FILMS = (".mp4", ".gif", ".webp")
+_CLEAR = (".webp", ".png")  # with an alpha
+_OWN = {  # flags that are for some files alone
+    **dict.fromkeys(("rig", "root_motion", "triangles", "uv", "reduce"), (".glb",)),
+    **{"transparent": _CLEAR, "turntable": _FILMS, "directions": (".png",), "size": (*_FILMS, ".png")},
+}
+_GIF_FPS = 50
+_WIDEST = 16384  # pixels of a sheet
 _CONVERTED = (".fbx", ".bvh", ".blend")  # what tools/to_fbx.py writes
 
 FLAGS = flags.FLAGS
@@ -39,11 +54,15 @@ flags.DEFINE_bool("plant", False, "Feet in stance stay where they are, by invers
 flags.DEFINE_integer("triangles", None, "At most so many, for creatures far away: 3000 fits most bodies.", 1)
 flags.DEFINE_bool("uv", False, "Faces have places in a texture, to be painted.")
 flags.DEFINE_bool("reduce", False, "Leave out keys that lines between others replace within 0.1 degrees.")
-flags.DEFINE_string("output", None, "File to write, .glb. Required.", short_name="o")
+flags.DEFINE_integer("size", 480, "Of films: width and height, in pixels.", 16, MAX_HEIGHT)
+flags.DEFINE_bool("transparent", False, "Of films and sheets, .webp or .png: the body alone.")
+flags.DEFINE_bool("turntable", False, "Of films: the body turns once while its clip is repeated.")
+flags.DEFINE_integer("directions", 8, "Of sheets: rows; the first goes to the right, the next to its left.", 1, 64)
+flags.DEFINE_string("output", None, "File to write, .glb, .mp4, .gif, .webp or .png. Required.", short_name="o")
 
 
 def main() -> None:
-    """Record, write both files and print a row for each clip."""
+    """Record and write what the extension asks for."""
     checks.name(FLAGS.rig, export.RIGS, "rig")
     checks.name(FLAGS.root_motion, export.ROOT_MOTIONS, "root_motion")
     setup = only_setup()
@@ -53,18 +72,53 @@ def main() -> None:
         raise ValueError(
             f"{FLAGS.output}: this program writes .glb; tools/to_fbx.py makes {extension} of it, by Blender"
         )
-    checks.extension(FLAGS.output, [".glb"])
+    extension = checks.extension(FLAGS.output, [".glb", *_FILMS, ".png"])
+    for flag, extensions in _OWN.items():
+        if FLAGS[flag].present and extension not in extensions:
+            raise ValueError(f"--{flag}: it is for {' and '.join(extensions)}, not for {extension}")
+    if extension == ".glb":
+        write_file(setup)
+    else:
+        write_pictures(setup, extension)
+
+
+def write_file(setup: Setup) -> None:
+    """Write clips and their metrics, and print a row for each clip."""
     sidecar = Path(FLAGS.output).with_suffix(".clips.json")
     names = list(export.CLIPS) if FLAGS.clips == [export.ALL] else FLAGS.clips
     with files.writing(FLAGS.output) as temporary, files.writing_json(sidecar) as metrics:
-        recording = functools.partial(progress, desc="recording", unit="clip", leave=False)
-        policy = policy_name(FLAGS.policy), FLAGS.preset
-        clips = export.clips(setup, names, *policy, FLAGS.fps, recording, FLAGS.straight, FLAGS.plant)
+        clips = recorded(setup, names)
         look = FLAGS.triangles, FLAGS.uv, FLAGS.reduce
         temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION, *look))
         metrics |= export.sidecar(setup.body, clips, FLAGS.root_motion)
     print_table(clips)
     print(f"wrote {FLAGS.output} and {sidecar}")
+
+
+def write_pictures(setup: Setup, extension: str) -> None:
+    """Write a film or a sheet of one clip."""
+    if len(FLAGS.clips) != 1 or FLAGS.clips == [export.ALL]:
+        raise ValueError(f"--clips={','.join(FLAGS.clips)}: expected one clip for {extension}")
+    if extension == ".gif" and FLAGS.fps > _GIF_FPS:
+        raise ValueError(f"--fps={FLAGS.fps:g}: expected at most {_GIF_FPS} for a GIF")
+    with files.writing(FLAGS.output) as temporary:
+        (clip,) = recorded(setup, FLAGS.clips)
+        if extension == ".png":
+            if (width := FLAGS.size * len(clip.times)) > _WIDEST:
+                raise ValueError(f"the sheet is {width} pixels wide, more than {_WIDEST}; lower --fps or --size")
+            sheet = filming.sheet(setup.body, clip, FLAGS.size, FLAGS.directions, FLAGS.transparent)
+            films.write_png(temporary, [sheet], 0.0)
+        else:
+            frames = filming.loop(setup.body, clip, FLAGS.size, FLAGS.transparent, FLAGS.turntable)
+            films.WRITERS[extension](temporary, progress(frames, "rendering", leave=False), clip.motion.step)
+    print(f"wrote {FLAGS.output}")
+
+
+def recorded(setup: Setup, names: list[str]) -> list[export.Clip]:
+    """Return the clips that the flags ask for."""
+    recording = functools.partial(progress, desc="recording", unit="clip", leave=False)
+    policy = policy_name(FLAGS.policy), FLAGS.preset
+    return export.clips(setup, names, *policy, FLAGS.fps, recording, FLAGS.straight, FLAGS.plant)
 
 
 def print_table(clips: list[export.Clip]) -> None:
