@@ -1,4 +1,4 @@
-"""Make animation clips for game engines (.glb) with their metrics (.clips.json), films and sheets of sprites.
+"""Make animation clips for game engines (.glb), films and sheets of sprites of one.
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
@@ -7,10 +7,11 @@
   arc-suite animate --robot queen --clips walk --turntable --transparent --output queen.webp
   arc-suite animate --spec spider --clips walk --fps 12 --size 128 --directions 8 --output sprites.png
 
-One policy makes all clips, each under a command of its own. Loops begin at the same phase of the gait and hold the same
-number of cycles. start and stop connect idle and walk. tuned and refined are presets of the four robots' demonstrators,
-with a gait of their own. A clip that cannot be made is left out with a line. A film (.mp4, .gif, .webp) shows one
-clip, in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction.
+Metrics go to .clips.json. One policy makes all clips, each under a command of its own. Loops begin at the same phase
+of the gait and hold the same number of cycles. start and stop connect idle and walk. tuned and refined are presets of
+the four robots' demonstrators, with a gait of their own. A clip that cannot be made is left out with a line. A film
+(.mp4, .gif, .webp) shows one clip, in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row
+of frames for each direction.
 """
 
 import functools
