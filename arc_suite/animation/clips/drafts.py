@@ -217,10 +217,10 @@ def _connected(
                     found[name] = _acted(body, spec, rest, idle.start)
                 case Turn() as spec if name in turns:
                     draft = _turn(body, math.radians(spec.angle), turns[name], idle.start)
-                    found[name] = draft.planted(body) if planted else draft
+                    found[name] = _planted_turn(body, draft, idle.start) if planted else draft
                 case Passage() as spec:
                     draft = _passage(body, spec, transition, idle.start, walk)
-                    found[name] = _planted_passage(body, spec, draft, walk, planted) if planted else draft
+                    found[name] = _planted_passage(body, spec, draft, idle.start, walk, planted) if planted else draft
         except ValueError as error:
             left_out[name] = str(error)
     return found
@@ -268,15 +268,22 @@ def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk
     return draft._replace(motion=motion)
 
 
-def _planted_passage(body: Body, spec: Passage, draft: Draft, walk: Draft, planted: Draft) -> Draft:
-    """Return a stop or a start with planted feet, which meets the planted walk in pose and velocity.
+def _planted_turn(body: Body, draft: Draft, idle: Pose) -> Draft:
+    """Return a turn with planted feet, which meets idle."""
+    motion, cycle = draft.planted(body).motion, round(draft.cycle / draft.motion.step)
+    return draft._replace(motion=motion.ending(idle, 0, cycle).ending(idle, -1, cycle))
+
+
+def _planted_passage(body: Body, spec: Passage, draft: Draft, idle: Pose, walk: Draft, planted: Draft) -> Draft:
+    """Return a stop or a start with planted feet, which meets idle, and the planted walk in pose and velocity.
 
     It is planted together with the walk, so that a stance that lasts beyond its end has one place.
 
     Args:
         body: the spec.
         spec: of the clip.
-        draft: the clip before, which meets the walk.
+        draft: the clip before, which meets idle and the walk.
+        idle: first pose of idle.
         walk: with feet as in the physics.
         planted: the same with planted feet.
     """
@@ -284,8 +291,8 @@ def _planted_passage(body: Body, spec: Passage, draft: Draft, walk: Draft, plant
     parts = (motion, walk.motion) if spec.starts else (walk.motion, motion)
     joints = draft._replace(motion=parts[0].before(parts[1])).planted(body).motion.joints
     motion = motion._replace(joints=joints[:count] if spec.starts else joints[-count:])
-    cycle = round(draft.cycle / motion.step)
-    return draft._replace(motion=motion.ending(planted.start, -1 if spec.starts else 0, cycle))
+    cycle, still, going = round(draft.cycle / motion.step), *((0, -1) if spec.starts else (-1, 0))
+    return draft._replace(motion=motion.ending(idle, still, cycle).ending(planted.start, going, cycle))
 
 
 def passage(body: Body, spec: Passage, transition: Transition) -> Draft:

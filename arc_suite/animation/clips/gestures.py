@@ -19,7 +19,7 @@ from arc_suite.robots.spec import Body
 _STAGES, _ROUNDS = 8, 6  # in which poses grow from rest, so that no leg folds the other way; searches in each
 _FASTEST = 7.0  # rad / sqrt(h / g), that a joint turns
 _WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of a sole's place: legs of two joints slide rather than sink
-_ASTRAY = 0.01  # standing heights, by which a sole may be from its place in a gesture at full size
+_ASTRAY = 0.0055  # standing heights, by which a sole may be from its place in a gesture at full size
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)  # of a gesture's size: the largest is taken that the legs can follow
 _DEEPER = (1.0, 1.6)  # times the height it sinks by, as stretched legs cannot follow a tilt
 _SINKS, _SLIDES = 0.01, 0.08  # standing heights, by which a sole may then miss its place in height and on the ground

@@ -51,7 +51,7 @@ def test_planted_clips_connect():
     clips = made(True)
     for before, after in (("walk", "stop"), ("stop", "idle")):
         for one, other in zip(clips[before].motion.pose(-1), clips[after].motion.pose(0), strict=True):
-            np.testing.assert_allclose(one, other, atol=1e-3)
+            np.testing.assert_allclose(one, other, atol=1e-6)
     jumps = []
     for plant in (False, True):
         before, after = (np.diff(soles(made(plant)[name].motion), axis=0) for name in ("walk", "stop"))
