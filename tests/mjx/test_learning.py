@@ -73,7 +73,8 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
 
 def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path):
     setup = Setup.of("leaper", "walk", {"time_limit": 0.5})
-    run = Configuration.of(setup, "ppo", SMALL | {"simulation": "mjx"}, steps=48, evaluate_every=48)
+    more = {"simulation": "mjx", "critic_blocks": ["velocity"], "noise_correlation": 0.5}
+    run = Configuration.of(setup, "ppo", SMALL | more, steps=48, evaluate_every=48)
     assert train(run, tmp_path / "whole")
     assert not train(run, tmp_path / "parts", minutes=1e-9)  # stops before the first slice
     slices = on_policy.learn(run.hyperparameters, run.context(tmp_path))
