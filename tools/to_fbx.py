@@ -21,7 +21,10 @@ import sys
 import tempfile
 from typing import Any
 
-import bpy
+try:
+    import bpy
+except ImportError as error:
+    sys.exit(f"to_fbx: {error}: pip install bpy==5.0.1, in an environment of its own")
 import numpy as np
 
 FPS = 60  # clips last whole frames at this rate
