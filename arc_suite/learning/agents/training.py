@@ -40,7 +40,7 @@ def train(
         progress: makes a progress bar as `tqdm` does.
         on_metrics: called after each line of training.csv, and after each evaluation, with the environment step and
             metrics by name; the metric of an evaluation is `return`.
-        stop: returns whether to stop; asked before the first slice and after each checkpoint.
+        stop: returns whether to stop; asked as soon as there is a checkpoint, and after each.
 
     Returns:
         Whether the run is finished.
@@ -74,8 +74,9 @@ def train(
             total=context.steps, initial=state["evaluated"], desc=Path(folder).name, unit="step", unit_scale=True
         )
         stack.enter_context(bar)
+        saved = run_files.arrays is not None
         while state["evaluated"] < context.steps:
-            if stop() or (minutes is not None and time.process_time() - cpu > 60.0 * minutes):
+            if (saved and stop()) or (minutes is not None and time.process_time() - cpu > 60.0 * minutes):
                 return False
             try:
                 found = next(slices)
@@ -99,6 +100,7 @@ def train(
                 seconds = {f"{name}_seconds": round(state[name], 3) for name in ("wall", "cpu")}
                 run_files.append("times", {"step": found.step, **seconds})
             run_files.save(found.checkpoint, state)
+            saved = True
     return True
 
 
