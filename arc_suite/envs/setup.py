@@ -123,6 +123,12 @@ class Setup:
         return json.loads(self.settings_json)
 
     @property
+    def excluded_blocks(self) -> tuple[str, ...]:
+        """Names of the blocks that the task leaves out of the observation."""
+        names = self.task_kwargs.get("exclude_blocks", ())
+        return (names,) if isinstance(names, str) else tuple(names)
+
+    @property
     def kind(self) -> type[Task]:
         """Class of the task, with its name and version."""
         return registry.task_of(self.task)

@@ -72,7 +72,7 @@ class Network(NamedTuple):
         Raises:
             ValueError: other blocks than those.
         """
-        excluded = _excluded(self.setup)
+        excluded = self.setup.excluded_blocks
         sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
             names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
@@ -80,12 +80,6 @@ class Network(NamedTuple):
             raise ValueError(f"policy of {self.setup.kind.name}: the observation does not fit: {wrong}")
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
-
-
-def _excluded(setup: Setup) -> tuple[str, ...]:
-    """Return the names of the blocks that a task leaves out."""
-    names = setup.task_kwargs.get("exclude_blocks", ())
-    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def save(path: str | os.PathLike, network: Network) -> None:
@@ -124,7 +118,7 @@ def load(path: str | os.PathLike) -> Network:
         arrays = {name: a.astype(np.float32) if a.dtype == np.float16 else a for name, a in arrays.items()}
         graph = checked(Graph(nodes, arrays), sum(blocks.values()))
         setup = Setup.from_dict(known)
-        _ = _excluded(setup)  # finds out at once whether they are names
+        _ = setup.excluded_blocks  # finds out at once whether they are names
         return Network(graph, setup, blocks, seed_ranges.from_json(known.get("training_seeds")))
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from arc_suite import checks, versions
 from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
+from arc_suite.learning.agents.hyperparameters import UNSEEN, BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
 
 
 class Algorithm(NamedTuple):
@@ -84,7 +84,7 @@ _PARALLEL = SoftActorCritic(
     target_entropy=-0.6,
     symmetry_augmentation=True,
     normalize=True,
-    exclude_blocks=("contact_forces",),
+    exclude_blocks=UNSEEN,
 )
 
 

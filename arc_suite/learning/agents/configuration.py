@@ -13,6 +13,7 @@ import numpy as np
 from arc_suite import checks, evaluation, files, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
+from arc_suite.learning.agents.hyperparameters import UNSEEN
 from arc_suite.learning.agents.learner import MOST_SEEDS, RunContext
 from arc_suite.tasks.contract import CURRICULUM
 
@@ -78,7 +79,7 @@ class Configuration:
             those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
             raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
         left_out = getattr(definition.hyperparameters, "exclude_blocks", ())
-        if setup.several and set(left_out) - {"contact_forces"}:
+        if setup.several and set(left_out) - set(UNSEEN):
             raise ValueError(f"exclude_blocks: expected none with several bodies, got {', '.join(left_out)}")
         steps = definition.steps_of(setup) if steps is None else steps
         evaluate_every = definition.evaluate_every if evaluate_every is None else evaluate_every
@@ -123,9 +124,8 @@ class Configuration:
         if not names or self.setup.several:  # the inputs of several bodies are always the same
             return {}
         there = self.setup.judging().definition.sizes
-        kept = self.setup.task_kwargs.get("exclude_blocks", ())
-        own = [kept] if isinstance(kept, str) else list(kept)
-        found = own + [name for name in names if name in there and name not in own]
+        own = self.setup.excluded_blocks
+        found = [*own, *(name for name in names if name in there and name not in own)]
         return {"exclude_blocks": found} if found else {}
 
     @property
