@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite.animation.clips import planting
-from arc_suite.animation.clips.catalogue import CLIPS, DEFAULT, WalkLoop
+from arc_suite.animation.clips.catalog import CLIPS, DEFAULT, WalkLoop
 from arc_suite.animation.clips.drafts import drafts, passage
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.envs.setup import Setup

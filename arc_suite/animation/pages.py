@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import versions
-from arc_suite.animation.colours import of_terms
+from arc_suite.animation.colors import of_terms
 from arc_suite.animation.parts import parts as described
 from arc_suite.animation.scenery import scenery
 from arc_suite.models.outline import outline

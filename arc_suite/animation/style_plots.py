@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from arc_suite.animation.colours import BLUE, FAINT, INK, PALE, VERMILION, of_terms
+from arc_suite.animation.colors import BLUE, FAINT, INK, PALE, VERMILION, of_terms
 from arc_suite.style import metrics
 from arc_suite.style.tracks import Track
 

@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips.catalogue import CLIPS
+from arc_suite.animation.clips.catalog import CLIPS
 from arc_suite.envs.setup import Setup
 from arc_suite.models.importing import imported
 from arc_suite.robots import ROBOTS, generator, spec_files

@@ -14,7 +14,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import collecting, inputs, on_policy, worlds
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import policy
 from arc_suite.tasks import command

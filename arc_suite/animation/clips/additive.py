@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS, WalkLoop
+from arc_suite.animation.clips.catalog import ADDITIVE, CLIPS, WalkLoop
 from arc_suite.animation.clips.foot_contacts import sole_heights
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
@@ -20,7 +20,7 @@ def bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[st
 
     Args:
         body: the spec.
-        name: of the additive clip, of `catalogue.ADDITIVE`.
+        name: of the additive clip, of `catalog.ADDITIVE`.
         motion: of each clip, by name, with frames of one rate.
         loops: whether each of them loops.
         idle: first pose of the idle clip, which engines subtract.

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.animation.clips import additive, planting
-from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS
+from arc_suite.animation.clips.catalog import ADDITIVE, CLIPS
 from arc_suite.animation.clips.drafts import Draft, drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
 from arc_suite.animation.clips.recorder import Recorder

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips import loops, planting, root_motion
-from arc_suite.animation.clips.catalogue import (
+from arc_suite.animation.clips.catalog import (
     CLIPS,
     PACES,
     REST,
@@ -89,7 +89,7 @@ def drafts(
 
     Args:
         recorder: of the body.
-        names: of `catalogue.CLIPS`.
+        names: of `catalog.CLIPS`.
         progress: wraps the recordings.
         left_out: takes the reasons why clips cannot be made, by name.
         straight: whether loops that do not turn go exactly where their commands say.

@@ -4,7 +4,7 @@ import collections
 from collections.abc import Sequence
 from typing import Any
 
-from arc_suite.animation.clips.catalogue import CLIPS, WalkLoop
+from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
 from arc_suite.robots.spec import Body

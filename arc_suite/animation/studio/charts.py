@@ -4,7 +4,7 @@ import numpy as np
 import viser
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
-from arc_suite.animation.colours import BLUE, INK, PALE, VERMILION, of_terms
+from arc_suite.animation.colors import BLUE, INK, PALE, VERMILION, of_terms
 from arc_suite.animation.studio.history import History
 
 _HEIGHT = 190  # of a chart, pixels

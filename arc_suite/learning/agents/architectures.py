@@ -13,7 +13,7 @@ import numpy as np
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import networks
-from arc_suite.learning.agents.normaliser import Moments, Normalizer
+from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.policies.graph import Graph
 from arc_suite.policies.tracing import perceptron, traced
 from arc_suite.tasks import Task, tokens

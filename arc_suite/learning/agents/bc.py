@@ -13,7 +13,7 @@ from arc_suite.learning.agents import architectures, dagger, networks, priors
 from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.hyperparameters import BehaviourCloning
 from arc_suite.learning.agents.learner import RunContext, Slice, generator, restoring
-from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.normalizer import Moments
 
 SLICE = 500  # updates
 

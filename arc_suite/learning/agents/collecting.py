@@ -9,7 +9,7 @@ from arc_suite.learning.agents import architectures, inputs, learner
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext, generator
-from arc_suite.learning.agents.normaliser import Normalizer
+from arc_suite.learning.agents.normalizer import Normalizer
 
 # Names of the arrays of a rollout.
 TRANSITIONS = ("observations", "actions", "means", "rewards", "terminated", "ended", "next_observations")

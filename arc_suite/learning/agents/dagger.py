@@ -19,7 +19,7 @@ from arc_suite.learning.agents import architectures, learner, networks
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import DAgger
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
-from arc_suite.learning.agents.normaliser import Moments, Normalizer
+from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.learning.teachers import Teacher
 
 CHUNK = 20  # updates of one call

@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.replay import Transitions
 from arc_suite.policies.graph import Graph
 from arc_suite.policies.tracing import perceptron, traced

@@ -20,7 +20,7 @@ from arc_suite.learning.agents import soft_actor_critic as sac
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.inputs import Inputs
 from arc_suite.learning.agents.learner import Diverged, RunContext, Slice, generator
-from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.replay import Protected, Replay, Transitions
 from arc_suite.learning.agents.stopping import Patience
 

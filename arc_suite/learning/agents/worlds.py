@@ -14,7 +14,7 @@ from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.collecting import TRANSITIONS, ages, correlated
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
-from arc_suite.learning.agents.normaliser import Normalizer
+from arc_suite.learning.agents.normalizer import Normalizer
 
 _IMPLEMENTATIONS = {"mjx": "jax", "warp": "warp"}
 

@@ -16,7 +16,7 @@ import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import drafts, foot_contacts, recordings
-from arc_suite.animation.clips.catalogue import CLIPS, WalkLoop
+from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.gestures import HITS
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy

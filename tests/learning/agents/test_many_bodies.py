@@ -13,7 +13,7 @@ from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import architectures
 from arc_suite.learning.agents.architectures import PerLeg
 from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network, policy
 from arc_suite.policies.tracing import traced

@@ -20,7 +20,7 @@ from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
-from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
 from arc_suite.robots import generator

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from arc_suite.learning.agents.normaliser import LIMIT, Moments
+from arc_suite.learning.agents.normalizer import LIMIT, Moments
 
 
 def test_moments_of_parts_are_those_of_the_whole():
