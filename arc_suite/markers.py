@@ -13,11 +13,11 @@ class Marker(NamedTuple):
         start: (3,) of its axis in the world, m.
         end: (3,) of its axis, or of an arrow's tip, in the world, m.
         radius: m; of an arrow's shaft.
-        colour: red, green, blue and opacity, 0 to 1.
+        color: red, green, blue and opacity, 0 to 1.
     """
 
     shape: str
     start: np.ndarray
     end: np.ndarray
     radius: float
-    colour: tuple[float, float, float, float]
+    color: tuple[float, float, float, float]

@@ -48,7 +48,7 @@ def register(
             walk's. Noise that walk does not set, and all parameters without walk's, are fitted to the body.
         presets: of the robot's demonstrators by name: a `cpg.prescribed.Preset`, or parameters of
             another law, see `cpg.selection.LAWS`; those that every body has are fitted where not given.
-        visuals: decorations and colours; None for those that suit any body.
+        visuals: decorations and colors; None for those that suit any body.
         tasks: classes by the contract of `tasks.contract`, each with its name.
         arenas: functions by name, from a body to the `Arena` that suits it.
         families: functions by name, from a seed to a body, always the same for the same seed; see

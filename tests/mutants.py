@@ -66,12 +66,12 @@ MUTANTS = {
     # Tasks.
     "dropped clip of the contact forces": "forces.reshape(forces.shape[:-2] + (-1,))«.clip(-1.0, 1.0)→»,",
     "sign of a weight": '        "smoothness": «-→»0.02',
-    "yaw rate penalised in place of pitch rate": "i) for i in (2, 3, «4→5»))",
+    "yaw rate penalized in place of pitch rate": "i) for i in (2, 3, «4→5»))",
     "stance and swing exchanged": "% TWO_PI «<→>» TWO_PI",
     "gait clock advances too late": "phases[tick - 1] + «→0.5 * »turn",
     "a long episode's clock jumps": "«np.argmin(np.abs(np.sin(0.5 * phases[ends])))→-1»",
     "previous action forgotten": "previous_action=«memory.→»action",
-    "quaternion not normalised": "«qpos[3:7] /= np.linalg.norm(qpos[3:7])→pass»",
+    "quaternion not normalized": "«qpos[3:7] /= np.linalg.norm(qpos[3:7])→pass»",
     "reset noise to one side": "random.uniform(«-→0.0 * »widths, widths)",
     "speed of the state in place of the frame's": "x = memory.tick + 1, component(readings.«frame→torso»_position, 0)",
     "the first step starts from nowhere": "_replace(«x=x, →»energy=",
@@ -144,7 +144,7 @@ MUTANTS = {
     "the seam of a loop is left": "np.«linspace(-0.5, 0.5, →zeros(»len(motion.joints))",
     "clips begin anywhere": "draft.motion.begun(«begin→0»)",
     "soles of clips hover": "self.motion.lowered(«self.contacts(body)[0]→0.0»)",
-    "sRGB written as linear": "linear = np.where(«colour <= 0.04045, colour / 12.92→True, colour»,",
+    "sRGB written as linear": "linear = np.where(«color <= 0.04045, color / 12.92→True, color»,",
     "the mouse pulls at nothing": "data.xfrc_applied[:] = «forces→0.0»",
     # Studies and datasets of agents.
     "medium agents are the best": ">= «MEDIUM * →»best",

@@ -35,7 +35,7 @@ MODIFIERS = [
     *({"friction": share} for share in (0.4, 0.2)),
     *({"mass": share} for share in (1.5, 2.5)),
     *({"payload": share} for share in (0.25, 0.5)),
-    {"centre_of_mass": 0.2},
+    {"center_of_mass": 0.2},
     {"joint_offset": 0.1},
     {"joint_strength": (0.25, 1.0)},
     *({"force": share} for share in (0.5, 1.0)),

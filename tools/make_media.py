@@ -1,6 +1,6 @@
 """Draws the pictures of creatures that README and docs show: a row of `MEDIA` each.
 
-Films are animated WebP: browsers and GitHub play it inline, in full colours, at a fifth of the size of a GIF.
+Films are animated WebP: browsers and GitHub play it inline, in full colors, at a fifth of the size of a GIF.
 
 Examples:
   python tools/make_media.py

@@ -7,7 +7,7 @@ const esbuild = require("esbuild");
 
 const modules = process.env.NODE_PATH;
 const folder = process.argv[2];
-const licence = fs.readFileSync(path.join(modules, "three", "LICENSE"), "utf8");
+const license = fs.readFileSync(path.join(modules, "three", "LICENSE"), "utf8");
 
 const common = {
   nodePaths: [modules],
@@ -15,8 +15,8 @@ const common = {
   minify: true,
   target: "es2022",
   charset: "ascii",
-  legalComments: "none", // the whole licence stands in front
-  banner: { js: `/*! This script contains three.js.\n\n${licence.trim()}\n*/` },
+  legalComments: "none", // the whole license stands in front
+  banner: { js: `/*! This script contains three.js.\n\n${license.trim()}\n*/` },
 };
 const bundled = (name, options) =>
   esbuild.buildSync({

@@ -34,11 +34,11 @@ export function drawGait(canvas, walk, time) {
   const { pen, width, height } = sized(canvas);
   const rows = walk.legs.length, pitch = (height - 4) / rows, scale = (width - LEFT - 8) / WINDOW;
   const start = time - WINDOW / 2;
-  const bar = (first, last, row, share, colour) => {
+  const bar = (first, last, row, share, color) => {
     const from = Math.max(LEFT, LEFT + (first * walk.step - start) * scale);
     const to = Math.min(width - 8, LEFT + (last * walk.step - start) * scale);
     if (to <= from) return;
-    pen.fillStyle = colour;
+    pen.fillStyle = color;
     pen.fillRect(from, 2 + (row + (1 - share) / 2) * pitch, to - from + 0.5, share * pitch); // without seams
   };
   walk.legs.forEach((leg, row) => {
@@ -72,7 +72,7 @@ export function drawReward(canvas, walk, time, row, [bottom, top]) {
     let up = 0, down = 0;
     for (const name of names) {
       const value = walk.terms[name][k], from = value > 0 ? up : down;
-      pen.fillStyle = walk.colours[name];
+      pen.fillStyle = walk.colors[name];
       pen.fillRect(LEFT + k * scale, Math.min(y(from), y(from + value)), scale + 0.6, Math.abs(y(from) - y(from + value)));
       if (value > 0) up += value;
       else down += value;
@@ -87,7 +87,7 @@ export function drawReward(canvas, walk, time, row, [bottom, top]) {
   pen.fillRect(LEFT + Math.min(time / walk.step, count) * scale - 0.5, 0, 1, height);
   names.forEach((name, index) => {
     const { left, end, line } = place(index, names.length, width);
-    pen.fillStyle = walk.colours[name];
+    pen.fillStyle = walk.colors[name];
     pen.fillRect(left, line - 4, 8, 8);
     pen.fillStyle = INK;
     pen.fillText(name.replaceAll("_", " "), left + 12, line);

@@ -53,9 +53,9 @@ function product({ shape: [rows], data }, { shape: [inner, outer], data: weight 
 function layerNorm({ shape, data }, scale, offset) {
   const width = shape.at(-1), found = new Float32Array(data.length);
   for (let start = 0; start < data.length; start += width) {
-    const row = data.subarray(start, start + width), middle = mean(row), centred = row.map((value) => value - middle);
-    const deviation = Math.sqrt(mean(centred.map((value) => value * value)) + EPSILON);
-    found.set(centred.map((value, i) => (value / deviation) * scale.data[i] + offset.data[i]), start);
+    const row = data.subarray(start, start + width), middle = mean(row), centered = row.map((value) => value - middle);
+    const deviation = Math.sqrt(mean(centered.map((value) => value * value)) + EPSILON);
+    found.set(centered.map((value, i) => (value / deviation) * scale.data[i] + offset.data[i]), start);
   }
   return { shape, data: found };
 }

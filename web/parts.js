@@ -31,8 +31,8 @@ function polyhedron({ points, triangles }) {
 
 export function materials(looks) {
   return Object.fromEntries(
-    Object.entries(looks).map(([name, { colour, emission, roughness }]) => {
-      const shown = new THREE.Color().setRGB(...colour, THREE.SRGBColorSpace);
+    Object.entries(looks).map(([name, { color, emission, roughness }]) => {
+      const shown = new THREE.Color().setRGB(...color, THREE.SRGBColorSpace);
       const glow = { emissive: shown, emissiveIntensity: emission };
       return [name, new THREE.MeshStandardMaterial({ color: shown, roughness, ...glow })];
     }),

@@ -6,8 +6,8 @@ const LIFE = 0.8, DRAG = 4; // s, 1/s
 const COLOR = [0.62, 0.58, 0.52]; // of dust
 const GOLDEN = 2.39996; // rad from grain to grain
 
-// A disc that fades towards its rim.
-function disc() {
+// A disk that fades towards its rim.
+function disk() {
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = 64;
   const pen = canvas.getContext("2d"), shade = pen.createRadialGradient(32, 32, 0, 32, 32, 32);
@@ -21,7 +21,7 @@ export class Traces {
   // Takes the standing height of a body, m, and the height of the ground at [x, y].
   constructor(height, ground) {
     Object.assign(this, { height, ground, printed: 0, thrown: 0 });
-    const soft = { map: disc(), transparent: true, depthWrite: false };
+    const soft = { map: disk(), transparent: true, depthWrite: false };
     const lifted = { polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -2 };
     const dark = new THREE.MeshBasicMaterial({ ...soft, ...lifted, color: "#14181d", opacity: 0.36 });
     this.prints = new THREE.InstancedMesh(new THREE.PlaneGeometry(2, 2), dark, PRINTS);

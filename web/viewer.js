@@ -87,9 +87,9 @@ function surroundings({ scenery, height, positions }) {
   const path = new THREE.Box2().setFromPoints(positions.map(([x, y]) => new THREE.Vector2(x, y)));
   const middle = path.getCenter(new THREE.Vector2()).divideScalar(height).round().multiplyScalar(height);
   const width = (Math.max(...path.getSize(new THREE.Vector2()).toArray()) / height + 80) * height;
-  const solid = ({ kind, size, place, colour, shade }) => {
-    if (!colour) return ground(geometry({ kind, size }), shade, place);
-    const look = new THREE.Color().setRGB(...colour, THREE.SRGBColorSpace);
+  const solid = ({ kind, size, place, color, shade }) => {
+    if (!color) return ground(geometry({ kind, size }), shade, place);
+    const look = new THREE.Color().setRGB(...color, THREE.SRGBColorSpace);
     const mesh = new THREE.Mesh(geometry({ kind, size }), new THREE.MeshStandardMaterial({ color: look }));
     mesh.position.set(...place);
     mesh.castShadow = mesh.receiveShadow = true;
@@ -102,12 +102,12 @@ function surroundings({ scenery, height, positions }) {
   ];
 }
 
-// What the task asks for: arrows and discs, one mesh for each style.
+// What the task asks for: arrows and disks, one mesh for each style.
 class Marks {
   constructor({ styles, marks }) {
     this.rows = marks;
     this.group = new THREE.Group();
-    this.shown = styles.map(({ shape, radius, colour: [red, green, blue, alpha] }) => {
+    this.shown = styles.map(({ shape, radius, color: [red, green, blue, alpha] }) => {
       const look = new THREE.MeshStandardMaterial({ transparent: alpha < 1, opacity: alpha });
       look.color.setRGB(red, green, blue, THREE.SRGBColorSpace);
       const shaft = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, 1, 32).translate(0, 0.5, 0), look);

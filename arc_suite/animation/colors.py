@@ -1,11 +1,11 @@
-"""Colours of pictures, Okabe and Ito's and Tol's, which colour-blind readers can tell apart."""
+"""Colors of pictures, Okabe and Ito's and Tol's, which color-blind readers can tell apart."""
 
 import itertools
 from collections.abc import Iterable
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
 INK, FAINT, PALE = "#333333", "#8C8C8C", "#E3E3E3"
-TERM_COLOURS = {
+TERM_COLORS = {
     "forward": BLUE,
     "healthy": "#56B4E9",
     "gait_bonus": "#009E73",
@@ -21,7 +21,7 @@ _SPARE = ("#44AA99", "#AA4499", "#DDCC77", "#6699CC")
 
 
 def of_terms(names: Iterable[str]) -> dict[str, str]:
-    """Return colours of a reward's terms by name; those that have none of their own get what others have not."""
+    """Return colors of a reward's terms by name; those that have none of their own get what others have not."""
     names = list(names)
-    free = itertools.cycle([*(colour for name, colour in TERM_COLOURS.items() if name not in names), *_SPARE])
-    return {name: TERM_COLOURS.get(name) or next(free) for name in names}
+    free = itertools.cycle([*(color for name, color in TERM_COLORS.items() if name not in names), *_SPARE])
+    return {name: TERM_COLORS.get(name) or next(free) for name in names}

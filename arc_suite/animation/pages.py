@@ -22,7 +22,7 @@ from arc_suite.models.outline import outline
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
 
-_DIGITS = 6  # behind the point: micrometres, microradians
+_DIGITS = 6  # behind the point: micrometers, microradians
 
 
 def built(name: str) -> bytes:
@@ -88,7 +88,7 @@ def _walk(label: str, track: Track) -> dict[str, Any]:
         "stance": track.stance.astype(int).tolist() if stance else None,
         "schedule": track.schedule.astype(int).tolist() if stance else None,
         "terms": {name: plain(track.weights[name] * values) for name, values in track.terms.items()},
-        "colours": of_terms(track.terms),
+        "colors": of_terms(track.terms),
         "totals": plain(track.rewards.cumsum()),
     }
 

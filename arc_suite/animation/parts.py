@@ -79,12 +79,12 @@ class Material(NamedTuple):
     """How a surface looks.
 
     Attributes:
-        colour: (3,) sRGB, 0 to 1.
-        emission: how much of the colour glows, 0 to 1.
+        color: (3,) sRGB, 0 to 1.
+        emission: how much of the color glows, 0 to 1.
         roughness: 0 to 1.
     """
 
-    colour: np.ndarray
+    color: np.ndarray
     emission: float
     roughness: float
 

@@ -44,15 +44,15 @@ def page(creatures: Sequence[Mapping[str, Any]]) -> str:
     """
     return pages.template("play.html").substitute(
         title=html.escape(", ".join(creature["name"] for creature in creatures)),
-        licences=licences(),
+        licenses=licenses(),
         data=pages.packed(creatures),
         engine=base64.b64encode(pages.built("mujoco.wasm.zlib")).decode(),
         script=pages.built("play.js").decode(),
     )
 
 
-def licences() -> str:
-    """Return the licence of MuJoCo and its notices of third parties, from its wheel, as text of an HTML comment."""
+def licenses() -> str:
+    """Return the license of MuJoCo and its notices of third parties, from its wheel, as text of an HTML comment."""
     files = sorted(file for file in metadata.files("mujoco") or () if file.parent.name == "licenses")
     texts = [file.read_text(encoding="utf-8") for file in files]
     return "\n\n".join(["This page contains MuJoCo and scripts of arc_suite.", *texts]).replace("-->", "-- >")

@@ -28,8 +28,8 @@ def scenery(track: Track) -> dict[str, Any]:
             `level`: whether the ground is the plane z = 0;
             `planes`: heights of planes;
             `fields`: height fields, each `low` (2,), `cell` (2,) and `heights` (rows, columns);
-            `solids`: shapes, each `kind`, `size`, `place` and `colour`, None for that of the ground times `shade`;
-            `styles`: of marks, `shape`, `radius` and `colour`;
+            `solids`: shapes, each `kind`, `size`, `place` and `color`, None for that of the ground times `shade`;
+            `styles`: of marks, `shape`, `radius` and `color`;
             `marks`: for every row of the track, of each mark the index of its style, start and end;
             `failed`: for every row the names of the parts of legs whose motors have failed.
             The last two are empty where all rows are.
@@ -88,9 +88,9 @@ def _field(model: mujoco.MjModel, index: int, place, low, high) -> dict[str, Any
 def _solid(model: mujoco.MjModel, geom: int, kind: str, place) -> dict[str, Any]:
     """A shape of the ground, whose axes are the world's, or an obstacle."""
     ground = model.body_mocapid[model.geom_bodyid[geom]] < 0
-    colour = None if ground else model.mat_rgba[model.geom_matid[geom], :3]
+    color = None if ground else model.mat_rgba[model.geom_matid[geom], :3]
     shade = float(model.geom_rgba[geom, 0])
-    return {"kind": kind, "size": model.geom_size[geom], "place": place.copy(), "colour": colour, "shade": shade}
+    return {"kind": kind, "size": model.geom_size[geom], "place": place.copy(), "color": color, "shade": shade}
 
 
 def _marks(environment, track: Track) -> tuple[list, list, list]:
@@ -107,7 +107,7 @@ def _marks(environment, track: Track) -> tuple[list, list, list]:
             break
         rows.append(_styled(task.markers(physics), styles))
         failed.append([name for leg in task.failed_legs() for name in parts[leg]])
-    looks = [dict(zip(("shape", "radius", "colour"), style[:3], strict=True)) for style in styles]
+    looks = [dict(zip(("shape", "radius", "color"), style[:3], strict=True)) for style in styles]
     return looks, rows if any(rows) else [], failed if any(failed) else []
 
 
@@ -115,7 +115,7 @@ def _styled(marks: Sequence[Marker], styles: dict[tuple, int]) -> list[list]:
     """Marks as indices of styles, start and end; styles that are new are added. None has two marks at once."""
     row, counts = [], {}
     for mark in marks:
-        style = (mark.shape, float(mark.radius), tuple(map(float, mark.colour)))
+        style = (mark.shape, float(mark.radius), tuple(map(float, mark.color)))
         counts[style] = counts.get(style, 0) + 1
         index = styles.setdefault((*style, counts[style]), len(styles))
         row.append([index, *np.concatenate([mark.start, mark.end]).tolist()])

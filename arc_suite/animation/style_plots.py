@@ -1,6 +1,6 @@
 """Pictures of tracks: foot contacts against the schedule, reward by term, speed against target, path of the torso.
 
-Each function takes labelled tracks, one or two to compare, and returns a figure. Needs matplotlib
+Each function takes labeled tracks, one or two to compare, and returns a figure. Needs matplotlib
 (extra `animate`).
 """
 
@@ -68,13 +68,13 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
         start, dt = track.times[rows][0] - track.time_step, track.time_step
         stance, schedule = track.stance[rows], track.schedule[rows]
         for leg in range(len(track.legs)):
-            for mask, height, colour in (
+            for mask, height, color in (
                 (schedule[:, leg], 0.84, PALE),
                 (stance[:, leg] & schedule[:, leg], 0.4, BLUE),
                 (stance[:, leg] & ~schedule[:, leg], 0.4, VERMILION),
             ):
                 spans = [(start + dt * first, dt * (last - first)) for first, last in _runs(mask)]
-                axis.broken_barh(spans, (leg - height / 2, height), color=colour, linewidth=0)
+                axis.broken_barh(spans, (leg - height / 2, height), color=color, linewidth=0)
         compliance, duty, error = metrics.gait_compliance(track), metrics.duty_factor(track), metrics.phase_error(track)
         wanted = track.duty_factors.mean()
         for column, heading, texts in (
@@ -98,7 +98,7 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
         "stance as prescribed": BLUE,
         "stance in place of swing": VERMILION,
     }
-    figure.legend(handles=[Patch(color=colour, label=text) for text, colour in entries.items()], ncols=3, **_BELOW)
+    figure.legend(handles=[Patch(color=color, label=text) for text, color in entries.items()], ncols=3, **_BELOW)
     return figure
 
 
@@ -139,14 +139,14 @@ def speed(tracks: Mapping[str, Track]) -> Figure:
     first = next(iter(tracks.values()))
     if not np.isnan(target := first.target_velocity):
         axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)), label=f"target: {target:.2f} m/s")
-    for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
+    for (label, track), color in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x = track.positions[:, 0]
         steps = np.diff(x) / track.time_step if len(x) > 1 else np.array([np.nan])
         times = track.times[-len(steps) :]
         low, high = _range_over_a_cycle(track, steps)
-        axis.fill_between(times, low, high, color=colour, alpha=0.2, linewidth=0)
+        axis.fill_between(times, low, high, color=color, alpha=0.2, linewidth=0)
         name = f"{label}: {metrics.speed(track):z.2f} m/s"
-        axis.plot(times, _over_a_cycle(track, steps), color=colour, linewidth=1.8, label=name)
+        axis.plot(times, _over_a_cycle(track, steps), color=color, linewidth=1.8, label=name)
     axis.set_title("Forward speed: mean over a gait cycle, and range of the steps within")
     axis.set_ylabel("speed (m/s)")
     axis.set_xlabel("time (s)")
@@ -167,13 +167,13 @@ def path(tracks: Mapping[str, Track]) -> Figure:
     straight = not np.isnan(next(iter(tracks.values())).target_velocity)  # whether the target is along x
     if straight:
         axis.axhline(0.0, color=INK, linewidth=1, linestyle=(0, (5, 3)), zorder=0)
-    for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
+    for (label, track), color in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x, y = track.positions[:, 0], track.positions[:, 1]
-        axis.plot(x, y, color=colour, linewidth=1.6, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
+        axis.plot(x, y, color=color, linewidth=1.6, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
         path = np.concatenate([[0.0], np.hypot(np.diff(x), np.diff(y)).cumsum()])
         arrows = np.flatnonzero(np.diff(path // (0.08 * width))) + 1
         facing = metrics.forward_axes(track)[arrows, :2].T
-        axis.quiver(x[arrows], y[arrows], *facing, color=colour, scale=25.0 / width, **_ARROWS)
+        axis.quiver(x[arrows], y[arrows], *facing, color=color, scale=25.0 / width, **_ARROWS)
     axis.plot(*points[0], "o", color=INK, markersize=5, zorder=5)
     axis.set_xlim(0.5 * (left + right - width), 0.5 * (left + right + width))
     axis.set_ylim(0.5 * (low + high - height), 0.5 * (low + high + height))

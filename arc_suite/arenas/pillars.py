@@ -23,7 +23,7 @@ class Pillars(Flat):
     """The plane z = 0 with movable pillars; their bodies are the last of the model, in the order of `places`.
 
     Attributes:
-        unit: m, the mean distance R of the feet of the body for which it is made from their centre: lengths across
+        unit: m, the mean distance R of the feet of the body for which it is made from their center: lengths across
             are multiples of it.
         top: of the pillars, m.
     """
@@ -42,7 +42,7 @@ class Pillars(Flat):
             pillar.add("geom", name=name, type="capsule", size=size, mass=0.0, contype=0, conaffinity=1, **contact)
 
     def places(self, shifts: np.ndarray) -> np.ndarray:
-        """Return the centres of the pillars (COUNT, 3), m.
+        """Return the centers of the pillars (COUNT, 3), m.
 
         Args:
             shifts: (COUNT, 2) off the middle of each one's cell, from -1 to 1.

@@ -31,7 +31,7 @@ _THICKNESS = 2.0  # of the ground
 _TRENCH = 0.6  # depth
 _BAR = 4  # grains of a hurdle along x, which a height scan of legs as long as the body is high meets
 _RUN_UP = (7.0, 9.0)  # level ground before a trench or hurdle that bodies leap
-_NEAR = 0.5  # how far around its centre the ground under a torso counts
+_NEAR = 0.5  # how far around its center the ground under a torso counts
 
 
 class Obstacle(NamedTuple):
@@ -57,7 +57,7 @@ _DIFFICULTIES = {
     "trenches": lambda difficulty: {"width": round(12.8 + 19.2 * difficulty) * _GRAIN},
     "hurdles": lambda difficulty: {"rise": 0.1 + 0.3 * difficulty},
 }
-# What a caller may give in metres, the slope in radians, with bounds.
+# What a caller may give in meters, the slope in radians, with bounds.
 SIZES = {"rise": (0.0, 100.0), "slope": (0.0, 1.2), "width": (1e-9, 1000.0)}
 _NARROWEST = 0.125  # tread or trench: every step is a box, and boxes take time
 
@@ -133,7 +133,7 @@ class Terrain(Arena):
         unit: m, the standing height of the body; all lengths are multiples of it.
         length: of the lanes ahead of the start, in units.
         lanes: kind and obstacle of each, by the order of `KINDS`; stairs and trenches have widths of one grain.
-        seed: of the random ground; a lane does not depend on its neighbours.
+        seed: of the random ground; a lane does not depend on its neighbors.
     """
 
     unit: float

@@ -42,7 +42,7 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
         [],
         "Factor on the length of a link of a spec or body made to order: --length lower=1.5; repeatable.",
     )
-    flags.DEFINE_string("palette", None, f"Colours of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
+    flags.DEFINE_string("palette", None, f"Colors of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
 
 
 def define_task(default: str = "walk") -> None:

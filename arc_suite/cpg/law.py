@@ -1,7 +1,7 @@
 """The published law of all demonstrators (the paper's Section 5), as pure functions of arrays of NumPy or JAX.
 
 A leg's hip sweeps linearly, back in stance and forth in swing; its other joints add a half-sine
-bell to their centre. A PD loop turns the distance to these targets into torques. Beyond the paper,
+bell to their center. A PD loop turns the distance to these targets into torques. Beyond the paper,
 a preset may add feedforward torques: harmonics of the leg's phase, and steering by yaw.
 
 A law of a demonstrator is a pure function `(state, observation) -> (state, actions)`. Its attribute
@@ -23,16 +23,16 @@ class Pattern(NamedTuple):
         duty_factor: share of the cycle spent in stance.
         offset: of the joint's leg, cycles.
         sweep: hips: half of the sweep, signed so that the foot moves back in stance; else 0.
-        centre: about which the joint bends; for a hip 0.
-        stance: departure from the centre in mid-stance.
-        swing: departure from the centre in mid-swing.
+        center: about which the joint bends; for a hip 0.
+        stance: departure from the center in mid-stance.
+        swing: departure from the center in mid-swing.
     """
 
     frequency: float
     duty_factor: float
     offset: np.ndarray
     sweep: np.ndarray
-    centre: np.ndarray
+    center: np.ndarray
     stance: np.ndarray
     swing: np.ndarray
 
@@ -46,7 +46,7 @@ def joint_targets(pattern: Pattern, time):
     progress = numpy.where(in_stance, cycle / duty, (cycle - duty) / (1.0 - duty))
     sweep = numpy.where(in_stance, 1.0 - 2.0 * progress, 2.0 * progress - 1.0)
     bend = numpy.where(in_stance, pattern.stance, pattern.swing)
-    return pattern.centre + pattern.sweep * sweep + bend * numpy.sin(np.pi * progress)
+    return pattern.center + pattern.sweep * sweep + bend * numpy.sin(np.pi * progress)
 
 
 class Drive(NamedTuple):

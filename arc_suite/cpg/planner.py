@@ -2,7 +2,7 @@
 
 Circles of known radius are fitted to the ranges, a shortest path around them is found by A* over points
 about them, and the law of `steering` follows the command that leads along its first stretch. The path is
-found anew in every step. Lengths are in R, the mean distance of the feet from their centre. The search
+found anew in every step. Lengths are in R, the mean distance of the feet from their center. The search
 runs under NumPy alone, and not under `jax.jit`.
 """
 
@@ -83,7 +83,7 @@ def toward(bearing: float, parameters: PlanningParameters) -> tuple[float, float
 def seen(ranges: np.ndarray) -> np.ndarray:
     """Return the middles (n, 2) of pillars, forward and left of the torso, that the ranges (24,) tell of.
 
-    Two neighbouring rays that meet one pillar tell exactly where it is; a ray alone, that it is about
+    Two neighboring rays that meet one pillar tell exactly where it is; a ray alone, that it is about
     as far behind as its radius.
     """
     points, met = (SIGHT * ranges * RAYS).T, ranges < _SEEN

@@ -18,7 +18,7 @@ ByRank = float | tuple[float, ...]
 
 
 class Bend(NamedTuple):
-    """How far a joint departs from its centre in mid-stance and in mid-swing, degrees."""
+    """How far a joint departs from its center in mid-stance and in mid-swing, degrees."""
 
     stance: ByRank
     swing: ByRank
@@ -37,10 +37,10 @@ class Preset(NamedTuple):
         duty_factor: share of the cycle spent in stance.
         phase_offsets: of the legs, cycles.
         sweep: half of the hip's sweep, degrees.
-        centre: angles about which joints move, degrees, by joint; a hip's is positive forwards and
+        center: angles about which joints move, degrees, by joint; a hip's is positive forwards and
             0 if it is not there.
         bends: of the other joints, by name.
-        crouch: angles held while settling, as `centre`; None for the centre. Legs drawn up catch a
+        crouch: angles held while settling, as `center`; None for the center. Legs drawn up catch a
             robot that a reset with its feet in the ground has thrown.
         torques: actions that are added whatever the error is, by joint and for each rank: amplitudes of
             the cosines of the leg's phase and its multiples, then of their sines; a hip's positive
@@ -58,7 +58,7 @@ class Preset(NamedTuple):
     duty_factor: float
     phase_offsets: tuple[float, ...]
     sweep: ByRank
-    centre: Mapping[str, ByRank]
+    center: Mapping[str, ByRank]
     bends: Mapping[str, Bend]
     crouch: Mapping[str, ByRank] | None = None
     torques: Mapping[str, tuple[tuple[float, ...], ...]] | None = None
@@ -102,7 +102,7 @@ class Prescribed(NamedTuple):
             raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
         try:
             laid, added = pattern(body, preset), feedforward(body, preset)
-            crouch = pattern(body, preset._replace(centre=preset.crouch)).centre if preset.crouch else laid.centre
+            crouch = pattern(body, preset._replace(center=preset.crouch)).center if preset.crouch else laid.center
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise ValueError(f"preset: does not fit {body.name}: {type(error).__name__}: {error}") from None
         return cls(laid, added, crouch, control_timestep(body), *(getattr(preset, name) for name in cls._fields[4:]))
@@ -163,11 +163,11 @@ def pattern(body: Body, preset: Preset) -> Pattern:
         forwards = -1.0 if leg.side == "left" else 1.0
         for joint in leg.joints:
             if joint.name == "hip":
-                angles = (preset.sweep, preset.centre.get("hip", 0.0))
+                angles = (preset.sweep, preset.center.get("hip", 0.0))
                 rows.append((offset, *(forwards * by_rank(angle, rank) for angle in angles), 0.0, 0.0))
             else:
                 bend = preset.bends[joint.name]
-                angles = (preset.centre[joint.name], bend.stance, bend.swing)
+                angles = (preset.center[joint.name], bend.stance, bend.swing)
                 rows.append((offset, 0.0, *(by_rank(angle, rank) for angle in angles)))
     return Pattern(preset.frequency, preset.duty_factor, *np.array(rows).T)
 

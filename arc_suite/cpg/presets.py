@@ -72,25 +72,25 @@ _LEAPER = {"stiffness": 0.8, "damping": 0.15, "settle": 0, "ramp": 15, "ramp_sta
 
 PRESETS = {
     "queen": _published(
-        {**_HEXAPOD, "damping": 0.18, "centre": {"knee": (-25, -25, 25), "ankle": (15, 30, -15)}},
+        {**_HEXAPOD, "damping": 0.18, "center": {"knee": (-25, -25, 25), "ankle": (15, 30, -15)}},
         (1.5, 0.65, 22, {"knee": Bend((10, 10, -10), (-40, -40, 40)), "ankle": Bend((25, 0, -25), (30, 45, -30))}),
         (1.5, 0.60, 26, {"knee": Bend((15, 15, -15), (-45, -45, 45)), "ankle": Bend((35, 0, -35), (35, 55, -35))}),
         (1.5, 0.55, 30, {"knee": Bend((20, 20, -20), (-50, -50, 50)), "ankle": Bend((45, 0, -45), (40, 65, -40))}),
     ),
     "bastion": _published(
-        {**_HEXAPOD, "damping": 0.15, "centre": {"ankle": 30}},
+        {**_HEXAPOD, "damping": 0.15, "center": {"ankle": 30}},
         (1.2, 0.65, 22, {"ankle": Bend(-15, 35)}),
         (1.5, 0.60, 26, {"ankle": Bend(-20, 45)}),
         (1.8, 0.55, 30, {"ankle": Bend(-25, 55)}),
     ),
     "tick": _published(
-        {**_HEXAPOD, "damping": 0.18, "centre": {"knee": 0, "ankle": 0}},
+        {**_HEXAPOD, "damping": 0.18, "center": {"knee": 0, "ankle": 0}},
         (1.5, 0.65, 32, {"knee": Bend(8, -35), "ankle": Bend(0, 35)}),
         (1.5, 0.60, 40, {"knee": Bend(12, -40), "ankle": Bend(0, 45)}),
         (1.5, 0.55, 40, {"knee": Bend(18, -45), "ankle": Bend(0, 55)}),
     ),
     "leaper": _published(
-        {**_LEAPER, "centre": {"knee": 0, "ankle": 0}},
+        {**_LEAPER, "center": {"knee": 0, "ankle": 0}},
         (1.0, 0.65, 30, {"knee": Bend(0, -50), "ankle": Bend((20, 0), (70, -70))}),
         (1.2, 0.60, 30, {"knee": Bend(0, -55), "ankle": Bend((25, 0), (75, -75))}),
         (1.5, 0.60, 30, {"knee": Bend(0, -60), "ankle": Bend((30, 0), (80, -80))}),

@@ -73,8 +73,8 @@ class Steered(CommandLaw):
     Attributes:
         neutral: (joints,) pose, rad.
         legs: in that pose.
-        feet: (legs, 2) places of the soles, from the centre of mass, m.
-        extent: of the feet from the centre of mass, m.
+        feet: (legs, 2) places of the soles, from the center of mass, m.
+        extent: of the feet from the center of mass, m.
     """
 
     def __init__(self, task: Task, parameters: SteeringParameters):
@@ -83,7 +83,7 @@ class Steered(CommandLaw):
         self.neutral = _neutral(body, parameters.share)
         super().__init__(task, parameters, tuple(self.neutral))
         self.legs = list(self._legs())
-        self.feet = (self.pose.soles - self.pose.centre)[:, :2]
+        self.feet = (self.pose.soles - self.pose.center)[:, :2]
         self.extent = float(max(np.hypot(*self.feet.T) + [leg.foot.radius for leg in body.legs]))
 
     def initial_paths(self, count: int) -> tuple:

@@ -91,7 +91,7 @@ class Stride(NamedTuple):
                 duty_factor=gait.duty_factor,
                 offset=np.repeat(gait.offsets, counts),
                 sweep=sweeps,
-                centre=np.concatenate(raised),
+                center=np.concatenate(raised),
                 stance=np.zeros(len(body.joints)),
                 swing=lifts,
             ),

@@ -25,7 +25,7 @@ class Step(NamedTuple):
 def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: int) -> Iterator[Step]:
     """Play one episode for each seed; an environment whose episode ends starts the next one at once.
 
-    An episode depends on its seed and the policy alone, not on the number of environments, threads or its neighbours.
+    An episode depends on its seed and the policy alone, not on the number of environments, threads or its neighbors.
     Actions are rounded to float32 before they are applied, so that the recorded actions are the applied ones.
 
     Args:

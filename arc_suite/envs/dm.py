@@ -61,7 +61,7 @@ def load(
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Of what
             else dm_control's environments take, steps and substeps are part of the benchmark and are
             refused, and `time_limit` is a setting of the task.
-        visualize_reward: let rendered pictures show the reward as a colour.
+        visualize_reward: let rendered pictures show the reward as a color.
 
     Returns:
         An `Environment`, which is a `dm_control.rl.control.Environment`.
@@ -233,7 +233,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         opened: the task before `Environment.change_settings`.
         next_changes: JSON of the settings that differ in the next episode.
         memory: of the present episode, as the next step will find it; None before the first.
-        visualize_reward: whether rendered pictures show the reward as a colour.
+        visualize_reward: whether rendered pictures show the reward as a color.
     """
 
     def __init__(self, task: Task, random=None, on_divergence: str = "raise", flat: bool = False):

@@ -138,7 +138,7 @@ def flows(motion, places):
 
     Args:
         motion: (environments, 3) forward, left and turning, m/s and rad/s.
-        places: m from the centre of turning.
+        places: m from the center of turning.
     """
     forward, left, turning = (motion[:, i : i + 1] for i in range(3))
     stack = motion.__array_namespace__().stack
@@ -150,7 +150,7 @@ def rises(vertical, places):
 
     Args:
         vertical: (environments, 3) the world's, in the torso's frame.
-        places: (places, 2 or 3) m from the centre.
+        places: (places, 2 or 3) m from the center.
     """
     return vertical[:, :1] * places[:, 0] + vertical[:, 1:2] * places[:, 1]
 

@@ -67,7 +67,7 @@ def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
     gait = fitted_gait(body)
     moves = strokes(body, _LENGTHENED * half_stroke(body, gait))
     offsets = np.array(gait.offsets)
-    # Neighbours reach the ends of their strides at different times. All legs sweep at constant speed between the
+    # Neighbors reach the ends of their strides at different times. All legs sweep at constant speed between the
     # moments at which one of them touches down or takes off, so that two are nearest at such a moment.
     for time in np.unique(np.concatenate([-offsets, gait.duty_factor - offsets]).round(9) % 1.0):
         ways = np.interp((time + offsets) % 1.0, (0.0, gait.duty_factor, 1.0), (1.0, -1.0, 1.0))

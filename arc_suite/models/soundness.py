@@ -16,9 +16,9 @@ from arc_suite.robots.spec import Body, Leg, Link
 _GAP = 0.12  # of feet from the floor; feet of published robots hang by up to 0.25 and sink by up to 0.07
 _HOPELESS_GAP = 0.6  # beyond which the torso settles outside of the healthy range of a walk
 _LEAST_STRIDE = 0.03  # that the most able foot sweeps or is lifted, within a demonstrator's bounds
-_HOPELESS_OVERHANG = 0.05  # of the centre of mass beyond the feet
+_HOPELESS_OVERHANG = 0.05  # of the center of mass beyond the feet
 
-_LEAST_TILT = 0.15  # margin of stability as a share of the height of the centre of mass; generated bodies have 0.7 to 2
+_LEAST_TILT = 0.15  # margin of stability as a share of the height of the center of mass; generated bodies have 0.7 to 2
 _LARGEST_TURN = 0.5  # rad, of a joint
 
 # A body walks about as fast, of the target speed, as its motors give of this many times the loads of a stride: medians
@@ -81,27 +81,27 @@ def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
 
 
 def _support(body: Body, pose: Standing) -> Iterator[Flaw]:
-    """Find a centre of mass outside the polygon of the feet, or too near its edge."""
+    """Find a center of mass outside the polygon of the feet, or too near its edge."""
     if len(body.legs) < 3:
         yield Flaw(f"{len(body.legs)} feet span no area to stand on: 3 or more legs fit", False)
         return
-    above = pose.centre[2] - pose.soles[:, 2].min()
+    above = pose.center[2] - pose.soles[:, 2].min()
     if pose.margin < 0.0:
-        outside = f"the centre of mass lies {-pose.margin:.3g} m outside of the feet"
+        outside = f"the center of mass lies {-pose.margin:.3g} m outside of the feet"
         sides = {leg.side for leg in body.legs}
         if len(sides) == 1:
             other, cure = "right" if sides == {"left"} else "left", None
             text = f"{outside}, all on the {sides.pop()}: legs mirrored to the {other} fit"
         else:
             middle = (pose.soles.min(axis=0) + pose.soles.max(axis=0)) / 2.0
-            # Legs take the centre of mass along with them.
-            x, y, _ = (pose.centre - middle) / (1.0 - _mass_of_legs(body) / pose.mass)
+            # Legs take the center of mass along with them.
+            x, y, _ = (pose.center - middle) / (1.0 - _mass_of_legs(body) / pose.mass)
             text, cure = f"{outside}: legs {_displacement(x, y)} fit", _moved(body, [(x, y)] * len(body.legs))
         yield Flaw(text, pose.margin < -_HOPELESS_OVERHANG * pose.height, cure)
     elif pose.margin < _LEAST_TILT * above:
         tilt, missing = np.degrees(np.arctan2(pose.margin, above)), 1.05 * (_LEAST_TILT * above - pose.margin)
         tower = f"a tower that tips over when tilted by {tilt:.2g} degrees"
-        outwards = missing * np.sign(pose.soles - pose.centre)[:, :2]
+        outwards = missing * np.sign(pose.soles - pose.center)[:, :2]
         yield Flaw(f"{tower}: feet {missing:.2g} m further out all around fit", False, _moved(body, outwards))
 
 

@@ -133,20 +133,20 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
 def _cameras(body: Body) -> dict[str, dict]:
     """Return the cameras by name, which frame the standing body with its colliders.
 
-    MuJoCo keeps a camera where it is seen from the centre of mass in the pose of all joints at zero.
+    MuJoCo keeps a camera where it is seen from the center of mass in the pose of all joints at zero.
     """
     model = bare(body)
-    data, centres = mujoco.MjData(model), []
+    data, centers = mujoco.MjData(model), []
     for qpos in (model.qpos0, model.key(HOME).qpos):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        centres.append(data.subtree_com[1] - data.xpos[1])
+        centers.append(data.subtree_com[1] - data.xpos[1])
     middles, halves = model.geom_aabb[:, None, :3], model.geom_aabb[:, None, 3:]
     turns = data.geom_xmat.reshape(-1, 3, 3).swapaxes(-1, -2)
     boxes = (middles + CORNERS * halves) @ turns + data.geom_xpos[:, None] - data.xpos[1]
     points = np.concatenate([outline(body), boxes.reshape(-1, 3)])
-    moved = centres[0] - centres[1]
+    moved = centers[0] - centers[1]
     return {name: camera | {"pos": camera["pos"] + moved} for name, camera in builder.cameras(body, points).items()}
 
 

@@ -27,7 +27,7 @@ class Standing(NamedTuple):
     Attributes:
         height: of the torso's origin above the floor.
         mass: of the whole body.
-        centre: (3,) of mass.
+        center: (3,) of mass.
         soles: (legs, 3) the lowest points of the feet.
         jacobians: for each leg (3, joints of the leg): velocity of the sole per joint velocity.
         inertias: (joints,) diagonal of the mass matrix without armature.
@@ -36,7 +36,7 @@ class Standing(NamedTuple):
 
     height: float
     mass: float
-    centre: np.ndarray
+    center: np.ndarray
     soles: np.ndarray
     jacobians: tuple[np.ndarray, ...]
     inertias: np.ndarray
@@ -44,9 +44,9 @@ class Standing(NamedTuple):
 
     @property
     def margin(self) -> float:
-        """Static stability: distance of the centre of mass, on the floor, from the nearest edge of the polygon of the
+        """Static stability: distance of the center of mass, on the floor, from the nearest edge of the polygon of the
         soles, m; negative outside."""
-        return stability_margin(self.centre, self.soles)
+        return stability_margin(self.center, self.soles)
 
 
 @functools.lru_cache(maxsize=256)
@@ -80,18 +80,18 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
         jacobians.append(jacobian[:, _span(dofs[first : first + len(leg.joints)])])
         first += len(leg.joints)
     soles = np.array(soles)
-    centre = data.subtree_com[1] - origin
+    center = data.subtree_com[1] - origin
     mass = float(model.body_mass.sum())
     matrix = np.empty((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
     loads, carrying = np.zeros(len(soles)), np.ones(len(soles), bool) if feet is None else feet
     if carrying.any():
-        loads[carrying] = foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - centre[:2])
+        loads[carrying] = foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - center[:2])
     held = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
     return Standing(
         height=body.torso.standing_height,
         mass=mass,
-        centre=centre,
+        center=center,
         soles=soles,
         jacobians=tuple(jacobians),
         inertias=np.diag(matrix)[dofs],
@@ -153,7 +153,7 @@ def compiled(body: Body) -> mujoco.MjModel:
 
 
 def foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
-    """Return vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the centre of mass.
+    """Return vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the center of mass.
 
     The least-norm solution of the balance of force and moments. Every foot carries at least a quarter
     of its equal share, since in walking every foot carries in turn.
@@ -163,18 +163,18 @@ def foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
     return forces.clip(min=0.25 * weight / len(soles))
 
 
-def stability_margin(centre, soles) -> float:
+def stability_margin(center, soles) -> float:
     """Return the distance of a point to the edge of the convex hull of others, seen from above; negative outside.
 
     Args:
-        centre: (2,) or more, the point.
+        center: (2,) or more, the point.
         soles: (n, 2) or more.
 
     Returns:
         Inside, the distance to the nearest edge; outside, minus one no larger than that to the hull;
         -inf if there are no others.
     """
-    points = np.asarray(soles)[:, :2] - np.asarray(centre)[:2]
+    points = np.asarray(soles)[:, :2] - np.asarray(center)[:2]
     # It is the least, over all directions, of how far the hull reaches beyond the point. That
     # direction is normal to an edge, and so to a line through two points.
     first, second = np.triu_indices(len(points), k=1)

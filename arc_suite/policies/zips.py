@@ -75,14 +75,14 @@ def statistics(path: Path, given: Path | None = None) -> Path | None:
         OSError: as `content`, or the given file does not exist.
     """
     data = content(path)
-    normalised = data.get("_last_original_obs") is not None
+    normalized = data.get("_last_original_obs") is not None
     if given is not None:
-        if data.get("_last_obs") is not None and not normalised:
+        if data.get("_last_obs") is not None and not normalized:
             raise ValueError(f"policy {path}: was trained without VecNormalize: expected no statistics, got {given}")
         if not given.is_file():
             raise OSError(f"cannot read {given}: no such file")
         return given
-    if not normalised:
+    if not normalized:
         return None
     numbered = re.sub(r"_(\d+_steps)$", r"_vecnormalize_\1", path.stem)
     names = dict.fromkeys((f"{path.stem}_vecnormalize.pkl", f"{numbered}.pkl", "vecnormalize.pkl"))

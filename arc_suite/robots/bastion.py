@@ -1,4 +1,4 @@
-"""Bastion: a low, armoured hexapod with two-link legs, 0.5 m at the torso."""
+"""Bastion: a low, armored hexapod with two-link legs, 0.5 m at the torso."""
 
 from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 

@@ -41,7 +41,7 @@ def metachronal(body: Body, duty_factor: float) -> Gait:
 
 
 def _alternating(body: Body, duty_factor: float) -> Gait:
-    """Return the gait in which every leg is half a cycle from its neighbours, in front, behind and across."""
+    """Return the gait in which every leg is half a cycle from its neighbors, in front, behind and across."""
     return _of_groups(body, duty_factor, lambda rank, right: 0.5 * ((rank + right) % 2))
 
 

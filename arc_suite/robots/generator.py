@@ -41,7 +41,7 @@ _BEND = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
 _CHANGED = re.compile("_(scaled|mutated)$")
 
 _HEIGHT = 0.4  # m
-_SPACING = 0.5  # of the height, between neighbouring legs of a side
+_SPACING = 0.5  # of the height, between neighboring legs of a side
 _REACH = 0.9  # of the height, from mount to foot
 
 

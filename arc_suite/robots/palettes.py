@@ -1,11 +1,11 @@
-"""Palettes: colours of the five materials of any body, by name or by seed."""
+"""Palettes: colors of the five materials of any body, by name or by seed."""
 
 import colorsys
 import random
 
 from arc_suite.robots.spec import PALETTES
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 _MATERIALS = ("shell", "trim", "frame", "limb", "glow")
 _NAMED = (  # in the order of `PALETTES`; sRGB, 0 to 1
@@ -17,8 +17,8 @@ _NAMED = (  # in the order of `PALETTES`; sRGB, 0 to 1
 )
 
 
-def colours(palette: str | int) -> dict[str, Colour]:
-    """Return the colours of the materials, sRGB from 0 to 1.
+def colors(palette: str | int) -> dict[str, Color]:
+    """Return the colors of the materials, sRGB from 0 to 1.
 
     Args:
         palette: of `spec.PALETTES`, or a seed: a hue of the shell, and an opposite one of what glows.
@@ -33,7 +33,7 @@ def parsed(text: str) -> str | int:
     return int(text) if text.isdecimal() else text
 
 
-def _drawn(seed: int) -> tuple[Colour, ...]:
+def _drawn(seed: int) -> tuple[Color, ...]:
     draw = random.Random(seed)
     hue, rich, bright = draw.random(), draw.uniform(0.15, 0.65), draw.uniform(0.4, 0.9)
     opposite = hue + 0.5 + draw.uniform(-0.15, 0.15)

@@ -1,7 +1,7 @@
 """The spec of a legged body: frozen, validated data.
 
 A `Body` is a torso, its ballast and its legs; a `Leg` is a chain of `Link`s that ends in a
-`Foot`; a `Link` is rigid or turns about one motorised `Joint`. Lengths are metres, masses
+`Foot`; a `Link` is rigid or turns about one motorized `Joint`. Lengths are meters, masses
 kilograms, angles degrees (the only place where they are). Frames: x forward, y left, z up; a
 child's origin is the end of the link before it, and a body stands with all joints at zero.
 
@@ -22,8 +22,8 @@ from typing import Any, NoReturn
 
 Vector = tuple[float, float, float]
 
-MAX_LENGTH = 100.0  # metres; far above any creature, far below what upsets MuJoCo
-MAX_DISTANCE = 1e4  # metres, of a camera: more than it takes to see any body
+MAX_LENGTH = 100.0  # meters; far above any creature, far below what upsets MuJoCo
+MAX_DISTANCE = 1e4  # meters, of a camera: more than it takes to see any body
 _DENSEST = 1e9  # kg/m^3
 
 # Of a motor and of a joint, in SI units: beyond what sizing asks for of any body that the other bounds admit, so that
@@ -35,7 +35,7 @@ MAX_NAME = 32  # characters
 DENSITY = 10.0  # kg/m^3, of the published robots
 MAX_ALIAS = 100  # characters of a name in a file of others
 MAX_SOURCE = 1 << 21  # bytes of the MJCF of an imported body; of 38 files the largest has 430,000
-PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colours`
+PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colors`
 _NAME = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
@@ -374,7 +374,7 @@ class Solid(_Spec):
         name: name of the geom.
         shape: sphere, capsule, cylinder, ellipsoid or box.
         size: half-extents as MuJoCo takes them for the shape.
-        position: centre in the torso's frame.
+        position: center in the torso's frame.
         euler_deg: turns about the x, y and z axes of the turning frame, in that order.
     """
 
@@ -422,7 +422,7 @@ class Torso(_Spec):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TrackingCamera(_Spec):
-    """A camera that keeps `position` relative to the body's centre of mass, `xyaxes` as in MJCF."""
+    """A camera that keeps `position` relative to the body's center of mass, `xyaxes` as in MJCF."""
 
     position: Vector = _field(_check_vector, 3, -MAX_DISTANCE, MAX_DISTANCE)
     xyaxes: tuple[float, ...] = _field(_check_vector, 6, -1.0, 1.0, default=(1.0, 0.0, 0.0, 0.0, 0.5, 1.0))
@@ -438,7 +438,7 @@ class Simulation(_Spec):
     """The constants of the simulation that have a dimension.
 
     The defaults are MuJoCo's, except the margin. They are those of the published robots and suit bodies of
-    about half a metre. Since MuJoCo 3.5 the margin of a contact is the sum of its geoms' margins:
+    about half a meter. Since MuJoCo 3.5 the margin of a contact is the sum of its geoms' margins:
     floor and robot each carry half of the published one.
 
     Attributes:
@@ -489,7 +489,7 @@ class Body(_Spec):
         density: of solids, links and feet, kg/m^3.
         simulation: its constants; None: scaled to the body.
         agility: factor on the motors that are sized, for bodies that leap.
-        palette: of its colours, one of `PALETTES` or a seed; None: the robot's own, or grey.
+        palette: of its colors, one of `PALETTES` or a seed; None: the robot's own, or gray.
         source: MJCF of an imported body, which names parts and joints as here and has the standing pose as the
             keyframe `home`; see `arc_suite.models.source`.
         held: its joints outside of the legs.

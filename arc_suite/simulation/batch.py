@@ -63,7 +63,7 @@ class Batch:
 
     @property
     def xfrc_applied(self) -> np.ndarray:
-        """Forces and torques (count, nbody, 6) on the bodies' centres of mass, N and N m, world, live."""
+        """Forces and torques (count, nbody, 6) on the bodies' centers of mass, N and N m, world, live."""
         return self._simulations.bind("xfrc_applied")
 
     @property

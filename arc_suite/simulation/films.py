@@ -173,14 +173,14 @@ def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: flo
     frames = list(frames)
     sample = Image.fromarray(np.concatenate(frames[:: -(-len(frames) // _GIF_SAMPLES)]))
     # Of Pillow's methods the octree is the one that keeps small bright spots: eyes and glows.
-    palette = sample.quantize(_GIF_COLOURS, Image.Quantize.FASTOCTREE)
+    palette = sample.quantize(_GIF_COLORS, Image.Quantize.FASTOCTREE)
     first, *others = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     durations = _durations(len(frames), seconds, 10)
     first.save(path, "GIF", save_all=True, append_images=others, duration=durations, loop=0)
 
 
 def write_webp(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:
-    """Write a film that plays forever, in full colours; arguments as of `write_gif`."""
+    """Write a film that plays forever, in full colors; arguments as of `write_gif`."""
     first, *others = map(Image.fromarray, frames)
     durations = _durations(1 + len(others), seconds, 1)
     first.save(
@@ -194,7 +194,7 @@ def _durations(count: int, seconds: float, unit: int) -> list[int]:
     return [unit * (end - start) for start, end in itertools.pairwise(ends)]
 
 
-_GIF_COLOURS = 128
+_GIF_COLORS = 128
 _GIF_SAMPLES = 4  # frames that the palette is made from
 _WEBP_QUALITY = 50
 WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif, ".webp": write_webp}

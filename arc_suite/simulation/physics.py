@@ -36,8 +36,8 @@ class Physics(dm_mujoco.Physics):
     Attributes:
         body: what is simulated.
         arena: where.
-        shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
-            the material `glow`; None keeps its own colour.
+        shown_reward: share of the greatest reward, 0 to 1, that pictures show as the color of
+            the material `glow`; None keeps its own color.
         marker: returns the debug markers of pictures, given this simulation; None for none.
         failed_legs: returns the names of the legs that pictures show dark; None for none.
         divergence: how the physics diverged in the latest step, or None.

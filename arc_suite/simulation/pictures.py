@@ -51,7 +51,7 @@ QUALITIES = {
     "close": Quality(4096, 2, 1.2),
 }
 
-_LIMP = (0.07, 0.07, 0.08, 1.0)  # colour of a leg whose motors have failed
+_LIMP = (0.07, 0.07, 0.08, 1.0)  # color of a leg whose motors have failed
 
 
 class Decorated(dm_mujoco.Physics):
@@ -87,7 +87,7 @@ class Decorated(dm_mujoco.Physics):
             still = decorated.model.geom_bodyid == 0
             decorated.model.geom_matid[still], decorated.model.geom_rgba[still] = -1, ground
         decorated._legs = _legs(body, decorated.model.ptr)
-        decorated._colours = decorated.model.geom_rgba.copy()
+        decorated._colors = decorated.model.geom_rgba.copy()
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
         buffer = decorated.model.vis.global_
         buffer.offwidth = buffer.offheight = 1  # grows with the size of pictures
@@ -105,8 +105,8 @@ class Decorated(dm_mujoco.Physics):
 
         Args:
             qpos: (nq,) positions of the simulation to look at.
-            share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None
-                keeps its own colour.
+            share: of the greatest reward, 0 to 1, shown as the color of the material `glow`; None
+                keeps its own color.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
             markers: debug markers to show.
             failed_legs: names of legs to show dark.
@@ -117,15 +117,15 @@ class Decorated(dm_mujoco.Physics):
             data.mocap_pos[:] = mocap_pos
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
             update(model, data)
-        model.material("glow").rgba = self._glow if share is None else visuals.reward_colour(share)
+        model.material("glow").rgba = self._glow if share is None else visuals.reward_color(share)
         self.darken(failed_legs)
 
     def darken(self, failed_legs: Iterable[str]) -> None:
         """Show legs dark, given their names, and all others as they are."""
-        colours = self.model.geom_rgba
-        colours[:] = self._colours
+        colors = self.model.geom_rgba
+        colors[:] = self._colors
         for name in failed_legs:
-            colours[self._legs[name]] = _LIMP  # goes before that of the material
+            colors[self._legs[name]] = _LIMP  # goes before that of the material
 
     def render(self, height, width, camera_id, **kwargs):
         """Draw the pose; arguments as in dm_control."""
@@ -152,7 +152,7 @@ class Decorated(dm_mujoco.Physics):
 def geom_of(marker: Marker, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeom:
     """Return a debug marker as a geom of a scene, a new one or the given one."""
     geom, kind = geom or mujoco.MjvGeom(), _SHAPES[marker.shape]
-    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(marker.colour, np.float32))
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(marker.color, np.float32))
     mujoco.mjv_connector(geom, kind, marker.radius, marker.start, marker.end)
     if marker.shape == "arrow":
         geom.size[2] *= 2.0  # MuJoCo draws an arrow half as long as a connector is
@@ -192,7 +192,7 @@ def picture(
         height: pixels.
         width: pixels.
         camera_id: a camera's name or index, -1 for a free one.
-        share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None keeps its own.
+        share: of the greatest reward, 0 to 1, shown as the color of the material `glow`; None keeps its own.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
         failed_legs: names of legs to show dark.

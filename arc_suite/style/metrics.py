@@ -3,7 +3,7 @@
 A metric of legs gives one value for each, (feet,), and the robot's value is their mean; any other
 gives a number. A value is NaN where what it measures did not happen, such as the stride of a robot
 that stands. A robot that gets nowhere, over less than 5 % of the distance that the target speed asks
-for, has no course, and its expenses per metre are infinite.
+for, has no course, and its expenses per meter are infinite.
 """
 
 import numpy as np
@@ -98,7 +98,7 @@ def foot_slip(track: Track) -> np.ndarray:
     2019, as a length).
     """
     sliding = np.hypot(track.foot_velocities[..., 0], track.foot_velocities[..., 1]) * track.contacts
-    return _per_metre(track, sliding.sum(axis=0) * track.time_step)
+    return _per_meter(track, sliding.sum(axis=0) * track.time_step)
 
 
 def foot_clearance(track: Track) -> np.ndarray:
@@ -137,8 +137,8 @@ def lateral_drift(track: Track) -> float:
     for a robot that gets nowhere.
     """
     sideways = abs(track.positions[-1, 1] - track.positions[0, 1])
-    travelled = _travelled(track)
-    return float(sideways / travelled) if travelled else np.nan
+    traveled = _traveled(track)
+    return float(sideways / traveled) if traveled else np.nan
 
 
 def torso_pitch(track: Track) -> float:
@@ -202,7 +202,7 @@ def cost_of_transport(track: Track) -> float:
     what they brake. Torque is constant over a control step, so its work is torque times the turn of the joint.
     """
     work = (track.torques[1:] * np.diff(track.joint_angles, axis=0)).clip(0.0).sum()
-    return float(_per_metre(track, work / (track.mass * track.gravity)))
+    return float(_per_meter(track, work / (track.mass * track.gravity)))
 
 
 def forward_axes(track: Track) -> np.ndarray:
@@ -214,16 +214,16 @@ def _seconds(track) -> float:
     return track.time_step * (len(track.positions) - 1)
 
 
-def _travelled(track) -> float:
+def _traveled(track) -> float:
     """Return the length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
     displacement = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
     target = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity) * _seconds(track)
     return displacement if displacement > _NOWHERE * target else 0.0
 
 
-def _per_metre(track, amount):
-    travelled = _travelled(track)
-    return amount / travelled if travelled else np.full_like(amount, np.inf)
+def _per_meter(track, amount):
+    traveled = _traveled(track)
+    return amount / traveled if traveled else np.full_like(amount, np.inf)
 
 
 def _rms(values) -> float:

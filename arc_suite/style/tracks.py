@@ -33,8 +33,8 @@ class Track(NamedTuple):
         actions: (steps, joints), as applied.
         torques: (steps, joints) of the motors, N m.
         torso_heights: (steps,) of the torso over the ground.
-        foot_positions: (steps, feet, 3) of the feet's centres.
-        foot_heights: (steps, feet) of the feet's centres over the ground.
+        foot_positions: (steps, feet, 3) of the feet's centers.
+        foot_heights: (steps, feet) of the feet's centers over the ground.
         foot_velocities: (steps, feet, 3) of the lowest points of the feet, world frame.
         contacts: (steps, feet) whether the ground pushes on the foot.
         phases: (steps,) of the gait clock, rad; None in a task without a gait.

@@ -15,7 +15,7 @@ from arc_suite.tasks import mirrors
 from arc_suite.tasks.mirrors import AXIAL, POLAR, QUATERNION, SAME, Mirror
 
 # Half-widths of noise at level 1, about those of legged_gym (joints 0.01 rad and 1.5 rad/s, velocity 0.1 m/s and
-# 0.2 rad/s, gravity 0.05, heights 0.1 m) for a robot that stands half a metre high.
+# 0.2 rad/s, gravity 0.05, heights 0.1 m) for a robot that stands half a meter high.
 HEIGHT = 0.02  # h
 ORIENTATION = 0.02  # of the quaternion's components
 JOINT_ANGLE = 0.01  # rad

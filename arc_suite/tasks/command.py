@@ -30,7 +30,7 @@ COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps th
 
 GOALS = 16  # of a chain; after the last one the way leads back
 NEAR = 0.7  # distance of the torso at which a goal is reached, R
-_DISC, _GOAL = 0.02, (0.2, 0.9, 0.4, 1.0)  # thickness, R, and colour of the disc that shows a goal
+_DISK, _GOAL = 0.02, (0.2, 0.9, 0.4, 1.0)  # thickness, R, and color of the disk that shows a goal
 
 _MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
 
@@ -474,10 +474,10 @@ class ToGoal(Command):
         return {"goals": memory.reached * 1.0}
 
     def markers(self, context: Context, memory: Chain) -> list[Marker]:
-        """Return the goal as the disc within which it is reached."""
+        """Return the goal as the disk within which it is reached."""
         unit = context.arena.unit
         middle = np.array((*_goal(memory.goals, memory.reached), 0.0))
-        return [Marker("cylinder", middle, middle + (0.0, 0.0, _DISC * unit), NEAR * unit, _GOAL)]
+        return [Marker("cylinder", middle, middle + (0.0, 0.0, _DISK * unit), NEAR * unit, _GOAL)]
 
 
 def _gained(context: Context, before, displacement):

@@ -49,7 +49,7 @@ COSTS = {
 _AHEAD = 0.8  # distance from the torso to where the command's arrows begin, R
 _SHAFT = 0.06  # radius of the arrows, R
 _SAMPLES = np.linspace(0.0, 1.0, 9)  # of an arrow, which the ground must not cover
-_GOING, _TURNING = (1.0, 0.75, 0.1, 1.0), (0.2, 0.8, 1.0, 1.0)  # their colours
+_GOING, _TURNING = (1.0, 0.75, 0.1, 1.0), (0.2, 0.8, 1.0, 1.0)  # their colors
 
 
 class CommandTaskSettings(NamedTuple):
@@ -439,19 +439,19 @@ class CommandTask(Task):
         hub = np.array((x, y)) + _AHEAD * unit * ahead
         tip = hub + forward * ahead + left * aside
         ways = (hub, tip, _GOING), (tip, tip + turn * aside, _TURNING)
-        arrows = [self._arrow(foot, end, colour) for foot, end, colour in ways if (foot != end).any()]
+        arrows = [self._arrow(foot, end, color) for foot, end, color in ways if (foot != end).any()]
         base = np.array((*hub, self.scene.arena.height(*hub)))
-        disc = Marker("cylinder", base, base + (0.0, 0.0, _SHAFT * unit), 2.0 * _SHAFT * unit, _GOING)
-        return [disc, *arrows, *self.settings.command.markers(self.context, memory.command)]
+        disk = Marker("cylinder", base, base + (0.0, 0.0, _SHAFT * unit), 2.0 * _SHAFT * unit, _GOING)
+        return [disk, *arrows, *self.settings.command.markers(self.context, memory.command)]
 
-    def _arrow(self, foot: np.ndarray, end: np.ndarray, colour) -> Marker:
+    def _arrow(self, foot: np.ndarray, end: np.ndarray, color) -> Marker:
         """An arrow on the ground between two points (2,); its axis clears what is higher than both ends."""
         points = foot + _SAMPLES[:, None] * (end - foot)
         heights = self.scene.arena.height(*points.T)
         straight = heights[0] + _SAMPLES * (heights[-1] - heights[0])
         lifted = straight + (heights - straight).max() + _SHAFT * self.context.reach
         start, tip = (np.array((*points[i], lifted[i])) for i in (0, -1))
-        return Marker("arrow", start, tip, _SHAFT * self.context.reach, colour)
+        return Marker("arrow", start, tip, _SHAFT * self.context.reach, color)
 
 
 def _place(readings: Sensed):

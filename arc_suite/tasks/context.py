@@ -16,7 +16,7 @@ class Context(NamedTuple):
     Attributes:
         arena: where the task takes place.
         height: h, the standing height, m.
-        reach: R, the mean distance of the feet from their centre, m.
+        reach: R, the mean distance of the feet from their center, m.
         units: (3,) of commands: the target velocity, twice, m/s, and rad/s at which feet move as fast when turning.
         force_unit: (1, 6) of contact forces: the weight times the standing height, N m, three times, and the weight, N.
         step_units: (3,) displacements of a control step at these units, m and rad.

@@ -108,7 +108,7 @@ class Inputs(NamedTuple):
     Attributes:
         ctrl: (..., motors) in [-1, 1].
         kick: (..., nv) added to qvel before the first substep; None for no kick.
-        force: (..., 3) on the torso's centre of mass throughout the step, N, world; None for no force.
+        force: (..., 3) on the torso's center of mass throughout the step, N, world; None for no force.
     """
 
     ctrl: np.ndarray
@@ -357,7 +357,7 @@ class Task(Observed):
 
     @functools.cached_property
     def clearances(self) -> np.ndarray:
-        """(legs,) heights of the feet's centres at which a start leaves them clear of the ground, m."""
+        """(legs,) heights of the feet's centers at which a start leaves them clear of the ground, m."""
         radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
         return radii + _CLEAR * self.scene.body.torso.standing_height
 

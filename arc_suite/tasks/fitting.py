@@ -69,6 +69,6 @@ def velocity_units(body: Body, target_velocity: float) -> np.ndarray:
 
 
 def reach(body: Body) -> float:
-    """Return R, the mean horizontal distance of the feet from the centre of mass in the standing pose, m."""
+    """Return R, the mean horizontal distance of the feet from the center of mass in the standing pose, m."""
     pose = standing(body)
-    return float(np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean())
+    return float(np.hypot(*(pose.soles - pose.center)[:, :2].T).mean())

@@ -1,4 +1,4 @@
-"""Mass added to a rigid part: its mass, centre of mass and principal inertia, as a model has them."""
+"""Mass added to a rigid part: its mass, center of mass and principal inertia, as a model has them."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ class Inertia(NamedTuple):
 
     Attributes:
         mass: kg.
-        centre: (3,) of mass in the part's frame, m.
+        center: (3,) of mass in the part's frame, m.
         principal: (3,) moments of inertia about the principal axes, kg m^2.
         quaternion: (4,) of the principal axes in the part's frame, w first.
     """
 
     mass: float
-    centre: np.ndarray
+    center: np.ndarray
     principal: np.ndarray
     quaternion: np.ndarray
 
@@ -29,13 +29,13 @@ class Inertia(NamedTuple):
             mass: of the point, kg.
             place: (3,) of the point in the part's frame, m.
         """
-        total, apart = self.mass + mass, place - self.centre
+        total, apart = self.mass + mass, place - self.center
         axes = rotations.matrix(self.quaternion)
         reduced = self.mass * mass / total
         tensor = axes * self.principal @ axes.T + reduced * (apart @ apart * np.eye(3) - np.outer(apart, apart))
         principal, axes = np.linalg.eigh(tensor)
         axes[:, 0] *= np.sign(np.linalg.det(axes))  # right-handed
-        return Inertia(total, self.centre + mass / total * apart, principal, _quaternion(axes))
+        return Inertia(total, self.center + mass / total * apart, principal, _quaternion(axes))
 
 
 def _quaternion(matrix: np.ndarray) -> np.ndarray:

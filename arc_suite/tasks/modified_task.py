@@ -26,7 +26,7 @@ from arc_suite.tasks.randomization import LONGEST, SCHEDULE, SHORTEST, Hidden, P
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.wrapper import Wrapper
 
-# How pictures show a kick or a push: for how many control steps a kick, in which colour; length by sqrt(g h) or by the
+# How pictures show a kick or a push: for how many control steps a kick, in which color; length by sqrt(g h) or by the
 # weight, radius of the shaft, and distance from the torso's solids, which shells exceed, h.
 SHOWN, _KICKED, _LENGTH, _SHAFT, _APART = 10, (0.95, 0.1, 0.08, 1.0), 1.0, 0.07, 0.3
 

@@ -39,7 +39,7 @@ class Modifiers(NamedTuple):
         exclude_blocks: names of blocks that the observation leaves out: the vector gets shorter.
         payload: mass of a load as a share of the body's, or two of them; its place, uniform in the box around
             the torso, is drawn.
-        centre_of_mass: the greatest displacement of the torso's centre of mass along each axis, h.
+        center_of_mass: the greatest displacement of the torso's center of mass along each axis, h.
         joint_offset: the greatest error of the zero of each joint's sensor, rad: of the angles that are observed, and
             of those that position control and servos hold.
         joint_strength: share of the torque of each motor, or two of them, in addition to `motor_strength`: every
@@ -62,7 +62,7 @@ class Modifiers(NamedTuple):
     actions: str | None = None
     exclude_blocks: tuple[str, ...] = ()
     payload: tuple[float, float] = (0.0, 0.0)
-    centre_of_mass: float = 0.0
+    center_of_mass: float = 0.0
     joint_offset: float = 0.0
     joint_strength: tuple[float, float] = (1.0, 1.0)
     gains: tuple[float, float] = (1.0, 1.0)
@@ -82,7 +82,7 @@ BOUNDS = {
     "observation_noise": (0.0, 100.0),
     "delay": _DELAYS,
     "payload": (0.0, 10.0),
-    "centre_of_mass": (0.0, 1.0),
+    "center_of_mass": (0.0, 1.0),
     "joint_offset": (0.0, 1.0),
     "joint_strength": (0.0, 1.0),
     "gains": (0.01, 10.0),
@@ -90,7 +90,7 @@ BOUNDS = {
     "force": (0.0, 100.0),
     "history": (0, LONGEST_HISTORY),
 }
-_NUMBERS = ("kicks", "centre_of_mass", "joint_offset", "force")
+_NUMBERS = ("kicks", "center_of_mass", "joint_offset", "force")
 _SPANS = ("motor_strength", "friction", "mass", "payload", "joint_strength", "gains", "armature")
 
 

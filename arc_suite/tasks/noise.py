@@ -26,7 +26,7 @@ def noise(key, step, count: int):
 def scrambled(bits):
     """Return scrambled uint32 numbers (...), a bijection in which every bit depends on all bits.
 
-    This is the finaliser of MurmurHash3 (Appleby 2011).
+    This is the finalizer of MurmurHash3 (Appleby 2011).
     """
     bits = (bits ^ (bits >> 16)) * np.uint32(0x85EBCA6B)
     bits = (bits ^ (bits >> 13)) * np.uint32(0xC2B2AE35)

@@ -26,7 +26,7 @@ def told(scene: Scene, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> 
     """Return those blocks of a privileged observation, each (size,), that changed fields of the model decide.
 
     `friction`, `armature` and `gains` are means. `mass` is that of the legs; what the torso weighs besides is the
-    `payload`, in the torso's centre of mass.
+    `payload`, in the torso's center of mass.
 
     Args:
         scene: of the task.
@@ -68,21 +68,21 @@ def _multiples(scene: Scene, fields: Mapping[str, Any], joints: int) -> dict[str
 
 
 def _masses(scene: Scene, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict[str, Any]:
-    """The multiple of the legs' mass, the payload, and the displacement of the torso's centre of mass."""
+    """The multiple of the legs' mass, the payload, and the displacement of the torso's center of mass."""
     torso, legs = scene.layout.torso, np.arange(len(scene.model["body_mass"]))[scene.layout.parts][1:]
     numpy, height = blocks["mass"].__array_namespace__(), scene.body.torso.standing_height
     own, place, whole = scene.model["body_mass"][torso], scene.model["body_ipos"][torso], standing(scene.body).mass
     payload = whole * blocks["payload"][:1]
-    centre = (own * (place + height * blocks["centre_of_mass"]) + payload * height * blocks["payload"][1:]) / (
+    center = (own * (place + height * blocks["center_of_mass"]) + payload * height * blocks["payload"][1:]) / (
         own + payload
     )
     multiple = blocks["mass"]
     if "body_mass" in fields:
         multiple = fields["body_mass"][legs].sum(keepdims=True) / scene.model["body_mass"][legs].sum()
         payload = fields["body_mass"][[torso]] / multiple - own
-    centre = fields["body_ipos"][torso] if "body_ipos" in fields else centre
+    center = fields["body_ipos"][torso] if "body_ipos" in fields else center
     return {
         "mass": multiple,
-        "payload": numpy.concatenate([payload / whole, centre / height]),
-        "centre_of_mass": (centre - place) / height,
+        "payload": numpy.concatenate([payload / whole, center / height]),
+        "center_of_mass": (center - place) / height,
     }

@@ -44,7 +44,7 @@ def blocks_of_modifiers(body: Body) -> dict[str, Block]:
         "friction": Block(1, SAME),
         "mass": Block(1, SAME),
         "payload": Block(4, mirrors.joined([SAME, POLAR])),
-        "centre_of_mass": Block(3, POLAR),
+        "center_of_mass": Block(3, POLAR),
         "joint_offset": Block(joints, mirrors.joints),
         "gains": Block(2, Mirror.signed(1, 1)),
         "armature": Block(1, SAME),

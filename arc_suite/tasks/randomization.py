@@ -38,7 +38,7 @@ class Hidden(NamedTuple):
         friction: (..., 1) multiple.
         mass: (..., 1) multiple.
         payload: (..., 4) its mass, a share of the body's, and its place in the torso's frame, h.
-        centre_of_mass: (..., 3) displacement in the torso's frame, h.
+        center_of_mass: (..., 3) displacement in the torso's frame, h.
         joint_offset: (..., joints) of sensors, rad.
         gains: (..., 2) multiples of stiffness and of damping.
         armature: (..., 1) multiple.
@@ -49,7 +49,7 @@ class Hidden(NamedTuple):
     friction: np.ndarray
     mass: np.ndarray
     payload: np.ndarray
-    centre_of_mass: np.ndarray
+    center_of_mass: np.ndarray
     joint_offset: np.ndarray
     gains: np.ndarray
     armature: np.ndarray
@@ -80,7 +80,7 @@ class Draws(NamedTuple):
     Attributes:
         payload: position of its mass in the range.
         place: (3,) of the payload in the box around the torso.
-        centre: (3,) of mass in the range of its displacements.
+        center: (3,) of mass in the range of its displacements.
         gains: (2,) positions of stiffness and of damping in their range.
         armature: position in its range.
         pauses: (SCHEDULE,) before pushes.
@@ -93,7 +93,7 @@ class Draws(NamedTuple):
 
     payload: float
     place: np.ndarray
-    centre: np.ndarray
+    center: np.ndarray
     gains: np.ndarray
     armature: float
     pauses: np.ndarray
@@ -136,7 +136,7 @@ def hidden(changes: Modifiers, body: Body, strength: float, friction: float, mas
         friction=np.array([within(changes.friction, friction)]),
         mass=np.array([within(changes.mass, mass)]),
         payload=np.array([within(changes.payload, drawn.payload), *within((low, high), drawn.place)]),
-        centre_of_mass=changes.centre_of_mass * (2.0 * drawn.centre - 1.0),
+        center_of_mass=changes.center_of_mass * (2.0 * drawn.center - 1.0),
         joint_offset=changes.joint_offset * (2.0 * drawn.offsets - 1.0),
         gains=within(changes.gains, drawn.gains),
         armature=np.array([within(changes.armature, drawn.armature)]),
@@ -168,7 +168,7 @@ def changed_model(
         fields |= {name: own.friction[0] * model[name] for name in _FRICTIONS}
     if changes.mass != (1.0, 1.0):
         fields |= {name: own.mass[0] * model[name] for name in _MASSES}
-    if changes.payload != (0.0, 0.0) or changes.centre_of_mass:
+    if changes.payload != (0.0, 0.0) or changes.center_of_mass:
         fields |= _torso(scene, own, model | fields)
     if changes.armature != (1.0, 1.0):
         fields["dof_armature"] = own.armature[0] * model["dof_armature"]
@@ -178,13 +178,13 @@ def changed_model(
 
 
 def _torso(scene: Scene, own: Hidden, model: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The masses with a payload on the torso, and its centre of mass moved."""
+    """The masses with a payload on the torso, and its center of mass moved."""
     part, height = scene.layout.torso, scene.body.torso.standing_height
     names = ("body_mass", "body_ipos", "body_inertia", "body_iquat")
     fields = {name: model[name].copy() for name in names}
     torso = Inertia(*(fields[name][part] for name in names))
     share, place = own.payload[0], own.payload[1:]
-    torso = torso._replace(centre=torso.centre + height * own.centre_of_mass)
+    torso = torso._replace(center=torso.center + height * own.center_of_mass)
     if share > 0.0:
         torso = torso.with_point(share * own.mass[0] * standing(scene.body).mass, height * place)
     for name, value in zip(names, torso, strict=True):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-# The block `scan`: places forward and left of the torso, in R, the mean distance of the feet from their centre.
+# The block `scan`: places forward and left of the torso, in R, the mean distance of the feet from their center.
 # They are denser along the lane, where trenches lie across.
 FORWARD, LEFT = np.linspace(-1.5, 2.1, 25), np.linspace(-1.2, 1.2, 7)
 SCAN = np.stack(np.meshgrid(FORWARD, LEFT, indexing="ij")).reshape(2, -1)

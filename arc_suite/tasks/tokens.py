@@ -53,7 +53,7 @@ class Description(NamedTuple):
         legs: (..., 12, 41) foot and mount from the torso's origin (6), direction of the foot (2), number of joints as
             one of four (4), Jacobian of the sole (3 x 4), joint ranges, rad (4 x 2), stiffness, action per rad, and
             damping of position control (4 + 4), duty factor.
-        torso: (..., 10) number of legs by 12, half-extents of the first solid (3), centre of mass (3), static
+        torso: (..., 10) number of legs by 12, half-extents of the first solid (3), center of mass (3), static
             stability margin, R, duty factor.
         mask: (..., 12, 4) booleans, which joints there are.
         reach: (..., 12, 4) angles that an action of 1 asks for, rad.
@@ -126,7 +126,7 @@ def leg_inputs(vectors):
     """Return the inputs (..., 12, 81) of a network of legs, and which joints there are (..., 12, 4).
 
     Args:
-        vectors: (..., 664) of `flat`, of NumPy or JAX; normalised ones keep the number of joints as it is.
+        vectors: (..., 664) of `flat`, of NumPy or JAX; normalized ones keep the number of joints as it is.
     """
     numpy = vectors.__array_namespace__()
     legs, torso, command, leg_descriptions, torso_description = split(vectors).values()
@@ -172,7 +172,7 @@ def described(task: Task) -> Description:
     legs = np.zeros((LEGS, LEG_DESCRIPTION))
     legs[:count] = np.concatenate([part.reshape(count, -1) for part in parts] + [np.full((count, 1), duty)], axis=-1)
     half = np.array((*first.size, *(first.size[-1],) * (3 - len(first.size))))
-    lengths = np.array((*half, *pose.centre, pose.margin, reach(body))) / height
+    lengths = np.array((*half, *pose.center, pose.margin, reach(body))) / height
     return Description(
         legs=legs.astype(np.float32),
         torso=np.array((count / LEGS, *lengths, duty), np.float32),

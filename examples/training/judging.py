@@ -36,7 +36,7 @@ def plot(folder: pathlib.Path, robot: str, task: str) -> None:
         else {}
     )
     for name, value in lines.items():
-        axis.axhline(value, color="grey", linestyle="--", linewidth=0.8)
+        axis.axhline(value, color="gray", linestyle="--", linewidth=0.8)
         axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
     axis.set(xlabel="environment steps", ylabel="return", title=f"{robot}, {task}; lines: the paper, 1,000,000 steps")
     figure.savefig(folder / "curve.png")

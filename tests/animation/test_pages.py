@@ -55,7 +55,7 @@ def test_a_page_holds_the_tracks(bundle, tracks):
     assert first["stance"] == track.stance.astype(int).tolist() != first["schedule"]
     np.testing.assert_allclose(np.sum(list(first["terms"].values()), axis=0), track.rewards, atol=1e-5)
     assert first["totals"][-1] == pytest.approx(track.rewards.sum(), abs=1e-5)
-    assert first["terms"].keys() == first["colours"].keys() and len(set(first["colours"].values())) == 10
+    assert first["terms"].keys() == first["colors"].keys() and len(set(first["colors"].values())) == 10
     nothing = dict.fromkeys(("fields", "solids", "styles", "marks", "failed"), [])
     assert first["scenery"] == {"level": True, "planes": [0.0], **nothing}
     assert pages.page(tracks) == page
@@ -106,7 +106,7 @@ def test_obstacles_and_goals_come_along():
     assert len(found["marks"]) == 12
     wanted = run.markers(environment.physics)
     for (style, *ends), mark in zip(found["marks"][-1], wanted, strict=True):
-        assert found["styles"][style] == {"shape": mark.shape, "radius": mark.radius, "colour": tuple(mark.colour)}
+        assert found["styles"][style] == {"shape": mark.shape, "radius": mark.radius, "color": tuple(mark.color)}
         np.testing.assert_allclose(ends, [*mark.start, *mark.end])
 
 
@@ -153,7 +153,7 @@ def test_programs_write_pages(tmp_path):
     assert re.fullmatch(r"tick: return [0-9.]+ in 400 steps\nwrote walk.html\n", programs.passed(done))
     page = (tmp_path / "walk.html").read_text()
     assert len(page) < 1_300_000
-    assert "Permission is hereby granted, free of charge" in page  # three.js's licence
+    assert "Permission is hereby granted, free of charge" in page  # three.js's license
     assert len(zlib.compress(pages.viewer().encode())) < 200_000
     compare = ("--robot=tick", "--compare=zero", "--episodes=1", "--page=both.html")
     programs.passed(programs.run("-m", "arc_suite", "style", *compare, cwd=tmp_path))

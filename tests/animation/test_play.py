@@ -263,7 +263,7 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     assert play.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
 
 
-def test_a_page_begins_with_the_licences(monkeypatch):
+def test_a_page_begins_with_the_licenses(monkeypatch):
     monkeypatch.setattr(pages, "built", lambda name: b"[" + name.encode() + b"]")
     page = play.page([play.creature(ROBOTS["leaper"])])
     assert page.index('<meta charset="utf-8">') < 200  # where browsers look for it

@@ -244,7 +244,7 @@ def test_bodies_and_grounds_are_chosen(tab):
           .map((index) => [color.getX(index), color.getY(index), color.getZ(index)]);
         return colors[0].map((value, i) => colors[1][i] / value); })()"""
     )
-    assert red > 1.5 and blue < 0.8  # the tops of bumps are of another colour than level ground
+    assert red > 1.5 and blue < 0.8  # the tops of bumps are of another color than level ground
     assert tab.locator("canvas").count() == 1
     tab.evaluate("play.state.play.draw()")
     assert tab.evaluate("play.state.play.view.camera.aspect") == pytest.approx(320 / 256)

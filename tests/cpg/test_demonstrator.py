@@ -22,7 +22,7 @@ from arc_suite.style import record
 
 
 class Medium(NamedTuple):
-    """Preset medium: of knees and ankles the centre, stance and swing bends in degrees by rank from the front."""
+    """Preset medium: of knees and ankles the center, stance and swing bends in degrees by rank from the front."""
 
     kd: float
     settle: int
@@ -72,9 +72,9 @@ def expected_target(robot, joint, step):
     figures = MEDIUM[robot]
     leg, part = joint.rsplit("_", 1)
     hip = part == "hip"
-    centre, stance, swing = (0, 0, 0) if hip else getattr(figures, part)[RANKS[leg]]
+    center, stance, swing = (0, 0, 0) if hip else getattr(figures, part)[RANKS[leg]]
     if step < figures.settle:
-        return math.radians(centre)
+        return math.radians(center)
     cycle = (figures.frequency * 0.05 * step + OFFSETS[leg]) % 1.0
     if cycle < 0.6:
         s = cycle / 0.6
@@ -82,7 +82,7 @@ def expected_target(robot, joint, step):
     else:
         w = (cycle - 0.6) / 0.4
         sweep, bend = 2 * w - 1, swing * math.sin(math.pi * w)
-    angle = figures.hip * sweep * (-1 if leg in LEFT else 1) if hip else centre + bend
+    angle = figures.hip * sweep * (-1 if leg in LEFT else 1) if hip else center + bend
     return math.radians(angle)
 
 
@@ -154,7 +154,7 @@ CREEPING = Preset(
     duty_factor=0.6,
     phase_offsets=(0.0, 0.5, 0.5, 0.0),
     sweep=20,
-    centre={"knee": 0},
+    center={"knee": 0},
     bends={"knee": Bend(stance=0, swing=30)},
 )
 
@@ -188,14 +188,14 @@ def test_a_robots_numbers_go_by_its_name():
 
 def test_ranks_and_sides_of_a_hip():
     medium = PRESETS["queen"]["medium"]
-    led = medium._replace(sweep=(1.0, 2.0, 3.0), centre=medium.centre | {"hip": (10.0, 20.0, 30.0)})
+    led = medium._replace(sweep=(1.0, 2.0, 3.0), center=medium.center | {"hip": (10.0, 20.0, 30.0)})
     hips = [i for i, name in enumerate(ROBOTS["queen"].joint_names) if name.endswith("hip")]
     laid = pattern(ROBOTS["queen"], led)
     assert_allclose(np.degrees(laid.sweep[hips]), [-1, -2, -3, 1, 2, 3])
-    assert_allclose(np.degrees(laid.centre[hips]), [-10, -20, -30, 10, 20, 30])
+    assert_allclose(np.degrees(laid.center[hips]), [-10, -20, -30, 10, 20, 30])
 
 
-def test_settling_is_a_crouch_or_the_centre():
+def test_settling_is_a_crouch_or_the_center():
     medium = PRESETS["bastion"]["medium"]
     crouching = medium._replace(settle=4, crouch={"hip": 10, "ankle": (60, 50, 40)})
     still = np.zeros((2, 12))

@@ -116,7 +116,7 @@ def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
     assert float(total) == data.open(ID)[0].observations[0].sum()
 
 
-def test_normalised_scores_run_from_the_zero_policy_to_the_gaits_best():
+def test_normalized_scores_run_from_the_zero_policy_to_the_gaits_best():
     collect(ID, data.DatasetSettings(QUEEN, "zero", (), steps=30), 10)
     dataset = minari.load_dataset(ID)
     totals = [episode.rewards.sum() for episode in dataset]
@@ -213,7 +213,7 @@ def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch
     settings = data.DatasetSettings(QUEEN, presets=("slow", "medium"), **SHORT)
     collect(ID, settings, 2)
     before, medium = digests(), PRESETS["queen"]["medium"]
-    for changed in (medium._replace(stiffness=0.81), medium._replace(centre=medium.centre | {"ankle": (15, 30, -14)})):
+    for changed in (medium._replace(stiffness=0.81), medium._replace(center=medium.center | {"ankle": (15, 30, -14)})):
         monkeypatch.setitem(PRESETS["queen"], "medium", changed)
         line = "its presets slow and medium had other numbers; --overwrite replaces it"
         with refused(f"dataset {ID!r} is another: {line}"):

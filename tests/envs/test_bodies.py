@@ -35,7 +35,7 @@ FEW = [generator.random_body(seed, 6, 3) for seed in range(3)] + [ROBOTS["tick"]
 SHORT = {"time_limit": 1.0}
 MODIFIED = {
     "kicks": 1.0, "motor_strength": (0.6, 1.0), "actuator_failure": True, "friction": (0.4, 1.1), "mass": (0.8, 1.3),
-    "payload": (0.1, 0.4), "centre_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0),
+    "payload": (0.1, 0.4), "center_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0),
     "gains": (0.8, 1.2), "armature": (0.8, 1.5), "force": 0.3,
     "observation_noise": 1.0, "delay": (0, 3),
 }  # fmt: skip

@@ -111,7 +111,7 @@ def test_an_action_of_0_stands_and_of_1_is_the_farther_limit(body):
 
 
 DISTURBED = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "actuator_failure": True, "payload": (0.1, 0.4)}
-DISTURBED |= {"centre_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0), "gains": (0.8, 1.2)}
+DISTURBED |= {"center_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0), "gains": (0.8, 1.2)}
 DISTURBED |= {"armature": (0.8, 1.5), "force": 0.3}
 
 

@@ -18,7 +18,7 @@ _FORBIDDEN = """
 row: environment, hyperparameters or run; rows: num_envs, mask, indices or runs; numbers: parameters or
 hyperparameters; averaging: tau; trace: gae_lambda; random_steps: start_steps; updates_per_step: utd_ratio; capacity:
 buffer_size; first_divergence: initial_desired_kl; last_divergence: final_desired_kl; first_std: initial_std;
-last_std: final_std; mirrored: symmetry_augmentation; normalising: normalize_until; warm_up: value_warm_up; imitation:
+last_std: final_std; mirrored: symmetry_augmentation; normalizing: normalize_until; warm_up: value_warm_up; imitation:
 dagger; cloning: bc; fenced: protected; beside: symmetric_sampling; stage: run context; felt: proprioception;
 following: feedback; manner, tread, balance, plan, build: parameters; look, looks: visuals; mark: debug marker; marks:
 debug markers; motions: root motion; footfalls, events: foot contact events; shot, take: recording; lift: spawn
@@ -47,7 +47,7 @@ ALLOWED = {
     "limp": r" Limp$|^README|^studies",  # the task
     "fitted": r"arenas\.|models\.stride|tasks\.fitting",  # sizes and parameters that are fitted to a body
     "warm_up": r"value_warm_up$",  # the field's word
-    "cloning": r" BehaviourCloning$",  # what bc abbreviates
+    "cloning": r" BehaviorCloning$",  # what bc abbreviates
     # Arena and body of a task; lights and floor of a picture; arguments that wrappers of others hand on.
     "scene": r"tasks\.|models\.|task_view\.|mjx\.Env\.render",
 }
@@ -88,6 +88,30 @@ def test_plain_sentences():
         for path in paths
         for number, line in enumerate(path.read_text().splitlines(), 1)
         for phrase in pattern.findall(line)
+    ]
+    assert not found, "\n".join(["", *found])
+
+
+# Stems of British spellings; MuJoCo and Gymnasium write "randomize", "color", "center", "meter".
+BRITISH = re.compile(
+    r"(?:col|neighb|behavi|arm)our|(?:normal|random|general|initial|visual|stabil|optim|penal)is[eai]"
+    r"|(?<![a-z])(?:centi|milli|micro)?metre|centre|centred|licence|grey|(?:travel|label|model)led|catalogue|artefact",
+    re.IGNORECASE,
+)
+
+
+def test_american_spelling():
+    """In names, prose and error texts, except this file's."""
+    rooms = ("arc_suite", "tools", "tests", "examples", "docs", "studies", "web")
+    paths = [
+        path for room in rooms for kind in ("py", "md", "js", "ipynb") for path in (ROOT / room).rglob(f"*.{kind}")
+    ]
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: {word}"
+        for path in [*paths, ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "Makefile", ROOT / "setup.cfg"]
+        if path != pathlib.Path(__file__)
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        for word in BRITISH.findall(line)
     ]
     assert not found, "\n".join(["", *found])
 

@@ -84,7 +84,7 @@ def test_privileged_observations_are_those_of_the_suite():
     assert "privileged" not in mjx.load(ROBOT, "walk", num_starts=1).start(0).info
 
 
-def test_privileged_observations_show_randomised_models(monkeypatch):
+def test_privileged_observations_show_randomized_models(monkeypatch):
     """As wrappers put them in place, with what an episode draws beside them."""
     env = mjx.load(ROBOT, "walk", {"mass": (0.5, 0.8)}, num_starts=1, privileged=True)
     drawn = randomization_fn(friction=(0.5, 0.9), motor_strength=(0.5, 0.9))
@@ -169,7 +169,7 @@ def test_what_wrappers_add_to_a_state_stays():
     assert jax.tree.structure(after) == jax.tree.structure(given)
 
 
-def test_randomised_models_differ_by_world():
+def test_randomized_models_differ_by_world():
     env, *_ = compiled(ROBOT)
     keys = jax.random.split(jax.random.key(0), 6)
     model, axes = randomization_fn(friction=(0.5, 1.5), damping=(0.9, 1.1))(env.mjx_model, rng=keys)

@@ -33,12 +33,12 @@ def test_a_rollout_of_jax_gives_the_update_of_numpy():
     environments = collecting.Environments(hp, context)
     task, architecture = environments.task, environments.architecture
     state = ppo.begin(hp, architecture, np.random.default_rng(0))
-    normalise = Moments.none(task.size).after(environments.observation).normalizer()
-    rollout = environments.roll_out(state.policy, normalise, 0.3, 0, 0)
+    normalize = Moments.none(task.size).after(environments.observation).normalizer()
+    rollout = environments.roll_out(state.policy, normalize, 0.3, 0, 0)
     orders = np.random.default_rng(0).permutation(32)[None, :8]
     found = []
     for transitions in (rollout, {name: jnp.asarray(array) for name, array in rollout.items()}):
-        batch = on_policy.batch_of(hp, architecture, transitions, state.values, normalise, inputs.symmetry(task))
+        batch = on_policy.batch_of(hp, architecture, transitions, state.values, normalize, inputs.symmetry(task))
         begun = ppo.begin(hp, architecture, np.random.default_rng(0))
         updated, *_ = ppo.update(hp, architecture, begun, batch, orders, (np.float32(0.3), np.float32(0.01)), True)
         moments = Moments.none(task.size).after(transitions["observations"])
@@ -55,8 +55,8 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     hp, context = run.hyperparameters, run.context(pathlib.Path())
     collector = worlds.Worlds(hp, context)
     state = ppo.begin(hp, collector.architecture, np.random.default_rng(0))
-    normalise = Moments.none(collector.task.size).normalizer()
-    rollout = jax.tree.map(np.asarray, collector.roll_out(state.policy, normalise, 0.01, 0, 0))
+    normalize = Moments.none(collector.task.size).normalizer()
+    rollout = jax.tree.map(np.asarray, collector.roll_out(state.policy, normalize, 0.01, 0, 0))
     here, there = (
         collector.task.split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations")
     )

@@ -49,7 +49,7 @@ def test_motors_armature_and_damping_follow_the_rules():
         data.qpos[7:] = angles
         mujoco.mj_forward(model, data)
         feet = [model.body(f"{leg.name}_foot").id for leg in BODY.legs]
-        # The least forces under the feet that stand which carry the weight, and no moment about its centre.
+        # The least forces under the feet that stand which carry the weight, and no moment about its center.
         places = data.xpos[feet][stands, :2] - data.subtree_com[1, :2]
         balance = np.vstack([np.ones(len(places)), places.T])
         forces = np.linalg.pinv(balance) @ [weight, 0.0, 0.0]

@@ -115,9 +115,9 @@ HOPELESS = [
     (high(0.2), "feet stand 0.2 m in the floor: standing_height 0.4 fits"),
     (
         BODY.replace(legs=BODY.legs[:3]),
-        "the centre of mass lies 0.34 m outside of the feet, all on the left: legs mirrored to the right fit",
+        "the center of mass lies 0.34 m outside of the feet, all on the left: legs mirrored to the right fit",
     ),
-    (ahead(1.0), "the centre of mass lies 0.233 m outside of the feet: legs 1 m backward fit"),
+    (ahead(1.0), "the center of mass lies 0.233 m outside of the feet: legs 1 m backward fit"),
     (
         with_joints(range_deg=(0.0, 40.0)),
         "no leg has a joint that sweeps its foot forward and back: a hip about axis [0, 0, 1], both ways, fits",
@@ -257,7 +257,7 @@ def test_hips_may_overlap_and_rigid_links_before_them():
     assert not any(overlaps(ROBOTS["leaper"]))
 
 
-def test_neighbours_overlap_at_different_ends_of_their_strides():
+def test_neighbors_overlap_at_different_ends_of_their_strides():
     """Bastion walks in a gait of its own; in the one that suits its body, its legs reach into each other."""
     body = generator.scaled(ROBOTS["bastion"], 1.0)
     assert {each.pose for each in overlaps(body)} == {"a stride"}

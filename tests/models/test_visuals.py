@@ -105,7 +105,7 @@ def glow_in(physics) -> np.ndarray:
 
 @pytest.mark.slow
 @every_robot
-def test_visualize_reward_colours_the_glow(robot):
+def test_visualize_reward_colors_the_glow(robot):
     plain, shown = begun(robot), arc_suite.load(robot, "walk", {"random": 0}, visualize_reward=True)
     shown.reset()
     own = compiled(ROBOTS[robot], True).mat("glow").rgba
@@ -115,31 +115,31 @@ def test_visualize_reward_colours_the_glow(robot):
     reward = plain.step(action).reward
     assert shown.step(action).reward == reward
     np.testing.assert_array_equal(glow_in(plain.physics), own)
-    np.testing.assert_allclose(glow_in(shown.physics), visuals.reward_colour(reward / 4.0), rtol=1e-6)
+    np.testing.assert_allclose(glow_in(shown.physics), visuals.reward_color(reward / 4.0), rtol=1e-6)
     before, after = (environment.physics.render(90, 120, "profile") for environment in (plain, shown))
     assert (before != after).any()
     shown.reset()
     np.testing.assert_array_equal(glow_in(shown.physics), own)
 
 
-def test_reward_colours_go_from_red_to_green():
-    red, middle, green = (visuals.reward_colour(share) for share in (0.0, 0.5, 1.0))
+def test_reward_colors_go_from_red_to_green():
+    red, middle, green = (visuals.reward_color(share) for share in (0.0, 0.5, 1.0))
     assert red[0] > 5 * red[1]
     assert green[1] > 5 * green[0]
     np.testing.assert_allclose(middle, (red + green) / 2.0)
-    np.testing.assert_array_equal(visuals.reward_colour(-3.0), red)
-    np.testing.assert_array_equal(visuals.reward_colour(7.0), green)
+    np.testing.assert_array_equal(visuals.reward_color(-3.0), red)
+    np.testing.assert_array_equal(visuals.reward_color(7.0), green)
 
 
-def test_a_palette_colours_the_materials_by_name_or_by_seed():
+def test_a_palette_colors_the_materials_by_name_or_by_seed():
     def seen(palette):
         model = compiled(STRANGER.replace(palette=palette), True)
         return {name: tuple(map(float, model.material(name).rgba[:3])) for name in ("shell", "limb", "glow")}
 
     assert seen("moss")["shell"] == pytest.approx((0.42, 0.52, 0.28), abs=1e-6)
-    colours = [seen(palette) for palette in (None, "moss", "night", 1, 2)]
-    assert len({tuple(each.values()) for each in colours}) == len(colours)
-    assert seen(1) == colours[3]
+    colors = [seen(palette) for palette in (None, "moss", "night", 1, 2)]
+    assert len({tuple(each.values()) for each in colors}) == len(colors)
+    assert seen(1) == colors[3]
     for palette in ("mos", -1, 1.5, True):
         with pytest.raises(ValueError, match=r"palette: expected one of moss, rust, bone, coral, night, or a seed"):
             STRANGER.replace(palette=palette)

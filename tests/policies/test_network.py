@@ -47,7 +47,7 @@ def test_what_operators_compute():
     x, other, weight, bias, scale, offset = (numbers(*shape) for shape in ((7, 5), (1, 5), (5, 4), (4,), (5,), (5,)))
     mask = (numbers(7, 5) > 0.0).astype(np.float32)
     rows, x64 = numbers(7, 5, 3), x.astype(float)
-    centred = x64 - x64.mean(axis=1, keepdims=True)
+    centered = x64 - x64.mean(axis=1, keepdims=True)
     expected = {
         "Add": ((x, other), x64 + other),
         "Clip": ((x, np.float32(-0.5), np.float32(0.7)), x64.clip(-0.5, 0.7)),
@@ -57,7 +57,7 @@ def test_what_operators_compute():
         "Equal": ((mask, np.float32(1.0)), mask == 1.0),
         "Greater": ((x, other), x > other),
         "GreaterOrEqual": ((x, x), x >= x),
-        "LayerNorm": ((x, scale, offset), centred / np.sqrt(x64.var(axis=1, keepdims=True) + 1e-5) * scale + offset),
+        "LayerNorm": ((x, scale, offset), centered / np.sqrt(x64.var(axis=1, keepdims=True) + 1e-5) * scale + offset),
         "Linear": ((x, weight, bias), x64 @ weight + bias),
         "Max": ((x, other), np.maximum(x64, other)),
         "Mul": ((x, other), x64 * other),

@@ -61,14 +61,14 @@ def test_errors_are_one_line(saved, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def normalised(tmp_path_factory):
+def normalized(tmp_path_factory):
     """A zip of PPO and the statistics that it was trained with, the raw observation and what it does there."""
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecNormalize
 
     from arc_suite.envs import sb3
 
-    folder = tmp_path_factory.mktemp("normalised")
+    folder = tmp_path_factory.mktemp("normalized")
     envs = VectorEnv("tick", "walk", 4, 1, "SameStep", task_kwargs={"time_limit": 1.0})
     environments = VecNormalize(sb3.VecEnv(envs))
     agent = PPO("MlpPolicy", environments, n_steps=16, batch_size=32, n_epochs=1, device="cpu", seed=0).learn(128)
@@ -79,16 +79,16 @@ def normalised(tmp_path_factory):
     return folder, observation, agent.predict(environments.normalize_obs(flat), deterministic=True)[0]
 
 
-def test_statistics_are_applied(normalised):
-    folder, timestep, expected = normalised
+def test_statistics_are_applied(normalized):
+    folder, timestep, expected = normalized
     with pytest.raises(ValueError, match=r"ppo\.zip: was trained with VecNormalize, whose statistics are missing: "):
         policies.policy(str(folder / "ppo.zip"), "tick")
     policy = policies.policy(f"{folder / 'ppo.zip'}+{folder / 'stats.pkl'}", "tick")
     assert np.array_equal(policies.alone(policy)(timestep), expected.astype(float))
 
 
-def test_a_zip_knows_its_robot(normalised, saved, recwarn):
-    name = f"{normalised[0] / 'ppo.zip'}+{normalised[0] / 'stats.pkl'}"
+def test_a_zip_knows_its_robot(normalized, saved, recwarn):
+    name = f"{normalized[0] / 'ppo.zip'}+{normalized[0] / 'stats.pkl'}"
     with pytest.raises(ValueError, match=r"ppo\.zip: made for tick, and not for queen$"):
         policies.policy(name, "queen")
     policies.policy(name, "tick")
@@ -97,8 +97,8 @@ def test_a_zip_knows_its_robot(normalised, saved, recwarn):
         policies.policy(str(saved[0] / "PPO.zip"), "queen")
 
 
-def test_programs_take_statistics(normalised):
-    folder = normalised[0]
+def test_programs_take_statistics(normalized):
+    folder = normalized[0]
     evaluate = ("evaluate", "--robot=tick", "--policy=ppo.zip", "--episodes=1", "--set=time_limit=1")
     programs.passed(programs.arc_suite(*evaluate, "--vecnormalize=stats.pkl", cwd=folder))
     done = programs.arc_suite(*evaluate, "--vecnormalize=stats.pkl", "--policy=cpg", cwd=folder)
@@ -114,8 +114,8 @@ def test_a_program_warns_in_one_line(saved):
     assert done.stderr.startswith("arc-suite evaluate: policy PPO.zip: does not hold the robot and task ")
 
 
-def test_what_are_no_statistics_is_one_line(normalised, tmp_path):
-    zipped = normalised[0] / "ppo.zip"
+def test_what_are_no_statistics_is_one_line(normalized, tmp_path):
+    zipped = normalized[0] / "ppo.zip"
     (tmp_path / "text.pkl").write_text("text")
     (tmp_path / "list.pkl").write_bytes(pickle.dumps([1, 2]))
     for name, message in (("text", "no statistics of VecNormalize: "), ("list", "expected statistics of VecNormalize")):
@@ -141,8 +141,8 @@ def test_as_layers(name, tmp_path):
     np.testing.assert_allclose(network.act(observation, np.zeros(1)), policy.act(observation, np.zeros(1)), atol=1e-5)
 
 
-def test_statistics_are_the_first_nodes(normalised):
-    folder, timestep, expected = normalised
+def test_statistics_are_the_first_nodes(normalized):
+    folder, timestep, expected = normalized
     network = policies.trained(f"{folder / 'ppo.zip'}+{folder / 'stats.pkl'}")
     operators = [node.operator for node in network.graph.nodes]
     assert operators[:3] == ["Sub", "Mul", "Clip"] and operators[-1] == "Clip"

@@ -80,7 +80,7 @@ LEFT_LEGS = {
     ),
 }
 
-# Torso shapes: name, kind, size, centre, pitch in degrees, and the mass of those that touch nothing.
+# Torso shapes: name, kind, size, center, pitch in degrees, and the mass of those that touch nothing.
 TORSOS = {
     "queen": (
         ("chassis", "ellipsoid", (0.35, 0.45, 0.15), (0.0, 0.0, -0.05), 0, None),

@@ -144,8 +144,8 @@ def test_specs_are_frozen_equal_by_value_and_hashable():
             setattr(spec, field, getattr(spec, field))
         assert spec.replace() == spec
         assert hash(spec.replace()) == hash(spec)
-    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
-        LEG.replace(colour="red")
+    with pytest.raises(TypeError, match="unexpected keyword argument 'color'"):
+        LEG.replace(color="red")
 
 
 def test_sequences_become_tuples_and_numbers_floats():

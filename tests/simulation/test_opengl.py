@@ -108,7 +108,7 @@ def test_import_opens_nothing():
 
 
 # Draws next to other users of OpenGL in this process, and leaves all of it to the interpreter's exit.
-NEIGHBOURS = """
+NEIGHBORS = """
 import sys
 if sys.argv[1] == "first":
     import dm_control.suite
@@ -129,7 +129,7 @@ print(dm_control._render.BACKEND)
 @pytest.mark.long
 @pytest.mark.parametrize("order", ["first", "last"])
 def test_dm_control_draws_in_the_same_process(order):
-    assert interpreters.printed(NEIGHBOURS, order, **EGL) == ["egl"]
+    assert interpreters.printed(NEIGHBORS, order, **EGL) == ["egl"]
 
 
 @pytest.mark.long

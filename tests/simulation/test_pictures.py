@@ -94,8 +94,8 @@ def test_a_limp_leg_is_dark():
     assert_array_equal(picture(BODY, FLAT, qpos, 120, 160, "profile"), plain)
     decorated = Decorated.from_body(BODY)
     decorated.pose(qpos, failed_legs=("r2",))
-    colours = {name: decorated.named.model.geom_rgba[name] for name in ("r2_foot", "l2_foot")}
-    assert colours["r2_foot"][:3].max() < 0.1 < colours["l2_foot"][:3].min()
+    colors = {name: decorated.named.model.geom_rgba[name] for name in ("r2_foot", "l2_foot")}
+    assert colors["r2_foot"][:3].max() < 0.1 < colors["l2_foot"][:3].min()
     decorated.pose(qpos)
     assert decorated.named.model.geom_rgba["r2_foot"][:3].min() > 0.1
 

@@ -150,7 +150,7 @@ def test_a_foot_that_bounces_in_stance_does_not_stride():
 
 
 def test_foot_slip():
-    # Half of the time at 0.1 m/s, while the torso moves on at 0.5 m/s: 0.1 m a metre.
+    # Half of the time at 0.1 m/s, while the torso moves on at 0.5 m/s: 0.1 m a meter.
     steps = 10 * CYCLE
     assert_allclose(legs("foot_slip", synthetic(slip=0.1)), 0.1 * steps / (steps - 1))
     assert_allclose(legs("foot_slip", synthetic(dragged=0)), [steps / (steps - 1), 0, 0, 0])
@@ -250,8 +250,8 @@ def test_cost_of_transport_counts_positive_work():
     steps = np.arange(len(track.positions))
     track.joint_angles[:, 0], track.torques[:, 0] = 0.1 * steps, 2.0  # drives: 0.2 J a step
     track.joint_angles[:, 1], track.torques[:, 1] = -0.1 * steps, 5.0  # brakes: does not count
-    metres_a_step = 0.5 * DT
-    assert value("cost_of_transport", track) == pytest.approx(0.2 / (2.0 * 10.0 * metres_a_step))
+    meters_a_step = 0.5 * DT
+    assert value("cost_of_transport", track) == pytest.approx(0.2 / (2.0 * 10.0 * meters_a_step))
     assert value("cost_of_transport", track._replace(positions=0 * track.positions)) == math.inf
 
 

@@ -70,13 +70,13 @@ def test_ground_is_a_function_of_its_settings(kind):
 
 
 def profile(robot, kind, **settings):
-    """Heights, m, along the middle of the first lane, every centimetre."""
+    """Heights, m, along the middle of the first lane, every centimeter."""
     arena = prepared(robot, kind, settings)[0].scene.arena
     x = np.arange(0.0, 12.0, 0.01)
     return arena.height(x, arena.start(0) + 0.0 * x)
 
 
-def test_obstacles_in_metres_are_the_same_for_all_bodies():
+def test_obstacles_in_meters_are_the_same_for_all_bodies():
     """Queen stands 0.45 m high, Tick 0.21 m; edges may be off by rounding of the places in the test."""
     for robot in ("queen", "tick"):
         height = ROBOTS[robot].torso.standing_height
@@ -93,7 +93,7 @@ def test_obstacles_in_metres_are_the_same_for_all_bodies():
         assert 0.03 < rough.max() <= 0.05
 
 
-def test_a_rise_in_metres_equals_its_difficulty():
+def test_a_rise_in_meters_equals_its_difficulty():
     height = ROBOTS["queen"].torso.standing_height
     assert_allclose(
         profile("queen", "stairs", rise=0.3 * height), profile("queen", "stairs", difficulty=1.0), atol=1e-12

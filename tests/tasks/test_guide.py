@@ -82,15 +82,15 @@ def test_a_task_in_the_arena_conforms(package):
 CHECKED = 'parameters.weights(cls.weights, changed=overrides.get("weights"))'
 UNCHECKED = CROUCHING.replace(CHECKED, 'cls.weights | overrides.get("weights", {})')
 OBSERVE = re.compile(r"    def observe\(.*?\n\n", re.DOTALL)
-MISSPELT = ("--set", 'weights={"heigt": 1.0}')
+MISSPELLED = ("--set", 'weights={"heigt": 1.0}')
 UNKNOWN = "unknown weight 'heigt'; did you mean 'height'? (there are: height, upright, control)"
 
 
 @pytest.mark.parametrize(
     ("module", "setting", "message"),
     [
-        (CROUCHING, MISSPELT, UNKNOWN),
-        (UNCHECKED, MISSPELT, UNKNOWN),
+        (CROUCHING, MISSPELLED, UNKNOWN),
+        (UNCHECKED, MISSPELLED, UNKNOWN),
         (OBSERVE.sub("", CROUCHING), (), "task 'crouch': has no observe, which arc_suite.tasks.Task requires"),
     ],
     ids=["weights that the task checks", "weights that it does not check", "a method is missing"],

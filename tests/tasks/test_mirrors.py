@@ -85,7 +85,7 @@ def mirror_of_hidden(task):
     return mirrors.joined(block.map(image) for block in task.privileged_blocks.values())
 
 
-DRAWN = {"payload": (0.1, 0.4), "centre_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0)}
+DRAWN = {"payload": (0.1, 0.4), "center_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0)}
 DRAWN |= {
     "gains": (0.8, 1.2),
     "actions": "position",

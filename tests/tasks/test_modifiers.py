@@ -43,7 +43,7 @@ EACH = {
     "actions": {"actions": "position"},
     "exclude_blocks": {"exclude_blocks": ("contact_forces",)},
     "payload": {"payload": (0.1, 0.4)},
-    "centre_of_mass": {"centre_of_mass": 0.1},
+    "center_of_mass": {"center_of_mass": 0.1},
     "joint_offset": {"joint_offset": 0.05},
     "joint_strength": {"joint_strength": (0.5, 1.0)},
     "gains": {"gains": (0.7, 1.3), "actions": "position"},
@@ -94,7 +94,7 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
     """And what they draw, they draw after all that the task draws."""
     own = {"kicks": 0.0, "actuator_failure": False}
     neutral = {"motor_strength": 1, "friction": 1.0, "mass": [1, 1], "observation_noise": 0, "delay": 0}
-    neutral |= {"payload": 0, "centre_of_mass": 0, "joint_offset": 0, "joint_strength": 1, "gains": 1, "armature": 1}
+    neutral |= {"payload": 0, "center_of_mass": 0, "joint_offset": 0, "joint_strength": 1, "gains": 1, "armature": 1}
     neutral |= {"force": 0, "history": 0}
     plain = load(BODIES[body], task_name, **(own if TASKS[task_name].modifiers else {}))
     one = load(BODIES[body], task_name, **neutral, **own, exclude_blocks=(), actions="torque")
@@ -172,7 +172,7 @@ def drawn_over(episodes, **settings):
 
 
 def tensor(model, part):
-    """The inertia of a part about its centre of mass, in its frame."""
+    """The inertia of a part about its center of mass, in its frame."""
     axes = rotations.matrix(model.body_iquat[part])
     return axes * model.body_inertia[part] @ axes.T
 
@@ -203,10 +203,10 @@ def test_a_payload_is_as_if_a_small_ball_had_been_welded_on():
     assert (np.ptp(places, axis=0) > 0.7 * (high - low)).all()
 
 
-def test_each_episode_has_a_centre_of_mass_an_armature_and_strengths_of_its_own():
+def test_each_episode_has_a_center_of_mass_an_armature_and_strengths_of_its_own():
     plain = load("leaper").physics.model.ptr
     torso, found = plain.body("torso").id, []
-    settings = {"centre_of_mass": 0.1, "armature": (0.5, 2.0), "joint_strength": (0.4, 0.8), "motor_strength": 0.5}
+    settings = {"center_of_mass": 0.1, "armature": (0.5, 2.0), "joint_strength": (0.4, 0.8), "motor_strength": 0.5}
     for environment in drawn_over(40, **settings):
         model, own = environment.physics.model.ptr, environment.task.memory.changes
         moved = model.body_ipos - plain.body_ipos
@@ -436,7 +436,7 @@ def test_noise_is_uniform_and_depends_on_all_that_it_counts():
         lines = np.moveaxis(drawn, axis, 0).reshape(drawn.shape[axis], -1)
         for lag in (1, 2, 7):
             assert abs((lines[lag:] * lines[:-lag]).mean() * 3.0) < 0.012
-    # As MurmurHash3's own finaliser computes.
+    # As MurmurHash3's own finalizer computes.
     scrambled = noise.scrambled(np.array([0, 1, 0xDEADBEEF], np.uint32))
     assert_array_equal(scrambled, [0, 0x514E28B7, 0x0DE5C6A9])
 
@@ -460,7 +460,7 @@ def test_noise_is_on_what_is_measured_and_on_nothing_else():
 
 
 def test_noise_of_the_scan_is_set_by_its_name():
-    """To legged_gym's 0.1 m for a body of half a metre, 0.2 h."""
+    """To legged_gym's 0.1 m for a body of half a meter, 0.2 h."""
     noisy, plain = load("leaper", "rough", observation_noise={"scan": 2.0}).reset(), load("leaper", "rough").reset()
     errors = {name: noisy.observation[name] - block for name, block in plain.observation.items()}
     assert 0.18 < abs(errors.pop("scan")).max() <= 0.2
@@ -491,9 +491,9 @@ def test_a_task_that_prescribes_no_gait_takes_modifiers():
 
 def test_named_environments_are_steer_with_modifiers_that_callers_can_change():
     for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"actuator_failure": True})):
-        named, spelt = load("tick", name), load("tick", "steer", **settings)
-        assert_array_equal(flat(named.reset()), flat(spelt.reset()))
-        assert named.task.definition.changes == spelt.task.definition.changes
+        named, spelled = load("tick", name), load("tick", "steer", **settings)
+        assert_array_equal(flat(named.reset()), flat(spelled.reset()))
+        assert named.task.definition.changes == spelled.task.definition.changes
     changes = load("tick", "shoved", kicks=0.5, delay=1).task.definition.changes
     assert (changes.kicks, changes.delay) == (0.5, (1, 1))
 
@@ -521,7 +521,7 @@ LISTED = ", ".join(BLOCKS)
         ({"observation_noise": {"postur": 1}}, "unknown block with noise 'postur'; did you mean 'posture'?"),
         ({"observation_noise": {"scann": 1}}, "unknown block with noise 'scann' (there are: posture, velocities, "),
         ({"payload": -1}, f"payload: expected a number from 0 to 10, {OR_TWO}, got -1"),
-        ({"centre_of_mass": (0, 1)}, "centre_of_mass: expected a number from 0 to 1, got (0, 1)"),
+        ({"center_of_mass": (0, 1)}, "center_of_mass: expected a number from 0 to 1, got (0, 1)"),
         ({"gains": 2.0}, "gains: torques have none, expected actions='position', got 2.0"),
         ({"delay": 1.5}, "delay: expected an integer from 0 to 100, got 1.5"),
         ({"delay": (3, 1)}, "delay: expected an integer from 3 to 100, got 1"),
@@ -553,7 +553,7 @@ def test_the_guide_runs():
 
 
 def kick_arrows(environment):
-    return [mark for mark in environment.task.markers(environment.physics) if mark.colour[1] < 0.2]
+    return [mark for mark in environment.task.markers(environment.physics) if mark.color[1] < 0.2]
 
 
 @pytest.mark.parametrize("task", ["walk", "steer"])
@@ -567,7 +567,7 @@ def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
         shown.append(kick_arrows(environment))
         if len(shown) == first:
             (arrow,), torso = shown[-1], environment.physics.data.qpos[:3].copy()
-            assert arrow.shape == "arrow" and arrow.colour[0] > 0.8
+            assert arrow.shape == "arrow" and arrow.color[0] > 0.8
             way, off = arrow.end - arrow.start, torso - arrow.end
             assert_allclose(way[:2] / np.hypot(*way[:2]), kick / np.hypot(*kick))
             assert_allclose(off[:2] / np.hypot(*off[:2]), kick / np.hypot(*kick))  # it points at the torso

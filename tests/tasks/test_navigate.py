@@ -173,9 +173,9 @@ def test_a_pillar_in_the_way_is_touched_and_stops_a_body():
 def test_pictures_show_the_goal_and_pillars():
     single, task, memory = opened("tick", "navigate")
     shown = single.physics.render(60, 80)
-    disc = task.markers(memory, task.read(single.physics.data.ptr))[-1]
-    assert (disc.shape, disc.radius) == ("cylinder", 0.7 * task.context.reach)
-    assert_array_equal(disc.start[:2], memory.command.goals[0])
+    disk = task.markers(memory, task.read(single.physics.data.ptr))[-1]
+    assert (disk.shape, disk.radius) == ("cylinder", 0.7 * task.context.reach)
+    assert_array_equal(disk.start[:2], memory.command.goals[0])
     single.physics.data.mocap_pos[:, :2] += 100.0
     assert not np.array_equal(single.physics.render(60, 80), shown)
 

@@ -15,7 +15,7 @@ from arc_suite.robots import ROBOTS
 from arc_suite.tasks import privileged, tokens
 from arc_suite.tasks.modifiers import FAILS_FROM
 
-DRAWN = {"friction": (0.5, 1.0), "mass": (0.8, 1.2), "payload": (0.1, 0.3), "centre_of_mass": 0.1}
+DRAWN = {"friction": (0.5, 1.0), "mass": (0.8, 1.2), "payload": (0.1, 0.3), "center_of_mass": 0.1}
 DRAWN |= {"joint_offset": 0.05, "joint_strength": (0.5, 1.0), "motor_strength": 0.8, "armature": (0.8, 1.2)}
 
 
@@ -49,7 +49,7 @@ def test_what_an_episode_draws_is_there(task):
     assert model.body_mass[own].sum() == pytest.approx((1 + found["payload"][0]) * found["mass"][0] * mass[own].sum())
     assert_allclose(model.dof_armature, found["armature"][0] * armature)
     assert (found["strength"] < 0.8).all() and len(set(found["strength"])) == 12
-    assert (abs(found["joint_offset"]) <= 0.05).all() and (abs(found["centre_of_mass"]) <= 0.1).all()
+    assert (abs(found["joint_offset"]) <= 0.05).all() and (abs(found["center_of_mass"]) <= 0.1).all()
     assert_array_equal(found["gains"], 1.0)
 
 
@@ -74,7 +74,7 @@ def test_what_is_changed_for_good_takes_the_place_of_what_is_drawn():
     for name, value in own.items():
         assert_allclose(found[name][1], value, rtol=1e-12)
     assert_allclose(found["payload"][1], (0.3, 0.0, 0.04, 0.0), atol=1e-12)
-    assert_allclose(found["centre_of_mass"][1], (0.0, 0.04, 0.0), atol=1e-12)
+    assert_allclose(found["center_of_mass"][1], (0.0, 0.04, 0.0), atol=1e-12)
     drawn = privileged.split(layout, drawn["privileged"])
     assert_allclose(found["strength"][1], 0.25 * drawn["strength"], rtol=1e-6)
     assert found["friction"][0] > 0.7 and found["mass"][0] < 1.0 and found["payload"][0, 0] < 0.3

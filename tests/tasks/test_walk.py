@@ -38,8 +38,8 @@ def test_reset_noise(domain):
         positions.append(environment.physics.position())
         velocities.append(environment.physics.velocity())
     positions, velocities = np.array(positions), np.array(velocities)
-    for column, centre in ((0, 0.0), (1, 0.0), (2, height)):
-        offsets = positions[:, column] - centre
+    for column, center in ((0, 0.0), (1, 0.0), (2, height)):
+        offsets = positions[:, column] - center
         assert 0.9 * base < np.abs(offsets).max() <= base
         assert abs(offsets.mean()) < 0.15 * base
     np.testing.assert_allclose(np.linalg.norm(positions[:, 3:7], axis=1), 1.0, atol=1e-12)

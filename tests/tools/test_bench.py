@@ -76,8 +76,8 @@ def test_robots_of_any_name_are_plotted_and_in_the_tables(small_run, tmp_path):
     report.plot(results, tmp_path / "plot.png")
     assert is_a_plot(tmp_path / "plot.png")
     assert "|  | queen | leaper | hopper | crawler |" in report.tables(results)
-    colours = [colour for _, colour, _ in report._colored(results)]
-    assert len(set(colours)) == 4
+    colors = [color for _, color, _ in report._colored(results)]
+    assert len(set(colors)) == 4
 
 
 def is_a_plot(path):

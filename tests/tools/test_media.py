@@ -66,7 +66,7 @@ def steps_of(name):
 def test_a_film_of_a_task_shows_what_the_task_is_about(name):
     run = steps_of(name)
     assert len(run) == 67 and not run[-1][2]["fell"]
-    reds = [any(mark.colour[1] < 0.2 for mark in marks) for marks, *_ in run]
+    reds = [any(mark.color[1] < 0.2 for mark in marks) for marks, *_ in run]
     moment = make_media.TASKS[name].moment
     assert all(len(marks) >= 2 for marks, *_ in run) or name == "navigate"
     assert (any(reds), reds[moment]) == 2 * (name in ("shoved", "roam"),)

@@ -19,7 +19,7 @@ TARGETS = {
     "vector env / threads x lean-model limit": 0.95,
     "vector env, most environments / reference": 0.95,
 }
-# A robot that is not here has a colour of matplotlib's.
+# A robot that is not here has a color of matplotlib's.
 _COLORS = {"queen": "#b8860b", "bastion": "#2a7f8e", "tick": "#7a5195", "leaper": "#c8443c"}
 _MARKED = re.compile(r"(<!-- benchmark -->\n).*?(<!-- end of benchmark -->)", re.DOTALL)
 

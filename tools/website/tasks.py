@@ -46,7 +46,7 @@ METRICS = {
     "pose_tracking": "mean of what the steps earn for keeping the pose, at most 1",
     "level": "of the curriculum",
     "fell": "1 if the body fell",
-    "sank": "1 if a foot got stuck under the ground, a contact artefact",
+    "sank": "1 if a foot got stuck under the ground, a contact artifact",
     "gait_compliance": "share of foot samples that agree with the prescribed contact schedule",
     "cost_of_transport": "positive work of the motors by weight and path",
     "collisions": "ways from goal to goal on which a pillar was touched",
@@ -162,7 +162,7 @@ def _end(kind: type[Task], tasks) -> str:
         ("0", f"the ground carries the torso with more than {health.lying:g} of the weight"),
     ]
     if isinstance(kind.ground, ground.Lanes):
-        lines.append(("0", f"a foot stays under the ground for {ground.SINKING} steps, a contact artefact"))
+        lines.append(("0", f"a foot stays under the ground for {ground.SINKING} steps, a contact artifact"))
         lines.append(
             ("1", f"the torso is {ground.OFF_LANE:g} h from the lane's middle, or {ground.END:g} h from an end")
         )

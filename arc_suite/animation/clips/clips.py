@@ -31,7 +31,7 @@ class Clip(NamedTuple):
         cycles: of the gait.
         foot_contacts: events, in the order of time.
         feet: names of all feet.
-        slip: path of a sole near the ground, m a metre of the root, as a mean over the feet; None if the root stays.
+        slip: path of a sole near the ground, m a meter of the root, as a mean over the feet; None if the root stays.
         additive_over: names of the clips that an additive clip can be added to; None for a clip that is not additive.
     """
 

@@ -115,17 +115,17 @@ def _bound(parts: list[Part], meshes: list[dict[str, Mesh]], clips: Sequence[Cli
 
 
 def _material(name: str, material: Material) -> dict:
-    colour = _linear(material.colour)
-    look = {"baseColorFactor": [*colour.tolist(), 1.0], "metallicFactor": 0.0, "roughnessFactor": material.roughness}
+    color = _linear(material.color)
+    look = {"baseColorFactor": [*color.tolist(), 1.0], "metallicFactor": 0.0, "roughnessFactor": material.roughness}
     properties = {"name": name, "pbrMetallicRoughness": look}
     if material.emission > 0.0:
-        properties["emissiveFactor"] = (material.emission * colour).tolist()
+        properties["emissiveFactor"] = (material.emission * color).tolist()
     return properties
 
 
-def _linear(colour: np.ndarray) -> np.ndarray:
-    """Return the linear intensities of an sRGB colour (IEC 61966-2-1), rounded to what a screen can show."""
-    linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+def _linear(color: np.ndarray) -> np.ndarray:
+    """Return the linear intensities of an sRGB color (IEC 61966-2-1), rounded to what a screen can show."""
+    linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
     return linear.astype(float).round(6)
 
 

@@ -114,11 +114,11 @@ def _view(stage: pictures.Decorated, qpos: np.ndarray, size: int, transparent: b
         picture = stage.render(scale * size, scale * size, _FREE, **kwargs)
         return picture.reshape(size, scale, size, scale, -1)
 
-    colours = drawn()
+    colors = drawn()
     if not transparent:
-        return colours.mean(axis=(1, 3)).round().astype(np.uint8)
+        return colors.mean(axis=(1, 3)).round().astype(np.uint8)
     parts = drawn(segmentation=True)[..., :1]
     solid = (parts >= 0) & (stage.model.ptr.geom_bodyid[parts] > 0)
     alpha = solid.mean(axis=(1, 3))
-    shade = (colours * solid).mean(axis=(1, 3)) / np.maximum(alpha, 1e-9)
+    shade = (colors * solid).mean(axis=(1, 3)) / np.maximum(alpha, 1e-9)
     return np.concatenate([shade, 255.0 * alpha], axis=-1).round().astype(np.uint8)

@@ -246,7 +246,7 @@ def _looped(motion: Motion) -> Motion:
 
 
 def _legs(body: Body) -> Legs:
-    """Return the legs with the centres of feet for soles, over which a torso tilts."""
+    """Return the legs with the centers of feet for soles, over which a torso tilts."""
     legs = Legs.of(body, used=1.0)
     return legs._replace(radii=np.zeros_like(legs.radii))
 

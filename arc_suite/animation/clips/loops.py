@@ -179,5 +179,5 @@ def _rooted(place) -> tuple[np.ndarray, np.ndarray]:
     """
     place = relative(place[0], place)
     local = relative(along(logarithm(place[-1]), np.linspace(0.0, 1.0, len(place))), place)
-    centre = local[:-1].mean(axis=0)
-    return logarithm(relative(centre, after(place[-1], centre))), relative(centre, local)
+    center = local[:-1].mean(axis=0)
+    return logarithm(relative(center, after(place[-1], center))), relative(center, local)

@@ -37,7 +37,7 @@ def metadata(clip: Clip) -> dict[str, Any]:
     """Return the metadata of a clip.
 
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
-    `slip` is the path of a sole near the ground, m a metre of the root. `additive_to` is the animation whose first
+    `slip` is the path of a sole near the ground, m a meter of the root. `additive_to` is the animation whose first
     frame is the reference of an additive clip, and `additive_over` names the clips that it can be added to: no sole
     then sinks deeper than 0.03 standing heights.
     """

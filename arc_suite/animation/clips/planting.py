@@ -65,7 +65,7 @@ def _smooth(values: np.ndarray, width: int, loops: bool) -> np.ndarray:
 
 
 def slip(body: Body, motion: Motion) -> float | None:
-    """Return the path of a sole in stance, m a metre of the root, as a mean over the feet; None if the root stays."""
+    """Return the path of a sole in stance, m a meter of the root, as a mean over the feet; None if the root stays."""
     legs, path = Legs.of(body), np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=-1).sum()
     if path < _STANDS * body.torso.standing_height:
         return None
@@ -94,13 +94,13 @@ def _nearer(legs: Legs, height: float, motion: Motion, stances, fastest: np.ndar
     rows = slice(count, 2 * count + 1) if loops else slice(None)
     feet, corrections, poses = feet[rows], corrections[rows], around.poses()[rows]
     turns, places, angles = rotations.matrix(poses[:, 3:7]), poses[:, None, :3], legs.by_leg(poses[:, 7:])
-    centres, found, waits = _centres(legs), angles, np.ones(len(legs.radii), bool)
+    centers, found, waits = _centers(legs), angles, np.ones(len(legs.radii), bool)
     for share in _SHARES:
         goals = feet + corrections * (share, share, 1.0)
         goals[..., 2] = np.maximum(goals[..., 2], legs.radii)
         seen = (turns.swapaxes(-1, -2)[:, None] @ (goals - places)[..., None])[..., 0]
-        reached = centres.reached(angles, seen, _WEIGHTS, _DAMPING * height, _ROUNDS)
-        missed = abs((turns[:, None] @ (centres.soles(reached)[0] - seen)[..., None])[..., 2, 0]).max(axis=0)
+        reached = centers.reached(angles, seen, _WEIGHTS, _DAMPING * height, _ROUNDS)
+        missed = abs((turns[:, None] @ (centers.soles(reached)[0] - seen)[..., None])[..., 2, 0]).max(axis=0)
         follows = waits & (missed <= _SINKS * height) & (_paces(reached) <= fastest)
         found = np.where(follows[:, None], reached, found)
         waits &= ~follows
@@ -112,15 +112,15 @@ def _nearer(legs: Legs, height: float, motion: Motion, stances, fastest: np.ndar
     return motion._replace(joints=joints)
 
 
-def _centres(legs: Legs) -> Legs:
-    """Return the legs with the centres of feet for soles."""
+def _centers(legs: Legs) -> Legs:
+    """Return the legs with the centers of feet for soles."""
     return legs._replace(radii=np.zeros_like(legs.radii))
 
 
 def _feet(legs: Legs, motion: Motion) -> np.ndarray:
-    """Return the places (samples, legs, 3) of the centres of feet in the world, m."""
+    """Return the places (samples, legs, 3) of the centers of feet in the world, m."""
     poses = motion.poses()
-    places = _centres(legs).soles(legs.by_leg(motion.joints))[0]
+    places = _centers(legs).soles(legs.by_leg(motion.joints))[0]
     return (rotations.matrix(poses[:, 3:7])[:, None] @ places[..., None])[..., 0] + poses[:, None, :3]
 
 

@@ -39,7 +39,7 @@ def joined(meshes: list[Mesh]) -> Mesh:
 
 
 def shape(kind: str, size, tolerance: float, fewest: int = FEWEST) -> Mesh:
-    """Return a shape about its centre.
+    """Return a shape about its center.
 
     Args:
         kind: of `KINDS`.

@@ -73,10 +73,8 @@ def contacts_image(contacts: tuple[np.ndarray, np.ndarray] | None, names: tuple[
         draw.text((2, 2), "no gait", INK, font)
         return np.asarray(picture)
     stance, schedule = (each[-_STEPS:] for each in contacts)
-    colours = np.array(
-        [[ImageColor.getrgb(colour) for colour in pair] for pair in (("white", PALE), (VERMILION, BLUE))]
-    )
-    cells = colours[stance.astype(int), schedule.astype(int)].astype(np.uint8).transpose(1, 0, 2)
+    colors = np.array([[ImageColor.getrgb(color) for color in pair] for pair in (("white", PALE), (VERMILION, BLUE))])
+    cells = colors[stance.astype(int), schedule.astype(int)].astype(np.uint8).transpose(1, 0, 2)
     cells = cells.repeat(_LINE, axis=0).repeat(_CELL, axis=1)
     cells[::_LINE] = 255  # a gap between lines
     picture.paste(Image.fromarray(cells), (size[0] - cells.shape[1], 0))
@@ -88,5 +86,5 @@ def contacts_image(contacts: tuple[np.ndarray, np.ndarray] | None, names: tuple[
 _OPTIONS: dict = {"scales": {"x": {"time": False}}, "legend": {"live": False}}
 
 
-def _series(colours: dict[str, str]) -> list[dict]:
-    return [{"label": name, "stroke": colour, "width": 1.5} for name, colour in colours.items()]
+def _series(colors: dict[str, str]) -> list[dict]:
+    return [{"label": name, "stroke": color, "width": 1.5} for name, color in colors.items()]

@@ -31,7 +31,7 @@ class Sketch:
         file: the text of a spec file, of `FILE`.
         scale, length, width, thickness, fan: see `shaping.Shape`.
         lengths: factors of links, pairs of a name and a number; those of links that the body lacks are ignored.
-        palette: of colours, a name of `spec.PALETTES`, a seed in digits, or `OWN`.
+        palette: of colors, a name of `spec.PALETTES`, a seed in digits, or `OWN`.
         task: name of the task.
         gait: name of the gait, or `OWN`.
         speed: target velocity, as a multiple of the body's own.

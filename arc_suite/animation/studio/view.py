@@ -39,7 +39,7 @@ class View:
     def show(self, creature: Creature) -> None:
         """Take the creature of the one before, in its pose of now."""
         self._creature, self._unit = creature, creature.unit
-        colours = {name: _rgb(material.colour) for name, material in creature.materials.items()}
+        colors = {name: _rgb(material.color) for name, material in creature.materials.items()}
         with self._server.atomic():
             self._server.scene.remove_by_name("/world")
             self._world = self._server.scene.add_frame("/world", show_axes=False)
@@ -52,7 +52,7 @@ class View:
                 )
                 self._frames.append(frame)
                 for material, mesh in part_meshes(part, _TOLERANCE * self._unit).items():
-                    self._add(f"{names[-1]}/{material}", mesh, colours[material])
+                    self._add(f"{names[-1]}/{material}", mesh, colors[material])
             self._hinges = [(index, part.joint) for index, part in enumerate(creature.parts) if part.joint is not None]
             self._standing = np.array([creature.parts[index].quaternion for index, _ in self._hinges])
             self._axes = np.array([creature.parts[index].axis for index, _ in self._hinges])
@@ -84,8 +84,8 @@ class View:
             self._anchor.position = place * (1.0, 1.0, 0.0)
             self._mark(markers, place * (1.0, 1.0, 0.0))
 
-    def _add(self, name: str, mesh: Mesh, colour: tuple[int, int, int]):
-        return self._server.scene.add_mesh_simple(name, mesh.points / self._unit, mesh.triangles, color=colour)
+    def _add(self, name: str, mesh: Mesh, color: tuple[int, int, int]):
+        return self._server.scene.add_mesh_simple(name, mesh.points / self._unit, mesh.triangles, color=color)
 
     def _ground_is_stale(self, place: np.ndarray) -> bool:
         walked = abs(place[:2] - self._middle).max() > _AROUND - _NEAR and not self._endless
@@ -114,7 +114,7 @@ class View:
         for solid in found["solids"]:
             mesh = shapes.shape(solid["kind"], solid["size"], _TOLERANCE * self._unit)
             shaded = [solid["shade"] * part for part in _STEPS]
-            rgb = _rgb([part / 255.0 for part in shaded] if solid["colour"] is None else solid["colour"])
+            rgb = _rgb([part / 255.0 for part in shaded] if solid["color"] is None else solid["color"])
             solids.setdefault(rgb, []).append(mesh.moved(solid["place"], np.eye(3)))
         for index, (rgb, meshes) in enumerate(solids.items()):
             self._add(f"/world/ground/solid{index}", shapes.joined(meshes), rgb)
@@ -132,9 +132,9 @@ class View:
             self._arrows = None
             if arrows:
                 radius = arrows[0].radius / self._unit
-                colours = np.array([_rgb(marker.colour[:3]) for marker in arrows])
+                colors = np.array([_rgb(marker.color[:3]) for marker in arrows])
                 sizes: dict = {"shaft_radius": radius, "head_radius": 2.0 * radius, "head_length": 3.0 * radius}
-                self._arrows = self._server.scene.add_arrows("/world/markers/arrows", points, colours, **sizes)
+                self._arrows = self._server.scene.add_arrows("/world/markers/arrows", points, colors, **sizes)
         elif arrows and abs(self._arrows.points - points).max() > _SAME:
             self._arrows.points = points
         cylinders = [marker for marker in markers if marker.shape == "cylinder"]
@@ -152,7 +152,7 @@ class View:
 
     def _style(self, index: int, marker: Marker) -> tuple:
         height = np.linalg.norm(marker.end - marker.start) / self._unit
-        return index, round(marker.radius / self._unit, 4), round(float(height), 4), _rgb(marker.colour[:3])
+        return index, round(marker.radius / self._unit, 4), round(float(height), 4), _rgb(marker.color[:3])
 
 
 def _surface(field: dict) -> Mesh:
@@ -167,6 +167,6 @@ def _surface(field: dict) -> Mesh:
     return Mesh(points, np.tile((0.0, 0.0, 1.0), (len(points), 1)), triangles)
 
 
-def _rgb(colour) -> tuple[int, int, int]:
-    red, green, blue = (round(255.0 * float(part)) for part in colour)
+def _rgb(color) -> tuple[int, int, int]:
+    red, green, blue = (round(255.0 * float(part)) for part in color)
     return red, green, blue

@@ -1,4 +1,4 @@
-"""Domain randomisation in the form of MuJoCo Playground: fields of the model that differ from world to world."""
+"""Domain randomization in the form of MuJoCo Playground: fields of the model that differ from world to world."""
 
 from collections.abc import Callable
 

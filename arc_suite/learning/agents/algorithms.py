@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from arc_suite import checks, versions
 from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents.hyperparameters import UNSEEN, BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
+from arc_suite.learning.agents.hyperparameters import UNSEEN, BehaviorCloning, DAgger, ProximalPolicy, SoftActorCritic
 
 
 class Algorithm(NamedTuple):
@@ -96,7 +96,7 @@ def _learn(hp, context) -> Iterator[Any]:
     """
     with versions.needing("training needs JAX", "learn"):
         from arc_suite.learning.agents import bc, dagger, off_policy, on_policy
-    learners = {SoftActorCritic: off_policy, ProximalPolicy: on_policy, DAgger: dagger, BehaviourCloning: bc}
+    learners = {SoftActorCritic: off_policy, ProximalPolicy: on_policy, DAgger: dagger, BehaviorCloning: bc}
     return learners[type(hp)].learn(hp, context)
 
 
@@ -141,7 +141,7 @@ ALGORITHMS = {
         steps=100_000,
     ),
     # Noise falls over the length of a run: uneven ground takes a longer one.
-    "ppo": _on_policy(ProximalPolicy(hidden=128), "proximal policy optimisation", 100_000, terrain_steps=3_000_000),
+    "ppo": _on_policy(ProximalPolicy(hidden=128), "proximal policy optimization", 100_000, terrain_steps=3_000_000),
     # Small steps around a good policy: the noise of `ppo` would undo it.
     "finetune": _finetune(
         ProximalPolicy(
@@ -152,7 +152,7 @@ ALGORITHMS = {
             policy_rate=1e-5,
             value_warm_up=320,
         ),
-        "proximal policy optimisation from the policy of another run, --hp start=FOLDER",
+        "proximal policy optimization from the policy of another run, --hp start=FOLDER",
         evaluate_every=100_000,
         steps=500_000,
     ),
@@ -180,13 +180,13 @@ ALGORITHMS = {
             value_warm_up=96,
             hidden=128,
         ),
-        "proximal policy optimisation with many bodies from the policy of another run, --hp start=FOLDER",
+        "proximal policy optimization with many bodies from the policy of another run, --hp start=FOLDER",
         evaluate_every=122_880,
         steps=270_336,
     ),
     # Its steps are updates.
     "bc": Algorithm(
-        _learn, BehaviourCloning(), "behaviour cloning of a dataset", 2500, 5000, source="prior data", acts=False
+        _learn, BehaviorCloning(), "behavior cloning of a dataset", 2500, 5000, source="prior data", acts=False
     ),
 }
 

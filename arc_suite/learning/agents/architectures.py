@@ -1,7 +1,7 @@
 """Architectures of networks: what maps vectors of observations to actions and to values.
 
 An architecture is a frozen value with the methods of `Perceptron`: how networks see observations (..., size), and how
-they give actions (..., joints) and values (...). Learners draw its parameters, normalise its observations and apply it.
+they give actions (..., joints) and values (...). Learners draw its parameters, normalize its observations and apply it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -25,7 +25,7 @@ ACTIVATION = "elu"
 class Perceptron(NamedTuple):
     """Multilayer perceptrons of two hidden layers, for one body.
 
-    Normalised numbers of a block are scaled, so that the variances of every block have the same sum. Otherwise 150
+    Normalized numbers of a block are scaled, so that the variances of every block have the same sum. Otherwise 150
     contact forces would outweigh a clock of two numbers.
 
     Attributes:
@@ -33,7 +33,7 @@ class Perceptron(NamedTuple):
         joints: of an action.
         privileged: sizes of blocks that follow those of the observation, and that values alone depend on.
         size: of an observation.
-        inputs: numbers whose moments normalise observations, privileged ones counted.
+        inputs: numbers whose moments normalize observations, privileged ones counted.
     """
 
     blocks: tuple[int, ...]
@@ -59,23 +59,23 @@ class Perceptron(NamedTuple):
         return networks.mlp(random, (self.inputs, hidden, hidden, 1), "orthogonal", gain=2**0.5)
 
     def actions(self, parameters, observations):
-        """Return the actions (..., joints) for normalised observations (..., size or inputs)."""
+        """Return the actions (..., joints) for normalized observations (..., size or inputs)."""
         return networks.forward(parameters, observations[..., : self.size] * self.scale, ACTIVATION)
 
     def values(self, parameters, observations):
-        """Return the values (...) of normalised observations (..., inputs)."""
+        """Return the values (...) of normalized observations (..., inputs)."""
         return networks.forward(parameters, observations * _scale(self.blocks + self.privileged), ACTIVATION)[..., 0]
 
     @property
     def scale(self) -> np.ndarray:
-        """(size,) factors of normalised numbers; their mean square is 1, so that gains of first weights hold."""
+        """(size,) factors of normalized numbers; their mean square is 1, so that gains of first weights hold."""
         return _scale(self.blocks)
 
     def seen(self, observations):
-        """Return the vectors (n, inputs) whose moments normalise observations (..., size)."""
+        """Return the vectors (n, inputs) whose moments normalize observations (..., size)."""
         return observations
 
-    def normalise(self, moments: Moments) -> Normalizer:
+    def normalize(self, moments: Moments) -> Normalizer:
         """Return what normalizes observations, from the moments of what was seen."""
         return moments.normalizer()
 
@@ -130,7 +130,7 @@ class PerLeg(NamedTuple):
         legs, mask = tokens.leg_inputs(observations)
         return legs[mask.any(axis=-1)]
 
-    def normalise(self, moments: Moments) -> Normalizer:
+    def normalize(self, moments: Moments) -> Normalizer:
         """Return what normalizes 664 numbers, the same for every leg; it leaves the number of joints as it is."""
         mean, factor, limit = moments.normalizer()
         return Normalizer(tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), limit)
@@ -172,9 +172,9 @@ def of(environment: VectorEnv | BodiesEnv, critic_blocks: Iterable[str] = ()) ->
     return Perceptron.of(environment.task.definition, critic_blocks)
 
 
-def policy(architecture: Architecture, normalise: Normalizer, parameters) -> Graph:
+def policy(architecture: Architecture, normalize: Normalizer, parameters) -> Graph:
     """Return the graph of a policy: a normalizer and a network of actions."""
-    mean, factor, limit = normalise
+    mean, factor, limit = normalize
     own = Normalizer(mean[: architecture.size], factor[: architecture.size], limit)
     return traced(lambda x: architecture.exported(parameters, own(x)).clip(-1.0, 1.0), architecture.size)
 
@@ -186,15 +186,15 @@ def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
         ValueError: another graph.
     """
     try:
-        normalise = Normalizer(*(graph.arrays[str(node.inputs[-1])] for node in graph.nodes[:3]))
+        normalize = Normalizer(*(graph.arrays[str(node.inputs[-1])] for node in graph.nodes[:3]))
         names = [node.inputs[1:] for node in graph.nodes if node.operator in ("Linear", "Product")]
         parameters = architecture.imported([graph.arrays[str(name)] for own in names for name in own])
-        same = policy(architecture, normalise, parameters).nodes == graph.nodes
+        same = policy(architecture, normalize, parameters).nodes == graph.nodes
     except (KeyError, TypeError, ValueError):
         same = False
     if not same:
         raise ValueError("a policy of dagger, bc or ppo, with two hidden layers")
-    return normalise, parameters
+    return normalize, parameters
 
 
 def _scale(blocks: Sequence[int]) -> np.ndarray:

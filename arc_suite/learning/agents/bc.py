@@ -1,4 +1,4 @@
-"""Behaviour cloning of a dataset: the simplest baseline of offline learning.
+"""Behavior cloning of a dataset: the simplest baseline of offline learning.
 
 No environment step is made: the steps of a run are updates of the network, towards the least squared distance from
 the dataset's actions.
@@ -11,16 +11,16 @@ import numpy as np
 
 from arc_suite.learning.agents import architectures, dagger, networks, priors
 from arc_suite.learning.agents.architectures import Perceptron
-from arc_suite.learning.agents.hyperparameters import BehaviourCloning
+from arc_suite.learning.agents.hyperparameters import BehaviorCloning
 from arc_suite.learning.agents.learner import RunContext, Slice, generator, restoring
 from arc_suite.learning.agents.normalizer import Moments
 
 SLICE = 500  # updates
 
-_CHUNK = 4096  # observations that are normalised at a time
+_CHUNK = 4096  # observations that are normalized at a time
 
 
-def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
+def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
     """Learn; see `arc_suite.learning.agents`.
 
     Raises:
@@ -34,7 +34,7 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
     moments = Moments.none(task.size)
     for first in range(0, len(data), _CHUNK):
         moments = moments.after(data.at(np.arange(first, min(first + _CHUNK, len(data)))).observations)
-    normalise = moments.normalizer()
+    normalize = moments.normalizer()
     architecture = Perceptron.of(task)
     state = dagger.begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
     step = 0
@@ -50,11 +50,11 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
             random = generator(context.seed, "update", step)
             batch = data.at(random.integers(len(data), size=updates * hp.batch))
             rates = hp.learning_rate * (1.0 - (step + np.arange(updates)) / context.steps)
-            known, orders = (normalise(batch.observations), batch.actions), np.arange(updates * hp.batch)
+            known, orders = (normalize(batch.observations), batch.actions), np.arange(updates * hp.batch)
             orders = orders.reshape(updates, hp.batch)
             state, error = dagger.fit(architecture, state, *known, orders, rates.astype(np.float32))
             errors.append(float(error))
             step += updates
         checkpoint = {**networks.named("state", state), "step": np.array(step)}
-        graph = architectures.policy(architecture, normalise, state.layers)
+        graph = architectures.policy(architecture, normalize, state.layers)
         yield Slice(step, {"error": float(np.mean(errors))}, graph, checkpoint)

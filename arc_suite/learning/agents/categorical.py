@@ -84,7 +84,7 @@ def _both(batch: Transitions, next_actions):
 
 
 def _joint(critic: Sequence[Mapping], x):
-    """Logits for inputs x that are normalised together, and the hidden layers with the statistics of this batch."""
+    """Logits for inputs x that are normalized together, and the hidden layers with the statistics of this batch."""
     found = []
     for layer in critic[:-1]:
         x = networks.linear(layer, x)

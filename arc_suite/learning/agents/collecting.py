@@ -53,12 +53,12 @@ class Environments:
         steps = ages(hp.num_envs, self.task.step_limit)
         self.environment.restore(self.environment.snapshot() | {"steps": steps})
 
-    def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, np.ndarray]:
+    def roll_out(self, policy, normalize: Normalizer, std: float, iteration: int, step: int) -> dict[str, np.ndarray]:
         """Act in all environments for a horizon.
 
         Args:
-            policy: network of normalised observations to mean actions.
-            normalise: what normalizes observations.
+            policy: network of normalized observations to mean actions.
+            normalize: what normalizes observations.
             std: standard deviation of actions.
             iteration: number of the horizon, from which the noise follows.
             step: environment steps before it.
@@ -74,8 +74,8 @@ class Environments:
         rollout = {name: [] for name in TRANSITIONS}
         noise = generator(self._seed, "noise before", iteration).standard_normal(self._shape, np.float32)
         for _ in range(self._hp.horizon):
-            normalised = normalise(self.observation)
-            mean = np.asarray(ppo.mean_action(self.architecture, policy, normalised))
+            normalized = normalize(self.observation)
+            mean = np.asarray(ppo.mean_action(self.architecture, policy, normalized))
             if not np.isfinite(mean).all():
                 raise Diverged("an action is not finite", step)
             noise = correlated(self._hp, noise, random.standard_normal(mean.shape, np.float32))

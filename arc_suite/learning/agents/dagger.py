@@ -1,4 +1,4 @@
-"""DAgger: imitation of a demonstrator, labelled wherever the learner goes.
+"""DAgger: imitation of a demonstrator, labeled wherever the learner goes.
 
 The demonstrator acts in half of the environments and the network in the other half, all with noise; the demonstrator
 labels every observation with its own action (Ross, Gordon and Bagnell, "A reduction of imitation learning and
@@ -47,7 +47,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
     architecture, teacher = architectures.of(environment), Teacher(environment, hp.preset)
     state = begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
     moments = Moments.none(architecture.inputs)
-    normalise = architecture.normalise(moments)
+    normalize = architecture.normalize(moments)
     length = -(-context.steps // hp.num_envs)  # control steps of each environment
     if length <= hp.left_out:
         first = f"as the first {hp.left_out} control steps of an episode are not learned from"
@@ -68,7 +68,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             step = min(done * hp.num_envs, context.steps)
             for name, array in dataset.items():
                 array[:done] = saved[name]
-            normalise = Normalizer(*map(np.asarray, networks.restored("normaliser", tuple(normalise), saved)))
+            normalize = Normalizer(*map(np.asarray, networks.restored("normalizer", tuple(normalize), saved)))
             observation = learner.restore_environment(environment, saved)
             teacher.restore(saved)
 
@@ -79,7 +79,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             teacher.reset(np.flatnonzero(age == 0))
             label = teacher.act(environment.task.split(observation), np.zeros(hp.num_envs)).clip(-1.0, 1.0)
             action, own = label.copy(), slice(hp.num_envs // 2, None)
-            action[own] = _act(architecture, state.layers, normalise(observation[own]))
+            action[own] = _act(architecture, state.layers, normalize(observation[own]))
             action += hp.noise * random.standard_normal(action.shape)
             for array, value in zip(dataset.values(), (observation, label, age), strict=True):
                 array[done] = value
@@ -94,13 +94,13 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         observations, labels, _ = (array[:done].reshape(known.size, -1)[known] for array in dataset.values())
         error = 0.0
         if len(labels):
-            normalise = architecture.normalise(moments.after(architecture.seen(observations)))
+            normalize = architecture.normalize(moments.after(architecture.seen(observations)))
             rates = hp.learning_rate * np.ones(hp.updates)
             if done == length:
                 rates = hp.learning_rate * np.linspace(1.0, 0.0, hp.last_updates, endpoint=False)
             most = length * hp.num_envs  # of one shape in every round, so compiled once
             inputs, outputs = (np.zeros((most, array.shape[-1]), np.float32) for array in (observations, labels))
-            inputs[: len(labels)], outputs[: len(labels)] = normalise(observations), labels
+            inputs[: len(labels)], outputs[: len(labels)] = normalize(observations), labels
             inputs, outputs = jnp.asarray(inputs), jnp.asarray(outputs)
             for first in range(0, len(rates), CHUNK):
                 part = rates[first : first + CHUNK].astype(np.float32)
@@ -112,11 +112,11 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             **networks.named("state", state),
             **{name: array[:done] for name, array in dataset.items()},
             "age": age,
-            **networks.named("normaliser", tuple(normalise)),
+            **networks.named("normalizer", tuple(normalize)),
             **learner.environment_arrays(environment),
             **teacher.snapshot(),
         }
-        yield Slice(step, metrics, architectures.policy(architecture, normalise, state.layers), checkpoint)
+        yield Slice(step, metrics, architectures.policy(architecture, normalize, state.layers), checkpoint)
 
 
 def begin(layers) -> DaggerState:
@@ -133,7 +133,7 @@ def fit(
     Args:
         architecture: of the network.
         state: before.
-        observations: (n, size), normalised.
+        observations: (n, size), normalized.
         labels: (n, joints)
         batches: (updates, batch) indices.
         rates: (updates,) learning rates.

@@ -40,9 +40,9 @@ class SoftActorCritic:
         initial_temperature: weight of the entropy at the start.
         target_entropy: of a joint, which the temperature follows.
         symmetry_augmentation: whether every other transition of a batch is mirrored, for symmetric bodies.
-        normalize: whether running moments normalise observations.
+        normalize: whether running moments normalize observations.
         exclude_blocks: names of blocks of the observation that networks do not see, where a task has them.
-        phase_every: environment steps between stabilisation phases.
+        phase_every: environment steps between stabilization phases.
         phase_updates: the most updates of the critics alone in a phase; 0 for no phases.
         early_stop: rule that ends a phase early: "none", "published" or "sign_safe"; see `stopping`.
         held_out: share of the online transitions in the validation set of a phase.
@@ -148,8 +148,8 @@ class DAgger:
 
 
 @dataclasses.dataclass(frozen=True)
-class BehaviourCloning:
-    """Hyperparameters of behaviour cloning.
+class BehaviorCloning:
+    """Hyperparameters of behavior cloning.
 
     Attributes:
         batch: transitions of an update.
@@ -170,7 +170,7 @@ class BehaviourCloning:
 
 @dataclasses.dataclass(frozen=True)
 class ProximalPolicy:
-    """Hyperparameters of proximal policy optimisation (Schulman et al., 2017).
+    """Hyperparameters of proximal policy optimization (Schulman et al., 2017).
 
     Attributes:
         start: folder of a run, or a policy file, whose policy learning starts from; "" for none.
@@ -182,7 +182,7 @@ class ProximalPolicy:
         epochs: passes over the transitions of a horizon.
         minibatch: transitions of an update, mirrored ones counted.
         discount: of a control step.
-        gae_lambda: decay of the generalised advantage estimate.
+        gae_lambda: decay of the generalized advantage estimate.
         clip: range of the probability ratio around 1.
         initial_std: standard deviation of actions at the start.
         final_std: the same at the end; it falls geometrically.
@@ -191,7 +191,7 @@ class ProximalPolicy:
         policy_rate: learning rate of the policy at the start; it follows the divergence.
         value_rate: learning rate of the value function.
         gradient_norm: the largest norm of a gradient; longer ones are scaled down.
-        normalize_until: share of the run during which the observation normaliser is updated; never if learning
+        normalize_until: share of the run during which the observation normalizer is updated; never if learning
             starts from a policy.
         value_warm_up: control steps of each environment during which only the value function learns; 0 unless
             learning starts from a policy.

@@ -1,4 +1,4 @@
-"""Inputs of networks: observations, normalised; privileged blocks of critics; and mirrored transitions."""
+"""Inputs of networks: observations, normalized; privileged blocks of critics; and mirrored transitions."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Self
@@ -42,7 +42,7 @@ class Inputs(NamedTuple):
 
     Attributes:
         size: of an observation.
-        moments: of observations, which normalise them; None for raw numbers.
+        moments: of observations, which normalize them; None for raw numbers.
         symmetry: mirror maps of the task; None for no mirrored transitions.
     """
 
@@ -56,7 +56,7 @@ class Inputs(NamedTuple):
 
         Args:
             task: whose observations they are.
-            normalize: whether running moments normalise the inputs.
+            normalize: whether running moments normalize the inputs.
             symmetry_augmentation: whether to mirror transitions, if the task is symmetric.
         """
         return cls(

@@ -1,10 +1,10 @@
-"""Running mean and variance of observations, for normalised inputs of networks."""
+"""Running mean and variance of observations, for normalized inputs of networks."""
 
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-LIMIT = 5.0  # of a normalised number
+LIMIT = 5.0  # of a normalized number
 _LEAST = 1e-3  # lower bound of the standard deviation, for near-constant inputs
 
 

@@ -2,7 +2,7 @@
 
 A step of all environments acts, stores the transitions and makes `utd_ratio` updates for each of them. The last
 update of an environment step moves the policy too; where updates are rarer than steps, each of them does.
-Stabilisation phases follow every `phase_every`-th step: updates of the critics alone, on the buffer as it stands. With
+Stabilization phases follow every `phase_every`-th step: updates of the critics alone, on the buffer as it stands. With
 early stopping a phase holds out a share of the buffer and ends by the loss on it.
 """
 
@@ -40,7 +40,7 @@ METRICS_OF_CRITICS = ("critic_loss", "q")
 
 
 class Phase(NamedTuple):
-    """A stabilisation phase.
+    """A stabilization phase.
 
     Attributes:
         updates: so far.
@@ -137,7 +137,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
                     state, critic_sums = update(core, state, critic_sums, *drawn)
                 updates += 1
 
-            # Begin a stabilisation phase, unless it lacks transitions for its validation set.
+            # Begin a stabilization phase, unless it lacks transitions for its validation set.
             begins = hp.phase_updates and steps // hp.phase_every > (steps - hp.num_envs) // hp.phase_every
             held_out = _held_out(hp, buffer, sources)
             if begins and (held_out or hp.early_stop == "none"):

@@ -1,4 +1,4 @@
-"""Proximal policy optimisation in a vector environment, or in worlds on a GPU.
+"""Proximal policy optimization in a vector environment, or in worlds on a GPU.
 
 With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`).
 A time limit bootstraps: the episode is worth the value of its last observation. Environments start at different
@@ -40,11 +40,11 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     task, architecture = collector.task, collector.architecture
     symmetry = inputs.symmetry(task, hp.critic_blocks) if hp.symmetry_augmentation else None
     moments, policy = Moments.none(architecture.inputs), None
-    normalise = architecture.normalise(moments)
+    normalize = architecture.normalize(moments)
     if hp.start and context.checkpoint is None:
         (mean, factor, limit), policy = _read(hp, context, task, architecture)
-        more = normalise.mean[len(mean) :], normalise.factor[len(mean) :]  # of privileged blocks, in units of about 1
-        normalise = Normalizer(np.append(mean, more[0]), np.append(factor, more[1]), limit)
+        more = normalize.mean[len(mean) :], normalize.factor[len(mean) :]  # of privileged blocks, in units of about 1
+        normalize = Normalizer(np.append(mean, more[0]), np.append(factor, more[1]), limit)
     state = ppo.begin(hp, architecture, generator(seed, "networks", 0), policy)
     iterations = 0
 
@@ -52,7 +52,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         with learner.restoring():
             state = networks.restored("state", state, saved)
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
-            normalise = Normalizer(*map(np.asarray, networks.restored("normaliser", tuple(normalise), saved)))
+            normalize = Normalizer(*map(np.asarray, networks.restored("normalizer", tuple(normalize), saved)))
             iterations = int(saved["iterations"])
             collector.restore(saved)
 
@@ -65,10 +65,10 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         with_policy = iterations * hp.horizon >= hp.value_warm_up
 
         # Act for the horizon.
-        rollout = collector.roll_out(state.policy, normalise, std, iterations, step)
+        rollout = collector.roll_out(state.policy, normalize, std, iterations, step)
 
         # Learn from it, in epochs of minibatches.
-        batch = batch_of(hp, architecture, rollout, state.values, normalise, symmetry)
+        batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
         count = len(batch.returns)
         random = generator(seed, "orders", iterations)
         orders = np.concatenate([random.permutation(count) for _ in range(hp.epochs)])
@@ -77,21 +77,21 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, schedules, with_policy)
         iterations += 1
 
-        # Update the normaliser.
+        # Update the normalizer.
         if not hp.start and done < hp.normalize_until:
             moments = moments.after(architecture.seen(rollout["observations"]))
             if symmetry is not None:
                 moments = moments.after(architecture.seen(symmetry.observation(rollout["observations"])))
-            normalise = architecture.normalise(moments)
+            normalize = architecture.normalize(moments)
 
         metrics = {"reward": rollout["rewards"].mean(), "falls": rollout["terminated"].sum(), "std": std}
         metrics |= {"kl": kl, "policy_rate": state.rate, "value_loss": value_loss}
         metrics = {name: float(metric) for name, metric in metrics.items()}
-        graph = architectures.policy(architecture, normalise, state.policy)
+        graph = architectures.policy(architecture, normalize, state.policy)
         checkpoint = {
             **networks.named("state", state),
             **networks.named("moments", moments),
-            **networks.named("normaliser", tuple(normalise)),
+            **networks.named("normalizer", tuple(normalize)),
             "iterations": np.array(iterations),
             **collector.arrays(),
         }
@@ -109,13 +109,13 @@ def _environments(hp: ProximalPolicy, context: RunContext):
 
 
 def batch_of(
-    hp: ProximalPolicy, architecture: Architecture, rollout: Mapping[str, Any], values, normalise: Normalizer, symmetry
+    hp: ProximalPolicy, architecture: Architecture, rollout: Mapping[str, Any], values, normalize: Normalizer, symmetry
 ) -> ppo.Horizon:
     """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
     size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
-    observations = normalise(rollout["observations"])
+    observations = normalize(rollout["observations"])
     here = numpy.asarray(ppo.value(architecture, values, observations))
-    after = normalise(rollout["next_observations"])
+    after = normalize(rollout["next_observations"])
     there = numpy.asarray(ppo.value(architecture, values, after))
     rewards = (1.0 - hp.discount) * rollout["rewards"]
     advantages = ppo.advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
@@ -125,7 +125,7 @@ def batch_of(
     actions, means = (rollout[name].reshape(len(returns), -1) for name in ("actions", "means"))
     if symmetry is not None:
         mirror, mirror_action = symmetry
-        mirrored = normalise(mirror(rollout["observations"]).reshape(-1, size))
+        mirrored = normalize(mirror(rollout["observations"]).reshape(-1, size))
         observations = numpy.concatenate([observations, mirrored])
         # The mirrored action is as probable as the action was. Under the policy's own mean for the mirrored
         # observation, where the policy is not symmetric, its probability would be almost 0 and its gradient huge.
@@ -136,7 +136,7 @@ def batch_of(
 
 
 def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Normalizer, tuple]:
-    """The normaliser and the network of the policy that learning starts from."""
+    """The normalizer and the network of the policy that learning starts from."""
     several, path = context.setup.several, hp.start
     found = universal.load(path) if several else policies.policy(Path(path), context.setup.body, task=task)
     if not isinstance(found, Network):
@@ -147,10 +147,10 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
             other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
     try:
-        normalise, policy = architectures.read(architecture, found.graph)
+        normalize, policy = architectures.read(architecture, found.graph)
     except ValueError as error:
         raise ValueError(f"{hp.start}: expected {error}") from None
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
     if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
-    return normalise, policy
+    return normalize, policy

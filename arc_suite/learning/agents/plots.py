@@ -10,8 +10,8 @@ from matplotlib.ticker import EngFormatter
 
 from arc_suite.evaluation import curve
 
-# Colour and marker of an algorithm in all pictures: Okabe and Ito's colours for the paper's six and PPO, Tol's muted
-# ones for the others. Both palettes are made for colour-blind eyes; markers tell apart what is near.
+# Color and marker of an algorithm in all pictures: Okabe and Ito's colors for the paper's six and PPO, Tol's muted
+# ones for the others. Both palettes are made for color-blind eyes; markers tell apart what is near.
 STYLES = {
     "sac": ("#0072B2", "o"),
     "speq": ("#009E73", "s"),
@@ -33,7 +33,7 @@ _OTHERS = (("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other pac
 # Line and hollow marker of further kinds of runs of one algorithm in a study; the first has the algorithm's own.
 _VARIANTS = (("--", "o"), (":", "s"), ("-.", "^"), ((0, (8, 2)), "D"), ((0, (1, 4)), "v"))
 _MARKERS = 15  # of a curve, at most
-_GREY = "#6E6E6E"
+_GRAY = "#6E6E6E"
 _ENTRY, _CHARACTER = 0.8, 0.08  # inches of a legend's entry without a text, and of a letter of the text
 _BESIDE = ("axes fraction", "data")  # coordinates of a label to the right of an axis
 _GAP = 0.052  # between the labels of two levels, as a share of the axis
@@ -43,7 +43,7 @@ class Curve(NamedTuple):
     """Returns of a kind of run.
 
     Attributes:
-        algorithm: which gives the colour.
+        algorithm: which gives the color.
         steps: (points,) environment steps.
         returns: (runs, points) mean return of each evaluation.
     """
@@ -74,9 +74,9 @@ def returns(
     steps = np.unique(evaluations["step"])
     episodes = [evaluations["return"][evaluations["step"] == step] for step in steps]
     low, mean, high = np.array([(each.min(), each.mean(), each.max()) for each in episodes]).T
-    colour, marker = _styles([algorithm])[algorithm]
-    axis.fill_between(steps, low, high, color=colour, alpha=0.15, linewidth=0)
-    axis.plot(steps, mean, color=colour, marker=marker, markevery=_every(steps))
+    color, marker = _styles([algorithm])[algorithm]
+    axis.fill_between(steps, low, high, color=color, alpha=0.15, linewidth=0)
+    axis.plot(steps, mean, color=color, marker=marker, markevery=_every(steps))
     _finish(axis, title, lines, finals, _styles([algorithm, *finals]))
     axis.set_ylabel("return: mean, lowest and highest of ten episodes")
     return figure
@@ -107,11 +107,11 @@ def study(
         axis.remove()
     for axis, (place, kinds) in zip(axes.flat, groups.items(), strict=False):
         for kind, each in kinds.items():
-            colour, marker = styles[each.algorithm]
-            style = {"color": colour, "marker": marker, "markersize": 5, "markevery": _every(each.steps)}
+            color, marker = styles[each.algorithm]
+            style = {"color": color, "marker": marker, "markersize": 5, "markevery": _every(each.steps)}
             robust = curve([each.returns])
             if len(each.returns) > 1:
-                axis.fill_between(each.steps, robust.low, robust.high, color=colour, alpha=0.15, linewidth=0)
+                axis.fill_between(each.steps, robust.low, robust.high, color=color, alpha=0.15, linewidth=0)
             axis.plot(each.steps, robust.iqm, label=kind, **style | variants[kind])
         _finish(axis, place, lines.get(place, {}), finals.get(place, {}), styles)
     for axis in axes[:, 0]:
@@ -124,7 +124,7 @@ def study(
 
 
 def _styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Return colours and markers by algorithm; unknown ones get others, in order."""
+    """Return colors and markers by algorithm; unknown ones get others, in order."""
     others = itertools.cycle(_OTHERS)
     return {name: STYLES[name] if name in STYLES else next(others) for name in dict.fromkeys(names)}
 
@@ -143,20 +143,20 @@ def _every(steps: np.ndarray) -> int:
 
 
 def _finish(axis, title: str, lines: Mapping[str, float], finals: Mapping[str, float], styles: Mapping) -> None:
-    """Draw levels to compare with, labelled on the right of the axis, where no line runs."""
-    levels = [(value, name, _GREY, "--") for name, value in lines.items()]
+    """Draw levels to compare with, labeled on the right of the axis, where no line runs."""
+    levels = [(value, name, _GRAY, "--") for name, value in lines.items()]
     levels += [(value, f"{name}, paper", styles[name][0], ":") for name, value in finals.items()]
-    for value, _, colour, dashes in levels:
-        axis.axhline(value, color=colour, linestyle=dashes, linewidth=1.0, zorder=0)
+    for value, _, color, dashes in levels:
+        axis.axhline(value, color=color, linestyle=dashes, linewidth=1.0, zorder=0)
     low, high = axis.get_ylim()
     low, high = min(low, 0.0), max([high, *(1.03 * value for value, *_ in levels)])
     axis.set_ylim(low, high)
     gap, levels = _GAP * (high - low), sorted(levels)
     heights = _apart([value for value, *_ in levels], gap, high)
-    for (value, name, colour, _), height in zip(levels, heights, strict=True):
-        arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "relpos": (0.0, 0.5), "shrinkB": 0.0}
+    for (value, name, color, _), height in zip(levels, heights, strict=True):
+        arrow = {"arrowstyle": "-", "color": color, "linewidth": 0.6, "relpos": (0.0, 0.5), "shrinkB": 0.0}
         text, places = f"{name} {value:.0f}", ((1.0, value), (1.04, height))
-        axis.annotate(text, *places, *[_BESIDE] * 2, arrow, va="center", fontsize=8, color=colour)
+        axis.annotate(text, *places, *[_BESIDE] * 2, arrow, va="center", fontsize=8, color=color)
     axis.set_xlabel("environment steps")
     axis.set_title(title, loc="left", fontweight="bold")
     axis.xaxis.set_major_formatter(EngFormatter(sep=""))

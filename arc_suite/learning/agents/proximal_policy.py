@@ -1,4 +1,4 @@
-"""Proximal policy optimisation (Schulman et al., "Proximal policy optimization algorithms", 2017), pure functions.
+"""Proximal policy optimization (Schulman et al., "Proximal policy optimization algorithms", 2017), pure functions.
 
 The policy is a normal distribution around a network's output, with a given standard deviation. Random numbers are
 inputs.
@@ -23,8 +23,8 @@ class PpoState(NamedTuple):
     """What updates change.
 
     Attributes:
-        policy: network of normalised observations to mean actions.
-        values: network of normalised observations to the discounted return.
+        policy: network of normalized observations to mean actions.
+        values: network of normalized observations to the discounted return.
         moments: of Adam, of policy and values.
         rate: () learning rate of the policy.
     """
@@ -39,7 +39,7 @@ class Horizon(NamedTuple):
     """Transitions of a horizon; leading axis (steps,).
 
     Attributes:
-        observations: (steps, size), normalised.
+        observations: (steps, size), normalized.
         actions: (steps, joints), not clipped.
         means: (steps, joints) mean actions of the acting policy.
         advantages: (steps,) mean 0, standard deviation 1.
@@ -70,7 +70,7 @@ value = jax.jit(lambda architecture, values, x: architecture.values(values, x), 
 
 
 def advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, ended):
-    """Return generalised advantage estimates (steps, num_envs) (Schulman et al., 2016).
+    """Return generalized advantage estimates (steps, num_envs) (Schulman et al., 2016).
 
     Args:
         hp: hyperparameters, for `discount` and `gae_lambda`.

@@ -1,4 +1,4 @@
-"""Early-stopping rules of stabilisation phases, on a validation loss.
+"""Early-stopping rules of stabilization phases, on a validation loss.
 
 The loss is that of the policy on the validation set, about -Q. The published rule counts a loss below 0.999 times
 the best as an improvement. Losses here are negative, and 0.999 times a negative best is worse than the best: a loss

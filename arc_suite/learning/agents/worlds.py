@@ -40,26 +40,26 @@ class Worlds:
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
         self._act = jax.jit(self._acted)
 
-    def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
+    def roll_out(self, policy, normalize: Normalizer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
         """Act in all worlds for a horizon."""
         key = jax.random.fold_in(self._key, iteration)
         keys = jax.random.split(key, self._hp.horizon)
         noise = jax.random.normal(jax.random.fold_in(key, 1), (self._hp.num_envs, self.architecture.joints))
         carry = self._state, self._steps, noise
-        (self._state, self._steps, _), rollout = self._act(carry, policy, normalise, np.float32(std), keys)
+        (self._state, self._steps, _), rollout = self._act(carry, policy, normalize, np.float32(std), keys)
         if not jnp.isfinite(rollout["means"]).all():
             raise Diverged("an action is not finite", step)
         return rollout
 
-    def _acted(self, carry, policy, normalise, std, keys):
-        return jax.lax.scan(functools.partial(self._step, policy, normalise, std), carry, keys)
+    def _acted(self, carry, policy, normalize, std, keys):
+        return jax.lax.scan(functools.partial(self._step, policy, normalize, std), carry, keys)
 
-    def _step(self, policy, normalise: Normalizer, std, carry, key):
+    def _step(self, policy, normalize: Normalizer, std, carry, key):
         """Step all worlds; return what the next step goes on from, and the transitions."""
         state, steps, noise = carry
         drawn, restart = jax.random.split(key)
         seen = self._seen(state)
-        mean = ppo.mean_action(self.architecture, policy, normalise(seen))
+        mean = ppo.mean_action(self.architecture, policy, normalize(seen))
         noise = correlated(self._hp, noise, jax.random.normal(drawn, mean.shape))
         action = mean + std * noise
         after = jax.vmap(self.env.step)(state, action)

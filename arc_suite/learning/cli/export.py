@@ -1,6 +1,6 @@
 """Write a trained policy as ONNX, for game engines and onnxruntime.
 
-The normaliser is inside; the metadata hold the robot, the observation's blocks, the control step, the
+The normalizer is inside; the metadata hold the robot, the observation's blocks, the control step, the
 gears of the motors and the rule of the gait's clock.
 
   arc-suite export runs/tick-walk-ppo-0

@@ -67,7 +67,7 @@ _EFFICIENCY = (
     "it has not. Area is the mean return over all evaluations so far."
 )
 _PHASES = (
-    "Updates of the critics alone in a stabilisation phase, for runs with published phases: those of `speq` and "
+    "Updates of the critics alone in a stabilization phase, for runs with published phases: those of `speq` and "
     "`speq_o2o` have the full length, the others may end early."
 )
 _STYLE = (

@@ -16,7 +16,7 @@ from arc_suite.seed_ranges import EVALUATION, Ranges, common, from_json
 
 RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators.csv"
 
-# Columns of the table of runs: the configuration, then the updates of stabilisation phases by environment step.
+# Columns of the table of runs: the configuration, then the updates of stabilization phases by environment step.
 RUN_COLUMNS = ("run", "kind", *CONFIGURATION, *PROVENANCE, "phases")
 TIMES = ("wall_seconds", "cpu_seconds")  # until the end of an evaluation
 SHARED, TEN = "data share seeds with evaluation", "ten episodes"
@@ -36,7 +36,7 @@ class RunResult(NamedTuple):
         progress: the task's progress in the latest evaluation by name, each (episodes,).
         cpu: (evaluations,) s of the processor until then.
         style: metrics of style of the latest policy by name, each (episodes,).
-        phases: (phases,) updates of each stabilisation phase; empty if they are not published.
+        phases: (phases,) updates of each stabilization phase; empty if they are not published.
         training_seeds: of the episodes that it learned from; None if they are unknown.
     """
 

@@ -139,7 +139,7 @@ def six(
         steps: environment steps of every run.
         seeds: number of seeds.
         prior: data of the algorithms that take any.
-        phases: hyperparameters of the algorithms that have stabilisation phases.
+        phases: hyperparameters of the algorithms that have stabilization phases.
         names: of the algorithms, for fewer than six.
         **fields: others of `run`.
     """

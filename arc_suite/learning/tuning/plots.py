@@ -9,9 +9,9 @@ from matplotlib.ticker import MaxNLocator
 from arc_suite.learning.tuning.evaluator import STYLE
 from arc_suite.learning.tuning.search import Generation
 
-# Okabe and Ito's colours, which colour-blind readers can tell apart.
-_BLUE, _GREEN, _GREY = "#0072B2", "#009E73", "#8C8C8C"
-_STYLE_COLOURS = ("#D55E00", "#CC79A7", "#E69F00")
+# Okabe and Ito's colors, which color-blind readers can tell apart.
+_BLUE, _GREEN, _GRAY = "#0072B2", "#009E73", "#8C8C8C"
+_STYLE_COLORS = ("#D55E00", "#CC79A7", "#E69F00")
 
 
 def course(robot: str, reward: float, generations: Sequence[Generation], length: int) -> Figure:
@@ -31,16 +31,16 @@ def course(robot: str, reward: float, generations: Sequence[Generation], length:
     returns.plot(counts, fitness[1], color=_BLUE, label="fitness, median and middle half")
     best = [length * generation.reward for generation in generations]
     returns.plot(counts, best, color=_GREEN, label="return of the fittest")
-    returns.axhline(length * reward, color=_GREY, linestyle="--", label="return of medium")
+    returns.axhline(length * reward, color=_GRAY, linestyle="--", label="return of medium")
     # Candidates that fall would flatten the rest.
     returns.set_ylim(min(length * reward, np.percentile(fitness[0], 20)) - 100.0, max(best) + 100.0)
     returns.set_ylabel(f"return of {length} control steps")
     returns.set_title(robot, loc="left", fontweight="bold")
 
     shares = np.transpose([generation.style for generation in generations])
-    for name, colour, values in zip(STYLE, _STYLE_COLOURS, shares, strict=True):
-        style.plot(counts, values, color=colour, label=name)
-    style.axhline(1.0, color=_GREY, linestyle="--", label="medium")
+    for name, color, values in zip(STYLE, _STYLE_COLORS, shares, strict=True):
+        style.plot(counts, values, color=color, label=name)
+    style.axhline(1.0, color=_GRAY, linestyle="--", label="medium")
     style.set_ylabel("the fittest's costs of style,\nas shares of medium's")
     style.set_xlabel("generation")
     style.set_ylim(0.0, 1.5)

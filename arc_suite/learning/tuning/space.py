@@ -43,7 +43,7 @@ _BY_RANK = {
     "hip": Range(6.0, -60.0, 60.0, 1),
 }
 _BY_JOINT_AND_RANK = {
-    "centre": Range(8.0, -120.0, 120.0, 1),
+    "center": Range(8.0, -120.0, 120.0, 1),
     "stance": Range(8.0, -120.0, 120.0, 1),
     "swing": Range(10.0, -120.0, 120.0, 1),
 }
@@ -59,8 +59,8 @@ class Space(NamedTuple):
     """A space of vectors of parameters around a preset.
 
     A vector holds the stiffness, the damping, how it settles and ramps up, and the duty factor; for
-    each rank of legs its lead over the preset's clock (cycles), the sweep and the centre of the hip
-    (degrees); and for each other joint and each rank its centre and bends (degrees). The frequency
+    each rank of legs its lead over the preset's clock (cycles), the sweep and the center of the hip
+    (degrees); and for each other joint and each rank its center and bends (degrees). The frequency
     is the gait's and stays.
 
     Attributes:
@@ -88,9 +88,9 @@ class Space(NamedTuple):
     def vector(self, lead: float = 0.0) -> np.ndarray:
         """Return the vector (size,) of the preset itself with a lead of all legs, cycles."""
         preset = self.origin
-        angles = [lead, preset.sweep, preset.centre.get("hip", 0.0)]
+        angles = [lead, preset.sweep, preset.center.get("hip", 0.0)]
         for name, bend in preset.bends.items():
-            angles += [preset.centre[name], bend.stance, bend.swing]
+            angles += [preset.center[name], bend.stance, bend.swing]
         by_rank = [value for angle in angles for value in self._by_rank(angle)]
         return np.array([*(getattr(preset, name) for name in _SHARED), *by_rank])
 
@@ -104,16 +104,16 @@ class Space(NamedTuple):
         def by_rank() -> tuple[float, ...]:
             return tuple(next(numbers) for _ in range(self.ranks))
 
-        leads, sweep, centre, bends = by_rank(), by_rank(), {"hip": by_rank()}, {}
+        leads, sweep, center, bends = by_rank(), by_rank(), {"hip": by_rank()}, {}
         for name in self.origin.bends:
-            centre[name] = by_rank()
+            center[name] = by_rank()
             bends[name] = Bend(by_rank(), by_rank())
         offsets = zip(self.origin.phase_offsets, self.body.ranks, strict=True)
         return self.origin._replace(
             **shared,
             phase_offsets=tuple(round((offset + leads[rank]) % 1.0, _DECIMALS) for offset, rank in offsets),
             sweep=sweep,
-            centre=centre,
+            center=center,
             bends=bends,
         )
 

@@ -114,7 +114,7 @@ def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[Opened
         for turn in urdf.TURNS if path.suffix.lower() == ".urdf" else ():
             with contextlib.suppress(SpecError):
                 file, robot, stance = tried(turn)
-                if np.ptp([leg.centre for leg in stance.legs], axis=0).argmax() == 0:
+                if np.ptp([leg.center for leg in stance.legs], axis=0).argmax() == 0:
                     note = "turned: the file's y axis points up, the torso's frame has z there"
                     return file._replace(notes=(*file.notes, note)), robot, stance
         raise SpecError(str(error)) from None

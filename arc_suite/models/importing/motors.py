@@ -82,11 +82,11 @@ def _mechanics(robot: Robot, stance: Stance) -> tuple[dict[int, float], dict[int
     matrix = np.empty((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
     mass = float(model.body_subtreemass[robot.root])
-    centre = data.subtree_com[robot.root]
+    center = data.subtree_com[robot.root]
     soles = np.array([leg.sole for leg in stance.legs])
     weight = mass * float(np.linalg.norm(model.opt.gravity))
     bias = data.qfrc_bias.copy()
-    for leg, force in zip(stance.legs, foot_loads(weight, soles[:, :2] - centre[:2]), strict=True):
+    for leg, force in zip(stance.legs, foot_loads(weight, soles[:, :2] - center[:2]), strict=True):
         bias -= force * _lever(model, data, leg)
     dofs = {joint: int(model.jnt_dofadr[joint]) for joint in robot.joints}
     inertias = {joint: float(matrix[dof, dof]) for joint, dof in dofs.items()}

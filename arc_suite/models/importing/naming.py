@@ -50,9 +50,9 @@ def _parts(leg: Leg) -> list[str]:
 
 def _leg_names(legs: tuple[Leg, ...]) -> tuple[str, ...]:
     """Return l1, l2 and so on of left legs, r1, r2 and so on of right ones, from front to rear."""
-    sides = ["r" if leg.centre[1] < -_MIDLINE else "l" for leg in legs]
+    sides = ["r" if leg.center[1] < -_MIDLINE else "l" for leg in legs]
     ranks = [
-        sum(other == side and ahead.centre[0] > leg.centre[0] for other, ahead in zip(sides, legs, strict=True))
+        sum(other == side and ahead.center[0] > leg.center[0] for other, ahead in zip(sides, legs, strict=True))
         for side, leg in zip(sides, legs, strict=True)
     ]
     found = [f"{side}{rank + 1}" for side, rank in zip(sides, ranks, strict=True)]

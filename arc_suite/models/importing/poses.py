@@ -15,8 +15,8 @@ from arc_suite.robots.spec import SpecError
 # Shares of the standing height.
 _AGREE = 0.15  # by which feet on the floor may differ
 _HANG = 0.5  # of the deepest foot: a chain that reaches lower is a leg that hangs
-_LEAST_MARGIN = 0.02  # of the centre of mass inside the feet
-_OFF = 0.15  # of the centre of mass from the line between two feet, which may be long
+_LEAST_MARGIN = 0.02  # of the center of mass inside the feet
+_OFF = 0.15  # of the center of mass from the line between two feet, which may be long
 
 _STRAIGHT = 0.96  # of a leg's length: one that is longer has no knee to bend
 _LEAST_THIGH = 0.2  # of the standing height; a shorter one does not make a leg straight
@@ -48,7 +48,7 @@ class Leg(NamedTuple):
         body: the last link.
         geom: the foot's collider.
         sole: (3,) the lowest point.
-        centre: (3,) of the foot, as a ball that touches the floor at the sole.
+        center: (3,) of the foot, as a ball that touches the floor at the sole.
         radius: of that ball, m.
     """
 
@@ -56,7 +56,7 @@ class Leg(NamedTuple):
     body: int
     geom: int
     sole: np.ndarray
-    centre: np.ndarray
+    center: np.ndarray
     radius: float
 
 
@@ -93,7 +93,7 @@ def stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
     """Return the pose in which a robot stands.
 
     The first of keyframes, zero angles, a search for bent knees, and the middles of the ranges in which all feet
-    reach the floor, with the centre of mass inside them and no straight legs.
+    reach the floor, with the center of mass inside them and no straight legs.
 
     Args:
         robot: the file's.
@@ -280,7 +280,7 @@ def _check_feet(robot: Robot, found: dict, legs: tuple[Leg, ...], height: float)
 
 
 def _check_torso(robot: Robot, data: mujoco.MjData, legs: tuple[Leg, ...], height: float) -> None:
-    """Refuse a torso or an arm below the feet, and a centre of mass outside of three or more feet."""
+    """Refuse a torso or an arm below the feet, and a center of mass outside of three or more feet."""
     own = {joint for leg in legs for joint in leg.joints}
     chains = {geom: robot.chains[int(robot.model.geom_bodyid[geom])] for geom in robot.colliders}
     rest = [geom for geom, chain in chains.items() if not own.intersection(chain)]
@@ -288,7 +288,7 @@ def _check_torso(robot: Robot, data: mujoco.MjData, legs: tuple[Leg, ...], heigh
         raise _Unfit("the torso is lower than the feet")
     margin = stability_margin(data.subtree_com[robot.root], [leg.sole for leg in legs])
     if margin < (_LEAST_MARGIN if len(legs) > 2 else -_OFF) * height:
-        raise _Unfit(f"the centre of mass is {margin:.3g} m inside of the feet")
+        raise _Unfit(f"the center of mass is {margin:.3g} m inside of the feet")
 
 
 def _check_knees(data: mujoco.MjData, legs: tuple[Leg, ...], height: float) -> None:

@@ -42,8 +42,8 @@ def _floats(numbers) -> spec.Vector:
 
 
 def _points(data: mujoco.MjData, leg: Leg, apart: float) -> list[np.ndarray]:
-    """Return the anchors of a leg's joints and the foot's centre, no two in one place; the foot stays where it is."""
-    points = [data.xanchor[joint].copy() for joint in leg.joints] + [leg.centre]
+    """Return the anchors of a leg's joints and the foot's center, no two in one place; the foot stays where it is."""
+    points = [data.xanchor[joint].copy() for joint in leg.joints] + [leg.center]
     for place in range(len(points) - 2, -1, -1):
         if np.linalg.norm(points[place + 1] - points[place]) < apart:
             points[place] = points[place + 1] + (0.0, 0.0, apart)
@@ -89,5 +89,5 @@ def torso(robot: Robot, stance: Stance) -> Torso:
 
 def camera(stance: Stance) -> TrackingCamera:
     """Return a camera from which all feet are seen."""
-    size = max(*(abs(leg.centre[:2]).max() for leg in stance.legs), stance.height)
+    size = max(*(abs(leg.center[:2]).max() for leg in stance.legs), stance.height)
     return TrackingCamera(position=_floats(size * _CAMERA))

@@ -183,7 +183,7 @@ def _add_leg_bodies(
             SubElement(elements[body], "body", name=f"{label}_link{place}")
     last = int(robot.model.jnt_bodyid[leg.joints[-1]])
     data = robot.placed(stance.qpos)
-    place = data.xmat[last].reshape(3, 3).T @ (leg.centre - data.xpos[last])
+    place = data.xmat[last].reshape(3, 3).T @ (leg.center - data.xpos[last])
     foot = SubElement(elements[last], "body", name=f"{label}_foot", pos=exact(place))
     SubElement(foot, "site", name=f"{label}_foot", size=exact(leg.radius), **SITE)
 

@@ -1,4 +1,4 @@
-"""Visuals of a body: colours and decorations, without mass or contacts."""
+"""Visuals of a body: colors and decorations, without mass or contacts."""
 
 import math
 
@@ -25,8 +25,8 @@ _FINISHES = {"shell": (0.0, 0.5, 0.6), "frame": (0.0, 0.6, 0.5), "glow": (0.7, 0
 _POOR, _RICH = np.array((0.9, 0.08, 0.05, 1.0)), np.array((0.1, 0.9, 0.2, 1.0))
 
 
-def reward_colour(share: float) -> np.ndarray:
-    """Return the colour of a share of the greatest reward, from red for 0 to green for 1: rgba (4,)."""
+def reward_color(share: float) -> np.ndarray:
+    """Return the color of a share of the greatest reward, from red for 0 to green for 1: rgba (4,)."""
     share = min(max(share, 0.0), 1.0)
     return (1.0 - share) * _POOR + share * _RICH
 
@@ -64,11 +64,11 @@ def _visuals(body: Body) -> Visuals:
 def add_materials(root: mjcf.RootElement, body: Body) -> None:
     """Add the materials of a body."""
     visuals = _visuals(body)
-    own = {} if body.palette is None else palettes.colours(body.palette)
-    for name, colour in {**visuals.colours, **own}.items():
+    own = {} if body.palette is None else palettes.colors(body.palette)
+    for name, color in {**visuals.colors, **own}.items():
         emission, specular, shininess = _FINISHES.get(name, _PLAIN)
         root.asset.add(
-            "material", name=name, rgba=(*colour, 1.0), emission=emission, specular=specular, shininess=shininess
+            "material", name=name, rgba=(*color, 1.0), emission=emission, specular=specular, shininess=shininess
         )
 
 

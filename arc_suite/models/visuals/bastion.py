@@ -1,9 +1,9 @@
-"""Bastion: three overlapping armour shells, a face shield with a cyan eye slit, and a gun."""
+"""Bastion: three overlapping armor shells, a face shield with a cyan eye slit, and a gun."""
 
 from arc_suite.models.visuals.spec import Ornament, Visuals
 
 VISUALS = Visuals(
-    colours={
+    colors={
         "shell": (0.36, 0.43, 0.38),
         "side": (0.25, 0.31, 0.28),
         "trim": (0.66, 0.62, 0.50),

@@ -8,13 +8,13 @@ from arc_suite.robots.spec import Body
 
 
 def generic(body: Body) -> Visuals:
-    """Return visuals for a body: slate armour, violet joints, and an eye on a snout in front of the torso."""
+    """Return visuals for a body: slate armor, violet joints, and an eye on a snout in front of the torso."""
     corners = solid_corners(body.torso.solids[0])
-    centre, half = corners.mean(axis=0), np.ptp(corners, axis=0) / 2.0
+    center, half = corners.mean(axis=0), np.ptp(corners, axis=0) / 2.0
     r = 0.4 * min(half)
-    x, y, z = centre + half * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
+    x, y, z = center + half * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
     return Visuals(
-        colours={
+        colors={
             "shell": (0.62, 0.66, 0.72),
             "trim": (0.35, 0.38, 0.45),
             "frame": (0.13, 0.14, 0.17),

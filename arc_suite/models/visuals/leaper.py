@@ -3,7 +3,7 @@
 from arc_suite.models.visuals.spec import Ornament, Visuals
 
 VISUALS = Visuals(
-    colours={
+    colors={
         "shell": (0.78, 0.80, 0.83),
         "trim": (0.85, 0.08, 0.06),
         "frame": (0.13, 0.14, 0.16),

@@ -3,7 +3,7 @@
 from arc_suite.models.visuals.spec import Ornament, Visuals
 
 VISUALS = Visuals(
-    colours={
+    colors={
         "shell": (0.80, 0.77, 0.71),
         "trim": (0.38, 0.20, 0.46),
         "frame": (0.12, 0.12, 0.15),

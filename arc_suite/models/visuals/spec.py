@@ -1,9 +1,9 @@
-"""The parts of visuals: colours and ornaments."""
+"""The parts of visuals: colors and ornaments."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 Vector = tuple[float, float, float]
 
 
@@ -12,10 +12,10 @@ class Ornament(NamedTuple):
 
     Attributes:
         name: unique in the visuals; the geom is called `visual-<name>`.
-        material: a key of the visuals' colours.
+        material: a key of the visuals' colors.
         shape: a MuJoCo geom type.
         size: half-extents as MuJoCo takes them for the shape, m.
-        position: centre in the torso's frame, m.
+        position: center in the torso's frame, m.
         euler_deg: turns about the x, y and z axes of the turning frame, in that order.
         paired: has a twin across the x-z plane, `visual-<name>_right`.
     """
@@ -35,16 +35,16 @@ class Ornament(NamedTuple):
 
 
 class Visuals(NamedTuple):
-    """Colours and ornaments of one creature.
+    """Colors and ornaments of one creature.
 
     Attributes:
-        colours: of the materials; "shell", "trim", "frame", "limb" and "glow" are those of any body.
+        colors: of the materials; "shell", "trim", "frame", "limb" and "glow" are those of any body.
         solids: materials of the torso's solids and ballast by name, where not "shell".
         ornaments: on the torso.
         glowing: names of the joints that glow; None for all of them.
     """
 
-    colours: Mapping[str, Colour]
+    colors: Mapping[str, Color]
     solids: Mapping[str, str] = {}
     ornaments: tuple[Ornament, ...] = ()
     glowing: tuple[str, ...] | None = None

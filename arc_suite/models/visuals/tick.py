@@ -3,7 +3,7 @@
 from arc_suite.models.visuals.spec import Ornament, Visuals
 
 VISUALS = Visuals(
-    colours={
+    colors={
         "shell": (0.86, 0.82, 0.72),
         "trim": (0.60, 0.50, 0.38),
         "frame": (0.32, 0.26, 0.22),

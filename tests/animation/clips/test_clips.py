@@ -160,7 +160,7 @@ def test_names_and_hierarchy(robot):
         assert animation["extras"] == figures
 
 
-def test_colours_are_linear_and_what_glows_is_emissive():
+def test_colors_are_linear_and_what_glows_is_emissive():
     materials = {material["name"]: material for material in of_rest("leaper").json["materials"]}
     red, green, blue, alpha = materials["trim"]["pbrMetallicRoughness"]["baseColorFactor"]  # sRGB 0.85, 0.08, 0.06
     np.testing.assert_allclose((red, green, blue, alpha), (0.6920, 0.0072, 0.0048, 1.0), atol=1e-4)

@@ -1,4 +1,4 @@
-"""Behaviour cloning: it acts as its dataset does, goes on to the same bits, and refuses what does not fit."""
+"""Behavior cloning: it acts as its dataset does, goes on to the same bits, and refuses what does not fit."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_it_learns_the_actions_of_its_dataset(begun, prior):
     learned = agent.latest.policy(observations)
     # Most of it; the demonstrator starts by a clock that the network does not see.
     assert ((learned - actions) ** 2).mean() < 0.3 * actions.var()
-    # The normaliser has the moments of the whole dataset.
+    # The normalizer has the moments of the whole dataset.
     mean, factor = (agent.latest.policy.arrays[name] for name in ("0", "1"))
     np.testing.assert_allclose(mean, observations.mean(axis=0), atol=1e-5)
     moving = observations.std(axis=0) > 1e-3

@@ -1,4 +1,4 @@
-"""Pictures of training: labels that can be read, and one colour for an algorithm."""
+"""Pictures of training: labels that can be read, and one color for an algorithm."""
 
 import itertools
 
@@ -20,8 +20,8 @@ STEPS = np.arange(1, 6) * 20_000
 def test_every_algorithm_has_a_style_of_its_own():
     assert plots.STYLES.keys() == ALGORITHMS.keys()
     styles = [*plots.STYLES.values(), *plots._OTHERS]
-    colours = [colour for colour, _ in styles]
-    assert len(set(colours)) == len(colours) and len(set(styles)) == len(styles)
+    colors = [color for color, _ in styles]
+    assert len(set(colors)) == len(colors) and len(set(styles)) == len(styles)
 
 
 def labels(figure):
@@ -55,7 +55,7 @@ def test_no_label_lies_on_a_line_or_on_another(crowded):
         assert not first.overlaps(second), (one, other)
 
 
-def test_one_run_has_no_band_and_kinds_of_one_algorithm_have_its_colour(crowded):
+def test_one_run_has_no_band_and_kinds_of_one_algorithm_have_its_color(crowded):
     for axis in crowded.axes:
         assert len(axis.collections) == 1, "of the kind with two runs"
         drawn = {line.get_label(): line for line in axis.get_lines()}
@@ -96,10 +96,10 @@ def test_long_curves_have_few_markers_and_the_legend_shows_them(points, shown):
     assert {each.get_marker() for each in (line, *figure.legends[0].get_lines())} == {"o"}
 
 
-def test_unknown_algorithms_get_other_colours():
+def test_unknown_algorithms_get_other_colors():
     styles = plots._styles(["mine:FIRST", "sac", "mine:SECOND"])
     assert styles["sac"] == plots.STYLES["sac"]
-    assert len({colour for colour, _ in styles.values()}) == 3 and styles["mine:FIRST"] not in plots.STYLES.values()
+    assert len({color for color, _ in styles.values()}) == 3 and styles["mine:FIRST"] not in plots.STYLES.values()
 
 
 def test_a_run_stands_over_its_anchors():

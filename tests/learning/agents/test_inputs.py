@@ -22,7 +22,7 @@ def test_raw_observations():
     assert_array_equal(inputs(drawn(4)), drawn(4))
 
 
-def test_moments_normalise():
+def test_moments_normalize():
     inputs, seen = Inputs.of(TASK, normalize=True, symmetry_augmentation=False).after(drawn(300)), drawn(300)
     expected = (seen - seen.mean(axis=0)) / seen.std(axis=0)
     assert_allclose(inputs(drawn(300)), expected.clip(-5.0, 5.0), atol=1e-5)

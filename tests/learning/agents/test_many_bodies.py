@@ -1,4 +1,4 @@
-"""One policy for many bodies: imitation, proximal policy optimisation from it, and its network of legs."""
+"""One policy for many bodies: imitation, proximal policy optimization from it, and its network of legs."""
 
 import numpy as np
 import pytest
@@ -40,15 +40,15 @@ def vectors():
 def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
     architecture = PerLeg()
     parameters = architecture.drawn(np.random.default_rng(0), 16)
-    normalise = architecture.normalise(Moments.none(architecture.inputs).after(architecture.seen(vectors)))
-    normalised = normalise(vectors)
-    expected = np.asarray(architecture.actions(parameters, normalised))
-    graph = architectures.policy(architecture, normalise, parameters)
+    normalize = architecture.normalize(Moments.none(architecture.inputs).after(architecture.seen(vectors)))
+    normalized = normalize(vectors)
+    expected = np.asarray(architecture.actions(parameters, normalized))
+    graph = architectures.policy(architecture, normalize, parameters)
     assert_allclose(graph(vectors), expected.clip(-1.0, 1.0), atol=1e-5)
     normalizer, again = architectures.read(architecture, graph)
-    for array, same in zip(normalizer, normalise, strict=True):
+    for array, same in zip(normalizer, normalize, strict=True):
         assert_array_equal(array, same)
-    assert_array_equal(np.asarray(architecture.actions(again, normalised)), expected)
+    assert_array_equal(np.asarray(architecture.actions(again, normalized)), expected)
     assert not expected[~SETUP.make_vec(2).description.mask.reshape(2, -1)].any()
     with pytest.raises(ValueError, match="^a policy of dagger, bc or ppo"):
         architectures.read(architecture, traced(lambda x: x.clip(-1.0, 1.0), architecture.size))
@@ -74,11 +74,11 @@ def test_the_order_of_legs_does_not_matter(vectors):
     assert values[0] == pytest.approx(values[1], abs=1e-5)
 
 
-def test_normalised_observations_keep_the_number_of_joints(vectors):
+def test_normalized_observations_keep_the_number_of_joints(vectors):
     architecture = PerLeg()
     seen = architecture.seen(vectors)
-    normalise = architecture.normalise(Moments.none(architecture.inputs).after(seen))
-    inputs, mask = tokens.leg_inputs(normalise(vectors))
+    normalize = architecture.normalize(Moments.none(architecture.inputs).after(seen))
+    inputs, mask = tokens.leg_inputs(normalize(vectors))
     assert_array_equal(mask, tokens.leg_inputs(vectors)[1])
     there = inputs[mask.any(axis=-1)]
     scaled = np.delete(there, np.arange(20, 24), axis=-1)

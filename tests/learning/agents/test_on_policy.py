@@ -1,4 +1,4 @@
-"""Proximal policy optimisation."""
+"""Proximal policy optimization."""
 
 import dataclasses
 import shutil
@@ -44,9 +44,9 @@ def begun(tmp_path):
 
 def rolled_out(agent):
     """Transitions of a horizon from the latest slice on, and the batch that they make."""
-    rollout = agent.collector.roll_out(agent.state.policy, agent.normalise, 0.3, 0, 0)
+    rollout = agent.collector.roll_out(agent.state.policy, agent.normalize, 0.3, 0, 0)
     return rollout, on_policy.batch_of(
-        agent.hp, agent.collector.architecture, rollout, agent.state.values, agent.normalise, agent.symmetry
+        agent.hp, agent.collector.architecture, rollout, agent.state.values, agent.normalize, agent.symmetry
     )
 
 
@@ -193,8 +193,8 @@ def test_every_transition_has_a_mirrored_one(begun):
         both = np.asarray(getattr(given, name))
         assert_array_equal(agent.symmetry.action(both[:32]), both[32:])
     mirrored = agent.symmetry.observation(rollout["observations"].reshape(32, -1))
-    assert_array_equal(agent.normalise(mirrored), given.observations[32:])
-    # The normaliser has seen as much of the left as of the right.
+    assert_array_equal(agent.normalize(mirrored), given.observations[32:])
+    # The normalizer has seen as much of the left as of the right.
     assert_allclose(agent.symmetry.observation(agent.moments.mean), agent.moments.mean, atol=1e-9)
 
 
@@ -226,13 +226,13 @@ def test_time_limits_fall_on_different_steps_and_bootstrap(begun):
     split = agent.collector.environment.task.split
     assert_allclose(split(rollout["observations"][2, 3])["gait_clock"], (0.0, 1.0))
     assert split(last)["gait_clock"][0] > 0.1
-    value = np.asarray(ppo.value(agent.collector.architecture, agent.state.values, agent.normalise(last[None])))[0]
+    value = np.asarray(ppo.value(agent.collector.architecture, agent.state.values, agent.normalize(last[None])))[0]
     expected = (1.0 - agent.hp.discount) * rollout["rewards"][1, 3] + agent.hp.discount * value
     assert np.asarray(given.returns)[:32].reshape(8, 4)[1, 3] == pytest.approx(expected, rel=1e-5)
 
 
 def test_schedules(begun):
-    """The standard deviation falls, and the normaliser stays from a part of the run on."""
+    """The standard deviation falls, and the normalizer stays from a part of the run on."""
     agent = begun(changes={"normalize_until": 0.5})
     assert agent.advance().metrics["std"] == SMALL.initial_std
     before = agent.until(192).policy.arrays["0"]  # the mean

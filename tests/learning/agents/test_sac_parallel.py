@@ -57,7 +57,7 @@ def test_the_policy_acts_from_the_first_step_and_updates_are_rarer_than_steps(le
 
 @pytest.mark.parametrize(("n_step", "discounts"), [(1, {1.0}), (3, {1.0, np.float32(0.97), np.float32(0.97) ** 2})])
 def test_what_an_update_sees(learner, drawn, n_step, discounts):
-    """Rewards of its steps, scaled; inputs normalised, without contact forces; every other transition mirrored."""
+    """Rewards of its steps, scaled; inputs normalized, without contact forces; every other transition mirrored."""
     agent = learner(NAME, small(NAME, batch=64, start_steps=0, n_step=n_step))
     agent.until(200)
     task, (batch, _) = agent.task, drawn[-1]

@@ -113,7 +113,7 @@ def begun(tmp_path):
 
 
 def rolled_out(agent):
-    return agent.collector.roll_out(agent.state.policy, agent.normalise, 0.3, 0, 0)
+    return agent.collector.roll_out(agent.state.policy, agent.normalize, 0.3, 0, 0)
 
 
 def test_environments_of_training_have_its_settings(begun):

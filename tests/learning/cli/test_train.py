@@ -190,7 +190,7 @@ class TestRun:
         [
             ["evaluate", "--episodes=2", "--set", "time_limit=2"],
             ["style", "--episodes=1", "--set", "time_limit=2"],
-            ["collect", "--episodes=2", "--steps=20", "--id=arc_suite/tick/walk/learnt-v0"],
+            ["collect", "--episodes=2", "--steps=20", "--id=arc_suite/tick/walk/learned-v0"],
         ],
         ids=lambda command: command[0],
     )

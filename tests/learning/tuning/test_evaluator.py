@@ -37,7 +37,7 @@ def test_evaluator_plays_the_episodes_of_ordinary_environments():
 
 def test_evaluator_counts_falls_and_pays_nothing_after_them():
     medium = PRESETS["leaper"]["medium"]
-    folding = medium._replace(stiffness=3.0, centre={"knee": -120.0, "ankle": -120.0}, sweep=0.0)
+    folding = medium._replace(stiffness=3.0, center={"knee": -120.0, "ankle": -120.0}, sweep=0.0)
     score = Evaluator(Setup.of("leaper"), presets=2, episodes=1, steps=60)([folding, medium], [0])
     assert_array_equal(score.falls, [[True], [False]])
     environment, policy = gymnasium.make("arc_suite/leaper-walk-v0"), Demonstrator("leaper", folding)

@@ -201,7 +201,7 @@ def test_feet_can_be_named_by_geom_or_body():
 
 def test_two_feet_of_four_do_not_stand():
     with pytest.raises(
-        SpecError, match=r"no standing pose \(keyframe home: the centre of mass is -0.194 m inside of the feet"
+        SpecError, match=r"no standing pose \(keyframe home: the center of mass is -0.194 m inside of the feet"
     ):
         imported(GO2, feet=["FL", "FR"])
 
