@@ -19,6 +19,7 @@ from absl import flags
 from arc_suite import checks, evaluation, files, policies, seed_ranges, versions
 from arc_suite.cli.flags import MOST, define_walk, policy_name, setups
 from arc_suite.cli.program import progress
+from arc_suite.cli.summary import footnote
 from arc_suite.cpg import suited_preset
 from arc_suite.evaluation import anchors, provenance
 
@@ -78,6 +79,8 @@ def main() -> None:
                 **report(episodes, stood, experts[robot], None if known is None else anchors.of_returns(known)),
             }
             print(row(labels[robot].ljust(width), reports[robot], robot in papers), flush=True)
+        if "cost_of_transport" in names and (text := footnote(setup.body for setup in asked.values())):
+            print(text)
         if training_seeds is None:
             print(f"policy {chosen}: {provenance.UNKNOWN}")
         file.update(

@@ -40,7 +40,7 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     flags.DEFINE_multi_string(
         "length",
         [],
-        "Factor on the length of a link of a spec or body made to order: --length lower=1.5; repeatable.",
+        "Factor on the length of a link of a spec or body made to order: --length lower=1.5.",
     )
     flags.DEFINE_string("palette", None, f"Colors of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
 
@@ -51,7 +51,7 @@ def define_task(default: str = "walk") -> None:
     flags.DEFINE_multi_string(
         "set",
         [],
-        "Setting of the task, name=value; repeat it for several. Values are JSON where they parse, else text: "
+        "Setting of the task, name=value. Values are JSON where they parse, else text: "
         "--set target_velocity=0.8 --set gait=ripple --set weights='{\"posture\": -0.01}'.",
     )
 

@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 import arc_suite
 from arc_suite import checks, files
+from arc_suite.cli.help_text import help_text
 from arc_suite.simulation.opengl import RenderingUnavailable
 
 _MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
@@ -27,6 +28,7 @@ TERMINATED = 143  # exit status of a program that SIGTERM has ended, as shells c
 
 VERSION = f"arc_suite {arc_suite.__version__}"
 
+_LONG = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # the name of a flag
 _PAUSE = 30.0  # s between two lines of progress in a log
 _CONTROL = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
@@ -99,7 +101,8 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
     def work():
         _, *rest = _parsed([script, *arguments], sys.modules[main.__module__])
         if _HELP.value:
-            return print(_help(sys.modules[main.__module__]))
+            module = sys.modules[main.__module__]
+            return print(help_text(module.__doc__, _flags(module)))
         if _VERSION.value:
             return print(VERSION)
         places = len(inspect.signature(main).parameters)
@@ -168,12 +171,14 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
 def _parsed(arguments: Sequence[str], module: ModuleType) -> list[str]:
     """Parse arguments into absl's flags, and return those that are none.
 
+    A flag of several words may be written with dashes, too.
+
     Raises:
         ValueError: a flag that the program does not have, or a value that its flag does not take.
         flags.Error: a flag without its value.
     """
     try:
-        return flags.FLAGS(arguments)
+        return flags.FLAGS([_LONG.sub(lambda flag: flag[0].replace("-", "_"), text) for text in arguments])
     except flags.UnrecognizedFlagError as error:
         checks.name(error.flagname, sorted({flag.name for flag in _flags(module)}), "flag")
         raise
@@ -189,14 +194,6 @@ def _flags(module: ModuleType) -> Iterator[flags.Flag]:
     for name, defined in flags.FLAGS.flags_by_module_dict().items():
         if name in (module.__name__, sys.argv[0]) or name.startswith(f"{__package__}."):
             yield from defined
-
-
-def _help(module: ModuleType) -> str:
-    """Return a program's docstring and flags."""
-    shown = flags.FlagValues()
-    for flag in _flags(module):
-        shown[flag.name] = flag
-    return f"{module.__doc__.strip()}\n\nFlags:\n{shown.get_help(include_special_flags=False)}"
 
 
 class _Log:

@@ -1,9 +1,14 @@
-"""A body in a few numbers."""
+"""A body in a few numbers, and what to know about a number of its own."""
+
+from collections.abc import Iterable
 
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
+from arc_suite.tasks.energy import torques
+
+_STRONG = 50.0  # torque of a motor by weight and standing height; those that the suite sizes have some 2 to 20
 
 
 def summary(body: Body) -> str:
@@ -27,3 +32,11 @@ def summary(body: Body) -> str:
     width = max(map(len, rows))
     lines = [*rows.items(), *(("flaw", flaw.text) for flaw in flaws(body))]
     return "\n".join(f"{name:<{width}}  {value}" for name, value in lines)
+
+
+def footnote(bodies: Iterable[Body]) -> str:
+    """Return the line under a table with costs of transport; "" where no body's motors make it high."""
+    strength = {body.name: torques(body).max() / standing(body).height for body in bodies}
+    strong = [f"{name} ({share:.0f} times weight times height)" for name, share in strength.items() if share > _STRONG]
+    line = "The cost of transport is high where motors are strong: {}. Compare policies of one body."
+    return line.format(", ".join(strong)) if strong else ""

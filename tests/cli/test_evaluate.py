@@ -12,14 +12,17 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.robots import ROBOTS
 
+FOOTNOTE = "The cost of transport is high where motors are strong: "
+
 
 def evaluate(*arguments):
     return programs.arc_suite("evaluate", *arguments)
 
 
 def evaluated(*arguments):
-    """Return the lines that the program prints."""
-    return programs.passed(evaluate(*arguments)).splitlines()
+    """Return the lines that the program prints, without the footnote of robots with strong motors."""
+    lines = programs.passed(evaluate(*arguments)).splitlines()
+    return [line for line in lines if not line.startswith(FOOTNOTE)]
 
 
 def test_table_of_all_robots(tmp_path):
@@ -35,6 +38,13 @@ def test_table_of_all_robots(tmp_path):
         assert zero == pytest.approx(reports[row.split()[0]]["zero_return"], abs=0.05)
         assert row.split()[8] == "-" and reports[row.split()[0]]["score"] is None  # of a task with settings
         assert total < zero == pytest.approx(163.0, abs=20.0)
+
+
+@pytest.mark.parametrize(("robot", "strength"), [("queen", None), ("leaper", 137)])
+def test_costs_of_transport_of_strong_motors_have_a_footnote(robot, strength):
+    last = programs.passed(evaluate(f"--robot={robot}", "--episodes=1", "--set=time_limit=0.5")).splitlines()[-1]
+    line = f"{FOOTNOTE}{robot} ({strength} times weight times height). Compare policies of one body."
+    assert last == line if strength else last.startswith(robot)
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ import pytest
 
 import arc_suite
 from arc_suite.cli import main
+from arc_suite.cli.help_text import GROUPS
 from arc_suite.cli.programs import summary
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -72,7 +73,7 @@ def test_only_the_program_that_runs_is_imported():
         "try: main.main()\n"
         "finally: print(sorted(name for name in sys.modules if name.startswith('arc_suite.cli.')))"
     )
-    names = [f"arc_suite.cli.{name}" for name in ("doctor", "main", "program", "programs")]
+    names = [f"arc_suite.cli.{name}" for name in ("doctor", "help_text", "main", "program", "programs")]
     assert interpreters.printed(code) == [VERSION.strip(), f"{names}"]
 
 
@@ -138,10 +139,12 @@ def test_help_of_a_program(program):
     text = help_of(program)
     assert text.startswith(f"{summary(program)}\n\n")
     assert f"\n  arc-suite {program}" in text
-    names = re.findall(r"^(-\S*?):", text, re.MULTILINE)
-    assert "--[no]version" in names
-    assert ("-o,--output" in names) == (program in WRITING)
-    assert "--output" not in names
+    names = re.findall(r"^  (?:-., )?(--\w+)", text, re.MULTILINE)
+    headings = re.findall(r"^(\w+):$", text, re.MULTILINE)
+    assert headings == [each for each in GROUPS if each in headings] and "--version" in names
+    assert ("\n  -o, --output=TEXT" in text) == (program in WRITING)
+    assert "\n  --output" not in text
+    assert not re.search(r"repeat this option|\(default|integer", text)
     assert {"--task", "--set"} & set(names) == (set() if program in WITHOUT_TASK else {"--task", "--set"})
 
 

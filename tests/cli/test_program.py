@@ -50,6 +50,18 @@ def main():
 if __name__ == "__main__":
     program.run(main)
 '''
+HELP = """\
+Run:
+  --count=N            How many. [0 or more; default: 1]
+  --raises=TEXT        What goes wrong.
+
+Output:
+  --output=TEXT        File to write after many lines.
+
+Help:
+  -h, --help           Print this text and exit.
+  --version            Print the version of the package and exit.
+"""
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +109,7 @@ def test_without_a_reader_the_work_goes_on(tool, tmp_path, redirection):
         ("--count=-1", "flag --count=-1: expected a non-negative integer\n"),
         ("--count=many", "flag --count=many: expected a non-negative integer\n"),
         ("--cuont=1", "unknown flag 'cuont'; did you mean 'count'? (there are: count, help, output, raises, "),
+        ("--cou-nt=1", "unknown flag 'cou_nt'; did you mean 'count'? (there are: "),
         ("--xyz=1", "unknown flag 'xyz' (there are: count, help, output, raises, version)\n"),
         ("--version=maybe", "flag --version=maybe: expected true or false\n"),
         ("stray", "unexpected argument 'stray'; see --help"),
@@ -110,8 +123,7 @@ def test_wrong_arguments_are_one_line(tool, argument, message):
 def test_help_shows_docstring_and_flags_of_the_program_alone(tool, flag):
     text = programs.passed(tool(flag))
     assert text.startswith("Count.\n\npython count.py ") and "How many." in text
-    flags = [line.split(":")[0] for line in text.splitlines() if line.startswith("-")]
-    assert flags == ["--count", "-h,--[no]help", "--output", "--raises", "--[no]version"]
+    assert text.split("\n\n", 2)[-1] == HELP
 
 
 @pytest.mark.slow

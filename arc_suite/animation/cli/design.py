@@ -43,7 +43,7 @@ _STEM = MAX_NAME - 7  # of the names of variants, before an underscore and a num
 FLAGS = flags.FLAGS
 flags.DEFINE_string("goal", "transport", f"{', '.join(GOALS)}; docs/design.md describes them.")
 flags.DEFINE_string("task", None, "Task in which bodies are evaluated. [default: that of the goal]")
-flags.DEFINE_multi_string("set", [], "Setting of the task, name=value; repeat it for several.")
+flags.DEFINE_multi_string("set", [], "Setting of the task, name=value.")
 flags.DEFINE_string("around", None, f"A creature whose variants are searched: {ROBOT_HELP}, or a spec file.")
 flags.DEFINE_float(
     "amount", 0.1, "Standard deviation of the variants' lengths (logarithm) and headings (rad).", 0.001, 0.5

@@ -22,6 +22,7 @@ from arc_suite import evaluation, files, style, versions
 from arc_suite.animation import pages
 from arc_suite.cli.flags import MOST, bodies, define_walk, policy_name, setups, task
 from arc_suite.cli.program import progress
+from arc_suite.cli.summary import footnote
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
@@ -160,6 +161,8 @@ def main() -> None:
                 style.save(saved, next(iter(tracks.values())))
             if draw:
                 draw(pathlib.Path(FLAGS.output, robot if len(recorders) > 1 else ""), firsts)
+        if text := footnote(setup.body for setup in chosen_for.values()):
+            print(text)
         if page:
             page.write_text(pages.page(played), encoding="utf-8")
         setup = next(iter(chosen_for.values()))

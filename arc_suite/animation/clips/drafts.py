@@ -179,11 +179,12 @@ def _unfit(name: str, draft: Draft, units: np.ndarray | None, walk: Draft | None
         command = np.array(spec.command)
         share = command @ (draft.motion.twist / units) / (command @ command)
         if share < _FOLLOWS:
-            return f"the policy moves at {round(100.0 * share)} % of its command"
+            return f"the policy moves at {round(100.0 * share)} % of its command, less than {100.0 * _FOLLOWS:.0f} %"
     if name in PACES and walk is not None:
         (low, high), (speed, usual) = PACES[name], (np.hypot(*each.motion.twist[:2]) for each in (draft, walk))
         if not low <= speed / usual <= high:
-            return f"its speed is {speed:.3f} m/s, and that of the walk {usual:.3f}"
+            rule = f"{low:g} times that or more" if low else f"{high:.2g} times that or less"
+            return f"its speed is {speed:.3f} m/s, and that of the walk {usual:.3f}: {name} has {rule}"
     return ""
 
 
@@ -264,7 +265,8 @@ def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk
     cycle, still, going = round(draft.cycle / draft.motion.step), *((0, -1) if spec.starts else (-1, 0))
     motion = draft.motion.meeting(idle, still, cycle).meeting(walk.start, going, cycle)
     if motion.seam > _FAR:
-        raise ValueError(f"its pose is {np.degrees(motion.seam):.0f} degrees from that of the walk or of idle")
+        seam, most = np.degrees((motion.seam, _FAR))
+        raise ValueError(f"its pose is {seam:.0f} degrees from that of the walk or of idle, more than {most:.0f}")
     return draft._replace(motion=motion)
 
 

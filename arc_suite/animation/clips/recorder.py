@@ -187,7 +187,8 @@ class Recorder:
             first, samples = recording.substeps * around, recording.substeps * (count + rest)
             turned = np.ptp(np.unwrap(rotations.yaw(recording.poses[first : first + samples + 1, 3:7]))[[0, -1]])
             if turned < _LEAST_TURN * abs(angle):
-                raise ValueError(f"the policy turns by {np.degrees(turned):.0f} degrees")
+                turned, least = np.degrees((turned, _LEAST_TURN * abs(angle)))
+                raise ValueError(f"the policy turns by {turned:.0f} degrees, less than {least:.0f}")
             missing = round((abs(angle) - turned) / abs(rate) / step)
             if not missing:
                 break
@@ -205,7 +206,7 @@ class Recorder:
     def _crouch(self, depth: float) -> float:
         room = _OF_ROOM * abs(posture.room(self.body, planted=False)[0, 0])
         if room < _LEAST_CROUCH:
-            raise ValueError("the legs do not fold far enough to crouch")
+            raise ValueError(f"the legs fold by {room:.2f} of their height; a crouch takes {_LEAST_CROUCH:g}")
         return min(depth, room)
 
     def _gait(self) -> tuple[float, float, float]:

@@ -17,8 +17,10 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
 """
 
 import contextlib
+import dataclasses
 import functools
 import importlib.util
+import operator
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -38,6 +40,27 @@ from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
 from arc_suite.simulation.cores import usable_cores, use_one_thread
 
+
+def algorithms_by(value: Callable[[algorithms.Algorithm], Any]) -> dict[Any, list[str]]:
+    """Return the names of algorithms by what they have."""
+    found = {}
+    for name, algorithm in algorithms.ALGORITHMS.items():
+        found.setdefault(value(algorithm), []).append(name)
+    return found
+
+
+def numbers(field: str) -> str:
+    """Return a default number of the algorithms, as text: that of the most, then those of others."""
+    (usual, _), *others = sorted(algorithms_by(operator.attrgetter(field)).items(), key=lambda item: -len(item[1]))
+    return "; ".join([str(usual), *(f"{number} for {', '.join(names)}" for number, names in others)])
+
+
+def hyperparameters() -> str:
+    """Return the names of the hyperparameters of all algorithms, as text."""
+    fields = algorithms_by(lambda algorithm: tuple(dataclasses.asdict(algorithm.hyperparameters)))
+    return "; ".join(f"of {', '.join(names)}: {', '.join(every)}" for every, names in fields.items())
+
+
 FLAGS = flags.FLAGS
 define_body(more="; or several with commas, such as varied:0-127,queen, for a policy of any body")
 define_task()
@@ -49,12 +72,25 @@ flags.DEFINE_string(
 flags.DEFINE_multi_string(
     "train_set", [], "Setting of the task in training alone, name=value, in place of that of --set."
 )
-flags.DEFINE_multi_string("hp", [], "Hyperparameter of the algorithm, name=value; repeat it for several.")
+flags.DEFINE_multi_string("hp", [], f"Hyperparameter, name=value, {hyperparameters()}.")
 flags.DEFINE_list("seed", ["0"], "Seed of the run; several with commas are as many runs, each a process.")
-flags.DEFINE_integer("steps", None, "Environment steps. [default: the algorithm's]", lower_bound=1)
+flags.DEFINE_integer(
+    "steps",
+    None,
+    f"Environment steps; of bc, updates. ppo takes {algorithms.ALGORITHMS['ppo'].terrain_steps} on uneven ground. "
+    f"[default: {numbers('steps')}]",
+    lower_bound=1,
+)
 flags.DEFINE_string("prior", None, "Id of a dataset of prior data, for algorithms that take any.")
-flags.DEFINE_integer("evaluate_every", None, "Steps between evaluations. [default: the algorithm's]", lower_bound=1)
-flags.DEFINE_string("config", None, "JSON file with the configuration of the run, in place of all flags above.")
+flags.DEFINE_integer(
+    "evaluate_every", None, f"Steps between evaluations. [default: {numbers('evaluate_every')}]", lower_bound=1
+)
+flags.DEFINE_string(
+    "config",
+    None,
+    "Train as config.json of another run's folder says. It stands for the flags of body, policy and task, and for "
+    "--seed, --steps and --evaluate_every.",
+)
 flags.DEFINE_float(
     "minutes",
     None,
