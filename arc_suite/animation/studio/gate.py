@@ -91,6 +91,7 @@ _OFFERS: dict[type, Callable[[Any, Any], bool]] = {
     viser.GuiNumberHandle: _spans,
     viser.GuiTextHandle: lambda handle, value: isinstance(value, str) and len(value) <= LONGEST_TEXT,
     viser.GuiCheckboxHandle: lambda handle, value: isinstance(value, bool),
+    viser.GuiButtonGroupHandle: lambda handle, value: isinstance(value, str) and value in handle.options,
     viser.GuiButtonHandle: lambda handle, value: isinstance(value, bool),
 }
 

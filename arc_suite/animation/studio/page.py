@@ -7,8 +7,9 @@ import itertools
 import math
 import random
 import socket
+import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import viser
@@ -20,7 +21,8 @@ from arc_suite.animation.studio.charts import Charts
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.gate import Server
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import FILE, LEGS, OWN, RANDOM, Sketch, cured, opened_file
+from arc_suite.animation.studio.sketch import LEGS, OWN, RANDOM, Sketch, cured, lengthened, opened_file
+from arc_suite.animation.studio.states import POSE, VELOCITY, Edits, State, edited, redone, undone
 from arc_suite.animation.studio.view import View
 from arc_suite.arenas import ARENAS
 from arc_suite.cpg.selection import preset_names, presets_of
@@ -42,14 +44,13 @@ _PROPORTIONS = (
     ("fan", "Fan of the legs", -40.0, 40.0, 1.0),
 )
 _KEYS = (
-    ("Faster", "I", (_PRESS, 0.0, 0.0)),
-    ("Slower", "K", (-_PRESS, 0.0, 0.0)),
-    ("Turn left", "J", (0.0, 0.0, _PRESS)),
-    ("Turn right", "L", (0.0, 0.0, -_PRESS)),
-    ("To the left", "U", (0.0, _PRESS, 0.0)),
-    ("To the right", "O", (0.0, -_PRESS, 0.0)),
+    ("Faster", "I", ("forward", _PRESS)),
+    ("Slower", "K", ("forward", -_PRESS)),
+    ("Turn left", "J", ("turn", _PRESS)),
+    ("Turn right", "L", ("turn", -_PRESS)),
+    ("To the left", "U", ("left", _PRESS)),
+    ("To the right", "O", ("left", -_PRESS)),
 )
-_POSE = ("Height", "Shift forward", "Shift left", "Roll", "Pitch", "Yaw")  # numbers of a pose
 _KEYS_TOLD = ", ".join(f"{key} {label.lower()}" for label, key, _ in _KEYS)
 
 
@@ -86,14 +87,16 @@ class Page:
         """Lay out the page."""
         self._gui, self._session, self._drawn = server.gui, session, -math.inf
         self._creature: Creature | None = None
-        self._file = session.creature.sketch.file
-        self._widgets: dict[str, Any] = {}
+        self._first = State(session.creature.sketch)
+        self._edits, self._lock = Edits(self._first), threading.Lock()
+        self._widgets: dict[str, Any] = {}  # by the fields of a `State` that they show
         self._links: tuple[str, ...] = ()
         self._cures: list[Any] = []
         self._view = View(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
         self._status = self._gui.add_html("")
+        self._add_changes()
         tabs, first = self._gui.add_tab_group(), session.creature.sketch
         with tabs.add_tab("Body"):
             self._add_body(first)
@@ -103,8 +106,8 @@ class Page:
             self._add_command()
         with tabs.add_tab("Files"):
             self._add_files()
-        for widget in (*self._widgets.values(), *self._lengths):
-            widget.on_update(self._changed)
+        for name, widget in self._widgets.items():
+            widget.on_update(functools.partial(self._changed, name))
         panel = server.gui.add_panel()
         with panel.add_tab("Measured"):
             self._charts = Charts(self._gui)
@@ -123,6 +126,15 @@ class Page:
             self._status.content = texts.status(session)
             self._charts.update(session.history, tuple(leg.name for leg in session.creature.setup.body.legs))
 
+    def _add_changes(self) -> None:
+        """Add undo, redo and reset, as buttons and as keys."""
+        calls = {"Undo": self._undo, "Redo": self._redo, "Reset": self._reset}
+        buttons = self._gui.add_button_group("Changes", tuple(calls), hint="Ctrl+Z, Ctrl+Shift+Z")
+        buttons.on_click(lambda event: calls[event.target.value]())
+        for label, modifier in (("Undo", "cmd/ctrl"), ("Redo", "cmd/ctrl+shift")):
+            command = self._gui.add_command(label, hotkey="Z", modifier=modifier)
+            command.on_trigger(lambda event, call=calls[label]: call())
+
     def _add_body(self, first: Sketch) -> None:
         gui, widgets = self._gui, self._widgets
         self._check = gui.add_folder("Check")
@@ -140,6 +152,8 @@ class Page:
         widgets["palette"] = gui.add_dropdown("Palette", palettes, initial_value=first.palette)
         with gui.add_folder("Length of links"):
             self._lengths = [gui.add_slider("", 0.5, 2.0, 0.05, 1.0, visible=False) for _ in range(_LINKS)]
+        for index, slider in enumerate(self._lengths):
+            slider.on_update(functools.partial(self._lengthened, index))
 
     def _add_task(self, first: Sketch) -> None:
         gui, widgets = self._gui, self._widgets
@@ -155,24 +169,21 @@ class Page:
         widgets["preset"] = gui.add_dropdown("Preset", presets, initial_value=first.preset)
 
     def _add_command(self) -> None:
-        gui = self._gui
-        self._by_hand = gui.add_checkbox("By hand", True, hint="Else the task's own command")
-        self._sticks = [
-            gui.add_slider(label, -1.0, 1.0, 0.05, value)
-            for label, value in (("Forward", 1.0), ("Left", 0.0), ("Turn", 0.0))
-        ]
+        gui, widgets = self._gui, self._widgets
+        widgets["by_hand"] = gui.add_checkbox("By hand", True, hint="Else the task's own command")
+        for name in VELOCITY:
+            widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.05, self._first.value(name))
         self._direction = gui.add_folder("Pose and gait")
         with self._direction:
-            self._gait = gui.add_dropdown("Gait now", [direction.OWN], initial_value=direction.OWN)
-            self._tempo = gui.add_slider("Frequency", *direction.TEMPI, 0.05, 1.0, hint="Multiple of the gait's own")
-            hint = "Standing heights or rad"
-            self._pose = [gui.add_slider(label, -1.0, 1.0, 0.01, 0.0, hint=hint) for label in _POSE]
+            widgets["gait_now"] = gui.add_dropdown("Gait now", [direction.OWN], initial_value=direction.OWN)
+            hint = "Multiple of the gait's own"
+            widgets["tempo"] = gui.add_slider("Frequency", *direction.TEMPI, 0.05, 1.0, hint=hint)
+            for name in POSE:
+                widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.01, 0.0, hint="Standing heights or rad")
             gui.add_button("Upright").on_click(lambda event: self._stand())
-        for widget in (self._by_hand, *self._sticks, self._gait, self._tempo, *self._pose):
-            widget.on_update(lambda event: self._command())
         for label, key, change in _KEYS:
             command = gui.add_command(label, hotkey=key)
-            command.on_trigger(functools.partial(self._press, change))
+            command.on_trigger(functools.partial(self._press, *change))
         gui.add_html(texts.line(f"Keys: {_KEYS_TOLD}"))
         gui.add_button("Kick").on_click(lambda event: self._session.kick(random.uniform(-math.pi, math.pi)))
         gui.add_button("Restart").on_click(lambda event: self._session.restart())
@@ -190,8 +201,9 @@ class Page:
         widgets["gait"].options = _listed(creature.sketch.gait, (OWN, *gaits.fitting(body)))
         widgets["preset"].options = _listed(creature.sketch.preset, (OWN, *presets_of(body)))
         self._show_what_applies(creature.sketch)
-        self._fit_links(creature)
+        self._links = creature.links[:_LINKS]
         self._fit_direction(creature)
+        self._render()
         for handle in self._cures:
             handle.remove()
         with self._check:
@@ -199,82 +211,102 @@ class Page:
             for flaw in creature.flaws:
                 if flaw.cure is not None:
                     button = self._gui.add_button(f"Apply: {flaw.text.rpartition(': ')[2]}")
-                    button.on_click(functools.partial(self._apply, cured(creature.sketch, flaw.cure)))
+                    sketch = cured(creature.sketch, flaw.cure)
+                    button.on_click(lambda event, sketch=sketch: self._sketched(sketch, "cure"))
                     self._cures.append(button)
         self._lines.content = texts.copied(creature.sketch)
 
-    def _fit_links(self, creature: Creature) -> None:
-        """Give each name of links a slider; the others are hidden, as a browser that is late updates removed ones."""
-        names, given = creature.links[:_LINKS], dict(creature.sketch.lengths)
-        if names == self._links:
-            return
-        self._links = names
-        for slider, name in itertools.zip_longest(self._lengths, names):
-            slider.visible = name is not None
-            slider.label, slider.value = name or "", given.get(name, 1.0)
-
     def _fit_direction(self, creature: Creature) -> None:
         """Offer the poses and gaits of a body, if they are by command in its task."""
-        task = creature.environment.task.definition
+        task, widgets = creature.environment.task.definition, self._widgets
         self._direction.visible = direction.directs(task)
         if not self._direction.visible:
             return
-        names = direction.named(task)
-        if self._gait.value not in names:
-            self._gait.value = direction.OWN
-        self._gait.options = list(names)
-        for slider, (low, high) in zip(self._pose, direction.room(creature.setup.body), strict=True):
-            slider.visible = bool(low < high)
-            slider.value = min(max(slider.value, low), high)
-            if slider.visible:
-                slider.min, slider.max = float(low), float(high)
+        widgets["gait_now"].options = list(direction.named(task))
+        for name, (low, high) in zip(POSE, direction.room(creature.setup.body), strict=True):
+            widgets[name].visible = bool(low < high)
+            if widgets[name].visible:
+                widgets[name].min, widgets[name].max = float(low), float(high)
 
     def _show_what_applies(self, sketch: Sketch) -> None:
         for name in ("legs", "links", "layout"):
             self._widgets[name].visible = sketch.source == LEGS
         self._widgets["seed"].visible = sketch.source == RANDOM
 
-    def _read(self) -> Sketch:
-        """Return what the widgets say."""
-        lengths = tuple((name, slider.value) for name, slider in zip(self._links, self._lengths, strict=False))
-        said = {name: widget.value for name, widget in self._widgets.items()}
-        return Sketch(**said, lengths=lengths, file=self._file)
+    def _render(self) -> None:
+        """Have the widgets say the state, as far as they can."""
+        state = self._edits.now
+        self._widgets["source"].options = _listed(state.sketch.source, sketches.sources())
+        for name, widget in self._widgets.items():
+            widget.value = _shown(widget, state.value(name))
+        given = dict(state.sketch.lengths)
+        for slider, name in itertools.zip_longest(self._lengths, self._links):
+            slider.visible = name is not None  # none is removed: a browser that is late would update it
+            slider.label, slider.value = name or "", given.get(name, 1.0)
 
-    def _changed(self, event: viser.GuiEvent) -> None:
+    def _edit(self, state: Callable[[State], State], name: str) -> None:
+        """Take another state, which depends on that of now, under a name of what changes it."""
+        with self._lock:
+            self._edits = edited(self._edits, state(self._edits.now), name, time.monotonic())
+            self._ask()
+
+    def _go(self, move: Callable[[Edits], Edits]) -> None:
+        """Undo or redo."""
+        with self._lock:
+            self._edits = move(self._edits)
+            self._ask()
+        self._render()
+
+    def _ask(self) -> None:
+        """Ask the session for what the state says."""
+        state = self._edits.now
+        self._session.ask(state.sketch)
+        self._session.command(state.velocity)
+        self._session.direct(state.pose, *state.gait)
+
+    def _undo(self) -> None:
+        self._go(undone)
+
+    def _redo(self) -> None:
+        self._go(redone)
+
+    def _reset(self) -> None:
+        """Return to the state in which the studio began, as one change."""
+        self._edit(lambda state: self._first, "reset")
+        self._render()
+
+    async def _changed(self, name: str, event: viser.GuiEvent) -> None:  # viser keeps the order of async calls alone
         if event.client_id is not None:  # a visitor changed it, and not the page itself
-            self._session.ask(self._read())
+            self._edit(lambda state: state.having(**{name: event.target.value}), name)
 
-    def _apply(self, sketch: Sketch, event: viser.GuiEvent | None = None) -> None:
-        """Set the widgets to a sketch, and ask for it."""
-        self._file, widgets = sketch.file, self._widgets
-        widgets["source"].options = (*sketches.sources(), FILE)
-        for name, widget in widgets.items():
-            widget.value = getattr(sketch, name)
-        for slider in self._lengths:
-            slider.value = 1.0
-        self._session.ask(sketch)
+    async def _lengthened(self, index: int, event: viser.GuiEvent) -> None:
+        if event.client_id is not None and index < len(self._links):
+            link, factor = self._links[index], event.target.value
+            self._edit(lambda state: state._replace(sketch=lengthened(state.sketch, link, factor)), link)
+
+    def _sketched(self, sketch: Sketch, name: str) -> None:
+        """Take another sketch, and show it."""
+        self._edit(lambda state: state._replace(sketch=sketch), name)
+        self._render()
 
     def _uploaded(self, event: viser.GuiEvent) -> None:
         text = event.target.value.content[: MAX_IMPORTED + 1].decode("utf-8", "replace")
-        self._apply(opened_file(self._read(), text))
-
-    def _command(self) -> None:
-        by_hand = self._by_hand.value
-        self._session.command([stick.value for stick in self._sticks] if by_hand else None)
-        pose, gait = [slider.value for slider in self._pose], (self._gait.value, self._tempo.value)
-        self._session.direct(*((pose, *gait) if by_hand else (None, None)))
+        self._sketched(opened_file(self._edits.now.sketch, text), "file")
 
     def _stand(self) -> None:
         """Ask for the pose at rest and the body's own gait, at its own frequency."""
-        self._gait.value, self._tempo.value = direction.OWN, 1.0
-        for slider in self._pose:
-            slider.value = 0.0
+        self._edit(lambda state: state.having(gait_now=direction.OWN, tempo=1.0, **dict.fromkeys(POSE, 0.0)), "upright")
+        self._render()
 
-    def _press(self, change: Sequence[float], event: viser.CommandEvent) -> None:
-        """Change the command by a step."""
-        self._by_hand.value = True
-        for stick, step in zip(self._sticks, change, strict=True):
-            stick.value = min(max(stick.value + step, -1.0), 1.0)
+    def _press(self, name: str, change: float, event: viser.CommandEvent) -> None:
+        """Change a number of the command by a step."""
+
+        def pressed(state: State) -> State:
+            number = min(max(state.value(name) + change, -1.0), 1.0)
+            return state.having(by_hand=True, **{name: number})
+
+        self._edit(pressed, name)
+        self._render()
 
     def _save(self, file: saving.File, event: viser.GuiEvent) -> None:
         """Make a file, and send it to the visitor who asks for it."""
@@ -294,3 +326,16 @@ class Page:
 def _listed(chosen: str, names: Iterable[str]) -> list[str]:
     """Return names for a list to choose from, with the chosen one."""
     return list(dict.fromkeys((*names, chosen)))
+
+
+def _label(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _shown(widget: Any, value: Any) -> Any:
+    """Return what a widget shows of a value that it may not reach."""
+    if isinstance(widget, viser.GuiSliderHandle):
+        return min(max(value, widget.min), widget.max)
+    if isinstance(widget, viser.GuiDropdownHandle):
+        return value if value in widget.options else OWN
+    return value

@@ -185,6 +185,12 @@ def cured(sketch: Sketch, cure: Body) -> Sketch:
     return opened_file(sketch, body_to_json(cure))
 
 
+def lengthened(sketch: Sketch, link: str, factor: float) -> Sketch:
+    """Return the sketch with another factor of the length of a link."""
+    lengths = dict(sketch.lengths) | {link: factor}
+    return dataclasses.replace(sketch, lengths=tuple((name, each) for name, each in lengths.items() if each != 1.0))
+
+
 def command_line(sketch: Sketch) -> str:
     """Return the command that shows the same in a window; a body of its own is read from its saved spec."""
     made = body(sketch)

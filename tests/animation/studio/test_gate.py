@@ -62,7 +62,7 @@ class Studio:
 
     def send(self, *sent):
         """Send messages of a visitor, and wait until they are handled: messages are in their order."""
-        marker = self.page._by_hand
+        marker = self.page._widgets["by_hand"]
         after = not marker.value
         with self.connect(Origin=f"http://{self.host}") as opened:
             opened.send(msgspec.msgpack.encode(CAMERA))

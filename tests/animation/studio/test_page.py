@@ -17,7 +17,7 @@ from arc_suite.robots.spec_files import body_from_json, body_to_json
 viser = pytest.importorskip("viser", reason="no viser here: make check-studio")
 from arc_suite.animation.studio import page as pages  # noqa: E402
 
-_PATIENCE = 240.0  # s: a browser that draws without a graphics card is slow
+_PATIENCE = 90.0  # s: a browser that draws without a graphics card is slow
 
 HIGH = generator.generate(6, 2)
 HIGH = HIGH.replace(torso=HIGH.torso.replace(standing_height=0.5))
@@ -152,14 +152,49 @@ def test_pose_and_gait_are_followed(served, tab):
     ripple = gaits.gait(served.session.creature.setup.body, "ripple")
     served.until(lambda: served.session.episodes.timestep.observation["gait"][-2] == pytest.approx(ripple.duty_factor))
     served.until(lambda: served.session.episodes.timestep.observation["pose"][0] == pytest.approx(low))
+    frequency = served.session.episodes.timestep.observation["gait"][-1]
+    press(tab, "Frequency", "End")
+    served.until(lambda: served.session.gait == ("ripple", 1.4))
+    faster = pytest.approx(1.4 * frequency, rel=1e-3)
+    served.until(lambda: served.session.episodes.timestep.observation["gait"][-1] == faster)
     tab.get_by_role("button", name="Upright").click()
-    served.until(lambda: served.session.gait == "own" and not served.session.pose.any())
+    served.until(lambda: served.session.gait == ("own", 1.0) and not served.session.pose.any())
     open_tab(tab, "Task")
     choose(tab, "Task", "steer")
     open_tab(tab, "Command")
     tab.get_by_text("Gait now").wait_for(state="hidden")
     open_tab(tab, "Task")
     choose(tab, "Task", "directed")
+
+
+def test_undo_redo_and_reset(served, tab):
+    """By keys and by buttons, over changes of body, task and command."""
+    open_tab(tab, "Body")
+    before = served.session.creature.sketch
+    press(tab, "Fan of the legs", "ArrowRight", 5)
+    served.until(lambda: served.session.creature.sketch.fan == 5.0)
+    open_tab(tab, "Command")
+    press(tab, "Left", "End")
+    served.until(lambda: served.session.desired[1] == 1.0)
+    tab.evaluate("document.activeElement.blur()")
+    tab.keyboard.press("Control+z")
+    served.until(lambda: served.session.desired[1] == 0.0)
+    served.until(lambda: float(field(tab, "Left").get_by_role("slider").get_attribute("aria-valuenow")) == 0.0)
+    tab.keyboard.press("Control+z")
+    served.until(lambda: served.session.creature.sketch == before)
+    tab.keyboard.press("Control+Shift+Z")
+    served.until(lambda: served.session.creature.sketch.fan == 5.0)
+    tab.get_by_role("button", name="Undo").click()
+    served.until(lambda: served.session.creature.sketch == before)
+    tab.get_by_role("button", name="Redo").click()
+    tab.get_by_role("button", name="Reset").click()
+    served.until(lambda: served.session.creature.sketch == Sketch(legs=8, links=2))
+    served.until(lambda: served.session.desired.tolist() == [1.0, 0.0, 0.0])
+    open_tab(tab, "Body")
+    served.until(lambda: field(tab, "Legs").get_by_role("textbox").input_value() == "8")
+    for _ in range(2):
+        tab.get_by_role("button", name="Undo").click()
+    served.until(lambda: served.session.creature.sketch == before)
 
 
 def test_tasks_and_grounds(served, tab):
