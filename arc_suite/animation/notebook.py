@@ -4,6 +4,7 @@ import base64
 import contextlib
 import dataclasses
 import io
+import itertools
 from collections.abc import Callable
 from xml.etree import ElementTree
 
@@ -93,8 +94,9 @@ def _film(environment: Environment, policy: Policy, seed: int, steps: int) -> st
     body = environment.task.body.name
     footage, file = films.Footage(body, environment, policies.alone(policy, seed), "profile", _SIZE), io.BytesIO()
     with contextlib.closing(footage):
-        seconds = films.steps_per_frame(footage.control_timestep) * footage.control_timestep
-        films.write_gif(file, [footage.view(), *films.frames(footage, steps)], seconds)
+        frame = films.frame_seconds(footage.control_timestep)
+        views = films.frames([footage], steps * footage.control_timestep, frame)
+        films.write_gif(file, [footage.view(), *itertools.chain(*views)], frame)
     source = f"data:image/gif;base64,{base64.b64encode(file.getvalue()).decode()}"
     return _element("img", src=source, width=str(_SIZE[0]), height=str(_SIZE[1]), alt=body)
 

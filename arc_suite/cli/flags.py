@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from absl import flags
@@ -262,6 +262,21 @@ def task() -> tuple[str, dict[str, Any]]:
     if "arena" in settings:
         registry.arena_maker(settings["arena"])
     return FLAGS.task, settings
+
+
+def check_extension(extension: str, own: Mapping[str, Iterable[str]]) -> None:
+    """Check that no flag is given that is for other files.
+
+    Args:
+        extension: of the file to write.
+        own: by flag, the extensions that it is for.
+
+    Raises:
+        ValueError: one is.
+    """
+    for flag, extensions in own.items():
+        if FLAGS[flag].present and extension not in extensions:
+            raise ValueError(f"--{flag}: it is for {' and '.join(extensions)}, not for {extension}")
 
 
 def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ GROUPS = {
         *("output", "json", "page", "pages", "save", "picture", "render", "summary", "visuals", "no_arena", "report"),
         *("results", "runs", "name", "id", "author", "code_permalink", "overwrite", "tensorboard"),
         *("clips", "rig", "root_motion", "straight", "plant", "triangles", "uv", "reduce"),
-        *("fps", "size", "transparent", "turntable", "directions"),
+        *("fps", "loop", "size", "transparent", "turntable", "directions"),
     ),
     "Help": ("help", "version"),
 }

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import IO
 
 import imageio.v2 as imageio
+import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from arc_suite import versions
 from arc_suite.models.builder import EYE
 
+_ROUNDING = 1e-6  # control steps
 _SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
 
 
@@ -45,6 +47,7 @@ class Footage:
         self.advance = 0.0
         self._environment, self._policy = environment, policy
         self._time_step = environment.reset()
+        self._before = self._state()
         self._camera, self._size, self._quality = camera, size, None if camera == EYE else quality
 
     @property
@@ -67,16 +70,48 @@ class Footage:
         """Advance by one control step."""
         if self.ended:
             return
-        before = self.phase
+        before, self._before = self.phase, self._state()
         self._time_step = self._environment.step(self._policy(self._time_step))
         self.advance = (self.phase - before) % 1.0
         self.earned += self._time_step.reward
         self.steps += 1
 
-    def view(self) -> np.ndarray:
-        """Return what the camera sees: (height, width, 3) uint8."""
-        width, height = self._size
-        return self._environment.physics.render(height, width, self._camera, quality=self._quality)
+    def view(self, share: float = 1.0) -> np.ndarray:
+        """Return what the camera sees.
+
+        Args:
+            share: of the latest control step that is over; the pose between its ends is a cubic through both.
+
+        Returns:
+            (height, width, 3) uint8.
+        """
+        (width, height), physics = self._size, self._environment.physics
+        qpos = physics.data.qpos if share == 1.0 else self.between(share)
+        return physics.render(height, width, self._camera, quality=self._quality, qpos=qpos)
+
+    def at(self, time: float) -> np.ndarray:
+        """Step on until a time of the episode, s, and return what the camera sees then."""
+        steps = time / self.control_timestep
+        while not self.ended and self.steps < steps - _ROUNDING:
+            self.step()
+        share = 1.0 - (self.steps - steps)
+        return self.view(share if _ROUNDING < share < 1.0 - _ROUNDING else 1.0)
+
+    def _state(self) -> tuple[np.ndarray, np.ndarray]:
+        data = self._environment.physics.data
+        return data.qpos.copy(), data.qvel.copy()
+
+    def between(self, share: float) -> np.ndarray:
+        """Return positions (nq,) at a share of the latest control step: Hermite's cubic, by velocities at its ends."""
+        (start, velocity), (end, last) = self._before, self._state()
+        model, way = self._environment.physics.model.ptr, np.empty_like(velocity)
+        mujoco.mj_differentiatePos(model, way, 1.0, start, end)
+        rest, step = 1.0 - share, self.control_timestep
+        way *= share**2 * (1.0 + 2.0 * rest)
+        way += step * share * rest * (rest * velocity - share * last)
+        qpos = start.copy()
+        mujoco.mj_integratePos(model, qpos, way, 1.0)
+        return qpos
 
     def close(self) -> None:
         """Free the simulation and its OpenGL context."""
@@ -99,18 +134,34 @@ def cycle(footage: Footage, count: int) -> Iterator[np.ndarray]:
         yield captioned(footage.view(), f"phase {footage.phase:.2f}")
 
 
-def frames(footage: Footage, steps: int) -> Iterator[np.ndarray]:
-    """Yield the view after every `steps_per_frame` control steps, up to a number of steps or the end of the episode."""
-    stride = steps_per_frame(footage.control_timestep)
-    while footage.steps < steps and not footage.ended:
-        for _ in range(min(stride, steps - footage.steps)):
-            footage.step()
-        yield footage.view()
+def frames(footages: Sequence[Footage], seconds: float, frame: float) -> Iterator[list[np.ndarray]]:
+    """Yield views of several episodes at equal times until all have ended.
+
+    Args:
+        footages: of the episodes.
+        seconds: of the film.
+        frame: seconds that a frame lasts; the last one shows the end.
+    """
+    start = footages[0].steps * footages[0].control_timestep
+    for number in range(1, math.ceil(seconds / frame - _ROUNDING) + 1):
+        yield [footage.at(start + min(number * frame, seconds)) for footage in footages]
+        if all(footage.ended for footage in footages):
+            return
 
 
-def steps_per_frame(control_timestep: float) -> int:
-    """Return how many control steps a frame of a film shows, so that players keep its pace."""
-    return math.ceil(_SHORTEST_FRAME / control_timestep)
+def frame_seconds(control_timestep: float) -> float:
+    """Return how long a frame of a film lasts, s: whole control steps, of a pace that players keep."""
+    return control_timestep * math.ceil(_SHORTEST_FRAME / control_timestep)
+
+
+def check_fps(fps: float, extension: str) -> None:
+    """Check that players show so many frames a second of a film.
+
+    Raises:
+        ValueError: more than those of a GIF.
+    """
+    if extension == ".gif" and fps * _SHORTEST_FRAME > 1.0:
+        raise ValueError(f"--fps={fps:g}: expected at most {1.0 / _SHORTEST_FRAME:g} for a GIF")
 
 
 def captioned(picture: np.ndarray, text: str) -> np.ndarray:

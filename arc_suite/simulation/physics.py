@@ -139,9 +139,8 @@ class Physics(dm_mujoco.Physics):
     def render(self, height=480, width=640, camera_id="tracking", **kwargs) -> np.ndarray:
         """Draw the decorated body in its present pose; other arguments as in dm_control.
 
-        With `quality="film"` edges of shadows are finer; with "still" the picture is also drawn at twice the size and
-        averaged; "close" has the finest shadows, of views of the body alone. The default is "fast". Through the camera
-        `eye` it is "sense", without shadows, ornaments and markers.
+        With `quality="film"` edges of shadows are finer; with "still" all edges are. The default is "fast". Through the
+        camera `eye` it is "sense", without shadows, ornaments and markers.
 
         Returns:
             (height, width, 3) uint8; with `depth=True`, (height, width) float32, m.
@@ -153,7 +152,7 @@ class Physics(dm_mujoco.Physics):
         """
         self._check_process()
         return pictures.picture(
-            self.body, self.arena, height=height, width=width, camera_id=camera_id, **self._pose(), **kwargs
+            self.body, self.arena, height=height, width=width, camera_id=camera_id, **self._pose() | kwargs
         )
 
     def decorated(self) -> pictures.Decorated:

@@ -26,30 +26,26 @@ class Quality(NamedTuple):
 
     Attributes:
         shadows: pixels of the shadow map's sides.
-        scale: a picture is drawn so many times as large and averaged.
-        clip: half of the shadow map's width in extents of the scene; ground beyond it is speckled.
-        samples: of a pixel.
+        scale: a picture is drawn so many times as large and averaged. That is faster than OpenGL's samples, and smooths
+            edges of shadows, too.
         faces: of a round solid, around and along.
         ornaments: whether visuals are drawn that have no mass and touch nothing.
     """
 
     shadows: int
     scale: int
-    clip: float = 5.0
-    samples: int = 4
     faces: tuple[int, int] = (28, 16)
     ornaments: bool = True
 
 
-# For policies that see, without what would stand before the eye; for people; for films, whose shadows have finer edges;
-# for pictures that are kept; and for those of the body alone.
+# For policies that see, without what would stand before the eye; for people; for films; for pictures that are kept.
 QUALITIES = {
-    "sense": Quality(0, 1, samples=0, faces=(12, 8), ornaments=False),
-    "fast": Quality(2048, 1),
-    "film": Quality(4096, 1),
-    "still": Quality(4096, 2),
-    "close": Quality(4096, 2, 1.2),
+    "sense": Quality(0, 1, faces=(12, 8), ornaments=False),
+    "fast": Quality(2048, 2),
+    "film": Quality(4096, 2),
+    "still": Quality(4096, 4),
 }
+LARGEST = 2  # times the largest picture's sides: what OpenGL draws at once
 
 _LIMP = (0.07, 0.07, 0.08, 1.0)  # color of a leg whose motors have failed
 
@@ -77,9 +73,8 @@ class Decorated(dm_mujoco.Physics):
         """
         decorated = cls.from_model(wrapper.MjModel(models.parsed(body, arena, decorated=True).compile()))
         drawing = decorated.model.vis.quality
-        drawing.shadowsize, drawing.offsamples = quality.shadows, quality.samples
+        drawing.shadowsize, drawing.offsamples = quality.shadows, 0
         drawing.numslices, drawing.numstacks = quality.faces
-        decorated.model.vis.map.shadowclip = quality.clip
         if not quality.ornaments:
             groups = decorated.model.geom_group
             groups[groups > 0] = mujoco.mjNGROUP - 1  # which pictures leave out
@@ -196,9 +191,9 @@ def picture(
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
         failed_legs: names of legs to show dark.
-        quality: of `QUALITIES`; pictures of depth or segments, and the largest ones, are not averaged. "sense" shows
-            what has mass or touches: no ornaments, markers, reward or failed legs. None for "sense" through the
-            camera `eye`, else "fast".
+        quality: of `QUALITIES`; pictures of depth or segments are not averaged, the largest ones less. "sense" shows
+            what has mass or touches: no ornaments, markers, reward or failed legs. None for "sense" through the camera
+            `eye`, else "fast".
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
@@ -214,8 +209,8 @@ def picture(
     if quality == "sense":
         share, markers, failed_legs = None, (), ()
     drawing = QUALITIES[checks.name(quality, QUALITIES, "quality")]
-    large = drawing.scale * height > MAX_HEIGHT or drawing.scale * width > MAX_WIDTH
-    scale = 1 if large or kwargs.get("depth") or kwargs.get("segmentation") else drawing.scale
+    single = kwargs.get("depth") or kwargs.get("segmentation")
+    scale = 1 if single else min(drawing.scale, LARGEST * MAX_HEIGHT // height, LARGEST * MAX_WIDTH // width)
 
     def draw():
         decorated = _shared(body, arena, drawing)
@@ -224,10 +219,22 @@ def picture(
         return decorated.render(scale * height, scale * width, camera_id, **kwargs)
 
     drawn = opengl.call(draw)
-    if scale == 1:
-        return drawn
-    blocks = drawn.reshape(height, scale, width, scale, 3)
-    return blocks.mean(axis=(1, 3)).round().astype(np.uint8)
+    return drawn if scale == 1 else smaller(drawn, scale)
+
+
+def smaller(picture: np.ndarray, scale: int) -> np.ndarray:
+    """Return the means of squares of pixels.
+
+    Args:
+        picture: (scale * height, scale * width, channels) uint8.
+        scale: of the squares, up to 16.
+
+    Returns:
+        (height, width, channels) uint8.
+    """
+    rows, columns = np.divmod(np.arange(scale * scale), scale)
+    total = sum(picture[row::scale, column::scale].astype(np.uint16) for row, column in zip(rows, columns, strict=True))
+    return ((total + scale * scale // 2) // (scale * scale)).astype(np.uint8)
 
 
 def check_size(height: int, width: int) -> None:

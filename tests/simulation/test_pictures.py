@@ -135,17 +135,16 @@ def test_the_eye_sees_neither_markers_nor_failed_legs():
 
 
 def test_qualities_show_the_same_in_finer_pixels():
-    """A still is the mean of a picture of twice its size; pictures of depth are not averaged."""
+    """A still is the mean of a film's picture of twice its size; pictures of depth are not averaged."""
     physics = Physics.from_body(ROBOTS["tick"])
     physics.forward()
-    sense, fast, film, still, close = (physics.render(90, 120, "portrait", quality=name) for name in QUALITIES)
+    sense, fast, film, still = (physics.render(90, 120, "portrait", quality=name) for name in QUALITIES)
     assert 0.0 < abs(sense.astype(int) - fast).mean() < 12.0  # no ornaments
     assert_array_equal(physics.render(90, 120, "portrait"), fast)
     assert (fast != film).any() and abs(fast.astype(int) - film).mean() < 2.0  # edges of shadows alone
     double = physics.render(180, 240, "portrait", quality="film").astype(float)
     mean = (double[::2, ::2] + double[1::2, ::2] + double[::2, 1::2] + double[1::2, 1::2]) / 4.0
-    np.testing.assert_allclose(still, mean, atol=0.5)
-    assert (close != still).any() and abs(close.astype(int) - still).mean() < 2.0  # edges of shadows alone
+    np.testing.assert_allclose(still, mean, atol=1.0)
     depths = [physics.render(90, 120, "portrait", depth=True, quality=name) for name in ("film", "still")]
     assert_array_equal(*depths)
     with pytest.raises(ValueError, match="^unknown quality 'fine'"):

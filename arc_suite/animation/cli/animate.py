@@ -23,7 +23,7 @@ from absl import flags
 from arc_suite import checks, files
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import filming
-from arc_suite.cli.flags import define_walk, only_setup, policy_name
+from arc_suite.cli.flags import check_extension, define_walk, only_setup, policy_name
 from arc_suite.cli.program import VERSION, progress
 from arc_suite.envs.setup import Setup
 from arc_suite.models.visuals.scene import MAX_HEIGHT
@@ -36,7 +36,6 @@ _OWN = {  # flags that are for some files alone
     **dict.fromkeys(("rig", "root_motion", "triangles", "uv", "reduce"), (".glb",)),
     **{"transparent": _CLEAR, "turntable": _FILMS, "directions": (".png",), "size": (*_FILMS, ".png")},
 }
-_GIF_FPS = 50
 _WIDEST = 16384  # pixels of a sheet
 _CONVERTED = (".fbx", ".bvh", ".blend")  # what tools/to_fbx.py writes
 
@@ -74,9 +73,7 @@ def main() -> None:
             f"{FLAGS.output}: this program writes .glb; tools/to_fbx.py makes {extension} of it, by Blender"
         )
     extension = checks.extension(FLAGS.output, [".glb", *_FILMS, ".png"])
-    for flag, extensions in _OWN.items():
-        if FLAGS[flag].present and extension not in extensions:
-            raise ValueError(f"--{flag}: it is for {' and '.join(extensions)}, not for {extension}")
+    check_extension(extension, _OWN)
     if extension == ".glb":
         write_file(setup)
     else:
@@ -100,8 +97,7 @@ def write_pictures(setup: Setup, extension: str) -> None:
     """Write a film or a sheet of one clip."""
     if len(FLAGS.clips) != 1 or FLAGS.clips == [export.ALL]:
         raise ValueError(f"--clips={','.join(FLAGS.clips)}: expected one clip for {extension}")
-    if extension == ".gif" and FLAGS.fps > _GIF_FPS:
-        raise ValueError(f"--fps={FLAGS.fps:g}: expected at most {_GIF_FPS} for a GIF")
+    films.check_fps(FLAGS.fps, extension)
     with files.writing(FLAGS.output) as temporary:
         (clip,) = recorded(setup, FLAGS.clips)
         if extension == ".png":

@@ -4,10 +4,12 @@
   arc-suite render --robot all --output robots.mp4
   arc-suite render --legs 8 --links 4 --output walker.gif
   arc-suite render --robot tick --set gait=ripple --output ripple.mp4
+  arc-suite render --robot leaper --fps 60 --loop --output leaper.webp
   arc-suite render --robot queen --preset tuned --output walk.html
 
 A PNG of one robot under the demonstrator shows one cycle of its gait; any other PNG, and one after
---steps=0, shows one moment. A film plays in real time. A page plays in any browser, with a camera to
+--steps=0, shows one moment. A film plays in real time. With --loop it
+holds whole cycles of a gait that has settled. A page plays in any browser, with a camera to
 turn, foot contacts and rewards; several robots walk side by side. The program prints each robot's return up
 to then, and the file it wrote. No display is needed.
 """
@@ -21,7 +23,7 @@ from absl import flags
 
 from arc_suite import checks, files, style
 from arc_suite.animation import pages
-from arc_suite.cli.flags import define_walk, policy_name, setups
+from arc_suite.cli.flags import check_extension, define_walk, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
@@ -30,7 +32,10 @@ from arc_suite.simulation import films
 
 _STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".webp": 80, ".html": 400}
 _SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180), ".webp": (480, 360)}
+_FILMS = (".mp4", ".gif", ".webp")
+_OWN = {"fps": _FILMS, "loop": _FILMS}  # flags that are for some files alone
 _CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
+_SETTLE = 60  # control steps, after which the start of an episode is forgotten
 
 FLAGS = flags.FLAGS
 define_walk(more=", or all of them side by side")
@@ -47,6 +52,8 @@ flags.DEFINE_integer(
     "[default: 200, in a GIF or WebP 80, on a page 400, before a picture 60]",
     lower_bound=0,
 )
+flags.DEFINE_float("fps", None, "Frames a second of a film. [default: one a control step, of 50 a second]", 1.0, 1000.0)
+flags.DEFINE_bool("loop", False, "Of films: the walk has settled, and holds the whole gait cycles nearest to --steps.")
 flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif, .webp or .html. Required.", short_name="o")
 
 
@@ -66,6 +73,8 @@ def main() -> None:
     steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
     if steps < 1 and extension != ".png":
         raise ValueError(f"--steps={steps}: expected 1 or more for a film or a page")
+    check_extension(extension, _OWN)
+    films.check_fps(FLAGS.fps or 0.0, extension)
 
     with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:
         if extension == ".html":
@@ -78,9 +87,8 @@ def main() -> None:
                 footages.append(films.Footage(name, environments[name], walk, camera, size, quality))
                 stack.callback(footages[-1].close)
             footages[0].view()  # finds out at once whether there is OpenGL
-            stride = films.steps_per_frame(footages[0].control_timestep)
-            frames = still(footages, steps) if extension == ".png" else film(footages, steps, stride)
-            films.WRITERS[extension](temporary, frames, stride * footages[0].control_timestep)
+            frames, frame = (still(footages, steps), 0.0) if extension == ".png" else film(footages, steps)
+            films.WRITERS[extension](temporary, frames, frame)
             for footage in footages:
                 print(f"{footage.robot}: return {footage.earned:.1f} in {footage.steps} steps")
     print(f"wrote {FLAGS.output}")
@@ -106,22 +114,41 @@ def still(footages: list[films.Footage], steps: int) -> Iterator[np.ndarray]:
         views = progress(films.cycle(footages[0], _CYCLE_VIEWS), "rendering", _CYCLE_VIEWS, leave=False)
         yield films.grid(list(views), _CYCLE_COLUMNS)
     else:
-        yield panel(footages)
+        yield panel(footages, [footage.view() for footage in footages])
 
 
-def film(footages: list[films.Footage], steps: int, stride: int) -> Iterator[np.ndarray]:
-    """Yield a frame for every `stride` control steps, until all episodes have ended."""
-    for start in progress(range(0, steps, stride), "rendering", leave=False):
-        for footage in footages:
-            for _ in range(min(stride, steps - start)):
-                footage.step()
-        yield panel(footages)
-        if all(footage.ended for footage in footages):
-            return
+def film(footages: list[films.Footage], steps: int) -> tuple[Iterator[np.ndarray], float]:
+    """Return the frames until all episodes have ended, and the seconds of each."""
+    step = footages[0].control_timestep
+    seconds, frame = steps * step, 1.0 / FLAGS.fps if FLAGS.fps else films.frame_seconds(step)
+    if FLAGS.loop:
+        seconds = settled(footages, steps)
+        frame = seconds / max(1, round(seconds / frame))
+    views = progress(films.frames(footages, seconds, frame), "rendering", round(seconds / frame), leave=False)
+    return (panel(footages, each) for each in views), frame
 
 
-def panel(footages: list[films.Footage]) -> np.ndarray:
+def settled(footages: list[films.Footage], steps: int) -> float:
+    """Walk until the gait has settled, and return how long its whole cycles nearest to a number of steps last, s.
+
+    Raises:
+        ValueError: several creatures, whose cycles differ, or no clock of a gait.
+    """
+    if len(footages) > 1:
+        raise ValueError(f"--loop: expected one creature, got {len(footages)}, whose gait cycles differ")
+    (footage,) = footages
+    for _ in range(_SETTLE):
+        footage.step()
+    if footage.ended or not footage.advance:
+        raise ValueError(
+            f"--loop: {footage.robot} {'falls' if footage.ended else 'has no clock of a gait'} in this task"
+        )
+    return max(1, round(steps * footage.advance)) / footage.advance * footage.control_timestep
+
+
+def panel(footages: list[films.Footage], views: list[np.ndarray]) -> np.ndarray:
     """Return what all cameras see, two side by side, with names where there are several."""
     if len(footages) == 1:
-        return footages[0].view()
-    return films.grid([films.captioned(footage.view(), footage.robot.capitalize()) for footage in footages], 2)
+        return views[0]
+    named = zip(views, footages, strict=True)
+    return films.grid([films.captioned(view, footage.robot.capitalize()) for view, footage in named], 2)

@@ -21,8 +21,8 @@ _EXTENTS = 1.5  # of the scene, from which the free camera looks
 _PLAIN = (0.36, 0.40, 0.45, 1.0)  # a ground without a grid, which would stand still under a body that walks in place
 _NONE = (0.0, 0.0, 0.0, 0.0)
 _AROUND = 6.0  # s, about what a turn on the turntable takes
-_SOLID = pictures.Quality(4096, 4, 1.2, samples=0)  # pixels that are body or not, so that their mean is an alpha
-_GROUNDED = pictures.Quality(4096, 2, 2.0)
+_SOLID = pictures.QUALITIES["still"]  # of many pixels, body or not, whose mean is an alpha
+_GROUNDED = pictures.QUALITIES["film"]
 
 
 def loop(body: Body, clip: Clip, size: int, transparent: bool = False, turntable: bool = False) -> Iterator[np.ndarray]:
@@ -108,17 +108,16 @@ def _stage(body: Body, positions: np.ndarray, transparent: bool) -> pictures.Dec
 
 def _view(stage: pictures.Decorated, qpos: np.ndarray, size: int, transparent: bool) -> np.ndarray:
     stage.pose(qpos)
-    scale = min((_SOLID if transparent else _GROUNDED).scale, MAX_HEIGHT // size)
+    scale = min((_SOLID if transparent else _GROUNDED).scale, pictures.LARGEST * MAX_HEIGHT // size)
 
     def drawn(**kwargs):
-        picture = stage.render(scale * size, scale * size, _FREE, **kwargs)
-        return picture.reshape(size, scale, size, scale, -1)
+        return stage.render(scale * size, scale * size, _FREE, **kwargs)
 
     colors = drawn()
     if not transparent:
-        return colors.mean(axis=(1, 3)).round().astype(np.uint8)
+        return pictures.smaller(colors, scale)
     parts = drawn(segmentation=True)[..., :1]
     solid = (parts >= 0) & (stage.model.ptr.geom_bodyid[parts] > 0)
-    alpha = solid.mean(axis=(1, 3))
-    shade = (colors * solid).mean(axis=(1, 3)) / np.maximum(alpha, 1e-9)
-    return np.concatenate([shade, 255.0 * alpha], axis=-1).round().astype(np.uint8)
+    alpha = pictures.smaller(np.uint8(255) * solid, scale)
+    shade = pictures.smaller(colors * solid, scale) * (255.0 / np.maximum(alpha, 1))
+    return np.concatenate([shade.clip(0.0, 255.0).round().astype(np.uint8), alpha], axis=-1)

@@ -1,6 +1,7 @@
 """Files of a creature, as bytes: what the buttons of the page save."""
 
 import contextlib
+import itertools
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -116,10 +117,11 @@ def film(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     environment = load(creature.setup)
     act = _commanded(environment, creature.sketch, commands)
     footage = films.Footage(creature.setup.body.name, environment, act, "profile", _SIZE)
-    seconds = films.steps_per_frame(footage.control_timestep) * footage.control_timestep
+    frame = films.frame_seconds(footage.control_timestep)
     with contextlib.closing(footage), tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        films.write_mp4(path, films.frames(footage, _FILM_STEPS), seconds)
+        views = films.frames([footage], _FILM_STEPS * footage.control_timestep, frame)
+        films.write_mp4(path, itertools.chain.from_iterable(views), frame)
         return path.read_bytes()
 
 

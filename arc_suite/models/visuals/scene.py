@@ -15,6 +15,10 @@ _GROUND = {"rgb1": (0.33, 0.37, 0.42), "rgb2": (0.29, 0.33, 0.375), "markrgb": (
 _OBSTACLE = (0.62, 0.36, 0.22)  # stands out from ground and creatures
 _SHADE = 0.35  # by which ground is darker that is a height of the creature lower
 _EXTENT = 3.5  # of the scene, in heights of the creature, about what MuJoCo makes of one on a plane
+_CLIP, _CLIP_WIDE = 1.2, 3.0  # half of the shadow map's width in extents: on a plane, where other things cast shadows
+# MuJoCo draws its map a pixel inside its edge. So ground that slopes along both of the map's sides would shade itself
+# in one corner: the sun shines along x.
+_SUN, _RIM = (-0.36, 0.0, -1.0), (0.6, 0.5, -0.35)
 
 
 def add_scene(root: mjcf.RootElement, height: float) -> None:
@@ -26,7 +30,7 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
     """
     getattr(root.visual, "global").set_attributes(offwidth=MAX_WIDTH, offheight=MAX_HEIGHT)
     root.visual.quality.shadowsize = 2048
-    root.visual.map.shadowclip = 5.0  # from 2 down, shadows speckle the ground in wide views
+    root.visual.map.shadowclip = _CLIP
     root.visual.quality.offsamples = 4
     root.visual.map.znear = 0.02
     root.visual.rgba.haze = (*_HORIZON, 1.0)
@@ -60,12 +64,13 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
         geom.material = "obstacle"
     if obstacles or any(geom.type != "plane" for geom in ground):  # would stretch the map of shadows over all of it
         root.statistic.set_attributes(extent=_EXTENT * height, center=(0.0, 0.0, height))
+        root.visual.map.shadowclip = _CLIP_WIDE
 
     # Lights ride on the torso, so that shadows stay sharp however far the creature walks.
     torso = root.find("body", "torso")
     for name, towards, strength, casts in (
-        ("sun", (-0.3, 0.2, -1.0), 0.62, True),
-        ("rim", (0.6, 0.5, -0.35), 0.25, False),
+        ("sun", _SUN, 0.62, True),
+        ("rim", _RIM, 0.25, False),
     ):
         direction = np.array(towards) / np.linalg.norm(towards)
         torso.add(

@@ -4,6 +4,7 @@ import os
 import re
 
 import imageio.v2 as imageio
+import mujoco
 import numpy as np
 import programs
 import pytest
@@ -120,6 +121,39 @@ def test_a_film_keeps_the_sum_of_frames_between_the_units_of_its_format(tmp_path
     assert (film.n_frames, total, film.info["loop"]) == (20, milliseconds, 0)
 
 
+@pytest.mark.slow
+def test_a_loop_holds_whole_cycles_at_any_frames_a_second(tmp_path):
+    """Leaper's gait of 1.2 Hz: of 20 steps one cycle, 5 / 6 s, is the nearest; its last frame leads to the first."""
+    programs.passed(render(tmp_path, "--robot=leaper", "--steps=20", "--fps=60", "--loop", "-o", "leaper.webp"))
+    with Image.open(tmp_path / "leaper.webp") as film:
+        views, total = [], 0
+        for i in range(film.n_frames):
+            film.seek(i)
+            views.append(np.asarray(film.convert("RGB")).astype(float))
+            total += film.info["duration"]
+    changes = [abs(view - views[i - 1]).mean() for i, view in enumerate(views)]  # the first is over the seam
+    assert (len(views), total) == (50, 833)
+    assert 0.0 < changes[0] < 2.0 * max(changes[1:])
+
+
+def test_poses_between_control_steps_are_those_of_the_physics():
+    environment = arc_suite.load("tick", "walk", {"random": 0})
+    tuned = policy("cpg", "tick", "tuned", task=environment.task.definition)
+    footage, physics = films.Footage("tick", environment, alone(tuned, 0), "profile", (64, 48)), environment.physics
+    model, full = physics.model.ptr, mujoco.mjtState.mjSTATE_INTEGRATION
+    state, data = np.empty(mujoco.mj_stateSize(model, full)), mujoco.MjData(model)
+    for _ in range(30):
+        mujoco.mj_getState(model, physics.data.ptr, state, full)
+        footage.step()
+    mujoco.mj_setState(model, data, state, full)
+    data.ctrl[:] = physics.data.ctrl
+    np.testing.assert_allclose(footage.between(0.0), data.qpos, atol=1e-12)
+    mujoco.mj_step(model, data, 10)
+    np.testing.assert_allclose(footage.between(10 / 25), data.qpos, atol=0.003)
+    np.testing.assert_allclose(footage.between(1.0), physics.data.qpos, atol=1e-12)
+    footage.close()
+
+
 def test_the_eye_shows_what_a_policy_sees():
     environment = arc_suite.load("bastion", "steer", {"random": 0})
     footage = films.Footage("bastion", environment, alone(policy("zero", "bastion"), 0), "eye", (64, 48))
@@ -148,6 +182,8 @@ def test_a_take_stays_at_its_end():
         (["--camera=", "--output=a.png"], f"unknown camera '' {CAMERAS}"),
         (["--output=a.jpg"], f"unknown extension '.jpg'; did you mean '.png'? {EXTENSIONS}"),
         (["--steps=0", "--output=a.html"], "--steps=0: expected 1 or more for a film or a page"),
+        (["--fps=60", "--output=a.gif"], "--fps=60: expected at most 50 for a GIF"),
+        (["--loop", "--output=a.png"], "--loop: it is for .mp4 and .gif and .webp, not for .png"),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
         ([], "no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html"),
     ],
