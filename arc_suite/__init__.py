@@ -24,7 +24,7 @@ with versions.explained():
     registration.register_ids()
 
 __version__ = "0.1.0"
-__all__ = ["ALL_TASKS", "Setup", "TASKS_BY_DOMAIN", "load", "register", "symmetry"]  # noqa: F822  # two are made by __getattr__
+__all__ = ["load", "symmetry", "register", "Setup", "TASKS_BY_DOMAIN", "ALL_TASKS"]  # noqa: F822  # two are made by __getattr__
 
 
 def __getattr__(name):

@@ -1,4 +1,4 @@
-"""Writes docs/package.md, the text for package indexes, from README.md: an index has neither its files nor a clone.
+"""Writes tools/package.md, the text for package indexes, from README.md: an index has neither its files nor a clone.
 
 Example:
   python tools/package_page.py
@@ -10,7 +10,7 @@ from pathlib import Path
 from arc_suite.cli import program
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "package.md"
+PAGE = ROOT / "tools" / "package.md"
 
 _PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)\n+")
 _FILE = re.compile(r"\[([^\]]*)\]\((?!https:)[^)]*\)")  # a link to a file of the repository

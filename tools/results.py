@@ -1,4 +1,4 @@
-"""Measures demonstrators on tasks: the tables between the marks in docs/results.md, and the anchors of scores.
+"""Measures demonstrators on tasks: the tables between the marks in studies/demonstrators.md, and the anchors of scores.
 
 A cell holds the return, the task's metric, and in brackets the share of episodes that ended in a fall or with a
 foot under the ground. Anchors are standing still and the best of the presets, in tasks with default settings; they
@@ -28,7 +28,7 @@ from arc_suite.evaluation import anchors
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "results.md"
+PAGE = Path(__file__).resolve().parents[1] / "studies" / "demonstrators.md"
 LANES = ("rough", "slopes", "stairs", "gaps", "course")
 
 # Task -> presets to compare; zero stands still.
@@ -54,7 +54,7 @@ flags.DEFINE_list("difficulties", ["0.3333", "0.6667", "1"], "Of ground, from 0 
 flags.DEFINE_integer("episodes", evaluation.CURVE_EPISODES, "How many of each.", lower_bound=1)
 flags.DEFINE_integer("terrain_seed", 1, "Of what is random in the ground; learners train on others.", lower_bound=0)
 flags.DEFINE_integer("threads", None, "To simulate on. [default: as many as there are cores]", lower_bound=1)
-flags.DEFINE_boolean("write", False, "Write the tables into docs/results.md.")
+flags.DEFINE_boolean("write", False, "Write the tables into studies/demonstrators.md.")
 flags.DEFINE_boolean("anchors", False, "Measure anchors in place of tables, and write them into the package.")
 
 

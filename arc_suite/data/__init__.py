@@ -19,4 +19,4 @@ from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import DatasetSettings
 from arc_suite.data.verification import verify
 
-__all__ = ["Dataset", "Episode", "DatasetSettings", "collect", "open", "verify"]
+__all__ = ["collect", "open", "verify", "Dataset", "Episode", "DatasetSettings"]

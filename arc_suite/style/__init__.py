@@ -5,4 +5,4 @@ from arc_suite.style.measures import METRICS, measure, report
 from arc_suite.style.sources import Source, source
 from arc_suite.style.tracks import Track, record
 
-__all__ = ["METRICS", "Source", "Track", "load", "measure", "record", "report", "save", "source"]
+__all__ = ["record", "measure", "report", "METRICS", "Track", "source", "Source", "save", "load"]

@@ -15,9 +15,9 @@ SETUP = configparser.ConfigParser()
 SETUP.read(ROOT / "setup.cfg")
 EXTRAS = set(SETUP["options.extras_require"])
 NOTEBOOK = ".ipynb"
-PAGES = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").rglob("*.md")]
+INDEX = ROOT / "tools" / "package.md"  # shown by a package index alone, which then has the package
+PAGES = [ROOT / "README.md", INDEX, *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").rglob("*.md")]
 SOURCES = [*PAGES, *(ROOT / "examples").rglob("*.py"), *(ROOT / "examples").rglob(f"*{NOTEBOOK}")]
-INDEX = ROOT / "docs" / "package.md"  # shown by a package index alone, which then has the package
 
 
 def text(path):

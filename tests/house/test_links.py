@@ -1,4 +1,4 @@
-"""Pages refer to files and headings that exist, and the index lists every page."""
+"""Pages refer to files and headings that exist, and the index lists every page, that of tasks those of each."""
 
 import pathlib
 import re
@@ -32,9 +32,9 @@ def test_links_of_pages():
 
 
 def test_the_index_lists_every_page():
-    index = ROOT / "docs" / "README.md"
-    listed = {(index.parent / link).resolve() for link, _ in LINK.findall(index.read_text()) if link}
-    assert set(ROOT.glob("docs/*.md")) - {index} <= listed
+    index, tasks = ROOT / "docs" / "README.md", ROOT / "docs" / "tasks.md"
+    links = [*LINK.findall(index.read_text()), *LINK.findall(tasks.read_text())]
+    assert set(ROOT.glob("docs/*.md")) - {index} <= {(index.parent / link).resolve() for link, _ in links if link}
 
 
 def test_pages_that_the_code_names():

@@ -114,7 +114,7 @@ def test_table_of_returns():
 def test_the_text_for_package_indexes_is_made_from_the_readme():
     """By python tools/package_page.py."""
     page = package_page.page(README)
-    assert _page("package") == page
+    assert package_page.PAGE.read_text() == page
     assert "](docs/" not in page and "make demo" not in page and "pip install 'arc_suite[learn,animate]'" in page
 
 

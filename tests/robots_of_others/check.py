@@ -1,7 +1,7 @@
 """Import the robots of `zoo.py`, compare their dynamics with their files, and walk them: `make check-robots`, minutes.
 
 python tests/robots_of_others/check.py FOLDER [NAME ...]
-python tests/robots_of_others/check.py FOLDER --page docs/imported.md
+python tests/robots_of_others/check.py FOLDER --page studies/robots_of_others.md
 
 Prints a table and writes it to FOLDER/robots.csv. Of each file: whether it comes in, in how many of 200 states the
 accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. Fails where

@@ -65,8 +65,7 @@ def test_the_page_of_a_task_is_complete(name):
     for setting in TASKS[name].names():
         assert row(page, f"`{setting}`", "Settings")[-1]
     headings = re.findall("^## (.*)$", page, re.MULTILINE)
-    asks, *others = ("What it asks", "Observation", "Reward", "End", "Metrics", "Settings", "Demonstrators", "Learners")
-    assert headings == [asks, *others]
+    assert headings == ["Parts", "Observation", "Reward", "End", "Metrics", "Settings", "Demonstrators", "Learners"]
 
 
 def test_the_page_of_settings_names_every_modifier():
@@ -112,8 +111,9 @@ def test_the_gallery_has_bodies_of_the_family():
 def test_the_front_page_has_every_page():
     page = sources.front_page(walks=False)
     listed = set(re.findall(r"^[\w./-]+$", page, re.MULTILINE))
-    expected = {f"docs/{path.stem}" for path in (sources.ROOT / "docs").glob("*.md")} - {"docs/README"}
-    assert expected <= listed
+    expected = {path.stem for path in (sources.ROOT / "docs").glob("*.md")} - {"README", *TASKS}
+    assert {f"docs/{name}" for name in expected} <= listed
+    assert set(sources.BELOW["docs/tasks.md"]) == set(TASKS)
     assert "iframe" in sources.front_page(walks=True)
 
 

@@ -12,7 +12,12 @@ _FIELD = re.compile(r"^    (?P<names>\w+(?:, \w+)*): (?P<text>.*(?:\n {8,}.*)*)"
 
 def page(title: str, *parts: str) -> str:
     """Return a page of paragraphs, headings and tables; empty parts are left out."""
-    return "\n\n".join([f"# {title}", *filter(None, parts)]) + "\n"
+    return joined(f"# {title}", *parts)
+
+
+def joined(*parts: str) -> str:
+    """Return paragraphs, headings and tables as text; empty parts are left out."""
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def dropdown(title: str, heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
@@ -38,11 +43,6 @@ def as_html(made: Element) -> str:
     """Return an element as text, with a row of a table on each line."""
     indent(made, space="")
     return tostring(made, encoding="unicode", method="html")
-
-
-def film(name: str) -> str:
-    """Return the film of a robot or task on its page, which tools/make_media.py draws."""
-    return f"![{name}](../films/{name}.webp)"
 
 
 def cards(texts: Mapping[str, str]) -> str:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 import arc_suite
 from arc_suite import policies, registry, style
 from arc_suite.animation import pages, play
@@ -10,7 +12,7 @@ from website import markdown
 
 GAME, GALLERY = "play.html", "gallery.html"  # pages to play in: the robots, generated creatures
 CREATURES = tuple(f"varied:{seed}" for seed in range(24))
-STEPS = 200  # control steps of a film
+START, STEPS = 60, 200  # control steps before a film, in which the thrown body finds its feet, and in it
 
 
 def films() -> dict[str, str]:
@@ -30,11 +32,17 @@ def write(folder: Path) -> None:
     for robot, name in films().items():
         environment = arc_suite.load(robot, "walk", {"random": 0})
         policy = policies.policy("ppo", robot, task=environment.task.definition)
-        track = style.record(environment, policy, 0, STEPS)
-        (folder / name).write_text(pages.page({robot: track}), encoding="utf-8")
+        track = style.record(environment, policy, 0, START + STEPS)
+        (folder / name).write_text(pages.page({robot: _after(track, START)}), encoding="utf-8")
 
 
-def frame(source: str, title: str) -> str:
-    """Return the HTML that shows a page within another."""
-    attributes = {"class": "creature", "src": source, "title": title, "loading": "lazy"}
+def _after(track: style.Track, start: int) -> style.Track:
+    """The rest of a track after some of its control steps."""
+    parts = {name: value[start:] for name, value in track._asdict().items() if isinstance(value, np.ndarray)}
+    return track._replace(**parts, terms={name: values[start:] for name, values in track.terms.items()})
+
+
+def frame(source: str, title: str, kind: str = "creature") -> str:
+    """Return the HTML that shows a page within another; `kind` is a class of docs/_static/site.css."""
+    attributes = {"class": kind, "src": source, "title": title, "loading": "lazy"}
     return markdown.as_html(markdown.element("iframe", **attributes))

@@ -20,7 +20,7 @@ def page(robot: str, player: str = "") -> str:
     return markdown.page(
         f"`{robot}`",
         f"{about(robot)} Ids of Gymnasium, `steer` and so on in place of `walk`: `{setup.env_id}`.",
-        markdown.film(robot),
+        f"![{robot}](../films/{robot}.webp)",
         player,
         "## Body",
         _body(setup, model),
@@ -31,7 +31,7 @@ def page(robot: str, player: str = "") -> str:
         f"Of `walk`: {task.size} numbers. Other tasks add blocks at the end; see the page of each task.",
         observations.listed(task, "Every index"),
         "## Reward",
-        "Weights of `walk`. The [page of the task](../tasks/walk.md) defines the terms.",
+        "Weights of `walk`. The [page of the task](../walk.md) defines the terms.",
         table(("term", "weight"), ([f"`{k}`", markdown.number(v)] for k, v in task.settings.weights.items())),
         "## Gait",
         "What `walk` prescribes.",

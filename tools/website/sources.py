@@ -14,13 +14,19 @@ PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "examples/**/*.md", "st
 
 FRONT = (ROOT / "README.md", ROOT / "docs" / "README.md")  # whose texts the front page has
 
+# Measured tables that are no study, by page.
+_MEASURED = {"demonstrators": "Demonstrators", "robots_of_others": "Robots of others", "clips": "Clips"}
+
+_WRITTEN = {name for name in TASKS if (ROOT / "docs" / f"{name}.md").is_file()}  # the others lie under `ground`
+
 # Page -> pages that lie below it, most of them generated, with what their cards say.
 BELOW = {
     "docs/robots.md": {f"robots/{robot}": robots.about(robot) for robot in players.films()},
     "docs/bodies.md": {"robots/gallery": "24 generated creatures"},
-    "docs/tasks.md": {f"tasks/{name}": f"`{name}`: {markdown.summary(task)}" for name, task in TASKS.items()},
+    "docs/tasks.md": {name: f"`{name}`: {markdown.summary(task)}" for name, task in TASKS.items()},
     "docs/reference.md": {f"reference/{name}": title for name, title in reference.TITLES.items()},
-    "studies/README.md": {f"{path.parent.name}/README": path.parent.name for path in ROOT.glob("studies/*/README.md")},
+    "studies/README.md": _MEASURED
+    | {f"{path.parent.name}/README": path.parent.name for path in ROOT.glob("studies/*/README.md")},
 }
 
 _LINK = re.compile(r"(?P<text>!?\[[^\]]*\])\((?P<path>[^):#\s]+)(?P<anchor>#[^)]*)?\)")
@@ -44,7 +50,9 @@ def _copy(page: Path, folder: Path) -> None:
     """Copy a page with what its links need."""
     text, place = page.read_text(encoding="utf-8"), page.relative_to(ROOT)
     below = BELOW.get(place.as_posix(), {})
-    parts = [resolved(text, page.parent), *((markdown.cards(below), toctree(below)) if below else ())]
+    text = resolved(text, page.parent)
+    written = tasks.page(page.stem, text) if page.stem in _WRITTEN and page.parent.name == "docs" else text
+    parts = [written, *((markdown.cards(below), toctree(below)) if below else ())]
     _write(folder / place, "\n".join(parts))
     _copy_files(text, page.parent, folder)
 
@@ -80,10 +88,13 @@ def resolved(text: str, folder: Path) -> str:
 def generated(walks: bool) -> Iterator[tuple[str, str]]:
     """Yield names of generated pages, as in `BELOW`, and their texts."""
     for robot, name in players.films().items():
-        yield f"robots/{robot}", robots.page(robot, players.frame(f"../../{name}", f"{robot} walks") if walks else "")
+        yield (
+            f"robots/{robot}",
+            robots.page(robot, players.frame(f"../../{name}", f"{robot} walks", "walk") if walks else ""),
+        )
     shown = players.frame(f"../../{players.GALLERY}#walk", "Creatures to play with") if walks else ""
     yield "robots/gallery", robots.gallery(shown)
-    yield from ((f"tasks/{task}", tasks.page(task)) for task in TASKS)
+    yield from ((task, tasks.page(task)) for task in TASKS if task not in _WRITTEN)
     yield from ((f"reference/{name}", text) for name, text in reference.pages())
 
 

@@ -1,4 +1,4 @@
-"""A page of each task, on one template."""
+"""A page of each task: what is written by hand, then tables of the code."""
 
 import math
 import re
@@ -52,9 +52,6 @@ METRICS = {
     "collisions": "ways from goal to goal on which a pillar was touched",
 }
 
-# The page that explains a task, where it is another one than that of the task's name.
-_EXPLAINED = dict.fromkeys(("rough", "slopes", "stairs", "gaps", "course", "leap", "roam"), "ground")
-
 
 def terms(kind: type[Task]) -> dict[str, str]:
     """Return definitions of the reward's terms of a task, by name."""
@@ -64,15 +61,26 @@ def terms(kind: type[Task]) -> dict[str, str]:
     return _COSTS | rates | _COMMAND
 
 
-def page(name: str) -> str:
-    """Return the page of a task."""
+def page(name: str, written: str = "") -> str:
+    """Return the page of a task.
+
+    Args:
+        name: of the task.
+        written: what docs/ has of it; empty for a task on ground, which docs/ground.md explains.
+    """
     kind, tasks = TASKS[name], {robot: Setup.of(robot, name).definition for robot in ROBOTS}
-    return markdown.page(
-        f"`{name}`",
-        markdown.film(name),
-        "## What it asks",
-        f"{markdown.summary(kind)} [{_title(name)}](../{_EXPLAINED.get(name, name)}.md) explains it.",
-        _asks(kind),
+    return "\n\n".join([written.strip() or _introduced(name), _tables(name, kind, tasks)])
+
+
+def _introduced(name: str) -> str:
+    explained = f"{markdown.summary(TASKS[name])} [Ground](ground.md) explains it."
+    return f"# {name.capitalize()}\n\n![{name}](films/{name}.webp)\n\n{explained}"
+
+
+def _tables(name: str, kind: type[Task], tasks) -> str:
+    return markdown.joined(
+        "## Parts",
+        _parts(kind),
         f"An episode has {STEPS} control steps: {_each(tasks, _duration)}. "
         f"Ids: {', '.join(f'`{Setup.of(robot, name).env_id}`' for robot in ROBOTS)}.",
         "## Observation",
@@ -85,20 +93,15 @@ def page(name: str) -> str:
         "In `environment.task.progress`, and in Gymnasium's infos as `progress_...`.",
         _metrics(name),
         "## Settings",
-        "Keys of `task_kwargs`, and of `--set name=value`. [All tasks](../reference/settings.md) have some more.",
+        "Keys of `task_kwargs`, and of `--set name=value`. [All tasks](reference/settings.md) have some more.",
         settings.of_task(kind),
         "## Demonstrators",
         f"Presets that suit the task, the best first: {_each(tasks, _presets)}.",
         returns.demonstrators(tasks=(name,)),
         _measured(name),
         "## Learners",
-        returns.learners(tasks=(name,)) or "No committed study has runs of this task.",
+        returns.learners(tasks=(name,), studies="../studies/") or "No committed study has runs of this task.",
     )
-
-
-def _title(name: str) -> str:
-    text = (returns.ROOT / "docs" / f"{_EXPLAINED.get(name, name)}.md").read_text(encoding="utf-8")
-    return text.partition("\n")[0].removeprefix("# ")
 
 
 def _each(tasks, text) -> str:
@@ -116,7 +119,7 @@ def _presets(task: Task) -> str:
     return ", ".join(f"`{name}`" for name in suited_presets(task))
 
 
-def _asks(kind: type[Task]) -> str:
+def _parts(kind: type[Task]) -> str:
     if not issubclass(kind, CommandTask):
         return ""
     lines = [("command", markdown.summary(type(kind.command))), ("ground", markdown.summary(type(kind.ground)))]
@@ -176,11 +179,11 @@ def _metrics(name: str) -> str:
 
 
 def _measured(name: str) -> str:
-    """The tables of a task in docs/results.md."""
-    text = (returns.ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    """The tables of a task in studies/demonstrators.md."""
+    text = (returns.ROOT / "studies" / "demonstrators.md").read_text(encoding="utf-8")
     found = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", text, re.DOTALL)
     if not found:
-        return "[Results](../results.md) has further demonstrators."
+        return "[Demonstrators, measured](../studies/demonstrators.md) has further demonstrators."
     about = (
         "Return, and the task's first metric of distance, goals, tracking; by preset (and difficulty of the ground):"
     )
