@@ -13,6 +13,7 @@ from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.sketch import Sketch
 from arc_suite.envs import dm
 from arc_suite.envs.setup import Setup
+from arc_suite.models.outline import outline
 from arc_suite.models.soundness import Flaw, flaws
 from arc_suite.policies import Policy, alone
 from arc_suite.robots.shaping import link_names
@@ -28,7 +29,8 @@ class Creature(NamedTuple):
         act: maps a `TimeStep` to an action.
         flaws: of the body.
         links: names of the links of its legs.
-        unit: standing height of the body before it was scaled, m.
+        tile: side of the tiles of its ground, m, whose number tells its size: what its standing height is at size 1.
+        reach: how far it extends from the torso's origin along any axis, m.
         parts: that are seen.
         materials: of the parts, by name.
     """
@@ -39,7 +41,8 @@ class Creature(NamedTuple):
     act: Callable[..., np.ndarray]
     flaws: tuple[Flaw, ...]
     links: tuple[str, ...]
-    unit: float
+    tile: float
+    reach: float
     parts: tuple[Part, ...]
     materials: Mapping[str, Material]
 
@@ -63,7 +66,8 @@ def opened(sketch: Sketch) -> Creature:
         act=act,
         flaws=tuple(flaws(setup.body)),
         links=link_names(setup.body),
-        unit=setup.body.torso.standing_height / sketch.scale,
+        tile=setup.body.torso.standing_height / sketch.scale,
+        reach=float(abs(outline(setup.body)).max()),
         parts=tuple(parts),
         materials=materials,
     )

@@ -108,7 +108,7 @@ class Page:
             self._add_files()
         for name, widget in self._widgets.items():
             widget.on_update(functools.partial(self._changed, name))
-        panel = server.gui.add_panel()
+        self._panel = panel = server.gui.add_panel()
         with panel.add_tab("Measured"):
             self._charts = Charts(self._gui)
         panel.dock_left()
@@ -124,7 +124,8 @@ class Page:
         if time.monotonic() - self._drawn > _CHARTS_EVERY:
             self._drawn = time.monotonic()
             self._status.content = texts.status(session)
-            self._charts.update(session.history, tuple(leg.name for leg in session.creature.setup.body.legs))
+            if self._panel.visible:
+                self._charts.update(session.history, tuple(leg.name for leg in session.creature.setup.body.legs))
 
     def _add_changes(self) -> None:
         """Add undo, redo and reset, as buttons and as keys."""
@@ -134,6 +135,8 @@ class Page:
         for label, modifier in (("Undo", "cmd/ctrl"), ("Redo", "cmd/ctrl+shift")):
             command = self._gui.add_command(label, hotkey="Z", modifier=modifier)
             command.on_trigger(lambda event, call=calls[label]: call())
+        charts = self._gui.add_checkbox("Charts", True)
+        charts.on_update(lambda event: setattr(self._panel, "visible", event.target.value))
 
     def _add_body(self, first: Sketch) -> None:
         gui, widgets = self._gui, self._widgets

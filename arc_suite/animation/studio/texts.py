@@ -28,7 +28,7 @@ def status(session: Session) -> str:
     }
     lines = [_element("tr", _element("td", name), _element("td", value)) for name, value in told.items()]
     error = [_element("p", session.error, role="alert", style="color:#b3261e")] if session.error else []
-    return _html(_element("div", *error, _element("table", *lines, id="status"), style=f"{_SMALL};padding:0 1em"))
+    return _html(_element("div", *error, _element("table", *lines, id="status"), style=f"{_SMALL};padding:0 1em 0.6em"))
 
 
 def checked(creature: Creature) -> str:

@@ -1,61 +1,60 @@
-"""The creature in viser's scene: a tree of frames, so that a pose sends the torso and the joints alone.
+"""Creatures on their ground in viser's scene, in the light of pages to play in.
 
-Lengths are in the `unit` of the creature, so that the camera suits any size. The world moves under the camera.
+Lengths are in a `unit`, how far the creatures extend, so that the camera suits any size. The world moves under it.
 """
+
+import math
 
 import numpy as np
 import viser
 
-from arc_suite import rotations
 from arc_suite.animation.clips import shapes
-from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.clips.shapes import Mesh
 from arc_suite.animation.scenery import ground
 from arc_suite.animation.studio.creature import Creature
+from arc_suite.animation.studio.figure import Figure, rgb
 from arc_suite.markers import Marker
-from arc_suite.tasks import readings
 
-_TOLERANCE = 0.01  # of the unit, by which a face may cut into a round shape
+_TOLERANCE = 0.01  # units, by which a face may cut into a round shape of the ground
 _AROUND = 14.0  # units of ground to each side of the torso, where it is not endless
-_NEAR = 6.0  # units from the edge of that ground, at which it is drawn anew
+_NEAR = 10.0  # units from the edge of that ground, at which it is drawn anew
 _FOLLOW = 0.1  # of the difference, by which the camera follows the height of the ground in a picture
+_THIN: dict = {"thickness": 1.5, "thickness_units": "screen"}  # pixels
+_RAISED = 0.005  # units, of lines over the ground
 _SAME = 0.02  # units, by which an arrow may be off
-_GROUND, _LINES, _STEPS = (214, 219, 226), (176, 184, 194), (196, 203, 212)
-_GRID: dict = {"infinite_grid": True, "cell_size": 1.0, "section_size": 5.0, "fade_distance": 40.0}
-_GRID |= {"cell_color": _LINES, "section_color": _LINES, "plane_color": _GROUND}
-_GRID |= {"plane_opacity": 1.0, "shadow_opacity": 0.3}
+_CAMERA, _TARGET = (2.85, -3.9, 1.9), (0.0, 0.0, 0.25)  # units
+_OVER_SHEET = (0.0, 0.0, -2.3)  # where the camera of a phone looks, whose lower part a sheet of widgets covers
+_PHONE = 500  # pixels, of the width of a picture
+_ANGLE = math.radians(35.0)  # of the camera, over the shorter side of a picture
+_SKY, _GROUND, _LINES, _STEPS = (163, 173, 184), (93, 104, 117), (141, 153, 166), (93, 104, 117)
+_FOG = (7.0, 18.0)  # units from the camera
+_GRID: dict = {"infinite_grid": True, "fade_distance": 60.0, "cell_color": _LINES, "section_color": _LINES}
+_GRID |= {"plane_color": _GROUND, "plane_opacity": 1.0, "shadow_opacity": 0.45}
 
 
 class View:
-    """Shows one creature at a time to all visitors."""
+    """Shows a creature to all visitors."""
 
     def __init__(self, server: viser.ViserServer):
         """Set up light and camera."""
-        self._server = server
-        server.scene.configure_environment_map(environment_intensity=0.6)
-        server.initial_camera.position = (2.6, -3.4, 1.9)
-        server.initial_camera.look_at = (0.0, 0.0, 0.6)
+        self._server, scene, camera = server, server.scene, server.initial_camera
+        scene.configure_default_lights(enabled=False)
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere("/sky", sky_color=(223, 232, 242), ground_color=(86, 96, 108), intensity=2.2)
+        sun = {"color": (255, 244, 230), "intensity": 3.4, "position": (-0.3, 0.5, 1.2)}
+        scene.add_light_directional("/sun", cast_shadow=True, **sun)
+        scene.set_background_image(np.full((1, 1, 3), _SKY, np.uint8), format="png")
+        scene.configure_fog(*_FOG, color=_SKY)
+        camera.position, camera.look_at, camera.fov = _CAMERA, _TARGET, _ANGLE
+        server.on_client_connect(_aim)
 
     def show(self, creature: Creature) -> None:
         """Take the creature of the one before, in its pose of now."""
-        self._creature, self._unit = creature, creature.unit
-        colors = {name: _rgb(material.color) for name, material in creature.materials.items()}
+        self._creature, self._unit = creature, creature.reach
         with self._server.atomic():
             self._server.scene.remove_by_name("/world")
             self._world = self._server.scene.add_frame("/world", show_axes=False)
-            names: list[str] = []
-            self._frames = []
-            for part in creature.parts:
-                names.append(f"{'/world' if part.parent is None else names[part.parent]}/{part.name}")
-                frame = self._server.scene.add_frame(
-                    names[-1], show_axes=False, position=part.place / self._unit, wxyz=part.quaternion
-                )
-                self._frames.append(frame)
-                for material, mesh in part_meshes(part, _TOLERANCE * self._unit).items():
-                    self._add(f"{names[-1]}/{material}", mesh, colors[material])
-            self._hinges = [(index, part.joint) for index, part in enumerate(creature.parts) if part.joint is not None]
-            self._standing = np.array([creature.parts[index].quaternion for index, _ in self._hinges])
-            self._axes = np.array([creature.parts[index].axis for index, _ in self._hinges])
+            self._figure = Figure(self._server.scene, "/world", creature, self._unit)
             self._height = 0.0
             self._draw_ground()
             self._anchor = self._server.scene.add_frame("/world/markers", show_axes=False)
@@ -68,19 +67,13 @@ class View:
             qpos: (nq,) positions.
             markers: of the task.
         """
-        now = readings.pose(qpos, self._creature.environment.task.definition.scene.layout)
-        place = now[:3] / self._unit
-        if self._ground_is_stale(place):
-            self._draw_ground()
-        half = 0.5 * now[7:][[joint for _, joint in self._hinges], None]
-        turned = rotations.product(self._standing, np.concatenate([np.cos(half), np.sin(half) * self._axes], axis=-1))
-        floor = float(self._arena.height(*now[:2])) / self._unit
-        self._height += _FOLLOW * (floor - self._height)
         with self._server.atomic():
+            place = self._figure.pose(qpos, lambda place: place) / self._unit
+            if self._ground_is_stale(place):
+                self._draw_ground()
+            floor = float(self._arena.height(*place[:2] * self._unit)) / self._unit
+            self._height += _FOLLOW * (floor - self._height)
             self._world.position = (-place[0], -place[1], -self._height)
-            self._frames[0].position, self._frames[0].wxyz = place, now[3:7]
-            for (index, _), wxyz in zip(self._hinges, turned, strict=True):
-                self._frames[index].wxyz = wxyz
             self._anchor.position = place * (1.0, 1.0, 0.0)
             self._mark(markers, place * (1.0, 1.0, 0.0))
 
@@ -107,17 +100,21 @@ class View:
         self._server.scene.add_frame("/world/ground", show_axes=False)
         for index, height in enumerate(found["planes"]):
             place = (0.0, 0.0, height / self._unit)
-            self._server.scene.add_grid(f"/world/ground/plane{index}", position=place, **_GRID)
+            tile = self._creature.tile / self._unit
+            sizes = {"cell_size": tile, "section_size": 5.0 * tile}
+            self._server.scene.add_grid(f"/world/ground/plane{index}", position=place, **_GRID | sizes)
         for index, field in enumerate(found["fields"]):
             self._add(f"/world/ground/field{index}", _surface(field), _GROUND)
+            lines = _tiles(field, self._creature.tile) / self._unit + (0.0, 0.0, _RAISED)
+            self._server.scene.add_line_segments(f"/world/ground/tiles{index}", lines, _LINES, **_THIN)
         solids: dict[tuple[int, int, int], list[Mesh]] = {}
         for solid in found["solids"]:
             mesh = shapes.shape(solid["kind"], solid["size"], _TOLERANCE * self._unit)
             shaded = [solid["shade"] * part for part in _STEPS]
-            rgb = _rgb([part / 255.0 for part in shaded] if solid["color"] is None else solid["color"])
-            solids.setdefault(rgb, []).append(mesh.moved(solid["place"], np.eye(3)))
-        for index, (rgb, meshes) in enumerate(solids.items()):
-            self._add(f"/world/ground/solid{index}", shapes.joined(meshes), rgb)
+            color = rgb([part / 255.0 for part in shaded] if solid["color"] is None else solid["color"])
+            solids.setdefault(color, []).append(mesh.moved(solid["place"], np.eye(3)))
+        for index, (color, meshes) in enumerate(solids.items()):
+            self._add(f"/world/ground/solid{index}", shapes.joined(meshes), color)
 
     def _mark(self, markers: list[Marker], anchor: np.ndarray) -> None:
         """Move arrows and cylinders, or draw them anew where there are others.
@@ -132,7 +129,7 @@ class View:
             self._arrows = None
             if arrows:
                 radius = arrows[0].radius / self._unit
-                colors = np.array([_rgb(marker.color[:3]) for marker in arrows])
+                colors = np.array([rgb(marker.color[:3]) for marker in arrows])
                 sizes: dict = {"shaft_radius": radius, "head_radius": 2.0 * radius, "head_length": 3.0 * radius}
                 self._arrows = self._server.scene.add_arrows("/world/markers/arrows", points, colors, **sizes)
         elif arrows and abs(self._arrows.points - points).max() > _SAME:
@@ -144,15 +141,15 @@ class View:
         for style, marker in shown.items():
             middle = 0.5 * (marker.start + marker.end) / self._unit - anchor
             if style not in self._cylinders:
-                index, radius, height, rgb = style
+                index, radius, height, color = style
                 self._cylinders[style] = self._server.scene.add_cylinder(
-                    f"/world/markers/cylinder{index}", radius, height, color=rgb, opacity=0.7, position=middle
+                    f"/world/markers/cylinder{index}", radius, height, color=color, opacity=0.7, position=middle
                 )
             self._cylinders[style].position = middle
 
     def _style(self, index: int, marker: Marker) -> tuple:
         height = np.linalg.norm(marker.end - marker.start) / self._unit
-        return index, round(marker.radius / self._unit, 4), round(float(height), 4), _rgb(marker.color[:3])
+        return index, round(marker.radius / self._unit, 4), round(float(height), 4), rgb(marker.color[:3])
 
 
 def _surface(field: dict) -> Mesh:
@@ -167,6 +164,24 @@ def _surface(field: dict) -> Mesh:
     return Mesh(points, np.tile((0.0, 0.0, 1.0), (len(points), 1)), triangles)
 
 
-def _rgb(color) -> tuple[int, int, int]:
-    red, green, blue = (round(255.0 * float(part)) for part in color)
-    return red, green, blue
+def _tiles(field: dict, tile: float) -> np.ndarray:
+    """The edges of tiles on a height field, at rows and columns of its points, as segments (n, 2, 3), m."""
+    points = _surface(field).points.reshape(*field["heights"].shape, 3)
+    strides = np.maximum(1, np.round(tile / field["cell"]).astype(int))
+    starts = -np.round(field["low"] / field["cell"]).astype(int) % strides  # the same in every part of a field
+    along_x, along_y = points[starts[1] :: strides[1]], points[:, starts[0] :: strides[0]]
+    segments = (along_x[:, :-1], along_x[:, 1:]), (along_y[:-1], along_y[1:])
+    return np.concatenate([np.stack(pair, axis=2).reshape(-1, 2, 3) for pair in segments])
+
+
+def _aim(client: viser.ClientHandle) -> None:
+    """Have a visitor's camera suit the form of the picture, now and later."""
+    if client.camera.image_width < _PHONE:
+        client.camera.look_at = _OVER_SHEET
+    _fit_lens(client.camera)
+    client.camera.on_update(_fit_lens)
+
+
+def _fit_lens(camera: viser.CameraHandle) -> None:
+    """Have a creature as far from the sides of a narrow picture as it is from top and bottom of a wide one."""
+    camera.fov = 2.0 * math.atan(math.tan(0.5 * _ANGLE) * max(1.0, 1.0 / camera.aspect))

@@ -34,9 +34,9 @@ def test_frames_are_where_the_simulation_has_the_feet(server, body):
     mujoco.mj_kinematics(model, data)
     view.pose(data.qpos.copy(), [])
     places, turns = [], []
-    for part, frame in zip(creature.parts, view._frames, strict=True):
+    for part, frame in zip(creature.parts, view._figure._frames, strict=True):
         place, turn = (np.zeros(3), np.eye(3)) if part.parent is None else (places[part.parent], turns[part.parent])
-        places.append(place + turn @ frame.position * creature.unit)
+        places.append(place + turn @ frame.position * creature.reach)
         turns.append(turn @ rotations.matrix(np.array(frame.wxyz)))
     shown = [places[body.part_names.index(name)] for name in body.foot_names]
     np.testing.assert_allclose(shown, data.xpos[layout.feet], atol=1e-6)

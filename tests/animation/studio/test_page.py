@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from arc_suite import rotations
 from arc_suite.animation import direction
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import FILE, Sketch
@@ -29,6 +30,13 @@ class Served:
     def __init__(self):
         self.session = Session(Sketch(legs=8, links=2))
         self.addresses: list[str] = []
+        made = pages.Page
+
+        def kept(*arguments):
+            self.page, pages.Page = made(*arguments), made
+            return self.page
+
+        pages.Page = kept
         arguments = (self.session, "127.0.0.1", 8180, self.addresses.append)
         self.thread = threading.Thread(target=pages.serve, args=arguments)
         self.thread.start()
@@ -195,6 +203,33 @@ def test_undo_redo_and_reset(served, tab):
     for _ in range(2):
         tab.get_by_role("button", name="Undo").click()
     served.until(lambda: served.session.creature.sketch == before)
+
+
+@pytest.mark.parametrize("source", ["queen", "tick", "millipede"])
+def test_the_camera_has_any_creature_of_any_size_in_its_picture(served, tab, source):
+    """Feet at the size that the slider has at most, where visitors see them."""
+    view, sketch = served.page._view, Sketch(source=source, scale=4.0)
+    (client,) = view._server.get_clients().values()
+    served.session.ask(sketch)
+    served.until(lambda: view._figure.creature.sketch == sketch)
+    figure, camera = view._figure, client.camera
+    places, turns = [], []
+    for part, frame in zip(figure.creature.parts, figure._frames, strict=True):
+        above = (np.zeros(3), np.eye(3)) if part.parent is None else (places[part.parent], turns[part.parent])
+        places.append(above[0] + above[1] @ frame.position)
+        turns.append(above[1] @ rotations.matrix(np.array(frame.wxyz)))
+    seen = (np.array(places) + view._world.position - camera.position) @ rotations.matrix(camera.wxyz)
+    high = np.tan(0.5 * camera.fov)
+    shares = abs(seen[:, :2] / seen[:, 2:]) / (high * camera.aspect, high)  # of the way from the middle to the edges
+    assert 0.3 < shares.max() < 1.0
+
+
+def test_charts_are_hidden(served, tab):
+    tab.get_by_text("Reward by term").wait_for()
+    tab.get_by_role("checkbox", name="Charts").click()
+    tab.get_by_text("Reward by term").wait_for(state="hidden")
+    tab.get_by_role("checkbox", name="Charts").click()
+    tab.get_by_text("Reward by term").wait_for()
 
 
 def test_tasks_and_grounds(served, tab):
