@@ -1,11 +1,13 @@
 """Animation: clips for engines, pages to play in, the studio, the search for creatures; the core does not import it."""
 
-__all__ = ["show"]  # noqa: F822  # made by __getattr__
+import importlib
+
+_HOMES = {"animate": "arc_suite.animation.clips", "show": "arc_suite.animation.notebook"}
+
+__all__ = ["animate", "show"]  # noqa: F822  # made by __getattr__
 
 
 def __getattr__(name):
-    if name == "show":  # only notebooks need what it imports
-        from arc_suite.animation.notebook import show
-
-        return show
+    if name in _HOMES:  # not before: programs do not need all that these import
+        return getattr(importlib.import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

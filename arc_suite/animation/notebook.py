@@ -13,7 +13,7 @@ from arc_suite.animation import pages
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import Individuals, Policy
+from arc_suite.policies import Policy
 from arc_suite.simulation import films
 
 _PAGE_STEPS, _FILM_STEPS = 400, 80
@@ -56,7 +56,7 @@ def show(
     """
     setup = _setup(environment)
     played = setup.load()
-    actor = _actor(policy, played)
+    actor = policies.acting(policy, played.task.definition)
     name = policy if isinstance(policy, str) else "policy"
     usual = _FILM_STEPS if film else _PAGE_STEPS
     steps = checks.integer("steps", usual if steps is None else steps, 1)
@@ -77,17 +77,6 @@ def _setup(environment) -> Setup:
         return Setup.of(made.task.body, made.task.definition.name, made.task_kwargs)
     kinds = "arc_suite.load, gymnasium.make or gymnasium.make_vec"
     raise ValueError(f"environment: expected one of {kinds}, got {type(environment).__name__}")
-
-
-def _actor(policy, environment: Environment) -> Policy:
-    task = environment.task.definition
-    if isinstance(policy, str):
-        return policies.policy(policy, task.scene.body, None, task=task)
-    if hasattr(policy, "act"):
-        return policy
-    if callable(policy):
-        return Individuals(lambda: policy, 1, len(task.scene.body.joint_names))
-    raise ValueError(f"policy: expected a name, a policy or a function of a TimeStep, got {type(policy).__name__}")
 
 
 def _film(environment: Environment, policy: Policy, seed: int, steps: int) -> str:

@@ -12,6 +12,7 @@ from arc_suite.evaluation.protocol import (
     rollout,
     run,
 )
+from arc_suite.evaluation.reports import Report, evaluate
 from arc_suite.evaluation.statistics import (
     Curve,
     Summary,
@@ -29,11 +30,13 @@ __all__ = [
     "EPISODES",
     "Curve",
     "EpisodeResult",
+    "Report",
     "check_ends",
     "Summary",
     "curve",
     "episodes",
     "episodes_in_batch",
+    "evaluate",
     "expert_return",
     "interquartile_mean",
     "iqm_and_interval",

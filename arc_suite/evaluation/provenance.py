@@ -1,6 +1,7 @@
 """What the results of an evaluation depend on: hashes of body, model, task and policy, and what it learned from."""
 
 import hashlib
+import os
 from typing import Any
 
 from arc_suite import policies, seed_ranges
@@ -23,11 +24,11 @@ def policy_sha256(policy: str) -> str | None:
     return policies.digest(policy) if has_files else None
 
 
-def training_seeds(policy: str, played: range) -> seed_ranges.Ranges | None:
+def training_seeds(policy, played: range) -> seed_ranges.Ranges | None:
     """Return the seeds of the episodes that a policy learned from; None where they are unknown.
 
     Args:
-        policy: its name, as on the command line.
+        policy: its name, as on the command line, or the policy.
         played: seeds of the episodes that judge it.
 
     Raises:
@@ -36,5 +37,6 @@ def training_seeds(policy: str, played: range) -> seed_ranges.Ranges | None:
     found = policies.training_seeds(policy)
     if shared := seed_ranges.common(found or (), played):
         free = f"those below {seed_ranges.COLLECTING.start} are evaluation's"
-        raise ValueError(f"policy {policy}: learned from episodes of seeds {shared.start} to {shared[-1]}; {free}")
+        name = f"policy {policy}" if isinstance(policy, str | os.PathLike) else "policy"
+        raise ValueError(f"{name}: learned from episodes of seeds {shared.start} to {shared[-1]}; {free}")
     return found

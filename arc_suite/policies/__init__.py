@@ -4,6 +4,7 @@ from arc_suite.policies.named import (
     HELP,
     POLICIES,
     PRESET_HELP,
+    acting,
     digest,
     function_file,
     is_file,
@@ -33,5 +34,6 @@ __all__ = [
     "Positioned",
     "Script",
     "Sum",
+    "acting",
     "alone",
 ]

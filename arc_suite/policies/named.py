@@ -130,6 +130,29 @@ def policy(
     return Sum(made, _noise(body, noise, num_envs)) if noise else made
 
 
+def acting(given, task: Task, presets: str | Sequence[str] | None = None) -> Policy:
+    """Return a policy for one environment.
+
+    Args:
+        given: a name or a path, as of `policy`; a policy for one environment; or a function of a `TimeStep` with
+            named blocks.
+        task: that it is to act in.
+        presets: of the demonstrator, see `policy`.
+
+    Raises:
+        ValueError: something else, or as `policy`.
+        OSError: as `policy`.
+    """
+    body = task.scene.body
+    if isinstance(given, str | os.PathLike):
+        return policy(given, body, presets, task=task)
+    if hasattr(given, "act"):
+        return given
+    if callable(given):
+        return Individuals(lambda: given, 1, len(body.joint_names))
+    raise ValueError(f"policy: expected a name, a policy or a function of a TimeStep, got {type(given).__name__}")
+
+
 def _noise(body: Body, deviation: float, num_envs: int) -> Policy:
     joints = len(body.joint_names)
 
@@ -186,16 +209,19 @@ def digest(name: str) -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in held)).hexdigest()
 
 
-def setup_of(name: str | os.PathLike) -> Setup | None:
-    """Return the setup that a policy in a file was trained in; None for other policies, and where no file is.
+def setup_of(name) -> Setup | None:
+    """Return the setup that a policy was trained in; None for one that is no network, and where no file is.
 
     Args:
-        name: of a policy. A zip of stable-baselines3 may not hold its setup; nothing else that it holds is read.
+        name: of a policy, or the policy. A zip of stable-baselines3 may not hold its setup; nothing else that it holds
+            is read.
 
     Raises:
         ValueError: a damaged file, or a robot, task or arena whose module has not been imported.
         OSError: a file cannot be read.
     """
+    if not isinstance(name, str | os.PathLike):
+        return name.setup if isinstance(name, Network) else None
     if not (isinstance(name, os.PathLike) or _is_path(name)):
         return None
     if zipped := zips.parts(name):
@@ -206,8 +232,8 @@ def setup_of(name: str | os.PathLike) -> Setup | None:
     return network.load(_policy_files(path)[0]).setup
 
 
-def training_seeds(name: str) -> seed_ranges.Ranges | None:
-    """Return the seeds of the episodes that a policy learned from; None where they are unknown.
+def training_seeds(name) -> seed_ranges.Ranges | None:
+    """Return the seeds of the episodes that a policy, or one of a name, learned from; None where they are unknown.
 
     Demonstrators and the trained policies of the package learned from `seed_ranges.LEARNING`. Files of policies hold
     their seeds; zips of stable-baselines3 and functions do not.
@@ -216,6 +242,9 @@ def training_seeds(name: str) -> seed_ranges.Ranges | None:
         ValueError: a damaged file.
         OSError: a file cannot be read.
     """
+    if not isinstance(name, str | os.PathLike):
+        return name.training_seeds if isinstance(name, Network) else None
+    name = os.fspath(name)
     if name in POLICIES:
         return () if name in _UNTRAINED else (seed_ranges.LEARNING,)
     if zips.parts(name) or not _is_path(name):

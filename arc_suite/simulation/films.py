@@ -161,7 +161,7 @@ def check_fps(fps: float, extension: str) -> None:
         ValueError: more than those of a GIF.
     """
     if extension == ".gif" and fps * _SHORTEST_FRAME > 1.0:
-        raise ValueError(f"--fps={fps:g}: expected at most {1.0 / _SHORTEST_FRAME:g} for a GIF")
+        raise ValueError(f"fps: expected at most {1.0 / _SHORTEST_FRAME:g} for a GIF, got {fps:g}")
 
 
 def captioned(picture: np.ndarray, text: str) -> np.ndarray:

@@ -5,7 +5,9 @@ import json
 import gltf_reader
 import programs
 import pytest
+from refusals import refused
 
+from arc_suite import animation
 from arc_suite.robots.spec_files import EXAMPLES
 
 
@@ -50,11 +52,11 @@ def test_any_body_as_rigid_parts(tmp_path):
     [
         ((), "no file to write; say --output=FILE.glb"),
         (("-o", "a.gltf"), "unknown extension '.gltf'; did you mean '.glb'?"),
-        (("-o", "a.fbx"), "a.fbx: this program writes .glb; tools/to_fbx.py makes .fbx of it, by Blender"),
-        (("-o", "a.glb", "--transparent"), "--transparent: it is for .webp and .png, not for .glb"),
-        (("-o", "a.png", "--rig=nodes"), "--rig: it is for .glb, not for .png"),
-        (("-o", "a.mp4", "--clips=all"), "--clips=all: expected one clip for .mp4"),
-        (("-o", "a.gif", "--clips=walk"), "--fps=60: expected at most 50 for a GIF"),
+        (("-o", "a.fbx"), "a.fbx: clips are written as .glb; tools/to_fbx.py makes .fbx of it, by Blender"),
+        (("-o", "a.glb", "--transparent"), "transparent: it is for .webp and .png, not for .glb"),
+        (("-o", "a.png", "--rig=nodes"), "rig: it is for .glb, not for .png"),
+        (("-o", "a.mp4", "--clips=all"), "clips: expected one for .mp4, got all"),
+        (("-o", "a.gif", "--clips=walk"), "fps: expected at most 50 for a GIF, got 60"),
         (("-o", "a.glb", "--rig=bones"), "unknown rig 'bones'; did you mean 'nodes'?"),
         (("-o", "a.glb", "--root_motion=none"), "unknown root_motion 'none'"),
         (("-o", "a.glb", "--clips=walk,fly"), "unknown clip 'fly'"),
@@ -83,3 +85,13 @@ def test_a_spec_keeps_its_file_next_to_clips_of_its_name(tmp_path):
     assert done.stderr == "arc-suite animate: spider, clip tuned is left out: spider has no preset tuned\n"
     assert spec.read_text() == before
     assert {path.name for path in tmp_path.iterdir()} == {"spider.json", "spider.glb", "spider.clips.json"}
+
+
+def test_a_function_refuses_what_the_program_does(tmp_path):
+    with refused("unknown option of clips 'sise'; did you mean 'size'? (there are: rig, root_motion, ", begins=True):
+        animation.animate("tick", tmp_path / "a.glb", sise=9)
+    with refused("size: expected an integer from 16 to 2160, got 9"):
+        animation.animate("tick", tmp_path / "a.webp", "walk", size=9)
+    with refused("uv: it is for .glb, not for .webp"):
+        animation.animate("tick", tmp_path / "a.webp", "walk", uv=True)
+    assert list(tmp_path.iterdir()) == []
