@@ -68,7 +68,7 @@ def played(players: list[reports.Player], seeds: range) -> list[evaluation.Repor
         if len(found) == 1:
             heading = found[0].heading(width)
             print(heading, "-" * len(heading), sep="\n")
-        print(found[-1].row(width), flush=True)
+        print(found[-1].line(width), flush=True)
     return found
 
 

@@ -79,7 +79,7 @@ class Report(NamedTuple):
         shown = _HEADS if self.of_the_paper else _HEADS[:-1]
         return _line("robot".ljust(width), {name: name for name in self.progress}, shown)
 
-    def row(self, width: int = LABEL) -> str:
+    def line(self, width: int = LABEL) -> str:
         """Return the row of the table; the first column has a width."""
         low, high = self.returns.interval
         cells = [
@@ -94,7 +94,7 @@ class Report(NamedTuple):
 
     def __str__(self) -> str:
         width = max(LABEL, len(self.label))
-        return f"{self.heading(width)}\n{self.row(width)}"
+        return f"{self.heading(width)}\n{self.line(width)}"
 
     def to_json(self) -> dict[str, Any]:
         """Return what `arc-suite evaluate --json` holds of a robot."""

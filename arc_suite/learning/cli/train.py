@@ -49,7 +49,7 @@ def algorithms_by(value: Callable[[algorithms.Algorithm], Any]) -> dict[Any, lis
     return found
 
 
-def numbers(field: str) -> str:
+def defaults(field: str) -> str:
     """Return a default number of the algorithms, as text: that of the most, then those of others."""
     (usual, _), *others = sorted(algorithms_by(operator.attrgetter(field)).items(), key=lambda item: -len(item[1]))
     return "; ".join([str(usual), *(f"{number} for {', '.join(names)}" for number, names in others)])
@@ -78,12 +78,12 @@ flags.DEFINE_integer(
     "steps",
     None,
     f"Environment steps; of bc, updates. ppo takes {algorithms.ALGORITHMS['ppo'].terrain_steps} on uneven ground. "
-    f"[default: {numbers('steps')}]",
+    f"[default: {defaults('steps')}]",
     lower_bound=1,
 )
 flags.DEFINE_string("prior", None, "Id of a dataset of prior data, for algorithms that take any.")
 flags.DEFINE_integer(
-    "evaluate_every", None, f"Steps between evaluations. [default: {numbers('evaluate_every')}]", lower_bound=1
+    "evaluate_every", None, f"Steps between evaluations. [default: {defaults('evaluate_every')}]", lower_bound=1
 )
 flags.DEFINE_string(
     "config",
