@@ -78,3 +78,31 @@ def test_what_a_target_installs(target, extra):
     command = ["make", "--dry-run", "--directory", CONFIG.parent, "VENV=/nonexistent", target]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert [line.split()[-1] for line in done.stdout.splitlines() if "pip install" in line] == [f"'{extra}'"]
+
+
+AS_ROOT = "missing Debian packages, installed now as root: "
+OF_ROOT = "missing: please have root run apt-get install libegl1 libgl1\n"
+
+
+@pytest.mark.parametrize(
+    ("programs", "line"),
+    [
+        ({}, "missing: please install what Debian calls libegl1 libgl1\n"),
+        ({"apt-get": "", "id": "echo 1000"}, OF_ROOT),
+        ({"apt-get": "", "id": "echo 1000", "sudo": "exit 1"}, OF_ROOT),
+        ({"apt-get": "echo $* >> ran", "id": "echo 0"}, f"{AS_ROOT}apt-get install libegl1 libgl1\n"),
+        (
+            {"apt-get": "echo $* >> ran", "id": "echo 1000", "sudo": "[ $1 = -n ] || $*"},
+            f"{AS_ROOT}sudo apt-get install libegl1 libgl1\n",
+        ),
+    ],
+)
+def test_debian_packages_are_named_before_root_installs_them(tmp_path, programs, line):
+    for name, text in programs.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    command = ["/bin/sh", SCRIPT.with_name("ensure_packages.sh"), "libegl1", "libgl1"]
+    done = subprocess.run(command, cwd=tmp_path, env={"PATH": f"{tmp_path}"}, capture_output=True, text=True)
+    assert done.stderr == line
+    installs = line.startswith(AS_ROOT)
+    assert (done.returncode, (tmp_path / "ran").exists()) == (0 if installs else 1, installs)
