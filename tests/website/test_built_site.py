@@ -75,6 +75,25 @@ def test_a_newcomer_needs_two_clicks(pages):
     assert len([link for link in steps.links if link.startswith("#") and link[1:] in steps.places]) >= len(sections)
 
 
+# What a newcomer searches, and the page that explains it.
+SOUGHT = {
+    "randomization": "docs/modifiers.html",
+    "friction": "docs/modifiers.html",
+    "curriculum": "docs/ground.html",
+    "pretrained": "docs/agents.html",
+    "license": "docs/cite.html",
+    "URDF": "docs/imported.html",
+}
+
+
+@pytest.mark.parametrize(("word", "page"), SOUGHT.items())
+def test_a_search_finds_the_page_that_explains_it_first(browser, word, page):
+    tab = browser.new_page()
+    tab.goto(f"{(SITE / 'search.html').as_uri()}?q={word}")
+    link = tab.wait_for_selector("ul.search li a", timeout=60_000).get_attribute("href")
+    assert link.partition("?")[0].partition("#")[0] == page
+
+
 @pytest.mark.skipif(not (SITE / "play.html").is_file(), reason="no page to play in: make web, then make docs")
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (1440, 900)])
 def test_a_creature_walks_on_the_front_page(browser, width, height):
