@@ -6,7 +6,7 @@
 # make media    draws the pictures and films of creatures in README and docs; minutes
 # make web      bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make dist     builds wheel and source distribution in dist/, with the viewer of pages; needs Node
-# make bench    measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
+# make bench    measures speed, writes studies/performance.md and a plot; minutes, on a quiet machine
 # make bench-gpu  measures worlds on this machine's GPU, writes its table into docs/gpu.md
 # make golden   shows how golden numbers and digests differ; tests/golden.py --accept and tests/digests.py --accept store new ones
 # make clean    deletes environments and what is built
@@ -103,7 +103,7 @@ bench-gpu: setup.cfg
 	$(VENV)/bin/python tools/bench_gpu.py --document docs/gpu.md
 
 bench: $(INSTALLED)
-	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md
+	$(PYTHON) tools/bench.py --plot docs/performance.png --document studies/performance.md
 
 golden: $(INSTALLED)
 	$(PYTHON) tests/golden.py

@@ -3,7 +3,7 @@
 `python tests/soak.py` steps environments two million times, single ones and environments of a vector
 environment in turn, with resets and a frame of each every 10,000 steps; then it makes, steps,
 renders and closes 500 environments. Exit status 1 if memory grows faster or threads or file
-descriptors become more than the targets of docs/reliability.md allow. Linux only.
+descriptors become more than the targets of studies/reliability.md allow. Linux only.
 """
 
 import argparse

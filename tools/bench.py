@@ -4,7 +4,7 @@ Prints tables and writes all measurements and a plot. Takes minutes; on a busy m
 are worth nothing.
 
 Example:
-  python tools/bench.py --plot docs/performance.png --document docs/performance.md
+  python tools/bench.py --plot docs/performance.png --document studies/performance.md
   python tools/bench.py --tasks --robots queen
   python tools/bench.py --collect 128 --robots queen --rounds 3
 """

@@ -15,7 +15,13 @@ PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "examples/**/*.md", "st
 FRONT = (ROOT / "README.md", ROOT / "docs" / "README.md")  # whose texts the front page has
 
 # Measured tables that are no study, by page.
-_MEASURED = {"demonstrators": "Demonstrators", "robots_of_others": "Robots of others", "clips": "Clips"}
+_MEASURED = {
+    "demonstrators": "Demonstrators",
+    "robots_of_others": "Robots of others",
+    "clips": "Clips",
+    "performance": "Performance",
+    "reliability": "Reliability",
+}
 
 _WRITTEN = {name for name in TASKS if (ROOT / "docs" / f"{name}.md").is_file()}  # the others lie under `ground`
 
