@@ -4,6 +4,7 @@
 # make lint     ruff, the contracts of imports, and the schemas of workflows
 # make docs     builds the documentation site in out/docs/html; with Node, creatures walk there
 # make media    draws the pictures and films of creatures in README and docs; minutes
+# make notebooks  runs the notebooks of examples, and keeps their pictures and tables in them; minutes
 # make web      bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make dist     builds wheel and source distribution in dist/, with the viewer of pages; needs Node
 # make bench    measures speed, writes studies/performance.md and a plot; minutes, on a quiet machine
@@ -29,7 +30,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint docs media web dist bench bench-gpu golden clean
+.PHONY: demo test check lint docs media notebooks web dist bench bench-gpu golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -78,6 +79,13 @@ docs: setup.cfg
 media: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	$(PYTHON) tools/make_media.py
+
+notebooks: VENV := .venv-notebooks
+notebooks: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) -m pip install -q -e '.[learn,video]' 'nbclient>=0.10' 'ipykernel>=7'
+	$(PYTHON) tools/run_notebooks.py
 
 # What it makes is not committed, and goes into wheels.
 VIEWER := arc_suite/animation/web/mujoco.wasm.zlib

@@ -13,7 +13,7 @@ _KEYS = {"rgb_array": "pixels", "depth_array": "depth"}  # of a render mode's pi
 
 
 def with_pixels(environment: gymnasium.Env | gymnasium.vector.VectorEnv):
-    """Return an environment whose observations also hold what its camera shows.
+    """Return an environment whose observations also hold what its camera shows::
 
         environment = gymnasium.make(
             "arc_suite/queen-rough-v0", render_mode="depth_array", width=64, height=64, camera_id="eye"

@@ -328,7 +328,7 @@ class VectorEnv(KnownAttributes, Together):
 
         Args:
             fields: values by name of `simulation.model.FIELDS`, the fields of `MjModel` and `gravity`: what broadcasts
-                to the field's shape, or (num_envs, *shape).
+                to the field's shape, or to that with a leading axis of num_envs.
             mask: (num_envs,) booleans, the environments that it goes to; None for all.
 
         Raises:

@@ -94,4 +94,10 @@ def test_a_film_needs_no_viewer():
     tag, attributes = element(shown)
     kind, _, data = attributes["src"].partition(",")
     film = Image.open(io.BytesIO(base64.b64decode(data)))
-    assert (tag, kind, film.format, film.size, film.n_frames) == ("img", "data:image/gif;base64", "GIF", (240, 180), 4)
+    assert (tag, kind, film.format, film.size, film.n_frames) == (
+        "img",
+        "data:image/webp;base64",
+        "WEBP",
+        (240, 180),
+        4,
+    )

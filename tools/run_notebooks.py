@@ -1,0 +1,60 @@
+"""Runs the notebooks of examples/notebooks and keeps what they print and draw, for readers who do not run them.
+
+What belongs to this machine does not stay: paths are refused, and progress and the output of pip are left out.
+
+Example:
+  python tools/run_notebooks.py
+"""
+
+import tempfile
+from pathlib import Path
+
+import nbformat
+from nbclient import NotebookClient
+
+from arc_suite.cli import program
+
+ROOT = Path(__file__).parents[1]
+MOST = 300_000  # bytes of a notebook
+_SECONDS = 3600  # of a cell, at most
+
+
+def kept(cell) -> list:
+    """Return the outputs of a cell that stay."""
+    if cell.source.startswith("%pip"):
+        return []
+    return [output for output in cell.outputs if output.get("name") != "stderr"]
+
+
+def executed(path: Path) -> str:
+    """Return a notebook with the outputs of its cells.
+
+    Raises:
+        ValueError: it is too large, or names a folder of this machine.
+    """
+    notebook = nbformat.read(path, as_version=4)
+    metadata = notebook.metadata.copy()
+    NotebookClient(notebook, timeout=_SECONDS, resources={"metadata": {"path": str(path.parent)}}).execute()
+    for cell in notebook.cells:
+        cell.metadata.pop("execution", None)
+        if cell.cell_type == "code":
+            cell.outputs = kept(cell)
+    notebook.metadata = metadata
+    text = nbformat.writes(notebook) + "\n"
+    found = [place for place in map(str, (ROOT.resolve(), Path.home(), tempfile.gettempdir())) if place in text]
+    if found:
+        raise ValueError(f"{path.name}: expected no folder of this machine, got {found[0]}")
+    if len(text) > MOST:
+        raise ValueError(f"{path.name}: expected at most {MOST} bytes, got {len(text)}: show fewer steps")
+    return text
+
+
+def main() -> None:
+    """Run all notebooks, and write each that fits."""
+    for path in sorted((ROOT / "examples" / "notebooks").glob("*.ipynb")):
+        path.write_text(executed(path), encoding="utf-8")
+        print(path.relative_to(ROOT), path.stat().st_size, "bytes")
+
+
+if __name__ == "__main__":
+    program.run(main)
