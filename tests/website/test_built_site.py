@@ -81,7 +81,7 @@ SOUGHT = {
     "friction": "docs/modifiers.html",
     "curriculum": "docs/ground.html",
     "pretrained": "docs/agents.html",
-    "license": "docs/cite.html",
+    "license": "index.html",
     "URDF": "docs/imported.html",
 }
 

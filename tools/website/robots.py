@@ -13,15 +13,14 @@ def page(robot: str, player: str = "") -> str:
 
     Args:
         robot: its name.
-        player: Markdown of a page in which it walks; empty without one.
+        player: Markdown of a page in which it walks; without one there is a film.
     """
     setup = Setup.of(robot)
     task, model = setup.prepared()
     return markdown.page(
         f"`{robot}`",
         f"{about(robot)} Ids of Gymnasium, `steer` and so on in place of `walk`: `{setup.env_id}`.",
-        f"![{robot}](../films/{robot}.webp)",
-        player,
+        player or f"![{robot}](../films/{robot}.webp)",
         "## Body",
         _body(setup, model),
         "## Joints and actions",
