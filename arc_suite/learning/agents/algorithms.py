@@ -141,7 +141,12 @@ ALGORITHMS = {
         steps=100_000,
     ),
     # Noise falls over the length of a run: uneven ground takes a longer one.
-    "ppo": _on_policy(ProximalPolicy(hidden=128), "proximal policy optimization", 100_000, terrain_steps=3_000_000),
+    "ppo": _on_policy(
+        ProximalPolicy(network="legs", hidden=64, minibatch=512),
+        "proximal policy optimization of a network that legs share",
+        100_000,
+        terrain_steps=3_000_000,
+    ),
     # Small steps around a good policy: the noise of `ppo` would undo it.
     "finetune": _finetune(
         ProximalPolicy(
@@ -170,6 +175,7 @@ ALGORITHMS = {
             horizon=24,
             epochs=2,
             minibatch=512,
+            network="legs",
             symmetry_augmentation=False,
             discount=0.96,
             initial_std=0.08,

@@ -1,25 +1,23 @@
 """Architectures of networks: what maps vectors of observations to actions and to values.
 
-An architecture is a frozen value with the methods of `Perceptron`: how networks see observations (..., size), and how
-they give actions (..., joints) and values (...). Learners draw its parameters, normalize its observations and apply it.
+An architecture is a value with the methods of `Perceptron`: how networks view observations, and how they give actions
+(..., joints) and values (...). Learners draw its parameters, normalize what it views and apply it.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, NamedTuple, Self
 
-import jax.numpy as jnp
 import numpy as np
 
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import networks
+from arc_suite.learning.agents.leg_networks import AnyLegs, Legs
+from arc_suite.learning.agents.networks import ACTIVATION
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.policies.graph import Graph
 from arc_suite.policies.tracing import perceptron, traced
-from arc_suite.tasks import Task, tokens
-from arc_suite.tasks.tokens import JOINTS, LEGS
-
-ACTIVATION = "elu"
+from arc_suite.tasks import Task
 
 
 class Perceptron(NamedTuple):
@@ -33,14 +31,17 @@ class Perceptron(NamedTuple):
         joints: of an action.
         privileged: sizes of blocks that follow those of the observation, and that values alone depend on.
         size: of an observation.
-        inputs: numbers whose moments normalize observations, privileged ones counted.
+        own: numbers of a view that actions depend on, which are its first.
+        inputs: numbers whose moments normalize views, privileged ones counted.
+        symmetric: whether the networks treat left and right alike, whatever their parameters.
     """
 
     blocks: tuple[int, ...]
     joints: int
     privileged: tuple[int, ...] = ()
 
-    size = property(lambda self: sum(self.blocks))
+    symmetric = False
+    size = own = property(lambda self: sum(self.blocks))
     inputs = property(lambda self: self.size + sum(self.privileged))
 
     @classmethod
@@ -48,6 +49,10 @@ class Perceptron(NamedTuple):
         """Return the architecture for a task, given names of privileged blocks for networks of values."""
         privileged = tuple(task.privileged_blocks[name].size for name in critic_blocks)
         return cls(tuple(task.sizes.values()), len(task.scene.body.joint_names), privileged)
+
+    def viewed(self, observations):
+        """Return observations (..., size), privileged blocks after them, as networks view them."""
+        return observations
 
     def drawn(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""
@@ -58,25 +63,26 @@ class Perceptron(NamedTuple):
         """Draw the parameters of a network of values."""
         return networks.mlp(random, (self.inputs, hidden, hidden, 1), "orthogonal", gain=2**0.5)
 
-    def actions(self, parameters, observations):
-        """Return the actions (..., joints) for normalized observations (..., size or inputs)."""
-        return networks.forward(parameters, observations[..., : self.size] * self.scale, ACTIVATION)
+    def actions(self, parameters, views):
+        """Return the actions (..., joints) for normalized views (..., own or more)."""
+        return networks.forward(parameters, views[..., : self.size] * self.scale, ACTIVATION)
 
-    def values(self, parameters, observations):
-        """Return the values (...) of normalized observations (..., inputs)."""
-        return networks.forward(parameters, observations * _scale(self.blocks + self.privileged), ACTIVATION)[..., 0]
+    def values(self, parameters, views):
+        """Return the values (...) of normalized views."""
+        scale = networks.scale(self.blocks + self.privileged)
+        return networks.forward(parameters, views * scale, ACTIVATION)[..., 0]
 
     @property
     def scale(self) -> np.ndarray:
         """(size,) factors of normalized numbers; their mean square is 1, so that gains of first weights hold."""
-        return _scale(self.blocks)
+        return networks.scale(self.blocks)
 
-    def seen(self, observations):
-        """Return the vectors (n, inputs) whose moments normalize observations (..., size)."""
-        return observations
+    def seen(self, views):
+        """Return the vectors (..., inputs) whose moments normalize views."""
+        return views
 
     def normalize(self, moments: Moments) -> Normalizer:
-        """Return what normalizes observations, from the moments of what was seen."""
+        """Return what normalizes views, from the moments of what was seen."""
         return moments.normalizer()
 
     def exported(self, parameters, x):
@@ -90,93 +96,43 @@ class Perceptron(NamedTuple):
         Raises:
             ValueError: others.
         """
-        first, *others = map(_layer, weights[::2], weights[1::2])
+        first, *others = map(networks.linear_layer, weights[::2], weights[1::2])
         return {**first, "weight": first["weight"] / self.scale[:, None]}, *others
 
 
-class PerLeg(NamedTuple):
-    """Networks of any body: one for all legs, which sees a leg, the torso, and the mean of what it finds of all legs.
+Architecture = Perceptron | Legs | AnyLegs
 
-    Observations are those of a flat `BodiesEnv`. A first network maps each leg, with torso, command and description, to
-    features. A second one maps the features of a leg and their mean over all legs to actions of its joints. Values
-    are means over legs.
+
+def of(
+    task: Task, network: str = "perceptron", critic_blocks: Iterable[str] = (), symmetric: bool = True
+) -> Perceptron | Legs:
+    """Return the architecture for a task of one body.
+
+    Args:
+        task: whose observations networks see.
+        network: "perceptron", or "legs".
+        critic_blocks: names of privileged blocks for networks of values.
+        symmetric: whether legs on the left and on the right share their network, if the task is symmetric.
     """
-
-    inputs: int = tokens.LEG_INPUTS
-    size: int = sum(tokens.FLAT.values())
-    joints: int = LEGS * JOINTS
-
-    def drawn(self, random, hidden, last_gain=1.0):
-        """Draw the parameters of a network of actions."""
-        return self._drawn(random, hidden, JOINTS, last_gain)
-
-    def drawn_values(self, random, hidden):
-        """Draw the parameters of a network of values."""
-        return self._drawn(random, hidden, 1)
-
-    def actions(self, parameters, observations):
-        """Return the actions (..., 48), 0 where there is no joint."""
-        found, mask = _of_legs(parameters, observations)
-        return jnp.where(mask, found, 0.0).reshape(*found.shape[:-2], -1)
-
-    def values(self, parameters, observations):
-        """Return the values (...)."""
-        found, mask = _of_legs(parameters, observations)
-        legs = mask.any(axis=-1)
-        return jnp.where(legs, found[..., 0], 0.0).sum(axis=-1) / legs.sum(axis=-1)
-
-    def seen(self, observations):
-        """Return the inputs (n, 81) of all legs that there are."""
-        legs, mask = tokens.leg_inputs(observations)
-        return legs[mask.any(axis=-1)]
-
-    def normalize(self, moments: Moments) -> Normalizer:
-        """Return what normalizes 664 numbers, the same for every leg; it leaves the number of joints as it is."""
-        mean, factor, limit = moments.normalizer()
-        return Normalizer(tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), limit)
-
-    def exported(self, parameters, x):
-        """Write the nodes of a network of actions, which compute the legs that there are."""
-        (first, second), (head, last) = parameters
-        own, mean = np.split(np.asarray(head["weight"]), 2)
-        inputs, mask = tokens.leg_inputs(x)
-        there = mask.sum(axis=-1) > 0.0
-        features = perceptron(inputs.node("Pick", there), (first, second), ACTIVATION).node("Elu")
-        context = features.node("Place", there).sum(axis=1) / there.sum(axis=1)[:, None]
-        context = context.node("Linear", mean, head["bias"])[:, None]
-        context = np.broadcast_to(context, (1, LEGS, context.shape[-1])).node("Pick", there)
-        hidden = features.node("Product", own) + context
-        found = hidden.node("Elu").node("Linear", last["weight"], last["bias"])
-        return (found.node("Place", there) * mask).reshape(1, -1)
-
-    def imported(self, weights):
-        """Return the parameters."""
-        first, first_bias, second, second_bias, mean, bias, own, last, last_bias = weights
-        head = _layer(np.concatenate([own, mean]), bias), _layer(last, last_bias)
-        return (_layer(first, first_bias), _layer(second, second_bias)), head
-
-    def _drawn(self, random, hidden, outputs, last_gain=1.0):
-        gain = 2**0.5
-        features = networks.mlp(random, (self.inputs, hidden, hidden), "orthogonal", gain=gain, last_gain=gain)
-        head = networks.mlp(random, (2 * hidden, hidden, outputs), "orthogonal", gain=gain, last_gain=last_gain)
-        return features, head
+    if network == "legs":
+        return Legs.of(task, critic_blocks, symmetric)
+    return Perceptron.of(task, critic_blocks)
 
 
-Architecture = Perceptron | PerLeg
-
-
-def of(environment: VectorEnv | BodiesEnv, critic_blocks: Iterable[str] = ()) -> Architecture:
-    """Return the architecture that suits environments, given names of privileged blocks for networks of values."""
-    if isinstance(environment, BodiesEnv):
-        return PerLeg()
-    return Perceptron.of(environment.task.definition, critic_blocks)
+def of_environment(environment: VectorEnv | BodiesEnv, *options, **more) -> Architecture:
+    """Return the architecture for environments: `AnyLegs` for several bodies, else what `of` returns."""
+    return AnyLegs() if isinstance(environment, BodiesEnv) else of(environment.task.definition, *options, **more)
 
 
 def policy(architecture: Architecture, normalize: Normalizer, parameters) -> Graph:
     """Return the graph of a policy: a normalizer and a network of actions."""
     mean, factor, limit = normalize
-    own = Normalizer(mean[: architecture.size], factor[: architecture.size], limit)
-    return traced(lambda x: architecture.exported(parameters, own(x)).clip(-1.0, 1.0), architecture.size)
+    own = Normalizer(mean[: architecture.own], factor[: architecture.own], limit)
+
+    def actions(x):
+        return architecture.exported(parameters, own(architecture.viewed(x))).clip(-1.0, 1.0)
+
+    return traced(actions, architecture.size)
 
 
 def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
@@ -186,33 +142,13 @@ def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
         ValueError: another graph.
     """
     try:
-        normalize = Normalizer(*(graph.arrays[str(node.inputs[-1])] for node in graph.nodes[:3]))
+        first = [node.operator for node in graph.nodes].index("Sub")
+        normalize = Normalizer(*(graph.arrays[str(node.inputs[-1])] for node in graph.nodes[first : first + 3]))
         names = [node.inputs[1:] for node in graph.nodes if node.operator in ("Linear", "Product")]
         parameters = architecture.imported([graph.arrays[str(name)] for own in names for name in own])
         same = policy(architecture, normalize, parameters).nodes == graph.nodes
     except (KeyError, TypeError, ValueError):
         same = False
     if not same:
-        raise ValueError("a policy of dagger, bc or ppo, with two hidden layers")
+        raise ValueError("a policy of dagger, bc or ppo, of the same network")
     return normalize, parameters
-
-
-def _scale(blocks: Sequence[int]) -> np.ndarray:
-    counts = [count for count in blocks if count]
-    squares = [sum(counts) / (len(counts) * count) for count in counts]
-    return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
-
-
-def _layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:
-    return {"weight": weight, "bias": bias}
-
-
-def _of_legs(parameters, observations):
-    """Return the outputs (..., 12, outputs) of networks of legs, and the mask (..., 12, 4) of joints."""
-    features, head = parameters
-    legs, mask = tokens.leg_inputs(observations)
-    found = networks.hidden(features, legs, ACTIVATION)
-    there = mask.any(axis=-1)[..., None]
-    mean = jnp.where(there, found, 0.0).sum(axis=-2, keepdims=True) / there.sum(axis=-2, keepdims=True)
-    both = jnp.concatenate([found, jnp.broadcast_to(mean, found.shape)], axis=-1)
-    return networks.forward(head, both, ACTIVATION), mask

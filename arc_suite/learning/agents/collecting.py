@@ -37,7 +37,7 @@ class Environments:
         environment: the vector environment.
         task: of the environments.
         architecture: of networks for it.
-        observation: (num_envs, inputs) before the next step, privileged blocks last.
+        observation: (num_envs, ...) before the next step, as networks view it.
     """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
@@ -48,7 +48,9 @@ class Environments:
         self._shape = hp.num_envs, self.environment.single_action_space.shape[0]
         if self._names:
             self._columns = inputs.privileged_columns(self.task, self._names)
-        self.architecture = architectures.of(self.environment, self._names)
+        self.architecture = architectures.of_environment(
+            self.environment, hp.network, self._names, hp.symmetry_augmentation
+        )
         self.observation = self._seen(*self.environment.reset())
         steps = ages(hp.num_envs, self.task.step_limit)
         self.environment.restore(self.environment.snapshot() | {"steps": steps})
@@ -104,7 +106,7 @@ class Environments:
         self.observation = arrays[f"{ENVIRONMENT}seen"]
 
     def _seen(self, observation: np.ndarray, info: Mapping, place: int | slice = slice(None)) -> np.ndarray:
-        """Observations (..., size) of environments with the critic's privileged blocks after them."""
-        if not self._names:
-            return observation
-        return np.concatenate([observation, info["privileged"][place][..., self._columns]], axis=-1)
+        """Observations (..., size) of environments, and the critic's privileged blocks, as networks view them."""
+        if self._names:
+            observation = np.concatenate([observation, info["privileged"][place][..., self._columns]], axis=-1)
+        return self.architecture.viewed(observation)

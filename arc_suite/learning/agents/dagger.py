@@ -44,7 +44,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         ValueError: the body has no such preset, or the run is too short to learn.
     """
     environment = context.environment(hp.num_envs)
-    architecture, teacher = architectures.of(environment), Teacher(environment, hp.preset)
+    architecture, teacher = architectures.of_environment(environment), Teacher(environment, hp.preset)
     state = begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
     moments = Moments.none(architecture.inputs)
     normalize = architecture.normalize(moments)

@@ -178,7 +178,10 @@ class ProximalPolicy:
             implementations of `arc_suite.envs.worlds.mjx`, where all of learning stays on JAX's device.
         num_envs: environments.
         horizon: control steps of each environment between updates.
-        symmetry_augmentation: whether a mirrored copy of each transition is learned from, for symmetric bodies.
+        network: what acts and values: "perceptron", two layers that see all of an observation; or "legs", which
+            all legs share, see `leg_networks`.
+        symmetry_augmentation: whether left and right are alike, for symmetric bodies: a perceptron learns from a
+            mirrored copy of each transition, legs share one network.
         epochs: passes over the transitions of a horizon.
         minibatch: transitions of an update, mirrored ones counted.
         discount: of a control step.
@@ -206,6 +209,7 @@ class ProximalPolicy:
     simulation: str = "mujoco"
     num_envs: int = 64
     horizon: int = 32
+    network: str = "perceptron"
     symmetry_augmentation: bool = True
     epochs: int = 5
     minibatch: int = 1024
@@ -233,7 +237,9 @@ class ProximalPolicy:
         ranges |= {"noise_correlation": (0.0, 0.99)}
         _check(self, ranges | dict.fromkeys(names, _POSITIVE))
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
-        if self.minibatch > self.num_envs * self.horizon * (2 if self.symmetry_augmentation else 1):
+        checks.name(self.network, ("perceptron", "legs"), "network")
+        mirrored = self.symmetry_augmentation and self.network == "perceptron"
+        if self.minibatch > self.num_envs * self.horizon * (2 if mirrored else 1):
             raise ValueError(f"minibatch: expected at most the transitions of a horizon, got {self.minibatch}")
 
 

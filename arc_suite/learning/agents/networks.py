@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 EPSILON = 1e-5  # of a norm
+ACTIVATION = "elu"  # of networks that act
 
 ACTIVATIONS = {"relu": jax.nn.relu, "elu": jax.nn.elu}
 
@@ -38,6 +39,24 @@ def layer(weight: np.ndarray, layer_norm: bool = False) -> dict[str, np.ndarray]
     outputs = weight.shape[1]
     norm = {"scale": np.ones(outputs, np.float32), "offset": np.zeros(outputs, np.float32)} if layer_norm else {}
     return {"weight": weight, "bias": np.zeros(outputs, np.float32), **norm}
+
+
+def linear_layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:
+    """Return a layer of a weight (inputs, outputs) and biases (outputs,)."""
+    return {"weight": weight, "bias": bias}
+
+
+def scale(sizes: Sequence[int]) -> np.ndarray:
+    """Return factors of normalized numbers with which the variances of all parts have the same sum, float32.
+
+    Their mean square is 1, so that gains of first weights hold.
+
+    Args:
+        sizes: of the parts, in order.
+    """
+    counts = [count for count in sizes if count]
+    squares = [sum(counts) / (len(counts) * count) for count in counts]
+    return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
 
 
 def mlp(

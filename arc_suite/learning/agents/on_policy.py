@@ -1,6 +1,7 @@
 """Proximal policy optimization in a vector environment, or in worlds on a GPU.
 
-With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`).
+With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`),
+unless the network treats left and right alike.
 A time limit bootstraps: the episode is worth the value of its last observation. Environments start at different
 ages, so their time limits fall on different steps. A step that begins another command bootstraps from the observation
 before it (`VectorEnv.resampled`).
@@ -38,7 +39,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
     seed, collector = context.seed, _environments(hp, context)
     task, architecture = collector.task, collector.architecture
-    symmetry = inputs.symmetry(task, hp.critic_blocks) if hp.symmetry_augmentation else None
+    augmented = hp.symmetry_augmentation and not architecture.symmetric
+    symmetry = inputs.symmetry(task, hp.critic_blocks) if augmented else None
     moments, policy = Moments.none(architecture.inputs), None
     normalize = architecture.normalize(moments)
     if hp.start and context.checkpoint is None:
@@ -99,6 +101,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
 
 def _environments(hp: ProximalPolicy, context: RunContext):
+    if context.setup.several and hp.network != "legs":
+        raise ValueError(f"network: expected legs with several bodies, got {hp.network}")
     if hp.critic_blocks and context.setup.several:
         raise ValueError(f"critic_blocks: expected none with several bodies, got {', '.join(hp.critic_blocks)}")
     if hp.simulation == "mujoco":

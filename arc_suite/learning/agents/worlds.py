@@ -8,9 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite.envs.worlds import mjx
-from arc_suite.learning.agents import inputs, networks
+from arc_suite.learning.agents import architectures, inputs, networks
 from arc_suite.learning.agents import proximal_policy as ppo
-from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.collecting import TRANSITIONS, ages, correlated
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
@@ -32,7 +31,8 @@ class Worlds:
         first = context.first_seed
         options = {"first_seed": first, "num_envs": hp.num_envs, "privileged": bool(hp.critic_blocks)}
         self.env = mjx.load(setup.body, setup.task, setup.task_kwargs, impl, **options)
-        self.task, self.architecture = self.env.task, Perceptron.of(self.env.task, hp.critic_blocks)
+        self.task = self.env.task
+        self.architecture = architectures.of(self.task, hp.network, hp.critic_blocks, hp.symmetry_augmentation)
         if hp.critic_blocks:
             self._columns = inputs.privileged_columns(self.task, hp.critic_blocks)
         self._key = jax.random.key(context.seed)
@@ -75,10 +75,11 @@ class Worlds:
         return carry, dict(zip(TRANSITIONS, values, strict=True))
 
     def _seen(self, state):
-        """Observations (num_envs, inputs), the critic's privileged blocks last."""
-        if not self._hp.critic_blocks:
-            return state.obs
-        return jnp.concatenate([state.obs, state.info["privileged"][:, self._columns]], axis=-1)
+        """Observations, and the critic's privileged blocks, as networks view them."""
+        observation = state.obs
+        if self._hp.critic_blocks:
+            observation = jnp.concatenate([observation, state.info["privileged"][:, self._columns]], axis=-1)
+        return self.architecture.viewed(observation)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the state of the worlds, from which simulation goes on."""

@@ -165,8 +165,9 @@ _PARTS = {
 
 
 def _seeing_forces(robot, algorithm, steps, seed=0, task="walk", label="", **fields) -> Run:
-    """A run whose networks see contact forces, as all did once; those of `ppo` have 256 units."""
-    own = {"exclude_blocks": []} | ({"hidden": 256} if algorithm == "ppo" else {})
+    """A run whose networks see contact forces, as all did once; those of `ppo` are perceptrons of 256 units."""
+    perceptron = {"network": "perceptron", "hidden": 256, "minibatch": 1024}
+    own = {"exclude_blocks": []} | (perceptron if algorithm == "ppo" else {})
     label = f"{label or algorithm}-forces"
     return run(robot, algorithm, steps, seed, task, hyperparameters=own, label=label, **fields)
 

@@ -11,7 +11,7 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import architectures
-from arc_suite.learning.agents.architectures import PerLeg
+from arc_suite.learning.agents.leg_networks import AnyLegs
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
@@ -38,7 +38,7 @@ def vectors():
 
 
 def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
-    architecture = PerLeg()
+    architecture = AnyLegs()
     parameters = architecture.drawn(np.random.default_rng(0), 16)
     normalize = architecture.normalize(Moments.none(architecture.inputs).after(architecture.seen(vectors)))
     normalized = normalize(vectors)
@@ -56,7 +56,7 @@ def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
 
 def test_the_order_of_legs_does_not_matter(vectors):
     """Actions follow the legs, and values stay."""
-    architecture = PerLeg()
+    architecture = AnyLegs()
     random = np.random.default_rng(0)
     of_actions, of_values = architecture.drawn(random, 16), architecture.drawn_values(random, 16)
     legs = int(tokens.leg_inputs(vectors[:1])[1].any(axis=-1).sum())
@@ -75,7 +75,7 @@ def test_the_order_of_legs_does_not_matter(vectors):
 
 
 def test_normalized_observations_keep_the_number_of_joints(vectors):
-    architecture = PerLeg()
+    architecture = AnyLegs()
     seen = architecture.seen(vectors)
     normalize = architecture.normalize(Moments.none(architecture.inputs).after(seen))
     inputs, mask = tokens.leg_inputs(normalize(vectors))

@@ -26,7 +26,7 @@ from arc_suite.policies import network
 from arc_suite.robots import generator
 from arc_suite.tasks import command
 
-CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16}
+CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16, "network": "perceptron"}
 SIZES = Perceptron((6,), 3)
 SMALL = ProximalPolicy(**CHANGES)
 
