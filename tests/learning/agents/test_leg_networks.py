@@ -1,0 +1,103 @@
+"""Networks that legs share."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from conftest import learning
+from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
+
+pytest.importorskip("jax", reason="of the extra learn: make check-agents")
+
+import jax
+
+from arc_suite.envs.setup import Setup
+from arc_suite.learning.agents import architectures, inputs
+from arc_suite.learning.agents.hyperparameters import ProximalPolicy
+from arc_suite.learning.agents.leg_networks import Legs
+from arc_suite.learning.agents.normalizer import Moments
+
+CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16}
+
+
+def drawn(task, critic_blocks=(), count=6):
+    """An architecture, parameters of actions and values, and vectors, normalized by their own moments."""
+    random, architecture = np.random.default_rng(1), architectures.of(task, "legs", critic_blocks)
+    size = task.size + sum(task.privileged_blocks[name].size for name in critic_blocks)
+    vectors = random.normal(size=(count, size)).astype(np.float32)
+    normalize = architecture.normalize(
+        Moments.none(architecture.inputs).after(architecture.seen(architecture.viewed(vectors)))
+    )
+    networks = architecture.drawn(random, 16), architecture.drawn_values(random, 16)
+    return architecture, *networks, normalize, vectors
+
+
+@pytest.mark.parametrize(("body", "critic_blocks"), [("queen", ()), ("tick", ("ground", "velocity")), ("leaper", ())])
+def test_left_and_right_are_treated_alike(body, critic_blocks):
+    task = Setup.of(body, "steer").definition
+    architecture, policy, values, normalize, vectors = drawn(task, critic_blocks)
+    assert architecture.symmetric
+    mirror, mirror_action = inputs.symmetry(task, critic_blocks)
+    here, there = (normalize(architecture.viewed(each)) for each in (vectors, mirror(vectors)))
+    acted, found = architecture.actions(policy, here), architecture.values(values, here)
+    assert_allclose(architecture.actions(policy, there), mirror_action(np.asarray(acted)), atol=1e-5)
+    assert_allclose(architecture.values(values, there), found, atol=1e-5)
+    assert np.std(acted) > 0.1 and np.std(found) > 0.1
+
+
+@pytest.mark.parametrize("body", ["queen", "varied:5"])
+def test_a_network_is_exported_and_imported_as_it_acts(body):
+    task = Setup.of(body, "steer").definition
+    architecture, policy, _, normalize, vectors = drawn(task)
+    graph = architectures.policy(architecture, normalize, policy)
+    expected = np.asarray(architecture.actions(policy, normalize(architecture.viewed(vectors)))).clip(-1.0, 1.0)
+    assert_allclose(graph(vectors), expected, atol=1e-5)
+    for row, actions in zip(vectors, graph(vectors), strict=True):
+        assert_array_equal(graph(row[None])[0], actions)  # whatever the number of environments
+    again, parameters = architectures.read(architecture, graph)
+    assert_array_equal(again.mean, normalize.mean)
+    for one, other in zip(jax.tree.leaves(policy), jax.tree.leaves(parameters), strict=True):
+        assert_allclose(one, other, rtol=1e-6)
+    with pytest.raises(ValueError, match="^a policy of dagger, bc or ppo, of the same network$"):
+        architectures.read(architectures.of(task), graph)
+
+
+def test_moments_are_those_of_all_legs():
+    task = Setup.of("tick", "steer").definition
+    architecture, _, _, normalize, _ = drawn(task)
+    mean = normalize.mean.reshape(6, -1)
+    assert_array_equal(mean, np.broadcast_to(mean[0], mean.shape))
+
+
+def test_learning_goes_on_bit_exactly(tmp_path):
+    setup = Setup.of("tick", "steer", {"time_limit": 1.0})
+    changes = CHANGES | {"network": "legs", "critic_blocks": ["velocity"]}
+
+    def learned(folder, **context):
+        agent = learning("ppo", changes, folder, setup, steps=320, evaluate_every=320, **context)
+        return agent
+
+    straight = learned(tmp_path / "straight")
+    straight.until(64)
+    checkpoint = straight.latest.checkpoint
+    straight.until(128)
+    resumed = learned(tmp_path / "resumed", checkpoint=checkpoint)
+    resumed.until(128)
+    assert isinstance(resumed.collector.architecture, Legs) and resumed.symmetry is None
+    for one, other in zip(jax.tree.leaves(straight.state), jax.tree.leaves(resumed.state), strict=True):
+        assert_array_equal(one, other)
+
+
+def test_a_network_is_one_of_two():
+    with refused("unknown network 'leg'; did you mean 'legs'? (there are: perceptron, legs)"):
+        ProximalPolicy(network="leg")
+    with refused("minibatch: expected at most the transitions of a horizon, got 4096"):
+        ProximalPolicy(network="legs", minibatch=4096)
+    assert dataclasses.replace(ProximalPolicy(), minibatch=4096).network == "perceptron"
+
+
+def test_several_bodies_share_a_network_of_legs(tmp_path):
+    setup = Setup.of("random:0-1", "walk")
+    with refused("network: expected legs with several bodies, got perceptron"):
+        learning("ppo", CHANGES | {"network": "perceptron"}, tmp_path, setup, steps=64, evaluate_every=64).advance()
