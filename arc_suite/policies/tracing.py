@@ -163,9 +163,17 @@ def perceptron(x: Traced, layers: Sequence[Mapping], activation: str = "relu") -
         layers: mappings to `weight`, `bias`, and `scale` and `offset` where a layer norm follows.
         activation: of hidden layers, relu, elu or tanh.
     """
-    for index, each in enumerate(layers):
-        x = x.node("Linear", each["weight"], each["bias"])
-        if index < len(layers) - 1:
-            x = x.node("LayerNorm", each["scale"], each["offset"]) if "scale" in each else x
-            x = x.node(activation.capitalize())
-    return x
+    for each in layers[:-1]:
+        x = activated(linear(x, each), each, activation)
+    return linear(x, layers[-1])
+
+
+def linear(x: Traced, layer: Mapping) -> Traced:
+    """Write the node of a layer's weight and bias."""
+    return x.node("Linear", layer["weight"], layer["bias"])
+
+
+def activated(x: Traced, layer: Mapping, activation: str = "relu") -> Traced:
+    """Write the nodes of a layer's norm, if it has one, and of an activation."""
+    x = x.node("LayerNorm", layer["scale"], layer["offset"]) if "scale" in layer else x
+    return x.node(activation.capitalize())

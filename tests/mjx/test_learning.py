@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import collecting, inputs, on_policy, worlds
+from arc_suite.learning.agents import collecting, critic_blocks, on_policy, worlds
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.normalizer import Moments
@@ -38,7 +38,7 @@ def test_a_rollout_of_jax_gives_the_update_of_numpy():
     orders = np.random.default_rng(0).permutation(32)[None, :8]
     found = []
     for transitions in (rollout, {name: jnp.asarray(array) for name, array in rollout.items()}):
-        batch = on_policy.batch_of(hp, architecture, transitions, state.values, normalize, inputs.symmetry(task))
+        batch = on_policy.batch_of(hp, architecture, transitions, state.values, normalize, critic_blocks.symmetry(task))
         begun = ppo.begin(hp, architecture, np.random.default_rng(0))
         updated, *_ = ppo.update(hp, architecture, begun, batch, orders, (np.float32(0.3), np.float32(0.01)), True)
         moments = Moments.none(task.size).after(transitions["observations"])
@@ -73,7 +73,7 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
 
 def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path):
     setup = Setup.of("leaper", "walk", {"time_limit": 0.5})
-    more = {"simulation": "mjx", "critic_blocks": ["velocity"], "noise_correlation": 0.5}
+    more = {"simulation": "mjx", "critic_blocks": ["velocity"]}
     run = Configuration.of(setup, "ppo", SMALL | more, steps=48, evaluate_every=48)
     assert train(run, tmp_path / "whole")
     assert not train(run, tmp_path / "parts", minutes=1e-9)  # stops before the first slice

@@ -36,7 +36,7 @@ def value(logits):
 def targets(hp, critics, batch: Transitions, next_actions, bonus, kept):
     """Return the distribution that critics learn, (batch, COUNT): that of the least critic, a control step before."""
     both = _both(batch, next_actions)
-    least = jnp.stack([_joint(critic, both)[0][len(next_actions) :] for critic in critics])
+    least = jnp.stack([_joint(hp, critic, both)[0][len(next_actions) :] for critic in critics])
     least = jnp.take_along_axis(least, value(least).argmin(axis=0)[None, :, None], axis=0)[0]
     ahead = (hp.discount * batch.goes_on)[:, None] * (_returns() - bonus[:, None])
     return projection(jax.nn.softmax(least), batch.rewards[:, None] + ahead)
@@ -57,7 +57,7 @@ def projection(probabilities, returns):
 def loss(hp, critics, batch: Transitions, next_actions, target, kept):
     """Return the sum over the critics of the mean cross-entropy; the mean value, and layers with statistics."""
     both, size = _both(batch, next_actions), len(next_actions)
-    logits, layers = zip(*(_joint(critic, both) for critic in critics), strict=True)
+    logits, layers = zip(*(_joint(hp, critic, both) for critic in critics), strict=True)
     losses = [-(target * jax.nn.log_softmax(each[:size])).sum(axis=-1).mean() for each in logits]
     return sum(losses), (jnp.mean(value(jnp.stack(logits)[:, :size])), layers)
 
@@ -78,19 +78,21 @@ def _returns():
 
 
 def _both(batch: Transitions, next_actions):
-    """Inputs of critics, (2 batch, size + joints): of the batch, then of the policy's next actions."""
+    """Inputs of critics, (2 batch, ..., size + joints): of the batch, then of the policy's next actions."""
     now, after = (batch.observations, batch.actions), (batch.next_observations, next_actions)
     return jnp.concatenate([jnp.concatenate(each, axis=-1) for each in (now, after)])
 
 
-def _joint(critic: Sequence[Mapping], x):
+def _joint(hp, critic: Sequence[Mapping], x):
     """Logits for inputs x that are normalized together, and the hidden layers with the statistics of this batch."""
-    found = []
+    found, axes, legs = [], range(x.ndim - 1), hp.network == "legs"
     for layer in critic[:-1]:
         x = networks.linear(layer, x)
-        found.append({**layer, "mean": x.mean(axis=0), "variance": x.var(axis=0)})
+        found.append({**layer, "mean": x.mean(axis=axes), "variance": x.var(axis=axes)})
         x = networks.activated(found[-1], x, "relu")
-    return networks.linear(critic[-1], x), found
+        x = networks.shared(x) if legs and len(found) == 1 else x
+    logits = networks.linear(critic[-1], x)
+    return logits.mean(axis=1) if legs else logits, found
 
 
 def _projected(critic: Sequence[Mapping]) -> tuple:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arc_suite.learning.agents import architectures, inputs, learner
+from arc_suite.learning.agents import architectures, critic_blocks, learner
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext, generator
@@ -18,16 +18,6 @@ TRANSITIONS = ("observations", "actions", "means", "rewards", "terminated", "end
 def ages(num_envs: int, step_limit: float) -> np.ndarray:
     """Return the control steps (num_envs,) that environments count as taken at the start of learning."""
     return np.arange(num_envs) * (int(step_limit) if math.isfinite(step_limit) else 0) // num_envs
-
-
-def correlated(hp: ProximalPolicy, before, drawn):
-    """Return the noise of a control step, given that of the step before and independent noise, float32.
-
-    Its standard deviation is 1. Slow noise explores more than fast noise, which motors average (Hollenstein et al.,
-    "Colored noise in PPO: improved exploration and performance through correlated action sampling", 2024).
-    """
-    kept = hp.noise_correlation
-    return np.float32(kept) * before + np.float32(math.sqrt(1.0 - kept**2)) * drawn
 
 
 class Environments:
@@ -45,9 +35,8 @@ class Environments:
         self._hp, self._seed, self._names = hp, context.seed, hp.critic_blocks
         self.environment = context.environment(hp.num_envs, privileged=bool(self._names))
         self.task = self.environment.task.definition
-        self._shape = hp.num_envs, self.environment.single_action_space.shape[0]
         if self._names:
-            self._columns = inputs.privileged_columns(self.task, self._names)
+            self._columns = critic_blocks.privileged_columns(self.task, self._names)
         self.architecture = architectures.of_environment(
             self.environment, hp.network, self._names, hp.symmetry_augmentation
         )
@@ -74,14 +63,12 @@ class Environments:
         """
         random = generator(self._seed, "noise", iteration)
         rollout = {name: [] for name in TRANSITIONS}
-        noise = generator(self._seed, "noise before", iteration).standard_normal(self._shape, np.float32)
         for _ in range(self._hp.horizon):
             normalized = normalize(self.observation)
             mean = np.asarray(ppo.mean_action(self.architecture, policy, normalized))
             if not np.isfinite(mean).all():
                 raise Diverged("an action is not finite", step)
-            noise = correlated(self._hp, noise, random.standard_normal(mean.shape, np.float32))
-            action = mean + np.float32(std) * noise
+            action = mean + np.float32(std) * random.standard_normal(mean.shape, np.float32)
             observation, rewards, terminated, truncated, info = self.environment.step(action)
             after = self._seen(observation, info)
             ended, resampled = terminated | truncated, self.environment.resampled()

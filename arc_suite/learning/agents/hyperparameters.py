@@ -8,6 +8,7 @@ from arc_suite import checks
 _POSITIVE = (1e-6, 1e3)
 # Contact forces are 114 to 150 numbers, without which learners that act are better: docs/algorithms.md.
 UNSEEN = ("contact_forces",)
+NETWORKS = ("perceptron", "legs")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,6 +28,8 @@ class SoftActorCritic:
         dropout: share of units that the critics drop.
         critics: what they learn: "squared", values by squared errors; or "categorical", distributions over returns by
             cross-entropy, with batch norm and weights on the unit sphere; see `categorical`.
+        network: what acts and values: "perceptron", which sees all of an observation; or "legs", which all legs share,
+            half of whose first units are means over legs; see `leg_networks.Legs`.
         prior: use of prior data: "none"; "protected", in one buffer with online data, never overwritten; or
             "symmetric_sampling", a second batch in every update.
         num_envs: environments, which step together.
@@ -61,6 +64,7 @@ class SoftActorCritic:
     buffer_size: int = 1_000_000
     dropout: float = 0.0
     critics: str = "squared"
+    network: str = "perceptron"
     prior: str = "none"
     num_envs: int = 1
     utd_ratio: float = 1.0
@@ -95,8 +99,10 @@ class SoftActorCritic:
                 f"it is above 1, got {checks.shown(self.utd_ratio)}"
             )
         checks.name(self.critics, ("squared", "categorical"), "critics")
-        if self.dropout and self.critics == "categorical":
-            raise ValueError(f"dropout: expected 0 with categorical critics, got {self.dropout}")
+        checks.name(self.network, NETWORKS, "network")
+        if self.dropout and (self.critics == "categorical" or self.network == "legs"):
+            kind = "categorical critics" if self.critics == "categorical" else "a network of legs"
+            raise ValueError(f"dropout: expected 0 with {kind}, got {self.dropout}")
         checks.name(self.prior, ("none", "protected", "symmetric_sampling"), "prior")
         checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
         if self.buffer_size <= self.start_steps and self.prior != "protected":  # prior data in the same buffer count
@@ -202,7 +208,6 @@ class ProximalPolicy:
         exclude_blocks: names of blocks of the observation that networks do not see, where a task has them.
         critic_blocks: names of blocks of the privileged observation that the value function sees too; see
             `arc_suite.tasks.privileged`.
-        noise_correlation: of a motor's noise in successive control steps; 0 for independent noise.
     """
 
     start: str = ""
@@ -228,16 +233,14 @@ class ProximalPolicy:
     hidden: int = 256
     exclude_blocks: tuple[str, ...] = UNSEEN
     critic_blocks: tuple[str, ...] = ()
-    noise_correlation: float = 0.0
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
         names = ("initial_std", "final_std", "initial_desired_kl", "final_desired_kl", "gradient_norm")
         ranges = {"value_warm_up": (0,), "gae_lambda": (0.0, 1.0), "normalize_until": (0.0, 1.0)}
-        ranges |= {"noise_correlation": (0.0, 0.99)}
         _check(self, ranges | dict.fromkeys(names, _POSITIVE))
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
-        checks.name(self.network, ("perceptron", "legs"), "network")
+        checks.name(self.network, NETWORKS, "network")
         mirrored = self.symmetry_augmentation and self.network == "perceptron"
         if self.minibatch > self.num_envs * self.horizon * (2 if mirrored else 1):
             raise ValueError(f"minibatch: expected at most the transitions of a horizon, got {self.minibatch}")

@@ -12,10 +12,11 @@ from typing import NamedTuple, Self
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite.learning.agents import inputs, networks
+from arc_suite.learning.agents import critic_blocks as behind
+from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.networks import ACTIVATION
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
-from arc_suite.policies.tracing import perceptron
+from arc_suite.policies.tracing import activated, linear, perceptron
 from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.leg_views import LegViews, leg_views
 from arc_suite.tasks.tokens import JOINTS, LEGS
@@ -54,7 +55,7 @@ class Legs:
             critic_blocks: names of privileged blocks for networks of values.
             symmetric: whether to treat left and right alike, if the task is symmetric.
         """
-        symmetry = inputs.symmetry(task, critic_blocks) if symmetric else None
+        symmetry = behind.symmetry(task, critic_blocks) if symmetric else None
         sizes = task.sizes | {f"privileged {name}": task.privileged_blocks[name].size for name in critic_blocks}
         return cls(leg_views(task, sizes, symmetry), task.size, len(task.sizes), symmetry is not None)
 
@@ -74,9 +75,8 @@ class Legs:
 
     def actions(self, parameters, views):
         """Return the actions (..., joints) for normalized views (..., own or more)."""
-        legs = self._by_leg(views)[..., : self.features] * self._scale
-        found = _of_legs(parameters, legs, np.ones(self.legs, bool))
-        return found.reshape(*found.shape[:-2], -1)[..., self.views.joints] * self.views.signs
+        legs = self._by_leg(views)[..., : self.features] * self.scale
+        return self.applied(_of_legs(parameters, legs, np.ones(self.legs, bool)))
 
     def values(self, parameters, views):
         """Return the values (...) of normalized views."""
@@ -96,18 +96,28 @@ class Legs:
     def exported(self, parameters, x):
         """Write the nodes of the actions (1, joints) for a normalized view (1, own)."""
         legs = x.reshape(1, self.legs, self.features)
-        there = legs[:, :, 0] >= -np.inf  # 1 for every leg
         (first,), head = parameters
-        first = {**first, "weight": first["weight"] * self._scale[:, None]}
-        return _exported(((first,), head), legs, there).reshape(1, -1)[:, self.views.joints] * self.views.signs
+        first = {**first, "weight": first["weight"] * self.scale[:, None]}
+        return self.applied(_exported(((first,), head), legs, _there(legs)))
 
     def imported(self, weights):
         """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order."""
         (first,), head = _imported(weights)
-        return ({**first, "weight": first["weight"] / self._scale[:, None]},), head
+        return ({**first, "weight": first["weight"] / self.scale[:, None]},), head
+
+    def applied(self, legs):
+        """Return the actions (..., joints) of the body that are what its legs do (..., legs, joints of a leg)."""
+        return legs.reshape(*legs.shape[:-2], -1)[..., self.views.joints] * self.views.signs
+
+    def done(self, actions: np.ndarray) -> np.ndarray:
+        """Return what legs do (..., legs, joints of a leg), 0 for no joint, from actions (..., joints) of the body."""
+        legs = np.zeros((*actions.shape[:-1], self.legs * self.views.most), actions.dtype)
+        legs[..., self.views.joints] = actions * self.views.signs
+        return legs.reshape(*actions.shape[:-1], self.legs, -1)
 
     @functools.cached_property
-    def _scale(self) -> np.ndarray:
+    def scale(self) -> np.ndarray:
+        """(features,) factors of normalized features; see `networks.scale`."""
         return networks.scale(self.views.sizes[: 1 + self.blocks])
 
     def _flat(self, values: np.ndarray) -> np.ndarray:
@@ -194,6 +204,23 @@ def _of_legs(parameters, legs, there):
     mean = jnp.where(there, found, 0.0).sum(axis=-2, keepdims=True) / there.sum(axis=-2, keepdims=True)
     both = jnp.concatenate([found, jnp.broadcast_to(mean, found.shape)], axis=-1)
     return networks.forward(head, both, ACTIVATION)
+
+
+def exported_halves(legs, layers):
+    """Write the nodes of layers that legs share for what they see (1, legs, size); see `networks.shared`."""
+    first, *others = layers
+    there = _there(legs)
+    found = activated(linear(legs.node("Pick", there), first), first).node("Place", there)
+    half = found.shape[-1] // 2
+    mean = (found[:, :, half:].sum(axis=1) / np.float32(found.shape[1]))[:, None]
+    mean = np.broadcast_to(mean, (*found.shape[:2], mean.shape[-1]))
+    found = np.concatenate([found[:, :, :half], mean], axis=-1)
+    return perceptron(found.node("Pick", there), others).node("Place", there)
+
+
+def _there(legs):
+    """Write a mask (1, legs) of 1: all legs (1, legs, size) are there."""
+    return legs[:, :, 0] >= -np.inf
 
 
 def _exported(parameters, legs, there):

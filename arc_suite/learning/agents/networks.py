@@ -88,7 +88,7 @@ def linear(layer: Mapping, x):
     return x @ layer["weight"] + layer.get("bias", 0.0)
 
 
-def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0):
+def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0, legs: bool = False):
     """Return the output of hidden layers for x (..., inputs): linear, dropout, layer norm if it has one, activation.
 
     Args:
@@ -97,13 +97,21 @@ def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dr
         activation: a name of `ACTIVATIONS`.
         kept: booleans (layers, ..., outputs), the units that dropout keeps; None for no dropout.
         dropout: share of the units that it drops.
+        legs: whether legs, the axis before the last, share what the first layer finds.
     """
     for index, each in enumerate(layers):
         x = linear(each, x)
         if kept is not None:
             x = dropped(x, kept[index], dropout)
         x = activated(each, x, activation)
+        x = shared(x) if legs and index == 0 else x
     return x
+
+
+def shared(x):
+    """Return units (..., legs, units) of which the second half is the mean over legs."""
+    own, common = jnp.split(x, [x.shape[-1] // 2], axis=-1)
+    return jnp.concatenate([own, jnp.broadcast_to(common.mean(axis=-2, keepdims=True), common.shape)], axis=-1)
 
 
 def dropped(x, kept, dropout: float):

@@ -71,13 +71,13 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
         raise ValueError(f"prior: the algorithm takes {expected}, got {checks.shown(context.prior)}")
     seed, core, environment = context.seed, sac.core(hp), context.environment(hp.num_envs)
     task, joints = environment.task.definition, environment.single_action_space.shape[0]
-    inputs = Inputs.of(task, hp.normalize, hp.symmetry_augmentation)
+    inputs = Inputs.of(task, hp.normalize, hp.symmetry_augmentation, hp.network)
     prior = None if context.prior is None else priors.mapped(context, task)
     mode = "w+" if context.checkpoint is None else "r+"
     size = min(hp.buffer_size, -(-context.steps // hp.num_envs) * hp.num_envs)
     buffer = Replay(context.folder / "replay", size, task.size, joints, SLICE, mode, hp.num_envs)
     sources = _SOURCES[hp.prior](buffer, prior)
-    state = sac.begin(hp, generator(seed, "networks", 0), task.size, joints)
+    state = sac.begin(hp, generator(seed, "networks", 0), inputs.size, inputs.joints[-1])
     observations = environment.reset()[0]
     steps = updates = phase_updates = 0
     sums, summed = zeros(METRICS), 0  # of metrics since the latest line
@@ -108,8 +108,8 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
             if hp.start_steps and len(sources[0]) <= hp.start_steps:
                 actions = random.uniform(-1.0, 1.0, (hp.num_envs, joints)).astype(np.float32)
             else:
-                noise = random.standard_normal((hp.num_envs, joints), np.float32)
-                actions = np.asarray(act(state.policy, inputs(observations), noise))
+                noise = random.standard_normal((hp.num_envs, *inputs.joints), np.float32)
+                actions = inputs.applied(np.asarray(act(core, state.policy, inputs(observations), noise)))
             if not np.isfinite(actions).all():
                 raise Diverged("an action is not finite", steps)
             after, rewards, terminated, truncated, info = environment.step(actions)
@@ -129,7 +129,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
             critic_sums, policy_every = zeros(METRICS_OF_CRITICS), max(1, round(hp.utd_ratio))
             for index in range(1, hp.updates_of_a_step + 1):
                 with_policy = index % policy_every == 0
-                drawn = _draw(hp, seed, updates, sources, inputs, joints, with_policy)
+                drawn = _draw(hp, seed, updates, sources, inputs, with_policy)
                 if with_policy:
                     state, sums = update(core, state, sums, *drawn)
                     summed += 1
@@ -149,7 +149,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
             # Update the critics alone up to the next check of the validation loss.
             critic_sums, count = zeros(METRICS_OF_CRITICS), min(hp.check_every, hp.phase_updates - phase.updates)
             for _ in range(count):
-                drawn = _draw(hp, seed, updates, sources, inputs, joints, with_policy=False, phase=phase)
+                drawn = _draw(hp, seed, updates, sources, inputs, with_policy=False, phase=phase)
                 state, critic_sums = update(core, state, critic_sums, *drawn)
                 updates += 1
             phase = phase._replace(updates=phase.updates + count)
@@ -182,9 +182,14 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
         yield Slice(before if phase else steps, metrics, inputs.exported(sac.actor(state)), checkpoint)
 
 
-act = jax.jit(lambda policy, observation, noise: sac.sample(*sac.distribution(policy, observation), noise)[0])
-_distribution = jax.jit(sac.distribution)
+_distribution = jax.jit(sac.distribution, static_argnums=0)
 _policy_loss = jax.jit(sac.policy_loss, static_argnums=0)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def act(hp: SoftActorCritic, policy, observations, noise):
+    """Return actions (num_envs, *joints) of the policy for standard normal noise."""
+    return sac.sample(*sac.distribution(hp, policy, observations), noise)[0]
 
 
 @functools.partial(jax.jit, static_argnums=0, donate_argnums=(1, 2))
@@ -199,9 +204,7 @@ def zeros(names: Sequence[str]) -> dict[str, jax.Array]:
     return {name: jnp.zeros((), jnp.float32) for name in names}
 
 
-def _draw(
-    hp, seed: int, updates: int, sources, inputs: Inputs, joints: int, with_policy: bool, phase: Phase | None = None
-):
+def _draw(hp, seed: int, updates: int, sources, inputs: Inputs, with_policy: bool, phase: Phase | None = None):
     """Draw the batch and the noise of an update, and look up the policy's next actions, None if they are not known."""
     random, held_out = generator(seed, "update", updates), phase.held_out if phase else 0
     batches, next_actions = [], []
@@ -213,7 +216,7 @@ def _draw(
         if phase and phase.next_actions:
             next_actions.append([array[places] for array in phase.next_actions[index]])
     batch = Transitions(*_joined(batches))
-    noise = sac.noise(hp, random, len(batch.rewards), joints, with_policy)
+    noise = sac.noise(hp, random, len(batch.rewards), inputs.joints, with_policy)
     return batch, noise, _joined(next_actions) if next_actions else None
 
 
@@ -233,16 +236,16 @@ def _phase(hp, seed: int, steps: int, sources, policy, inputs: Inputs, held_out:
     random = generator(seed, "held out", steps)
     orders = [random.permutation(len(source)).astype(np.int32) for source in sources] if held_out else None
     cached = hp.n_step == 1 and inputs.symmetry is None
-    next_actions = [_distributions(policy, source, inputs) for source in sources] if cached else None
+    next_actions = [_distributions(sac.core(hp), policy, source, inputs) for source in sources] if cached else None
     return Phase(0, held_out, Patience(0.0), orders, next_actions)
 
 
-def _distributions(policy, source, inputs: Inputs) -> list[np.ndarray]:
+def _distributions(core: SoftActorCritic, policy, source, inputs: Inputs) -> list[np.ndarray]:
     """Return the policy's distributions at the next observations of every transition of a source."""
     parts = []
     for first in range(0, len(source), _CHUNK):
         indices = np.arange(first, first + _CHUNK).clip(max=len(source) - 1)  # of one shape, so compiled once
-        parts.append(_distribution(policy, inputs(source.at(indices).next_observations)))
+        parts.append(_distribution(core, policy, inputs(source.at(indices).next_observations)))
     return [np.concatenate(arrays)[: len(source)] for arrays in zip(*parts, strict=True)]
 
 
@@ -253,8 +256,7 @@ def validation_loss(
     size = hp.batch * min(phase.held_out // hp.batch, hp.scored_batches)
     pairs = zip(sources, phase.orders, strict=True)
     observations = inputs(np.concatenate([source.at(order[:size]).observations for source, order in pairs]))
-    joints = state.policy["mean"]["bias"].shape[-1]
-    noise = sac.noise(hp, generator(seed, "look", updates), len(observations), joints, with_policy=True)
+    noise = sac.noise(hp, generator(seed, "look", updates), len(observations), inputs.joints, with_policy=True)
     kept = None if noise.kept is None else noise.kept[2]
     return float(_policy_loss(sac.core(hp), state.policy, state, observations, noise.action, kept)[0])
 

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.learning.agents import architectures, collecting, inputs, learner, networks
+from arc_suite.learning.agents import architectures, collecting, critic_blocks, learner, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
@@ -40,7 +40,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     seed, collector = context.seed, _environments(hp, context)
     task, architecture = collector.task, collector.architecture
     augmented = hp.symmetry_augmentation and not architecture.symmetric
-    symmetry = inputs.symmetry(task, hp.critic_blocks) if augmented else None
+    symmetry = critic_blocks.symmetry(task, hp.critic_blocks) if augmented else None
     moments, policy = Moments.none(architecture.inputs), None
     normalize = architecture.normalize(moments)
     if hp.start and context.checkpoint is None:

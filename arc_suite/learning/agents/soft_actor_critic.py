@@ -31,7 +31,7 @@ _LOG_TWO_PI = math.log(2.0 * math.pi)
 
 def core(hp: SoftActorCritic) -> SoftActorCritic:
     """Return hyperparameters that differ only where updates do, so that compiled programs are shared."""
-    names = "hidden", "learning_rate", "discount", "tau", "dropout", "target_entropy", "critics"
+    names = "hidden", "learning_rate", "discount", "tau", "dropout", "target_entropy", "critics", "network"
     return SoftActorCritic(**{name: getattr(hp, name) for name in names})
 
 
@@ -57,8 +57,8 @@ class Noise(NamedTuple):
     """The random inputs of an update.
 
     Attributes:
-        next_action: (batch, joints) standard normal, of the action in the target.
-        action: (batch, joints) standard normal, of the action in the policy's loss; None for critics alone.
+        next_action: (batch, *joints) standard normal, of the action in the target.
+        action: (batch, *joints) standard normal, of the action in the policy's loss; None for critics alone.
         kept: (uses, critics, hidden layers, batch, hidden) booleans, the units that dropout keeps; uses are
             targets, critics' loss and policy's loss, if there is one; None without dropout.
     """
@@ -69,7 +69,7 @@ class Noise(NamedTuple):
 
 
 def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> SacState:
-    """Draw the networks for observations (size,) and actions (joints,)."""
+    """Draw the networks for observations (size,) and actions (joints,), of a leg if legs share them."""
     hidden = [hp.hidden] * HIDDEN_LAYERS
     *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True, last_gain=hp.last_gain)
     log_std = networks.layer(networks.xavier(random, hp.hidden, joints, hp.last_gain))
@@ -81,10 +81,12 @@ def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: i
     return jax.tree.map(jnp.array, SacState(policy, critics, critics, log_alpha, moments))
 
 
-def noise(hp: SoftActorCritic, random: np.random.Generator, batch: int, joints: int, with_policy: bool) -> Noise:
+def noise(
+    hp: SoftActorCritic, random: np.random.Generator, batch: int, joints: tuple[int, ...], with_policy: bool
+) -> Noise:
     """Draw the random inputs of an update, with the policy's loss or of critics alone."""
-    next_action = random.standard_normal((batch, joints), np.float32)
-    action = random.standard_normal((batch, joints), np.float32) if with_policy else None
+    next_action = random.standard_normal((batch, *joints), np.float32)
+    action = random.standard_normal((batch, *joints), np.float32) if with_policy else None
     shape = (3 if with_policy else 2, CRITICS, HIDDEN_LAYERS, batch, hp.hidden)
     return Noise(next_action, action, kept(random, shape, hp.dropout) if hp.dropout else None)
 
@@ -105,19 +107,19 @@ def kept(random: np.random.Generator, shape: tuple[int, ...], dropout: float) ->
     return mask.reshape(shape)
 
 
-def distribution(policy, observations):
-    """Return mean and logarithm of the standard deviation, (..., joints) each, of the normal under the tanh."""
-    x = networks.hidden(policy["trunk"], observations)
+def distribution(hp: SoftActorCritic, policy, observations):
+    """Return mean and logarithm of the standard deviation, (batch, *joints) each, of the normal under the tanh."""
+    x = networks.hidden(policy["trunk"], observations, legs=hp.network == "legs")
     return networks.linear(policy["mean"], x), jnp.clip(networks.linear(policy["log_std"], x), *LOG_STD)
 
 
 def sample(mean, log_std, noise):
-    """Return actions (..., joints) for standard normal noise, and the logarithm of their density (...)."""
+    """Return actions (batch, *joints) for standard normal noise, and the logarithm of their density (batch,)."""
     raw = mean + jnp.exp(log_std) * noise
     small = jnp.exp(-2.0 * jnp.abs(raw))
     slope = 4.0 * small / (1.0 + small) ** 2  # 1 - tanh(raw)^2, without its loss of digits where tanh saturates
     density = -0.5 * noise * noise - log_std - 0.5 * _LOG_TWO_PI - jnp.log(slope + _TINY)
-    return jnp.tanh(raw), density.sum(axis=-1)
+    return jnp.tanh(raw), density.sum(axis=range(1, density.ndim))
 
 
 def values(hp: SoftActorCritic, critics, observations, actions, kept=None):
@@ -134,9 +136,15 @@ def values(hp: SoftActorCritic, critics, observations, actions, kept=None):
         if masks is not None:
             x = networks.dropped(x, masks[0], hp.dropout)
         x = networks.activated(first, x, "relu")
+        x = networks.shared(x) if hp.network == "legs" else x
         x = networks.hidden(others, x, "relu", None if masks is None else masks[1:], hp.dropout)
-        results.append(KINDS[hp.critics].value(networks.linear(last, x)))
+        results.append(KINDS[hp.critics].value(of_body(hp, networks.linear(last, x))))
     return results
+
+
+def of_body(hp: SoftActorCritic, outputs):
+    """Return the outputs (batch, outputs) of a critic, means over legs if it is theirs."""
+    return outputs.mean(axis=1) if hp.network == "legs" else outputs
 
 
 def targets(hp: SoftActorCritic, critics, batch: Transitions, next_actions, bonus, kept):
@@ -187,7 +195,7 @@ KINDS = {
 
 def policy_loss(hp: SoftActorCritic, policy, state: SacState, observations, noise, kept):
     """Return the mean of alpha log pi minus the mean of the critics, and the mean of log pi."""
-    action, density = sample(*distribution(policy, observations), noise)
+    action, density = sample(*distribution(hp, policy, observations), noise)
     value = sum(values(hp, state.critics, observations, action, kept)) / CRITICS
     return jnp.mean(jnp.exp(state.log_alpha) * density - value), density.mean()
 
@@ -205,7 +213,7 @@ def update(
         next_actions: the policy's `distribution` at the next observations, if it is known; else None.
     """
     masks = (None, None, None) if noise.kept is None else noise.kept
-    next_actions = distribution(state.policy, batch.next_observations) if next_actions is None else next_actions
+    next_actions = distribution(hp, state.policy, batch.next_observations) if next_actions is None else next_actions
     next_actions, density = sample(*next_actions, noise.next_action)
     kind = KINDS[hp.critics]
     target = kind.targets(hp, state.targets, batch, next_actions, jnp.exp(state.log_alpha) * density, masks[0])
@@ -217,7 +225,7 @@ def update(
     if noise.action is not None:
         policy_gradient = jax.value_and_grad(policy_loss, argnums=1, has_aux=True)
         (loss, density), gradient = policy_gradient(hp, state.policy, state, batch.observations, noise.action, masks[2])
-        target_entropy = hp.target_entropy * batch.actions.shape[-1]
+        target_entropy = hp.target_entropy * math.prod(batch.actions.shape[1:])
         log_alpha, moments = _stepped(hp, "log_alpha", state.log_alpha, -target_entropy - density, moments)
         policy, moments = _stepped(hp, "policy", state.policy, gradient, moments)
         state = state._replace(policy=policy, log_alpha=log_alpha)

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite.envs.worlds import mjx
-from arc_suite.learning.agents import architectures, inputs, networks
+from arc_suite.learning.agents import architectures, critic_blocks, networks
 from arc_suite.learning.agents import proximal_policy as ppo
-from arc_suite.learning.agents.collecting import TRANSITIONS, ages, correlated
+from arc_suite.learning.agents.collecting import TRANSITIONS, ages
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
 from arc_suite.learning.agents.normalizer import Normalizer
@@ -34,7 +34,7 @@ class Worlds:
         self.task = self.env.task
         self.architecture = architectures.of(self.task, hp.network, hp.critic_blocks, hp.symmetry_augmentation)
         if hp.critic_blocks:
-            self._columns = inputs.privileged_columns(self.task, hp.critic_blocks)
+            self._columns = critic_blocks.privileged_columns(self.task, hp.critic_blocks)
         self._key = jax.random.key(context.seed)
         self._state = jax.jit(jax.vmap(self.env.start))(np.uint32(first) + np.arange(hp.num_envs, dtype=np.uint32))
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
@@ -42,11 +42,9 @@ class Worlds:
 
     def roll_out(self, policy, normalize: Normalizer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
         """Act in all worlds for a horizon."""
-        key = jax.random.fold_in(self._key, iteration)
-        keys = jax.random.split(key, self._hp.horizon)
-        noise = jax.random.normal(jax.random.fold_in(key, 1), (self._hp.num_envs, self.architecture.joints))
-        carry = self._state, self._steps, noise
-        (self._state, self._steps, _), rollout = self._act(carry, policy, normalize, np.float32(std), keys)
+        keys = jax.random.split(jax.random.fold_in(self._key, iteration), self._hp.horizon)
+        before = self._state, self._steps
+        (self._state, self._steps), rollout = self._act(before, policy, normalize, np.float32(std), keys)
         if not jnp.isfinite(rollout["means"]).all():
             raise Diverged("an action is not finite", step)
         return rollout
@@ -56,12 +54,11 @@ class Worlds:
 
     def _step(self, policy, normalize: Normalizer, std, carry, key):
         """Step all worlds; return what the next step goes on from, and the transitions."""
-        state, steps, noise = carry
+        state, steps = carry
         drawn, restart = jax.random.split(key)
         seen = self._seen(state)
         mean = ppo.mean_action(self.architecture, policy, normalize(seen))
-        noise = correlated(self._hp, noise, jax.random.normal(drawn, mean.shape))
-        action = mean + std * noise
+        action = mean + std * jax.random.normal(drawn, mean.shape)
         after = jax.vmap(self.env.step)(state, action)
         steps = steps + 1
         time_is_up = steps >= self.task.step_limit
@@ -71,7 +68,7 @@ class Worlds:
         next_obs = jnp.where(resampled[:, None], seen, self._seen(after))
         values = seen, action, mean, after.reward, terminated, ended | resampled, next_obs
         fresh = jax.vmap(self.env.reset)(jax.random.split(restart, self._hp.num_envs))
-        carry = jax.vmap(mjx.restarted)(after, fresh, ended), jnp.where(ended, 0, steps), noise
+        carry = jax.vmap(mjx.restarted)(after, fresh, ended), jnp.where(ended, 0, steps)
         return carry, dict(zip(TRANSITIONS, values, strict=True))
 
     def _seen(self, state):

@@ -3,13 +3,23 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents.inputs import Inputs, privileged_columns, symmetry
+from arc_suite.learning.agents.critic_blocks import privileged_columns, symmetry
+from arc_suite.learning.agents.inputs import Inputs
 from arc_suite.learning.agents.replay import Transitions
-from arc_suite.robots import generator
+from arc_suite.robots import generator, queen
 
 TASK = Setup.of("tick").definition
+
+
+def stiff(*names):
+    """Queen, some of whose legs have no ankle."""
+    body = queen.BODY
+    legs = [leg.replace(links=(*leg.links[:2], leg.links[2].replace(joint=None))) for leg in body.legs]
+    legs = tuple(other if leg.name in names else leg for leg, other in zip(body.legs, legs, strict=True))
+    return body.replace(name="stiff", legs=legs)
 
 
 def drawn(count, size=TASK.size):
@@ -75,3 +85,19 @@ def test_exported_layers_take_observations(normalize):
     observations = 3.0 + 2.0 * drawn(60)[50:]
     expected = np.tanh(inputs(observations) @ weight + 1.0)
     assert_allclose(inputs.exported(layers)(observations), expected, atol=1e-5)
+
+
+def test_legs_see_and_do_what_the_body_does():
+    task = Setup.of("queen", "steer").definition
+    inputs = Inputs.of(task, normalize=True, symmetry_augmentation=True, network="legs")
+    assert inputs.joints == (6, 3) and inputs.symmetry is None
+    observations = drawn(40, task.size)
+    inputs = inputs.after(observations)
+    seen = inputs(observations) / inputs.legs.scale
+    assert seen.shape == (40, 6, inputs.size)
+    varied = seen.std(axis=(0, 1)) > 0.0  # not what is the same for all legs
+    assert_allclose(seen.mean(axis=(0, 1))[varied], 0.0, atol=1e-3)
+    actions = drawn(40, 18)
+    assert_array_equal(inputs.applied(inputs.legs.done(actions)), actions)
+    with refused("network: expected perceptron for legs with different numbers of joints, got legs"):
+        Inputs.of(Setup.of(stiff("l2", "r2")).definition, True, True, "legs")

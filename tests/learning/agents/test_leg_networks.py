@@ -13,7 +13,8 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 import jax
 
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import architectures, inputs
+from arc_suite.learning.agents import architectures
+from arc_suite.learning.agents import critic_blocks as behind
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.leg_networks import Legs
 from arc_suite.learning.agents.normalizer import Moments
@@ -38,7 +39,7 @@ def test_left_and_right_are_treated_alike(body, critic_blocks):
     task = Setup.of(body, "steer").definition
     architecture, policy, values, normalize, vectors = drawn(task, critic_blocks)
     assert architecture.symmetric
-    mirror, mirror_action = inputs.symmetry(task, critic_blocks)
+    mirror, mirror_action = behind.symmetry(task, critic_blocks)
     here, there = (normalize(architecture.viewed(each)) for each in (vectors, mirror(vectors)))
     acted, found = architecture.actions(policy, here), architecture.values(values, here)
     assert_allclose(architecture.actions(policy, there), mirror_action(np.asarray(acted)), atol=1e-5)

@@ -11,8 +11,8 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import architectures
-from arc_suite.learning.agents.leg_networks import AnyLegs
 from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.leg_networks import AnyLegs
 from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network, policy

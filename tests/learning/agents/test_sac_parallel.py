@@ -41,7 +41,7 @@ def test_learning_begins_with_little_noise_around_zero():
     hp, size, joints = algorithms.ALGORITHMS[NAME].hyperparameters, 50, 18
     state = sac.begin(hp, np.random.default_rng(0), size, joints)
     observations = np.random.default_rng(1).standard_normal((64, size), np.float32)
-    mean, log_std = sac.distribution(state.policy, observations)
+    mean, log_std = sac.distribution(hp, state.policy, observations)
     assert np.abs(mean).max() < 0.1
     assert_allclose(np.exp(log_std), 0.3, rtol=0.1)
     assert float(np.exp(state.log_alpha)) == pytest.approx(0.003)
@@ -77,12 +77,14 @@ def test_what_an_update_sees(learner, drawn, n_step, discounts):
     assert agent.inputs.moments.count == 2 * 200
 
 
-def test_its_policy_takes_whole_observations(learner):
-    agent = learner(NAME, small(NAME))
+@pytest.mark.parametrize("network", ["perceptron", "legs"])
+@pytest.mark.parametrize("name", [NAME, "xqc"])
+def test_its_policy_takes_whole_observations(learner, name, network):
+    agent = learner(name, small(name, network=network))
     found = agent.until(50)
     observations = agent.buffer.at(np.arange(50)).observations
-    mean, _ = sac.distribution(agent.state.policy, agent.inputs(observations))
-    assert_allclose(found.policy(observations), np.tanh(mean), atol=1e-5)
+    mean, _ = sac.distribution(agent.core, agent.state.policy, agent.inputs(observations))
+    assert_allclose(found.policy(observations), agent.inputs.applied(np.tanh(mean)), atol=1e-5)
 
 
 @pytest.mark.parametrize("changes", [{}, {"n_step": 1}, {"symmetry_augmentation": False}])

@@ -173,13 +173,3 @@ def test_critic_blocks_that_there_are_not(tmp_path, setup, blocks, line):
     pytest.importorskip("jax", reason="of the extra learn: make check-agents")
     with pytest.raises(ValueError, match=line):
         learning("ppo", SMALL | {"critic_blocks": blocks}, tmp_path, setup).advance()
-
-
-@pytest.mark.parametrize("kept", [0.0, 0.7])
-def test_noise_of_successive_steps(begun, kept):
-    agent = begun(SMALL | {"horizon": 64, "num_envs": 8, "minibatch": 64, "noise_correlation": kept})
-    agent.advance()
-    rollout = rolled_out(agent)
-    noise = (rollout["actions"] - rollout["means"]) / 0.3
-    assert noise.std() == pytest.approx(1.0, abs=0.05)
-    assert (noise[1:] * noise[:-1]).mean() == pytest.approx(kept, abs=0.05)
