@@ -16,6 +16,7 @@
 #   types, lowest       annotations, by mypy; the environments with the oldest Gymnasium that setup.cfg admits
 #   agents, agents-release, jax, mjx, mjx-release    learners, tasks and worlds on JAX, on a processor
 #   sb3, clients        stable-baselines3 and our scripts for it; the clients of docs/clients.md: gigabytes
+#   first-steps         a newcomer's five first successes, by the commands of the pages; an hour
 #   docs, notebooks     links of the site, its front page in Chromium; the notebooks of examples
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them
@@ -154,6 +155,11 @@ check-sb3: RUN = $(VENV)/bin/python tools/check_sb3.py --steps 500 && \
 	$(PYTEST) tests/envs/test_sb3.py tests/policies/test_sb3_file.py tests/examples
 
 check-clients: RUN = $(PYTHON) tools/check_clients.py
+
+# The extras of README's install line.
+check-first-steps: VENV := .venv-first-steps
+check-first-steps: EXTRAS := learn,animate
+check-first-steps: RUN = $(PYTHON) tools/check_first_steps.py
 
 check-docs: docs
 check-docs: VENV := .venv-docs

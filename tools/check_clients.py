@@ -18,29 +18,14 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
+import page_commands
+
 from arc_suite.cli import program
 
-_ROOT = pathlib.Path(__file__).parents[1]
+_ROOT = page_commands.ROOT
 PAGES = [_ROOT / "docs" / f"{name}.md" for name in ("clients", "first_steps")]
-_SECTION = re.compile(r"^## (?P<name>[^\n]*)\n(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 _INSTALL = re.compile(r"^```sh\npip install (.*)\n```\n", re.MULTILINE)
-_BLOCK = re.compile(r"^```(?P<kind>sh|python)\n(?P<text>.*?)^```", re.MULTILINE | re.DOTALL)
 _SHELLS = {"sh": ["bash", "-e"], "python": ["python"]}
-_SAVED = re.compile(r"[Ss]ave this as\s+`(?P<file>[^`]+)`[^`]*\Z")
-
-
-class Block(NamedTuple):
-    """A block of a section.
-
-    Attributes:
-        kind: sh or python.
-        text: commands, or a script.
-        file: that the text goes into, instead of being run; None for a block that is run.
-    """
-
-    kind: str
-    text: str
-    file: str | None = None
 
 
 class Client(NamedTuple):
@@ -54,20 +39,14 @@ class Client(NamedTuple):
 
     name: str
     packages: list[str]
-    blocks: list[Block]
+    blocks: list[page_commands.Block]
 
 
 def clients(page: str) -> Iterator[Client]:
     """Yield the clients of a page's text, in its order."""
-    for section in _SECTION.finditer(page):
-        for packages in _INSTALL.findall(section["text"]):
-            yield Client(section["name"], shlex.split(packages), list(_blocks(_INSTALL.sub("", section["text"]))))
-
-
-def _blocks(text: str) -> Iterator[Block]:
-    for block in _BLOCK.finditer(text):
-        saved = _SAVED.search(text, 0, block.start())
-        yield Block(block["kind"], block["text"], saved and saved["file"])
+    for name, text in page_commands.sections(page).items():
+        for packages in _INSTALL.findall(text):
+            yield Client(name, shlex.split(packages), list(page_commands.blocks(_INSTALL.sub("", text))))
 
 
 def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path) -> str:

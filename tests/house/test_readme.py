@@ -7,6 +7,7 @@ import shlex
 import tomllib
 
 import package_page
+import page_commands
 import programs
 import pytest
 from tiers import tiers
@@ -33,9 +34,8 @@ BLOCKS = [
     for place, block in enumerate(re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL))
 ]
 
-_COMMAND = re.compile(r"(?:^|`)((?:python (?:tools/|-m arc_suite)|arc-suite )[^`\n]*(?:\n[^`\n]+(?=`))?)", re.MULTILINE)
 SCHEMATIC = {"arc-suite --help", "arc-suite PROGRAM --help", "arc-suite PROGRAM", "python -m arc_suite PROGRAM"}
-COMMANDS = sorted({" ".join(text.split()) for page in PAGES for text in _COMMAND.findall(page.read_text())} - SCHEMATIC)
+COMMANDS = sorted({text for page in PAGES for text in page_commands.commands(page.read_text())} - SCHEMATIC)
 
 
 def _page(name):

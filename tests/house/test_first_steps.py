@@ -1,0 +1,74 @@
+"""A newcomer's first successes and the commands of pages: quick ones run here, others by `make check-first-steps`."""
+
+import re
+import shlex
+
+import check_first_steps
+import page_commands
+import programs
+import pytest
+from page_commands import ROOT, page, sections
+
+MAKEFILE = (ROOT / "Makefile").read_text()
+
+
+@pytest.mark.parametrize("name", check_first_steps.SUCCESSES)
+def test_the_pages_have_what_a_success_takes(name):
+    for stem, what in check_first_steps.SUCCESSES[name]:
+        if what.startswith("make "):
+            assert f"`{what}`" in page(stem) and re.search(rf"^{what[5:]}:", MAKEFILE, re.MULTILINE)
+        else:
+            assert list(page_commands.blocks(sections(page(stem))[what])), (stem, what)
+
+
+def test_the_environment_has_the_extras_of_the_front_page():
+    (extras,) = re.findall(r"pip install -e '\.\[(.*)\]'", page("README"))
+    assert f"check-first-steps: EXTRAS := {extras}\n" in MAKEFILE
+
+
+def test_blocks_and_commands_of_a_text():
+    text = (
+        "# Title\n```sh\na b  # why\nc \\\n  d\n```\n## Next\nSave this as `x.py`:\n```python\n# No heading\n1\n```\n"
+    )
+    assert list(sections(text)) == ["Title", "Next"]
+    (block,) = page_commands.blocks(sections(text)["Title"])
+    assert block.commands == ["a b", "c d"] and block.file is None
+    assert next(page_commands.blocks(sections(text)["Next"])).file == "x.py"
+
+
+# Why a command of arc-suite is not run here: the first that fits.
+NOT_HERE = {
+    r"\S+$|-|PROGRAM": "a name or a sketch",
+    r"train|study|benchmark|export": "learners need JAX: make check-first-steps, make check-agents",
+    r"view|studio|doctor": "they wait for people; their tests run them",
+    r"play|\S+ .*\.html": "pages need the viewer that Node builds: make check-play",
+    r"\S+ .*(go2|ppo\.zip|\.json|entry|theirs|RUN|ID\b)": "a file of the reader",
+    r"\S+ .*runs/(?!tick-walk-ppo-0)": "a run of a learner",
+    r"\S+ .*(--checkpoint|--quality|--verify)": "what another command left",
+    r"\S+ .*(crouching|ice|ramps)": "a module that the page's own test saves",
+    r"render (?!.* (-o|--output) )": "without a file to write",
+    r"design": "minutes: make check-bodies has searches",
+}
+EVERY = [
+    command
+    for path in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    for command in page_commands.commands(path.read_text())
+    if command.startswith("arc-suite ") and not any(re.match(f"arc-suite ({each})", command) for each in NOT_HERE)
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", dict.fromkeys(EVERY))
+def test_a_quick_command_runs(command, tmp_path, monkeypatch):
+    """With one episode in place of many."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+    run = tmp_path / "runs" / "tick-walk-ppo-0"  # in place of minutes of training
+    run.mkdir(parents=True)
+    (run / "policy.npz").write_bytes((ROOT / "arc_suite/policies/packaged/tick-walk.npz").read_bytes())
+    _, *arguments = shlex.split(page_commands.shortened(command))
+    done = programs.arc_suite(*arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_most_commands_are_quick():
+    assert len(set(EVERY)) >= 20

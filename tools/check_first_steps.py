@@ -1,0 +1,89 @@
+"""Makes a newcomer's five first successes in an empty folder, by what the pages say alone.
+
+    python tools/check_first_steps.py
+    python tools/check_first_steps.py --short --only "offline data and an entry"
+
+A success is some sections of pages, whose commands and code run in order, and commands of `make` that pages name. Later
+successes find what earlier ones left, such as runs. `pip` lines are left to the environment, which has the extras of
+README. Prints a line for each and exits with status 1 if one fails.
+"""
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+
+import page_commands
+from absl import flags
+
+from arc_suite.cli import program
+
+# By name: a page and the heading of a section, or a command of `make` on a page.
+SUCCESSES = {
+    "train and compare": (("README", "Use"), ("first_steps", "A creature learns to walk"), ("study", "Enter a result")),
+    "pixels and a task": (("environments", "Pixels and depth"), ("adding_a_task", "Adding a task")),
+    "eight legs, Blender, play": (
+        *(("clips", "Animation clips"), ("engines", "Clips in Blender, Godot and three.js")),
+        *(("engines", "FBX, BVH and Blender"), ("play", "make web"), ("play", "Play")),
+    ),
+    "site and notebooks": (("reference", "make docs"), ("first_steps", "A notebook")),
+    "offline data and an entry": (("datasets", "Datasets"), ("datasets", "Datasets of agents")),
+}
+ELSEWHERE = ("pip install", "python learn.py", "python play.py")  # the last two are of docs/clients.md
+
+_SHORT = flags.DEFINE_bool("short", False, "One episode in place of many, wherever the page's command allows it.")
+_ONLY = flags.DEFINE_multi_enum("only", [], list(SUCCESSES), "Success to make; all without it.")
+
+
+def work(name: str) -> Iterator[tuple[list[str], str, str]]:
+    """Yield the steps of a success: a command, its input, and the file that the input goes into instead, or ""."""
+    for page, what in SUCCESSES[name]:
+        if what.startswith("make "):
+            yield ["make", "-C", str(page_commands.ROOT), *what.split()[1:]], "", ""
+            continue
+        for block in page_commands.blocks(page_commands.sections(page_commands.page(page))[what]):
+            for command in block.commands:
+                if not command.startswith(ELSEWHERE):
+                    shortened = page_commands.shortened(command) if _SHORT.value else command
+                    yield ["bash", "-c", shortened], "", ""
+            if block.kind == "python":
+                yield [sys.executable, "-"], block.text, block.file or ""
+
+
+def check(name: str, folder: pathlib.Path) -> str:
+    """Make a success in a folder, and return what is wrong, in one line."""
+    own = {"MINARI_DATASETS_PATH": str(folder / "datasets"), "MPLBACKEND": "Agg", "PYTHONPATH": str(folder)}
+    path = f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    for command, text, file in work(name):
+        if file:
+            (folder / file).write_text(text, encoding="utf-8")
+            continue
+        environ = os.environ | own | {"PATH": path}
+        done = subprocess.run(command, cwd=folder, env=environ, input=text, capture_output=True, encoding="utf-8")
+        if done.returncode:
+            said = re.sub(r"\s+", " ", (done.stderr or done.stdout)[-300:]).strip()
+            return f"{' '.join(command[2:] or ['code of a page'])}: status {done.returncode}: {said}"
+    return ""
+
+
+def main() -> int:
+    """Print a line for each success; return the exit status."""
+    failed = False
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for part in ("tools", "examples"):  # which pages name as in a clone
+            (folder / part).symlink_to(page_commands.ROOT / part)
+        for success in _ONLY.value or SUCCESSES:
+            start = time.perf_counter()
+            problem = check(success, folder)
+            failed |= bool(problem)
+            print(f"{success:28}{time.perf_counter() - start:7.1f} s  {problem or 'ok'}", flush=True)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    program.run(main)
