@@ -220,7 +220,7 @@ def exported_halves(legs, layers):
 
 def _there(legs):
     """Write a mask (1, legs) of 1: all legs (1, legs, size) are there."""
-    return legs[:, :, 0] >= -np.inf
+    return legs[:, :, 0] >= np.finfo(np.float32).min
 
 
 def _exported(parameters, legs, there):

@@ -15,9 +15,12 @@ import jax
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import architectures
 from arc_suite.learning.agents import critic_blocks as behind
+from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.leg_networks import Legs
 from arc_suite.learning.agents.normalizer import Moments
+from arc_suite.learning.agents.training import train
+from arc_suite.policies import network
 
 CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16}
 
@@ -88,6 +91,15 @@ def test_learning_goes_on_bit_exactly(tmp_path):
     assert isinstance(resumed.collector.architecture, Legs) and resumed.symmetry is None
     for one, other in zip(jax.tree.leaves(straight.state), jax.tree.leaves(resumed.state), strict=True):
         assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", ["ppo", "xqc"])
+def test_the_policy_of_a_run_is_read_again(tmp_path, name):
+    setup = Setup.of("tick", "steer", {"time_limit": 0.5})
+    changes = CHANGES if name == "ppo" else {"network": "legs", "hidden": 16, "batch": 8, "buffer_size": 100}
+    assert train(Configuration.of(setup, name, changes, steps=64, evaluate_every=64), tmp_path / "run")
+    found = network.load(tmp_path / "run" / "policy.npz")
+    assert np.isfinite(found.actions(np.zeros((3, found.size), np.float32))).all()
 
 
 def test_a_network_is_one_of_two():
