@@ -21,6 +21,8 @@ from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.leg_views import LegViews, leg_views
 from arc_suite.tasks.tokens import JOINTS, LEGS
 
+_LEAST = -1e4  # less than any feature, and finite in policies of 16 bits
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Legs:
@@ -219,8 +221,8 @@ def exported_halves(legs, layers):
 
 
 def _there(legs):
-    """Write a mask (1, legs) of 1: all legs (1, legs, size) are there."""
-    return legs[:, :, 0] >= np.finfo(np.float32).min
+    """Write a mask (1, legs) of 1, as all legs (1, legs, size) are there."""
+    return legs[:, :, 0] >= _LEAST
 
 
 def _exported(parameters, legs, there):

@@ -153,7 +153,7 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
     try:
         normalize, policy = architectures.read(architecture, found.graph)
     except ValueError as error:
-        raise ValueError(f"{hp.start}: expected {error}") from None
+        raise ValueError(f"{hp.start}: expected {error}, {hp.network}") from None
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
     if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
