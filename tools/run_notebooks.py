@@ -4,13 +4,11 @@ What belongs to this machine does not stay: paths are refused, and progress and 
 
 Example:
   python tools/run_notebooks.py
+  python tools/run_notebooks.py first_steps
 """
 
 import tempfile
 from pathlib import Path
-
-import nbformat
-from nbclient import NotebookClient
 
 from arc_suite.cli import program
 
@@ -32,6 +30,9 @@ def executed(path: Path) -> str:
     Raises:
         ValueError: it is too large, or names a folder of this machine.
     """
+    import nbformat  # here, as `make notebooks` alone installs them
+    from nbclient import NotebookClient
+
     notebook = nbformat.read(path, as_version=4)
     metadata = notebook.metadata.copy()
     NotebookClient(notebook, timeout=_SECONDS, resources={"metadata": {"path": str(path.parent)}}).execute()
@@ -49,9 +50,9 @@ def executed(path: Path) -> str:
     return text
 
 
-def main() -> None:
-    """Run all notebooks, and write each that fits."""
-    for path in sorted((ROOT / "examples" / "notebooks").glob("*.ipynb")):
+def main(name: str = "*") -> None:
+    """Run all notebooks, or that of a name, and write each that fits."""
+    for path in sorted((ROOT / "examples" / "notebooks").glob(f"{name}.ipynb")):
         path.write_text(executed(path), encoding="utf-8")
         print(path.relative_to(ROOT), path.stat().st_size, "bytes")
 

@@ -230,12 +230,14 @@ def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: flo
     first.save(path, "GIF", save_all=True, append_images=others, duration=durations, loop=0)
 
 
-def write_webp(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:
-    """Write a film that plays forever, in full colors; arguments as of `write_gif`."""
+def write_webp(
+    path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float, quality: int = 50, method: int = 6
+) -> None:
+    """Write a film that plays forever, in full colors; arguments as of `write_gif`, and Pillow's."""
     first, *others = map(Image.fromarray, frames)
     durations = _durations(1 + len(others), seconds, 1)
     first.save(
-        path, "WEBP", save_all=True, append_images=others, duration=durations, loop=0, quality=_WEBP_QUALITY, method=6
+        path, "WEBP", save_all=True, append_images=others, duration=durations, loop=0, quality=quality, method=method
     )
 
 
@@ -247,5 +249,4 @@ def _durations(count: int, seconds: float, unit: int) -> list[int]:
 
 _GIF_COLORS = 128
 _GIF_SAMPLES = 4  # frames that the palette is made from
-_WEBP_QUALITY = 50
 WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif, ".webp": write_webp}

@@ -19,7 +19,7 @@ def page(robot: str, player: str = "") -> str:
     task, model = setup.prepared()
     return markdown.page(
         f"`{robot}`",
-        f"{about(robot)} Ids of Gymnasium, `steer` and so on in place of `walk`: `{setup.env_id}`.",
+        f"{about(robot)} Gymnasium id: `{setup.env_id}`; each task has one.",
         player or f"![{robot}](../films/{robot}.webp)",
         "## Body",
         _body(setup, model),
