@@ -1,7 +1,7 @@
 """Bodies of other proportions: links, torso and heading of the legs by factors and degrees."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from arc_suite import checks
@@ -20,6 +20,7 @@ class Shape(NamedTuple):
         length, width, thickness: factors of the torso along x, y and z, with the mounts of the legs along x and y.
         fan: degrees by which the first legs turn forward and the last ones backward.
         links: factors of the lengths of links, by name of the link.
+        ends: ends (3,) of links of single legs in place of the body's own, before all factors, m, by name of the part.
     """
 
     scale: float = 1.0
@@ -28,11 +29,17 @@ class Shape(NamedTuple):
     thickness: float = 1.0
     fan: float = 0.0
     links: Mapping[str, float] = {}
+    ends: Mapping[str, Sequence[float]] = {}
 
 
 def link_names(body: Body) -> tuple[str, ...]:
     """Return the names of the links of all legs, each once, from the torso outwards."""
     return tuple(dict.fromkeys(link.name for leg in body.legs for link in leg.links))
+
+
+def link_ends(body: Body) -> dict[str, Vector]:
+    """Return the ends (3,) of the links of all legs, m, by names of their parts."""
+    return {leg.full_name(link): link.end for leg in body.legs for link in leg.links}
 
 
 def shaped(body: Body, **changes) -> Body:
@@ -54,17 +61,20 @@ def shaped(body: Body, **changes) -> Body:
         checks.name(name, link_names(body), "link"): checks.number(f"links[{name!r}]", factor, *FACTOR)
         for name, factor in shape.links.items()
     }
+    own = link_ends(body)
+    ends = {checks.name(name, own, "part"): end for name, end in shape.ends.items()}
     length, width, thickness = (
         checks.number(name, getattr(shape, name), *FACTOR) for name in ("length", "width", "thickness")
     )
     torso = length, width, thickness
     fan = checks.number("fan", shape.fan, *FAN)
-    if shape._replace(links={}) == Shape() and set(factors.values()) <= {1.0}:
+    same_links = set(factors.values()) <= {1.0} and all(tuple(end) == own[name] for name, end in ends.items())
+    if shape._replace(links={}, ends={}) == Shape() and same_links:
         return body
     if body.source:
         raise ValueError(f"shape: {body.name} was imported, and keeps the shape of its file")
     furthest = max(abs(leg.mount[0]) for leg in body.legs) or 1.0
-    legs = tuple(_leg(leg, factors, torso, fan * leg.mount[0] / furthest) for leg in body.legs)
+    legs = tuple(_leg(leg, factors, ends, torso, fan * leg.mount[0] / furthest) for leg in body.legs)
     solids = tuple(_stretched(solid, torso) for solid in body.torso.solids)
     ballast = tuple(_stretched(each, torso) for each in body.ballast)
     reshaped = body.replace(torso=body.torso.replace(standing_height=None, solids=solids), ballast=ballast, legs=legs)
@@ -72,13 +82,14 @@ def shaped(body: Body, **changes) -> Body:
     return generator.scaled(reshaped, shape.scale).replace(name=f"{stem.removesuffix('_shaped')}_shaped")
 
 
-def _leg(leg: Leg, factors: Mapping[str, float], torso: Vector, turn: float) -> Leg:
+def _leg(
+    leg: Leg, factors: Mapping[str, float], ends: Mapping[str, Sequence[float]], torso: Vector, turn: float
+) -> Leg:
     (x, y, z), (length, width, _) = leg.mount, torso
     side = math.copysign(1.0, y) if abs(y) > 1e-9 else 0.0  # a leg on the midline keeps its heading
-    links = tuple(
-        link.replace(end=tuple(factors.get(link.name, 1.0) * part for part in link.end)) for link in leg.links
-    )
-    return leg.replace(mount=(length * x, width * y, z), links=links, yaw_deg=leg.yaw_deg - side * turn)
+    links = [link.replace(end=tuple(ends.get(leg.full_name(link), link.end))) for link in leg.links]
+    links = [link.replace(end=tuple(factors.get(link.name, 1.0) * part for part in link.end)) for link in links]
+    return leg.replace(mount=(length * x, width * y, z), links=tuple(links), yaw_deg=leg.yaw_deg - side * turn)
 
 
 def _stretched(solid: Solid, factors: Vector) -> Solid:

@@ -1,5 +1,6 @@
 """A creature in viser's scene: a tree of frames, so that a pose sends the torso and the joints alone."""
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -10,6 +11,8 @@ from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.tasks import readings
 
+_BALL, _ORANGE = 1.35, (255, 140, 0)  # radius of a handle, of its link's, and its color
+_FURTHEST = 10.0  # of the unit, that a link can be dragged at once
 _TOLERANCE = 0.01  # of a creature's reach, by which a face may cut into a round shape
 
 
@@ -25,7 +28,8 @@ class Figure:
             creature: to show.
             unit: of lengths in the scene, m.
         """
-        self.creature, self._unit = creature, unit
+        self.creature, self._scene, self._unit = creature, scene, unit
+        self._balls: list[viser.IcosphereHandle] = []
         self._frames: list[viser.FrameHandle] = []
         names: list[str] = []
         for part in creature.parts:
@@ -38,6 +42,40 @@ class Figure:
         self._hinges = [(index, part.joint) for index, part in enumerate(creature.parts) if part.joint is not None]
         self._standing = np.array([creature.parts[index].quaternion for index, _ in self._hinges])
         self._axes = np.array([creature.parts[index].axis for index, _ in self._hinges])
+
+    def handles(self, dragged: Callable[[str, np.ndarray], None] | None) -> None:
+        """Show a ball at the end of every link, which visitors drag; None hides them.
+
+        Args:
+            dragged: called with the name of a link's part, and by how much (3,) its end was dragged, in the frame of
+                the link, m.
+        """
+        for ball in self._balls:
+            ball.remove()
+        self._balls = []
+        frames = dict(zip((part.name for part in self.creature.parts), self._frames, strict=True))
+        links = [(leg.full_name(link), link) for leg in self.creature.setup.body.legs for link in leg.links]
+        for name, link in links if dragged else ():
+            radius, end = _BALL * link.radius / self._unit, np.array(link.end) / self._unit
+            ball = self._scene.add_icosphere(f"{frames[name].name}/end", radius, color=_ORANGE, position=end)
+            ball.on_drag(functools.partial(self._drag, name, dragged))
+            self._balls.append(ball)
+
+    async def _drag(self, name: str, dragged: Callable, event: viser.SceneNodeDragEvent) -> None:
+        """Take a drag when it ends; a browser may send anything."""
+        if event.phase != "end":
+            return
+        moved = np.subtract(event.end_position, event.start_position)
+        if moved.shape == (3,) and np.isfinite(moved).all() and np.linalg.norm(moved) < _FURTHEST:
+            dragged(name, self._unit * moved @ self._turn(name))
+
+    def _turn(self, name: str) -> np.ndarray:
+        """Return the axes of a part's frame in the scene, as columns (3, 3)."""
+        parts, turn = self.creature.parts, np.eye(3)
+        index = next((index for index, part in enumerate(parts) if part.name == name), None)
+        while index is not None:
+            turn, index = rotations.matrix(self._frames[index].wxyz) @ turn, parts[index].parent
+        return turn
 
     def pose(self, qpos: np.ndarray, place: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Take a pose.

@@ -3,6 +3,8 @@
 A browser sends requests to this machine for every page that it shows, so a foreign page could speak to the studio.
 """
 
+import asyncio
+import contextlib
 import http
 import secrets
 from collections.abc import Callable
@@ -46,6 +48,7 @@ class Server(viser.ViserServer):
         finally:
             websockets.serve = serve  # type: ignore[misc]
         connection, gui = self._websock_server, self.gui
+        connection.get_message_buffer().message_event = _LoopEvent()
         for kind, handler, taken in (
             (messages.GuiUpdateMessage, gui._handle_gui_updates, self._offers),
             (messages.FileTransferStartUpload, gui._handle_file_transfer_start, _fits),
@@ -61,6 +64,19 @@ class Server(viser.ViserServer):
         """Return whether a widget offers the value of a message, which changes nothing else of it."""
         handle = self.gui._gui_input_handle_from_uuid.get(message.uuid)
         return list(message.updates) == ["value"] and offers(handle, message.updates["value"])
+
+
+class _LoopEvent(asyncio.Event):
+    """An event that other threads do not set: in the midst of a loop's turn that breaks, and ends the walk.
+
+    Viser sets it at once in the thread that sends, and has the loop set it soon after, which suffices.
+    """
+
+    def set(self) -> None:
+        """Set the event, if this is the thread of a loop."""
+        with contextlib.suppress(RuntimeError):
+            asyncio.get_running_loop()
+            super().set()
 
 
 def offers(handle: Any, value: Any) -> bool:

@@ -1,6 +1,7 @@
 """The page: viser's widgets around a session; all visitors share them."""
 
 import contextlib
+import dataclasses
 import functools
 import io
 import itertools
@@ -9,40 +10,43 @@ import random
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 
+from arc_suite import checks
 from arc_suite.animation import direction
-from arc_suite.animation.studio import saving, texts
+from arc_suite.animation.studio import layout, saving, texts
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.charts import Charts
 from arc_suite.animation.studio.creature import Creature
-from arc_suite.animation.studio.gate import Server
+from arc_suite.animation.studio.effects import without_effect
+from arc_suite.animation.studio.gate import Server, offers
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import LEGS, OWN, RANDOM, Sketch, cured, lengthened, opened_file
-from arc_suite.animation.studio.states import POSE, VELOCITY, Edits, State, edited, redone, undone
+from arc_suite.animation.studio.sketch import OWN, Sketch, cured, dragged, length, lengthened, opened_file
+from arc_suite.animation.studio.states import (
+    POSE,
+    Command,
+    Edits,
+    State,
+    edited,
+    from_json,
+    is_state,
+    redone,
+    to_json,
+    undone,
+)
 from arc_suite.animation.studio.view import View
-from arc_suite.arenas import ARENAS
-from arc_suite.cpg.selection import preset_names, presets_of
-from arc_suite.policies import POLICIES
-from arc_suite.robots import gaits, generator
-from arc_suite.robots.spec import PALETTES
+from arc_suite.cpg.selection import presets_of
+from arc_suite.robots import gaits
 from arc_suite.robots.spec_files import MAX_IMPORTED
 from arc_suite.simulation.opengl import RenderingUnavailable
-from arc_suite.tasks import TASKS
 
 _CHARTS_EVERY = 0.25  # s
+_ALL = "all"  # legs
 _PRESS = 0.25  # of the body's own speed, by which a key changes the command
-_LINKS = 8  # sliders of links, at most
-_PROPORTIONS = (
-    ("scale", "Size", 0.25, 4.0, 0.05),
-    ("length", "Torso length", 0.5, 2.0, 0.05),
-    ("width", "Torso width", 0.5, 2.0, 0.05),
-    ("thickness", "Torso thickness", 0.5, 2.0, 0.05),
-    ("fan", "Fan of the legs", -40.0, 40.0, 1.0),
-)
 _KEYS = (
     ("Faster", "I", ("forward", _PRESS)),
     ("Slower", "K", ("forward", -_PRESS)),
@@ -86,11 +90,12 @@ class Page:
     def __init__(self, server: viser.ViserServer, session: Session):
         """Lay out the page."""
         self._gui, self._session, self._drawn = server.gui, session, -math.inf
-        self._creature: Creature | None = None
+        self._creatures: tuple[Creature | None, Creature | None] = None, None
         self._first = State(session.creature.sketch)
         self._edits, self._lock = Edits(self._first), threading.Lock()
         self._widgets: dict[str, Any] = {}  # by the fields of a `State` that they show
-        self._links: tuple[str, ...] = ()
+        self._fixed: frozenset[str] = frozenset()  # numbers of a pose without room
+        self._links: tuple[str, ...] = ()  # whose sliders are shown, of all legs or of one
         self._cures: list[Any] = []
         self._view = View(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -101,7 +106,7 @@ class Page:
         with tabs.add_tab("Body"):
             self._add_body(first)
         with tabs.add_tab("Task"):
-            self._add_task(first)
+            self._widgets |= layout.task(self._gui, first)
         with tabs.add_tab("Command"):
             self._add_command()
         with tabs.add_tab("Files"):
@@ -114,13 +119,16 @@ class Page:
         panel.dock_left()
         panel.set_width(330)
 
-    def show(self, session: Session, share: float) -> None:
+    def show(self, session: Session) -> None:
         """Send a state to all visitors, in the loop's thread; see `Session.run`."""
-        if session.creature is not self._creature:
-            self._creature = session.creature
-            self._view.show(session.creature)
-            self._fit(session.creature)
-        self._view.pose(session.episodes.qpos(share), session.episodes.markers(share))
+        walker, kept = session.walker, session.kept
+        creatures = walker.creature, kept and kept.creature
+        if any(new is not old for new, old in zip(creatures, self._creatures, strict=True)):
+            self._creatures = creatures
+            self._view.show(*creatures)
+            self._fit(walker.creature)
+        beside = kept and kept.episodes.qpos(kept.share)
+        self._view.pose(walker.episodes.qpos(walker.share), walker.episodes.markers(walker.share), beside)
         if time.monotonic() - self._drawn > _CHARTS_EVERY:
             self._drawn = time.monotonic()
             self._status.content = texts.status(session)
@@ -137,52 +145,33 @@ class Page:
             command.on_trigger(lambda event, call=calls[label]: call())
         charts = self._gui.add_checkbox("Charts", True)
         charts.on_update(lambda event: setattr(self._panel, "visible", event.target.value))
+        keep = self._gui.add_checkbox("Keep beside", False, hint="This creature walks beside all later ones")
+        keep.on_update(lambda event: self._session.keep(event.target.value))
 
     def _add_body(self, first: Sketch) -> None:
-        gui, widgets = self._gui, self._widgets
+        gui = self._gui
         self._check = gui.add_folder("Check")
-        sources = _listed(first.source, sketches.sources())
-        widgets["source"] = gui.add_dropdown("Body", sources, initial_value=first.source)
-        widgets["legs"] = gui.add_slider("Legs", *generator.LEGS, 1, first.legs)
-        widgets["links"] = gui.add_slider("Links", *generator.LINKS, 1, first.links)
-        widgets["layout"] = gui.add_dropdown("Layout", [OWN, *generator.LAYOUTS], initial_value=first.layout)
-        widgets["seed"] = gui.add_number("Seed", first.seed, min=0, max=2**32 - 1, step=1)
-        upload = gui.add_upload_button("Open a spec file", mime_type="application/json")
+        self._widgets |= layout.source(gui, first)
+        upload = gui.add_upload_button("Open a spec or a design", mime_type="application/json")
         upload.on_upload(self._uploaded)
-        for name, label, low, high, step in _PROPORTIONS:
-            widgets[name] = gui.add_slider(label, low, high, step, getattr(first, name))
-        palettes = _listed(first.palette, (OWN, *PALETTES))
-        widgets["palette"] = gui.add_dropdown("Palette", palettes, initial_value=first.palette)
-        with gui.add_folder("Length of links"):
-            self._lengths = [gui.add_slider("", 0.5, 2.0, 0.05, 1.0, visible=False) for _ in range(_LINKS)]
+        self._widgets |= layout.shape(gui, first)
+        self._shape = gui.add_folder("Links")
+        with self._shape:
+            self._leg = gui.add_dropdown("Legs to change", [_ALL], initial_value=_ALL)
+            self._leg.on_update(lambda event: self._render())
+            self._symmetric = gui.add_checkbox("Symmetric", True, hint="The leg across changes, too")
+            self._dragging = gui.add_checkbox("Drag joints", False, hint="Time stands still; drag the balls")
+            self._dragging.on_update(lambda event: self._session.do(self._let_drag))
+            self._lengths = [gui.add_slider("", *layout.FACTORS, 1.0, visible=False) for _ in range(layout.LINKS)]
         for index, slider in enumerate(self._lengths):
             slider.on_update(functools.partial(self._lengthened, index))
 
-    def _add_task(self, first: Sketch) -> None:
-        gui, widgets = self._gui, self._widgets
-        widgets["task"] = gui.add_dropdown("Task", _listed(first.task, TASKS), initial_value=first.task)
-        widgets["ground"] = gui.add_dropdown("Ground", _listed(first.ground, ARENAS), initial_value=first.ground)
-        widgets["gait"] = gui.add_dropdown("Gait", [OWN, *gaits.NAMES], initial_value=first.gait)
-        widgets["speed"] = gui.add_slider("Speed", 0.2, 2.0, 0.05, first.speed, hint="Multiple of the body's own")
-        most = max(3.0, first.kicks)
-        widgets["kicks"] = gui.add_slider("Kicks", 0.0, most, 0.1, first.kicks, hint="At most, sqrt(g h)")
-        widgets["settings"] = gui.add_text("Settings", first.settings, hint="Of the task, as a JSON object")
-        widgets["policy"] = gui.add_dropdown("Policy", _listed(first.policy, POLICIES), initial_value=first.policy)
-        presets = _listed(first.preset, (OWN, *preset_names()))
-        widgets["preset"] = gui.add_dropdown("Preset", presets, initial_value=first.preset)
-
     def _add_command(self) -> None:
-        gui, widgets = self._gui, self._widgets
-        widgets["by_hand"] = gui.add_checkbox("By hand", True, hint="Else the task's own command")
-        for name in VELOCITY:
-            widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.05, self._first.value(name))
+        gui = self._gui
+        self._widgets |= layout.velocity(gui, self._first)
         self._direction = gui.add_folder("Pose and gait")
         with self._direction:
-            widgets["gait_now"] = gui.add_dropdown("Gait now", [direction.OWN], initial_value=direction.OWN)
-            hint = "Multiple of the gait's own"
-            widgets["tempo"] = gui.add_slider("Frequency", *direction.TEMPI, 0.05, 1.0, hint=hint)
-            for name in POSE:
-                widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.01, 0.0, hint="Standing heights or rad")
+            self._widgets |= layout.pose(gui)
             gui.add_button("Upright").on_click(lambda event: self._stand())
         for label, key, change in _KEYS:
             command = gui.add_command(label, hotkey=key)
@@ -190,9 +179,11 @@ class Page:
         gui.add_html(texts.line(f"Keys: {_KEYS_TOLD}"))
         gui.add_button("Kick").on_click(lambda event: self._session.kick(random.uniform(-math.pi, math.pi)))
         gui.add_button("Restart").on_click(lambda event: self._session.restart())
-        gui.add_checkbox("Pause", False).on_update(lambda event: self._session.pause(event.target.value))
+        self._pause = gui.add_checkbox("Pause", False)
+        self._pause.on_update(lambda event: self._session.pause(event.target.value))
 
     def _add_files(self) -> None:
+        self._gui.add_button("Save Design", hint="All that the page says").on_click(self._save_design)
         for file in saving.FILES:
             button = self._gui.add_button(f"Save {file.label}")
             button.on_click(functools.partial(self._save, file))
@@ -201,12 +192,15 @@ class Page:
     def _fit(self, creature: Creature) -> None:
         """Show the choices, the check and the lines that belong to a creature."""
         body, widgets = creature.setup.body, self._widgets
-        widgets["gait"].options = _listed(creature.sketch.gait, (OWN, *gaits.fitting(body)))
-        widgets["preset"].options = _listed(creature.sketch.preset, (OWN, *presets_of(body)))
-        self._show_what_applies(creature.sketch)
-        self._links = creature.links[:_LINKS]
+        widgets["gait"].options = layout.listed(creature.sketch.gait, (OWN, *gaits.fitting(body)))
+        widgets["preset"].options = layout.listed(creature.sketch.preset, (OWN, *presets_of(body)))
+        legs = (_ALL, *(leg.name for leg in body.legs))
+        if self._leg.value not in legs:
+            self._leg.value = _ALL
+        self._leg.options = legs
         self._fit_direction(creature)
         self._render()
+        self._show_balls()
         for handle in self._cures:
             handle.remove()
         with self._check:
@@ -222,30 +216,54 @@ class Page:
     def _fit_direction(self, creature: Creature) -> None:
         """Offer the poses and gaits of a body, if they are by command in its task."""
         task, widgets = creature.environment.task.definition, self._widgets
-        self._direction.visible = direction.directs(task)
-        if not self._direction.visible:
+        self._fixed = frozenset()
+        if not direction.directs(task):
             return
         widgets["gait_now"].options = list(direction.named(task))
-        for name, (low, high) in zip(POSE, direction.room(creature.setup.body), strict=True):
-            widgets[name].visible = bool(low < high)
-            if widgets[name].visible:
-                widgets[name].min, widgets[name].max = float(low), float(high)
-
-    def _show_what_applies(self, sketch: Sketch) -> None:
-        for name in ("legs", "links", "layout"):
-            self._widgets[name].visible = sketch.source == LEGS
-        self._widgets["seed"].visible = sketch.source == RANDOM
+        rooms = dict(zip(POSE, direction.room(creature.setup.body), strict=True))
+        self._fixed = frozenset(name for name, (low, high) in rooms.items() if low >= high)
+        for name in rooms.keys() - self._fixed:
+            widgets[name].min, widgets[name].max = map(float, rooms[name])
 
     def _render(self) -> None:
-        """Have the widgets say the state, as far as they can."""
-        state = self._edits.now
-        self._widgets["source"].options = _listed(state.sketch.source, sketches.sources())
-        for name, widget in self._widgets.items():
-            widget.value = _shown(widget, state.value(name))
-        given = dict(state.sketch.lengths)
-        for slider, name in itertools.zip_longest(self._lengths, self._links):
-            slider.visible = name is not None  # none is removed: a browser that is late would update it
-            slider.label, slider.value = name or "", given.get(name, 1.0)
+        """Have the widgets say the state, as far as they can; what has no effect is not shown."""
+        with self._lock:
+            state, creature = self._edits.now, self._session.creature
+            idle = without_effect(creature, state.command) | self._fixed
+            self._widgets["source"].options = layout.listed(state.sketch.source, sketches.sources())
+            for name, widget in self._widgets.items():
+                widget.value = _shown(widget, state.value(name))
+                _show(widget, name not in idle)
+            _show(self._direction, "tempo" not in idle)
+            _show(self._shape, "lengths" not in idle)
+            self._links = self._shown_links(creature) if self._shape.visible else ()
+            for slider, name in itertools.zip_longest(self._lengths, self._links):
+                _show(slider, name is not None)  # none is removed: a browser that is late would update it
+                if slider.label != (name or ""):
+                    slider.label = name or ""
+                slider.value = _shown(slider, 1.0 if name is None else length(state.sketch, name))
+
+    def _shown_links(self, creature: Creature) -> tuple[str, ...]:
+        """The names of the links of all legs, or of the parts of the one to change."""
+        chosen = [leg for leg in creature.setup.body.legs if leg.name == self._leg.value]
+        names = tuple(leg.full_name(link) for leg in chosen for link in leg.links) or creature.links
+        return names[: layout.LINKS]
+
+    def _let_drag(self) -> None:
+        """Have time stand still at the start of an episode while joints are dragged."""
+        self._pause.value = self._dragging.value
+        if self._dragging.value:
+            self._session.restart()
+        self._show_balls()
+
+    def _show_balls(self) -> None:
+        self._view.handles(self._dragged if self._dragging.value and self._shape.visible else None)
+
+    def _dragged(self, part: str, by: np.ndarray) -> None:
+        """Move the end of a link, in the frame of the link, m."""
+        symmetric = self._symmetric.value
+        self._edit(lambda state: state._replace(sketch=dragged(state.sketch, part, by, symmetric)), part)
+        self._render()
 
     def _edit(self, state: Callable[[State], State], name: str) -> None:
         """Take another state, which depends on that of now, under a name of what changes it."""
@@ -281,11 +299,12 @@ class Page:
     async def _changed(self, name: str, event: viser.GuiEvent) -> None:  # viser keeps the order of async calls alone
         if event.client_id is not None:  # a visitor changed it, and not the page itself
             self._edit(lambda state: state.having(**{name: event.target.value}), name)
+            self._render()
 
     async def _lengthened(self, index: int, event: viser.GuiEvent) -> None:
         if event.client_id is not None and index < len(self._links):
-            link, factor = self._links[index], event.target.value
-            self._edit(lambda state: state._replace(sketch=lengthened(state.sketch, link, factor)), link)
+            link, factor, symmetric = self._links[index], event.target.value, self._symmetric.value
+            self._edit(lambda state: state._replace(sketch=lengthened(state.sketch, link, factor, symmetric)), link)
 
     def _sketched(self, sketch: Sketch, name: str) -> None:
         """Take another sketch, and show it."""
@@ -294,7 +313,27 @@ class Page:
 
     def _uploaded(self, event: viser.GuiEvent) -> None:
         text = event.target.value.content[: MAX_IMPORTED + 1].decode("utf-8", "replace")
-        self._sketched(opened_file(self._edits.now.sketch, text), "file")
+        try:
+            state = self._opened(text) if is_state(text) else None
+        except ValueError as error:
+            self._session.refuse(str(error))
+            return
+        self._edit(lambda now: state or now._replace(sketch=opened_file(now.sketch, text)), "file")
+        self._render()
+
+    def _opened(self, text: str) -> State:
+        """Return the state of a file, which imports nothing and asks for no more than the widgets offer."""
+        state = from_json(text)
+        for name in ("task", "policy"):
+            checks.name(state.value(name), self._widgets[name].options, name)
+        for name in (field.name for field in dataclasses.fields(Command) if field.name != "gait_now"):
+            if not offers(self._widgets[name], state.value(name)) and name not in POSE:
+                raise ValueError(f"command.{name}: expected a value that its slider has, got {state.value(name)!r}")
+        return state
+
+    def _save_design(self, event: viser.GuiEvent) -> None:
+        name = f"{self._session.creature.setup.body.name}_design.json"
+        event.client.send_file_download(name, to_json(self._edits.now).encode(), save_immediately=True)
 
     def _stand(self) -> None:
         """Ask for the pose at rest and the body's own gait, at its own frequency."""
@@ -326,13 +365,9 @@ class Page:
             note.remove()
 
 
-def _listed(chosen: str, names: Iterable[str]) -> list[str]:
-    """Return names for a list to choose from, with the chosen one."""
-    return list(dict.fromkeys((*names, chosen)))
-
-
-def _label(name: str) -> str:
-    return name.replace("_", " ").capitalize()
+def _show(widget: Any, visible: bool) -> None:
+    if widget.visible != visible:  # else viser sends it all the same
+        widget.visible = visible
 
 
 def _shown(widget: Any, value: Any) -> Any:

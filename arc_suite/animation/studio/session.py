@@ -21,15 +21,46 @@ _WINDOW = 2.0  # s, over which the pace is a mean
 _KICK = 1.0  # change of the torso's velocity, sqrt(g h)
 
 
-class Session:
-    """The creature that walks, and the sketch that is asked for next.
-
-    A creature is made in a thread of its own while the one before walks on. All else happens in the loop of `run`.
+class Walker:
+    """A creature with its episodes, in its own time.
 
     Attributes:
         creature: that walks.
         episodes: of the creature.
         history: of the episodes.
+    """
+
+    def __init__(self, creature: Creature):
+        """Start the first episode."""
+        self.creature = creature
+        self.episodes = Episodes(creature.environment, creature.act)
+        self.history = History(self.episodes)
+        self._ahead = 0.0
+
+    @property
+    def share(self) -> float:
+        """Return the share, 0 to 1, of the latest control step that has passed."""
+        return self._ahead / self.episodes.control_timestep
+
+    def advance(self, seconds: float) -> float:
+        """Take the control steps of some time, and return how long they are, s."""
+        step, steps = self.episodes.control_timestep, 0
+        self._ahead += seconds
+        while self._ahead >= step:
+            self.episodes.step()
+            self.history.observe()
+            self._ahead, steps = self._ahead - step, steps + 1
+        return steps * step
+
+
+class Session:
+    """The creature that walks, one that was kept beside it, and the sketch that is asked for next.
+
+    A creature is made in a thread of its own while the one before walks on. All else happens in the loop of `run`.
+
+    Attributes:
+        walker: of the latest sketch.
+        kept: that walks beside it under the same command, or None.
         error: one line, why the latest sketch made no creature; empty if it did.
         desired: (3,) command that visitors have set; None for that of the task.
         pose: (6,) that they have set, or None; see `posture`.
@@ -49,12 +80,36 @@ class Session:
         self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
         self.pose: np.ndarray | None = np.zeros(6)
         self.gait: tuple[str | None, float] = direction.OWN, 1.0
+        self.kept: Walker | None = None
         self._replace(opened(sketch))
+
+    @property
+    def creature(self) -> Creature:
+        """Return the creature of the latest sketch."""
+        return self.walker.creature
+
+    @property
+    def episodes(self) -> Episodes:
+        """Return its episodes."""
+        return self.walker.episodes
+
+    @property
+    def history(self) -> History:
+        """Return the history of its episodes."""
+        return self.walker.history
 
     def ask(self, sketch: Sketch) -> None:
         """Ask for another creature, from any thread; of several that wait, the latest is made."""
         self._asked = sketch
         self._maker.submit(self._make)
+
+    def keep(self, kept: bool) -> None:
+        """Have the present creature walk beside all later ones, or the kept one leave, from any thread."""
+        self._maker.submit(self._keep, self.creature.sketch if kept else None)
+
+    def refuse(self, line: str) -> None:
+        """Tell why something makes no creature, from any thread."""
+        self.do(functools.partial(self._refuse, line))
 
     def do(self, call: Callable[[], None]) -> None:
         """Have the loop call something between two control steps, from any thread."""
@@ -65,7 +120,7 @@ class Session:
 
         def change():
             self.desired = None if desired is None else np.array(desired)
-            self.episodes.command(self.desired)
+            self._direct()
 
         self.do(change)
 
@@ -74,7 +129,7 @@ class Session:
 
         def change():
             self.pose, self.gait = None if pose is None else np.array(pose), (gait, tempo)
-            self.episodes.direct(self.pose, *self.gait)
+            self._direct()
 
         self.do(change)
 
@@ -88,16 +143,17 @@ class Session:
         """Kick the torso in a direction of the world, rad, from any thread."""
 
         def change():
-            environment = self.episodes.environment
-            gravity = -environment.physics.model.opt.gravity[2]
-            speed = _KICK * np.sqrt(gravity * environment.task.body.torso.standing_height)
-            environment.physics.data.qvel[:2] += speed * np.array((np.cos(angle), np.sin(angle)))
+            for walker in self._walkers():
+                environment = walker.episodes.environment
+                gravity = -environment.physics.model.opt.gravity[2]
+                speed = _KICK * np.sqrt(gravity * environment.task.body.torso.standing_height)
+                environment.physics.data.qvel[:2] += speed * np.array((np.cos(angle), np.sin(angle)))
 
         self.do(change)
 
     def restart(self) -> None:
         """Start the next episode, from any thread."""
-        self.do(lambda: self.episodes.restart())
+        self.do(lambda: [walker.episodes.restart() for walker in self._walkers()])
 
     def pause(self, paused: bool) -> None:
         """Stop the time, or let it go on, from any thread."""
@@ -107,26 +163,24 @@ class Session:
         """End `run`, from any thread."""
         self.open = False
 
-    def run(self, show: Callable[["Session", float], None]) -> None:
+    def run(self, show: Callable[["Session"], None]) -> None:
         """Step in real time until the session is closed; a machine that is too slow shows slow motion.
 
         Args:
-            show: called after control steps, `STATES` times a second at most, with the session and the share, 0 to 1,
-                of the latest control step that has passed.
+            show: called after control steps, `STATES` times a second at most, with the session.
         """
         begun = last = due = time.monotonic()
-        ahead = simulated = 0.0
+        simulated = 0.0
         while self.open:
             while not self._calls.empty():
                 self._calls.get()()
-            step, now = self.episodes.control_timestep, time.monotonic()
-            ahead += 0.0 if self.paused else min(now - last, LONGEST)
+            now = time.monotonic()
+            passed = 0.0 if self.paused else min(now - last, LONGEST)
             last = now
-            while ahead >= step:
-                self.episodes.step()
-                self.history.observe()
-                ahead, simulated = ahead - step, simulated + step
-            show(self, ahead / step)
+            simulated += self.walker.advance(passed)
+            if self.kept is not None:
+                self.kept.advance(passed)
+            show(self)
             if now - begun > _WINDOW:
                 self.pace, begun, simulated = simulated / (now - begun), now, 0.0
             due = max(due + 1.0 / STATES, now := time.monotonic())
@@ -151,9 +205,24 @@ class Session:
     def _refuse(self, line: str) -> None:
         self.error = " ".join(line.split())
 
+    def _keep(self, sketch: Sketch | None) -> None:
+        kept = None if sketch is None else Walker(opened(sketch))  # with an environment of its own
+
+        def change():
+            self.kept = kept
+            self._direct()
+
+        self.do(change)
+
     def _replace(self, creature: Creature) -> None:
-        self.creature, self.error = creature, ""
-        self.episodes = Episodes(creature.environment, creature.act)
-        self.episodes.command(self.desired)
-        self.episodes.direct(self.pose, *self.gait)
-        self.history = History(self.episodes)
+        self.walker, self.error = Walker(creature), ""
+        self._direct()
+
+    def _walkers(self) -> list[Walker]:
+        return [self.walker] if self.kept is None else [self.walker, self.kept]
+
+    def _direct(self) -> None:
+        """Have all that walk follow the command."""
+        for walker in self._walkers():
+            walker.episodes.command(self.desired)
+            walker.episodes.direct(self.pose, *self.gait)

@@ -1,20 +1,24 @@
 """What the widgets say, as one value, and the body, task and lines of text that it makes."""
 
 import dataclasses
+import functools
 import json
+import math
 import shlex
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from arc_suite import checks, registry
 from arc_suite.envs.setup import Setup
 from arc_suite.models import families
 from arc_suite.robots import ROBOTS, generator, palettes
-from arc_suite.robots.shaping import Shape, link_names, shaped
-from arc_suite.robots.spec import Body
+from arc_suite.robots.shaping import Shape, link_ends, link_names, shaped
+from arc_suite.robots.spec import Body, Leg, Vector
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json
 
 LEGS, RANDOM, FILE = "legs and links", "random", "file"
 _DOING = ("task", "gait", "speed", "ground", "kicks", "settings", "policy", "preset")  # fields that are not the body's
+_SAME = 3e-5  # of the lengths of two vectors, by which they may differ: ends are rounded
 OWN = "own"  # the gait, layout or preset that the body or task has by itself
 
 
@@ -31,6 +35,7 @@ class Sketch:
         file: the text of a spec file, of `FILE`.
         scale, length, width, thickness, fan: see `shaping.Shape`.
         lengths: factors of links, pairs of a name and a number; those of links that the body lacks are ignored.
+        ends: see `shaping.Shape`, pairs of a part's name and an end; those of parts that the body lacks are ignored.
         palette: of colors, a name of `spec.PALETTES`, a seed in digits, or `OWN`.
         task: name of the task.
         gait: name of the gait, or `OWN`.
@@ -54,6 +59,7 @@ class Sketch:
     thickness: float = 1.0
     fan: float = 0.0
     lengths: tuple[tuple[str, float], ...] = ()
+    ends: tuple[tuple[str, Vector], ...] = ()
     palette: str = OWN
     task: str = "directed"
     gait: str = OWN
@@ -76,14 +82,18 @@ def source_body(sketch: Sketch) -> Body:
     Raises:
         ValueError: an unknown source, a value out of range, or a file that holds no body.
     """
-    if sketch.source == LEGS:
-        return generator.generate(sketch.legs, sketch.links, _given(sketch.layout))
-    if sketch.source == RANDOM:
-        return families.sound_body(sketch.seed)
-    if sketch.source == FILE:
-        return body_from_json(sketch.file)
-    name = checks.name(sketch.source, sources(), "source", near=(FILE,))
-    return registry.body_of(name)
+    return _source_body(sketch.source, sketch.legs, sketch.links, _given(sketch.layout), sketch.seed, sketch.file)
+
+
+@functools.lru_cache(maxsize=8)
+def _source_body(source: str, legs: int, links: int, layout: str | None, seed: int, file: str) -> Body:
+    if source == LEGS:
+        return generator.generate(legs, links, layout)
+    if source == RANDOM:
+        return families.sound_body(seed)
+    if source == FILE:
+        return body_from_json(file)
+    return registry.body_of(checks.name(source, sources(), "source", near=(FILE,)))
 
 
 def body(sketch: Sketch) -> Body:
@@ -97,17 +107,25 @@ def body(sketch: Sketch) -> Body:
     return made if sketch.palette == OWN else made.replace(palette=palettes.parsed(sketch.palette))
 
 
+def field(sketch: Sketch) -> Mapping[str, Any]:
+    """Return the further settings of the task.
+
+    Raises:
+        ValueError: the field holds no JSON object.
+    """
+    try:
+        return checks.mapping("settings", json.loads(sketch.settings.strip() or "{}"))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
+
+
 def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
     """Return the settings of the task, `task_kwargs` of `arc_suite.load`; those of the field come before the sliders'.
 
     Raises:
         ValueError: the field holds no JSON object, a gait that does not fit, or an arena that is not registered.
     """
-    try:
-        field = checks.mapping("settings", json.loads(sketch.settings.strip() or "{}"))
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
-    kind = registry.task_of(sketch.task)
+    given, kind = field(sketch), registry.task_of(sketch.task)
     found: dict[str, Any] = {} if sketch.gait == OWN else {"gait": sketch.gait}
     if sketch.speed != 1.0:
         own = getattr(kind.settings_for(made, found), "parameters", None)
@@ -119,7 +137,7 @@ def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
         found["arena"] = sketch.ground
     if sketch.kicks:
         found["kicks"] = sketch.kicks
-    found |= field
+    found |= given
     registry.imported("arena", str(found.get("arena", "flat")))  # a visitor of the page imports nothing
     return found
 
@@ -185,10 +203,71 @@ def cured(sketch: Sketch, cure: Body) -> Sketch:
     return opened_file(sketch, body_to_json(cure))
 
 
-def lengthened(sketch: Sketch, link: str, factor: float) -> Sketch:
-    """Return the sketch with another factor of the length of a link."""
+def length(sketch: Sketch, link: str) -> float:
+    """Return the length of a link as a multiple of the body's own.
+
+    Args:
+        sketch: of the body.
+        link: name of a link of all legs, or of the part that it is of one leg.
+    """
+    own = link_ends(source_body(sketch))
+    if link not in own:
+        return dict(sketch.lengths).get(link, 1.0)
+    return math.hypot(*dict(sketch.ends).get(link, own[link])) / math.hypot(*own[link])
+
+
+def lengthened(sketch: Sketch, link: str, factor: float, symmetric: bool) -> Sketch:
+    """Return the sketch with another length of a link, as `length` returns it; `symmetric` as for `moved`."""
+    own = link_ends(source_body(sketch))
+    if link in own:
+        ratio, end = factor / length(sketch, link), dict(sketch.ends).get(link, own[link])
+        return moved(sketch, link, tuple(ratio * number for number in end), symmetric)
     lengths = dict(sketch.lengths) | {link: factor}
     return dataclasses.replace(sketch, lengths=tuple((name, each) for name, each in lengths.items() if each != 1.0))
+
+
+def dragged(sketch: Sketch, part: str, by: Sequence[float], symmetric: bool) -> Sketch:
+    """Return the sketch with the end of a link of one leg moved in its frame, m as the body is; see `moved`."""
+    own = link_ends(source_body(sketch))
+    factor = sketch.scale * next((each for name, each in sketch.lengths if part.endswith(f"_{name}")), 1.0)
+    end = dict(sketch.ends).get(part, own[part])
+    return moved(sketch, part, tuple(old + new / factor for old, new in zip(end, by, strict=True)), symmetric)
+
+
+def moved(sketch: Sketch, part: str, end: Vector, symmetric: bool) -> Sketch:
+    """Return the sketch with another end of a link of one leg.
+
+    Args:
+        sketch: to change.
+        part: name of the link's part, which the body may lack.
+        end: (3,) in the frame of the link, before proportions change, m.
+        symmetric: whether the leg across the body's plane of symmetry gets the mirrored end, if there is one.
+    """
+    made, (x, y, z) = source_body(sketch), (float(f"{number:.5g}") for number in end)
+    own, across = link_ends(made), _across(made, part) if symmetric else None
+    ends = dict(sketch.ends) | {part: (x, y, z)} | ({across: (x, -y, z)} if across else {})
+    changed = tuple((name, each) for name, each in ends.items() if not _near(each, own.get(name, each[:0])))
+    return dataclasses.replace(sketch, ends=changed)
+
+
+def _across(made: Body, part: str) -> str | None:
+    """The name of the part in the leg that mirrors a part's leg; None without one."""
+    for leg in made.legs:
+        if part in leg.part_names:
+            reflected = [(x, -y, z) for x, y, z in leg.points]
+            others = (other for other in made.legs if other is not leg and len(other.points) == len(reflected))
+            return next(
+                (other.part_names[leg.part_names.index(part)] for other in others if _alike(other, reflected)), None
+            )
+    return None
+
+
+def _alike(leg: Leg, points: list[Vector]) -> bool:
+    return all(_near(mine, other) for mine, other in zip(leg.points, points, strict=True))
+
+
+def _near(one: Vector, other: Vector) -> bool:
+    return len(one) == len(other) and math.dist(one, other) <= _SAME * math.hypot(*one, *other)
 
 
 def command_line(sketch: Sketch) -> str:
@@ -219,7 +298,8 @@ def _given(choice: str) -> str | None:
 
 def _shape(sketch: Sketch, made: Body) -> dict[str, Any]:
     """The changes of proportions of a body, without those that change nothing."""
-    shape = {name: getattr(sketch, name) for name in Shape._fields if name != "links"}
+    shape = {name: getattr(sketch, name) for name in Shape._fields if name not in ("links", "ends")}
     names = link_names(made)
     shape["links"] = {name: factor for name, factor in sketch.lengths if factor != 1.0 and name in names}
+    shape["ends"] = {name: end for name, end in sketch.ends if name in link_ends(made)}
     return {name: value for name, value in shape.items() if value != getattr(Shape(), name)}

@@ -1,9 +1,11 @@
 """What the whole page says, as one value, and a history of such values: undo and redo replace the value."""
 
 import dataclasses
+import json
 import math
 from typing import Any, NamedTuple
 
+from arc_suite import checks
 from arc_suite.animation import direction
 from arc_suite.animation.studio.sketch import Sketch
 
@@ -120,3 +122,68 @@ def undone(edits: Edits) -> Edits:
 def redone(edits: Edits) -> Edits:
     """Return the history at the state that was undone last; the same if there is none."""
     return Edits(edits.after[0], (*edits.before, edits.now), edits.after[1:]) if edits.after else edits
+
+
+def to_json(state: State) -> str:
+    """Return a state as JSON: what differs from the defaults."""
+    parts = {}
+    for name, part in state._asdict().items():
+        fields = {field.name: (getattr(part, field.name), field.default) for field in dataclasses.fields(part)}
+        parts[name] = {field: value for field, (value, default) in fields.items() if value != default}
+    return json.dumps(parts, indent=2)
+
+
+def is_state(text: str) -> bool:
+    """Return whether a text is meant as a state, and not as the spec of a body."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(value, dict) and set(State._fields) <= set(value)
+
+
+def from_json(text: str) -> State:
+    """Return the state that a text describes; whether its names and numbers fit turns out when it is opened.
+
+    Raises:
+        ValueError: an unknown field, or a value of another kind.
+    """
+    value = json.loads(text)
+    return State(_read(Sketch, value["sketch"], "sketch"), _read(Command, value["command"], "command"))
+
+
+def _read(kind: type, value: Any, what: str) -> Any:
+    """Return a sketch or a command, of JSON."""
+    defaults = {field.name: field.default for field in dataclasses.fields(kind)}
+    given = {}
+    for name, each in checks.mapping(what, value).items():
+        checks.name(name, defaults, f"field of the {what}")
+        given[name] = _KINDS[type(defaults[name])](f"{what}.{name}", each)
+    return kind(**given)
+
+
+def _text(what: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{what}: expected a text, got {checks.shown(value)}")
+    return value
+
+
+def _pairs(what: str, value: Any) -> tuple:
+    """Pairs of a name with a number or with three of them."""
+    found = []
+    for pair in value if isinstance(value, list) else [value]:
+        name, given = pair if isinstance(pair, list) and len(pair) == 2 else (None, None)
+        if not isinstance(name, str):
+            raise ValueError(f"{what}: expected pairs of a name and its value, got {checks.shown(value)}")
+        several = what.endswith("ends")
+        found.append((name, tuple(checks.array(what, given, 3).tolist()) if several else checks.number(what, given)))
+    return tuple(found)
+
+
+_KINDS: dict[type, Any] = {
+    bool: checks.boolean,
+    int: lambda what, value: checks.integer(what, value, 0),
+    float: checks.number,
+    str: _text,
+    tuple: _pairs,
+}

@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import Creature
-from arc_suite.animation.studio.session import Session
+from arc_suite.animation.studio.session import Session, Walker
 from arc_suite.animation.studio.sketch import Sketch
 
 _REAL = 0.97  # of real time, from which the pace is called so
@@ -18,17 +18,22 @@ _COPY = (
 
 def status(session: Session) -> str:
     """Return lines about the walk and the machine, as HTML; the first is the error, if there is one."""
-    creature, episodes, history = session.creature, session.episodes, session.history
-    speed = history.speeds()[-1] if len(history) else 0.0
+    episodes = session.episodes
     pace = "paused" if session.paused else "real time" if session.pace > _REAL else f"{session.pace:.2f} of real time"
     told = {
-        "walks": f"{creature.setup.body.name}, {creature.setup.kind.name}, {speed:.2f} m/s",
+        "walks": _walk(session.walker),
+        **({} if session.kept is None else {"kept": _walk(session.kept)}),
         "return": f"{episodes.earned:.0f} in {episodes.steps * episodes.control_timestep:.1f} s",
         "pace": pace,
     }
     lines = [_element("tr", _element("td", name), _element("td", value)) for name, value in told.items()]
     error = [_element("p", session.error, role="alert", style="color:#b3261e")] if session.error else []
     return _html(_element("div", *error, _element("table", *lines, id="status"), style=f"{_SMALL};padding:0 1em 0.6em"))
+
+
+def _walk(walker: Walker) -> str:
+    setup, history = walker.creature.setup, walker.history
+    return f"{setup.body.name}, {setup.kind.name}, {history.speeds()[-1] if len(history) else 0.0:.2f} m/s"
 
 
 def checked(creature: Creature) -> str:

@@ -3,7 +3,9 @@
 Lengths are in a `unit`, how far the creatures extend, so that the camera suits any size. The world moves under it.
 """
 
+import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import viser
@@ -22,8 +24,9 @@ _FOLLOW = 0.1  # of the difference, by which the camera follows the height of th
 _THIN: dict = {"thickness": 1.5, "thickness_units": "screen"}  # pixels
 _RAISED = 0.005  # units, of lines over the ground
 _SAME = 0.02  # units, by which an arrow may be off
+_LANE = 0.9  # of both creatures' reach, between the one of now and the one that is kept
 _CAMERA, _TARGET = (2.85, -3.9, 1.9), (0.0, 0.0, 0.25)  # units
-_OVER_SHEET = (0.0, 0.0, -2.3)  # where the camera of a phone looks, whose lower part a sheet of widgets covers
+_OVER_SHEET = (0.0, 0.0, -1.9)  # where the camera of a phone looks, whose lower part a sheet of widgets covers
 _PHONE = 500  # pixels, of the width of a picture
 _ANGLE = math.radians(35.0)  # of the camera, over the shorter side of a picture
 _SKY, _GROUND, _LINES, _STEPS = (163, 173, 184), (93, 104, 117), (141, 153, 166), (93, 104, 117)
@@ -48,34 +51,59 @@ class View:
         camera.position, camera.look_at, camera.fov = _CAMERA, _TARGET, _ANGLE
         server.on_client_connect(_aim)
 
-    def show(self, creature: Creature) -> None:
-        """Take the creature of the one before, in its pose of now."""
-        self._creature, self._unit = creature, creature.reach
+    def show(self, creature: Creature, kept: Creature | None = None) -> None:
+        """Take the creature of the one before, in its pose of now, and one that is kept beside it."""
+        self._creature, self._unit, self._lane = creature, creature.reach, np.zeros(3)
+        if kept is not None:
+            self._lane[1] = _LANE * (creature.reach + kept.reach)
+            self._unit = max(creature.reach, kept.reach) + 0.5 * self._lane[1]
         with self._server.atomic():
             self._server.scene.remove_by_name("/world")
             self._world = self._server.scene.add_frame("/world", show_axes=False)
-            self._figure = Figure(self._server.scene, "/world", creature, self._unit)
-            self._height = 0.0
+            self._figure = Figure(self._server.scene, "/world/now", creature, self._unit)
+            self._kept = kept and Figure(self._server.scene, "/world/kept", kept, self._unit)
+            self._height, self._aside = 0.0, np.full(3, np.inf)
             self._draw_ground()
             self._anchor = self._server.scene.add_frame("/world/markers", show_axes=False)
             self._arrows, self._cylinders = None, {}
 
-    def pose(self, qpos: np.ndarray, markers: list[Marker]) -> None:
+    def pose(self, qpos: np.ndarray, markers: list[Marker], kept: np.ndarray | None = None) -> None:
         """Take a pose.
 
         Args:
             qpos: (nq,) positions.
             markers: of the task.
+            kept: positions of the creature that is kept, if one is.
         """
         with self._server.atomic():
-            place = self._figure.pose(qpos, lambda place: place) / self._unit
+            place = self._figure.pose(qpos, lambda place: place)
+            if self._kept is not None:
+                self._kept.pose(kept, functools.partial(self._beside, place))
+            middle, place = (place + 0.5 * self._lane) / self._unit, place / self._unit
             if self._ground_is_stale(place):
                 self._draw_ground()
             floor = float(self._arena.height(*place[:2] * self._unit)) / self._unit
             self._height += _FOLLOW * (floor - self._height)
-            self._world.position = (-place[0], -place[1], -self._height)
+            self._world.position = (-middle[0], -middle[1], -self._height)
             self._anchor.position = place * (1.0, 1.0, 0.0)
             self._mark(markers, place * (1.0, 1.0, 0.0))
+
+    def handles(self, dragged: Callable[[str, np.ndarray], None] | None) -> None:
+        """Show balls to drag the creature's links by, or hide them; see `Figure.handles`."""
+        with self._server.atomic():
+            self._figure.handles(dragged)
+
+    def _beside(self, place: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Return where the scene shows the kept creature, whose torso is at a place of its `own`, m.
+
+        It walks as far as it does, and is set beside the other one again where it would leave the picture.
+        """
+        if not np.linalg.norm(own + self._aside - place - self._lane) < self._lane[1]:
+            self._aside = (place + self._lane - own) * (1.0, 1.0, 0.0)
+        shown = own + self._aside
+        arena = self._kept.creature.environment.task.definition.scene.arena
+        rise = float(self._arena.height(*shown[:2])) - float(arena.height(*own[:2]))
+        return shown + (0.0, 0.0, rise)
 
     def _add(self, name: str, mesh: Mesh, color: tuple[int, int, int]):
         return self._server.scene.add_mesh_simple(name, mesh.points / self._unit, mesh.triangles, color=color)

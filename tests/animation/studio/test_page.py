@@ -10,15 +10,16 @@ import pytest
 
 from arc_suite import rotations
 from arc_suite.animation import direction
+from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import FILE, Sketch
-from arc_suite.robots import gaits, generator
+from arc_suite.robots import gaits, generator, shaping
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 
 viser = pytest.importorskip("viser", reason="no viser here: make check-studio")
 from arc_suite.animation.studio import page as pages  # noqa: E402
 
-_PATIENCE = 90.0  # s: a browser that draws without a graphics card is slow
+_PATIENCE = 240.0  # s: a browser that draws without a graphics card is slow
 
 HIGH = generator.generate(6, 2)
 HIGH = HIGH.replace(torso=HIGH.torso.replace(standing_height=0.5))
@@ -62,7 +63,7 @@ def served():
 
 @pytest.fixture(scope="module")
 def tab(browser, served):
-    context = browser.new_context(viewport={"width": 900, "height": 620}, accept_downloads=True)
+    context = browser.new_context(viewport={"width": 1100, "height": 700}, accept_downloads=True)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     tab, wrong, asked = context.new_page(), [], []
     tab.set_default_timeout(1000.0 * _PATIENCE)
@@ -74,7 +75,7 @@ def tab(browser, served):
     tab.get_by_text("Fan of the legs").wait_for()
     tab.add_style_tag(content="#webgl-software-rendering { display: none }")  # a note, over the tabs
     yield tab
-    assert wrong == []
+    assert [line for line in wrong if "preventDefault" not in line] == []  # which viser calls too late in a drag
     at_home = served.addresses[0].partition("?")[0], "data:", "blob:"
     assert {url for url in asked if not url.startswith(at_home)} == set()
     context.close()
@@ -82,7 +83,7 @@ def tab(browser, served):
 
 def field(tab, label):
     """The line of a widget, by its label."""
-    return tab.locator(f"xpath=//label[text()='{label}']/ancestor::div[contains(@class, 'Flex-root')][1]")
+    return tab.locator(f"xpath=//label[.='{label}']/ancestor::div[contains(@class, 'Flex-root')][1]")
 
 
 def press(tab, label, key, times=1):
@@ -105,6 +106,14 @@ def saved(tab, label):
     with tab.expect_download() as download:
         tab.get_by_role("button", name=f"Save {label}", exact=True).click()
     return download.value.suggested_filename, download.value.path().read_bytes()
+
+
+def upload(tab, path, content):
+    path.write_bytes(content)
+    open_tab(tab, "Body")
+    with tab.expect_file_chooser() as chooser:
+        tab.get_by_role("button", name="Open a spec or a design").click()
+    chooser.value.set_files(path)
 
 
 def test_it_listens_on_this_machine_alone_and_never_asks_for_a_public_address(served):
@@ -205,6 +214,28 @@ def test_undo_redo_and_reset(served, tab):
     served.until(lambda: served.session.creature.sketch == before)
 
 
+def seen(view, camera, name=None):
+    """Where the origins of a creature's parts are in the picture: shares of the way from its middle to its edges.
+
+    Args:
+        view: of the page.
+        camera: of a visitor.
+        name: of the part whose end is meant, if one is.
+    """
+    figure, places, turns = view._figure, {None: np.zeros(3)}, {None: np.eye(3)}
+    for index, (part, frame) in enumerate(zip(figure.creature.parts, figure._frames, strict=True)):
+        places[index] = places[part.parent] + turns[part.parent] @ frame.position
+        turns[index] = turns[part.parent] @ rotations.matrix(np.array(frame.wxyz))
+    points = [places[index] for index in range(len(figure.creature.parts))]
+    if name is not None:
+        (index,) = (index for index, part in enumerate(figure.creature.parts) if part.name == name)
+        end = np.array(shaping.link_ends(figure.creature.setup.body)[name]) / figure._unit
+        points = [places[index] + turns[index] @ end]
+    x, y, z = ((np.array(points) + view._world.position - camera.position) @ rotations.matrix(camera.wxyz)).T
+    high = np.tan(0.5 * camera.fov)
+    return np.stack([x / (z * high * camera.aspect), y / (z * high)], axis=-1)
+
+
 @pytest.mark.parametrize("source", ["queen", "tick", "millipede"])
 def test_the_camera_has_any_creature_of_any_size_in_its_picture(served, tab, source):
     """Feet at the size that the slider has at most, where visitors see them."""
@@ -212,16 +243,8 @@ def test_the_camera_has_any_creature_of_any_size_in_its_picture(served, tab, sou
     (client,) = view._server.get_clients().values()
     served.session.ask(sketch)
     served.until(lambda: view._figure.creature.sketch == sketch)
-    figure, camera = view._figure, client.camera
-    places, turns = [], []
-    for part, frame in zip(figure.creature.parts, figure._frames, strict=True):
-        above = (np.zeros(3), np.eye(3)) if part.parent is None else (places[part.parent], turns[part.parent])
-        places.append(above[0] + above[1] @ frame.position)
-        turns.append(above[1] @ rotations.matrix(np.array(frame.wxyz)))
-    seen = (np.array(places) + view._world.position - camera.position) @ rotations.matrix(camera.wxyz)
-    high = np.tan(0.5 * camera.fov)
-    shares = abs(seen[:, :2] / seen[:, 2:]) / (high * camera.aspect, high)  # of the way from the middle to the edges
-    assert 0.3 < shares.max() < 1.0
+    shares = seen(view, client.camera)  # of the way from the middle to the edges
+    assert 0.3 < abs(shares).max() < 1.0
 
 
 def test_charts_are_hidden(served, tab):
@@ -230,6 +253,102 @@ def test_charts_are_hidden(served, tab):
     tab.get_by_text("Reward by term").wait_for(state="hidden")
     tab.get_by_role("checkbox", name="Charts").click()
     tab.get_by_text("Reward by term").wait_for()
+
+
+def test_one_leg_and_the_leg_across(served, tab):
+    open_tab(tab, "Body")
+    tab.get_by_role("button", name="Reset").click()
+    served.until(lambda: served.session.creature.sketch == Sketch(legs=8, links=2))
+    choose(tab, "Legs to change", "l1")
+    press(tab, "l1_lower", "ArrowRight", 4)
+    served.until(lambda: sketches.length(served.session.creature.sketch, "r1_lower") == pytest.approx(1.2, rel=1e-3))
+    tab.get_by_role("checkbox", name="Symmetric").click()
+    press(tab, "l1_lower", "ArrowRight", 2)
+    served.until(lambda: sketches.length(served.session.creature.sketch, "l1_lower") == pytest.approx(1.3, rel=1e-3))
+    assert sketches.length(served.session.creature.sketch, "r1_lower") == pytest.approx(1.2, rel=1e-3)
+    tab.get_by_role("checkbox", name="Symmetric").click()
+    choose(tab, "Legs to change", "all")
+    tab.get_by_role("button", name="Reset").click()
+    served.until(lambda: served.session.creature.sketch == Sketch(legs=8, links=2))
+
+
+def test_a_joint_is_dragged(served, tab):
+    """A foot to the right of the picture, and the one across with it."""
+    view = served.page._view
+    (client,) = view._server.get_clients().values()
+    tab.get_by_role("checkbox", name="Drag joints").click()
+    served.until(lambda: served.session.paused and served.session.episodes.steps == 0 and view._figure._balls)
+    time.sleep(2.0)  # for the browser to draw them
+    box = tab.locator("canvas").first.bounding_box()
+    (place,) = seen(view, client.camera, "r2_lower")
+    x, y = box["x"] + 0.5 * (1.0 + place[0]) * box["width"], box["y"] + 0.5 * (1.0 + place[1]) * box["height"]
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 12.0, y, steps=4)
+    time.sleep(0.5)
+    tab.mouse.up()
+    served.until(lambda: len(served.session.creature.sketch.ends) == 2)
+    ends = dict(served.session.creature.sketch.ends)
+    x, y, z = ends["r2_lower"]
+    assert ends["l2_lower"] == (x, -y, z)
+    (moved,) = seen(view, client.camera, "r2_lower")
+    assert moved[0] - place[0] == pytest.approx(24.0 / box["width"], rel=0.25)
+    tab.get_by_role("button", name="Undo").click()
+    served.until(lambda: served.session.creature.sketch.ends == ())
+    tab.get_by_role("checkbox", name="Drag joints").click()
+    served.until(lambda: not served.session.paused and not view._figure._balls)
+
+
+def test_a_kept_creature_walks_beside(served, tab):
+    view = served.page._view
+    tab.get_by_role("checkbox", name="Keep beside").click()
+    served.until(lambda: view._kept)
+    press(tab, "Size", "End")
+    served.until(lambda: view._figure.creature.sketch.scale == 4.0)
+    assert view._kept.creature.sketch.scale == 1.0
+    tab.get_by_text("kept").wait_for()
+    apart = (view._kept._frames[0].position - view._figure._frames[0].position) * view._unit
+    reach = view._figure.creature.reach + view._kept.creature.reach
+    assert 0.0 < np.linalg.norm(apart[:2] - (0.0, 0.9 * reach)) < 0.9 * reach
+    tab.get_by_role("checkbox", name="Keep beside").click()
+    tab.get_by_role("button", name="Undo").click()
+    served.until(lambda: view._kept is None and view._figure.creature.sketch.scale == 1.0)
+
+
+def test_a_design_is_opened_again(served, tab, tmp_path):
+    """Body, task and command as they were saved, after everything else was changed."""
+    open_tab(tab, "Body")
+    press(tab, "Fan of the legs", "ArrowRight", 3)
+    open_tab(tab, "Command")
+    press(tab, "Turn", "End")
+    served.until(lambda: served.session.creature.sketch.fan == 3.0)
+    name, content = saved(tab, "Design")
+    assert name == "walker_8x2_shaped_design.json"
+    tab.get_by_role("button", name="Reset").click()
+    served.until(lambda: served.session.creature.sketch.fan == 0.0)
+    upload(tab, tmp_path / name, content)
+    served.until(lambda: served.session.creature.sketch.fan == 3.0 and served.session.desired[2] == 1.0)
+    upload(tab, tmp_path / "bad.json", content.replace(b'"fan": 3.0', b'"policy": "file.py:make"'))
+    tab.get_by_role("alert").get_by_text("unknown policy 'file.py:make'").wait_for()
+    assert served.session.creature.sketch.fan == 3.0
+    tab.get_by_role("button", name="Reset").click()
+    served.until(lambda: served.session.creature.sketch.fan == 0.0 and not served.session.error)
+
+
+def test_what_has_no_effect_is_not_shown(served, tab):
+    open_tab(tab, "Task")
+    tab.get_by_text("Ground", exact=True).wait_for()
+    choose(tab, "Task", "stairs")  # which has its own
+    tab.get_by_text("Ground", exact=True).wait_for(state="hidden")
+    choose(tab, "Policy", "zero")
+    tab.get_by_text("Preset", exact=True).wait_for(state="hidden")
+    open_tab(tab, "Command")
+    tab.get_by_text("Forward", exact=True).wait_for()
+    tab.get_by_role("checkbox", name="By hand").click()
+    tab.get_by_text("Forward", exact=True).wait_for(state="hidden")
+    tab.get_by_role("button", name="Reset").click()
+    tab.get_by_text("Forward", exact=True).wait_for()
+    tab.get_by_text("Frequency", exact=True).wait_for()
 
 
 def test_tasks_and_grounds(served, tab):
@@ -244,12 +363,7 @@ def test_tasks_and_grounds(served, tab):
 
 
 def test_an_uploaded_body_and_the_value_that_fits(served, tab, tmp_path):
-    path = tmp_path / "high.json"
-    path.write_text(body_to_json(HIGH))
-    open_tab(tab, "Body")
-    with tab.expect_file_chooser() as chooser:
-        tab.get_by_role("button", name="Open a spec file").click()
-    chooser.value.set_files(path)
+    upload(tab, tmp_path / "high.json", body_to_json(HIGH).encode())
     served.until(lambda: served.session.creature.setup.body == HIGH)
     assert served.session.creature.sketch.source == FILE
     tab.get_by_text("feet hang 0.1 m above the floor: standing_height 0.4 fits").wait_for()

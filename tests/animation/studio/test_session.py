@@ -24,8 +24,8 @@ class Shown:
     def __init__(self, session):
         self.session, self.states = session, []
 
-    def __call__(self, session, share):
-        episodes = session.episodes
+    def __call__(self, session):
+        episodes, share = session.episodes, session.walker.share
         self.states.append((session.creature.setup.body.name, episodes.steps, share, episodes.qpos(share)))
 
     def until(self, condition, seconds=60.0):
@@ -74,7 +74,7 @@ def test_another_creature_walks_under_the_same_command():
         shown.until(lambda: session.creature.sketch.legs == 4)
         shown.steps(2)
         np.testing.assert_array_equal(session.episodes.timestep.observation["command"][:3], (0.5, 0.0, 0.5))
-        assert shown.states[-1][0] == "walker_4x3" and len(shown.states[-1][3]) == 7 + 12
+        shown.until(lambda: shown.states[-1][0] == "walker_4x3" and len(shown.states[-1][3]) == 7 + 12)
 
 
 def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
@@ -93,6 +93,22 @@ def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
         session.ask(Sketch(legs=4, links=3, task="steer"))
         shown.until(lambda: session.creature.sketch.task == "steer")
         assert list(session.commands) == ["command"]
+
+
+def test_a_kept_creature_walks_beside_later_ones():
+    with running() as (session, shown):
+        session.keep(True)
+        shown.until(lambda: session.kept)
+        session.ask(Sketch(legs=4, links=3))
+        shown.until(lambda: session.creature.sketch.legs == 4)
+        session.command((0.5, 0.0, 0.0))
+        shown.until(lambda: session.kept.episodes.steps > 5)
+        for walker in (session.walker, session.kept):
+            shown.until(lambda walker=walker: walker.episodes.timestep.observation["command"][0] == 0.5)
+        assert session.kept.creature.setup.body.name == "walker_6x2"
+        assert "walker_6x2, directed" in texts.status(session) and "walker_4x3, directed" in texts.status(session)
+        session.keep(False)
+        shown.until(lambda: session.kept is None)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from arc_suite.animation.studio.creature import opened
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
 from arc_suite.models.families import sound_body
 from arc_suite.models.soundness import flaws
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS, generator, shaping
 from arc_suite.robots.spec_files import body_to_json, load_body
 
 HIGH = generator.generate(6, 3)
@@ -23,6 +23,7 @@ SKETCHES = {
     "legs": Sketch(legs=6, links=2),
     "layout": Sketch(legs=6, layout="radial", gait="wave"),
     "shaped": Sketch(legs=6, scale=2.0, fan=5.0, lengths=(("lower", 1.3), ("upper", 1.0)), speed=0.8),
+    "dragged": Sketch(legs=6, links=2, ends=(("l1_lower", (0.0, 0.3, -0.3)), ("r9_lower", (1.0, 0.0, 0.0)))),
     "robot": Sketch(source="queen", ground="bumps", kicks=0.5, task="walk", preset="tuned"),
     "shaped robot": Sketch(source="tick", width=1.2, palette="moss"),
     "example": Sketch(source="spider", task="stairs", settings='{"difficulty": 0.5}'),
@@ -58,6 +59,25 @@ def test_settings_of_the_task():
     assert sketches.setup(sketch).task_kwargs == {"difficulty": 0.5}
     sketch = Sketch(kicks=0.5, settings='{"kicks": 1.0, "friction": 0.5}')
     assert sketches.setup(sketch).task_kwargs == {"kicks": 1.0, "friction": 0.5}
+
+
+def test_a_link_of_one_leg_and_of_the_leg_across():
+    """Lengths and dragged ends hold in the body's own proportions, and the way back leaves nothing."""
+    sketch = Sketch(legs=6, links=2, scale=2.0, lengths=(("lower", 1.5),))
+    own = {part: end for part, end in shaping.link_ends(sketches.source_body(sketch)).items() if "lower" in part}
+    longer = sketches.lengthened(sketch, "l1_lower", 1.2, True)
+    assert sketches.length(longer, "r1_lower") == pytest.approx(1.2, rel=1e-3)
+    assert sketches.length(longer, "l2_lower") == 1.0 and sketches.length(longer, "lower") == 1.5
+    assert sketches.lengthened(longer, "r1_lower", 1.0, True) == sketch
+    (alone,) = sketches.lengthened(sketch, "l1_lower", 1.2, False).ends
+    assert alone[0] == "l1_lower"
+    moved = sketches.dragged(sketch, "r1_lower", (0.3, 0.6, 0.0), True)
+    x, y, z = own["l1_lower"]
+    assert dict(moved.ends)["l1_lower"] == pytest.approx((x + 0.1, y - 0.2, z), rel=1e-3)
+    assert dict(moved.ends)["r1_lower"] == pytest.approx((x + 0.1, -y + 0.2, z), rel=1e-3)
+    ends = shaping.link_ends(sketches.body(moved))
+    assert ends["l1_lower"] == pytest.approx([3.0 * (x + 0.1), 3.0 * (y - 0.2), 3.0 * z], rel=1e-3)
+    assert ends["l2_lower"] == pytest.approx([3.0 * number for number in own["l2_lower"]])
 
 
 def test_factors_of_links_that_the_body_lacks_are_ignored():
