@@ -8,7 +8,7 @@ Examples:
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +16,8 @@ import numpy as np
 
 import arc_suite
 from arc_suite import checks, evaluation, files, policies, rotations
+from arc_suite.animation import clips
+from arc_suite.animation.clips import filming
 from arc_suite.cli import program
 from arc_suite.cpg import suited_preset
 from arc_suite.envs.setup import Setup
@@ -40,7 +42,7 @@ class View(NamedTuple):
         elevation: of the camera, degrees.
         distance: of the camera, in distances of the farthest foot from the torso.
         drives: whether the camera goes along in a straight line; else it stands.
-        close: whether the picture ends near the body, and has finer shadows.
+        settings: of the task.
     """
 
     robot: str
@@ -53,55 +55,40 @@ class View(NamedTuple):
     elevation: float = 13.0
     distance: float = 4.4
     drives: bool = True
-    close: bool = False
+    settings: Mapping[str, float] = {}
 
 
-class Media(NamedTuple):
-    """A picture or film, of one view or of several in a grid.
-
-    Attributes:
-        path: of the file, from the repository's root.
-        views: by caption.
-        columns: of the grid.
-        size: width and height of a view, pixels.
-        steps: control steps of a film, a frame each; 0 for a still.
-        captions: whether it shows them.
-        limit: bytes.
-    """
-
-    path: str
-    views: Mapping[str, View]
-    columns: int = 1
-    size: tuple[int, int] = (448, 252)
-    steps: int = 67  # five cycles of a gait of 1.5 Hz, four of 1.2 Hz: the loop goes on where it began
-    captions: bool = False
-    limit: int = 400_000
-
-
-_CLOSE = {"distance": 3.7, "azimuth": -42.0, "close": True}
+_CLOSE = {"distance": 3.7, "azimuth": -42.0}
 _SIDE = {"azimuth": -90.0, "elevation": 14.0, "distance": 6.0, "drives": False}
 ROBOTS = {robot: View(robot, **_CLOSE) for robot in ("queen", "bastion", "tick", "leaper")}
+IN_PLACE = {robot: view._replace(task="steer") for robot, view in ROBOTS.items()}
+IN_PLACE["leaper"] = IN_PLACE["leaper"]._replace(settings={"gait_frequency": 1.5})  # that of the others: one loop
 TASKS = {
     "walk": View("queen", azimuth=-60.0, distance=4.0),
     "steer": View("bastion", "steer", 39, 105, 60, azimuth=-25.0, elevation=32.0, distance=6.2),
     "directed": View("queen", "directed", 5, 45, 50, azimuth=-75.0, elevation=10.0, distance=4.5),
+    "shoved": View("bastion", "shoved", 1, 45, 30, (1.0, 0.0, 0.0), azimuth=35.0, elevation=18.0, distance=5.0),
+    "limp": View("tick", "limp", 1, 60, 20, (1.0, 0.0, 0.0), azimuth=60.0),
     "rough": View("tick", "rough", **_SIDE),
-    "slopes": View("queen", "slopes", start=120, **{**_SIDE, "elevation": 8.0}),
+    "slopes": View(
+        "queen",
+        "slopes",
+        start=110,
+        azimuth=-105.0,
+        elevation=14.0,
+        distance=6.2,
+        drives=False,
+        settings={"difficulty": 1.0},
+    ),
     "stairs": View("bastion", "stairs", **{**_SIDE, "azimuth": -112.0}),
     "gaps": View("tick", "gaps", **{**_SIDE, "elevation": 25.0}),
     "course": View("queen", "course", start=110, **_SIDE),
     "leap": View("queen", "leap", start=288, moment=32, **{**_SIDE, "elevation": 20.0}),
-    "shoved": View("bastion", "shoved", 1, 45, 30, (1.0, 0.0, 0.0), azimuth=35.0, elevation=18.0, distance=5.0),
-    "limp": View("tick", "limp", 1, 60, 20, (1.0, 0.0, 0.0), azimuth=60.0),
     "roam": View("queen", "roam", 0, 40, 31, elevation=20.0, distance=6.0, drives=False),
     "navigate": View("bastion", "navigate", 0, 40, 62, azimuth=155.0, elevation=38.0, distance=9.0),
 }
-MEDIA = (
-    Media("docs/films/robots.webp", ROBOTS, 2, (300, 180), limit=950_000),
-    Media("docs/robots.png", ROBOTS, 2, (640, 400), 0, True, 700_000),
-    Media("docs/tasks.png", TASKS, 4, (360, 216), 0, True, 800_000),
-    *(Media(f"docs/films/{name}.webp", {name: view}) for name, view in {**ROBOTS, **TASKS}.items()),
-)
+_FPS = 30.0  # of clips
+_ABOVE = 0.82  # share of what is cut from a square, where it is empty, that is cut above
 _FRAMES = 67  # control steps of a view, on whose path the camera is fitted
 
 
@@ -118,7 +105,7 @@ def played(view: View, environment, steps: int) -> Iterator[int]:
 
 def opened(view: View):
     """The environment of a view."""
-    return arc_suite.load(view.robot, view.task)
+    return arc_suite.load(view.robot, view.task, dict(view.settings))
 
 
 class Camera:
@@ -149,7 +136,7 @@ class Camera:
 def pictures(view: View, size: tuple[int, int], steps: int) -> Iterator[np.ndarray]:
     """Yield the pictures (height, width, 3) of a view: of each of its steps, or of its moment where there are none."""
     (width, height), environment = size, opened(view)
-    camera, quality = Camera(view, environment), "close" if view.close else "still"
+    camera, quality = Camera(view, environment), "film" if steps else "still"
     for step in played(view, environment, steps or view.moment + 1):
         if steps or step == view.moment:
             yield environment.physics.render(
@@ -162,19 +149,79 @@ def pictures(view: View, size: tuple[int, int], steps: int) -> Iterator[np.ndarr
     environment.close()
 
 
+def in_place(view: View, size: tuple[int, int], steps: int) -> Iterator[np.ndarray]:
+    """Yield the pictures (height, width, 3) of one gait cycle in place, 30 a second, on plain ground."""
+    width, height = size
+    setup = Setup.of(view.robot, view.task, dict(view.settings))
+    (clip,) = clips.clips(setup, ["walk"], fps=_FPS)
+    above = round(_ABOVE * (width - height))
+    for square in filming.loop(setup.body, clip, width, heading=math.radians(-90.0 - view.azimuth)):
+        yield square[above : above + height]
+
+
+class Media(NamedTuple):
+    """A picture or film, of one view or of several in a grid.
+
+    Attributes:
+        path: of the file, from the repository's root.
+        views: by caption.
+        columns: of the grid.
+        size: width and height of a view, pixels.
+        steps: control steps of a film, a frame each; 0 for a still.
+        captions: whether it shows them.
+        large: whether the first view takes four cells.
+        limit: bytes.
+        source: of a view's pictures.
+        quality: of WebP, 0 to 100.
+        fps: frames a second.
+    """
+
+    path: str
+    views: Mapping[str, View]
+    columns: int = 1
+    size: tuple[int, int] = (448, 252)
+    steps: int = _FRAMES  # five cycles of a gait of 1.5 Hz, four of 1.2 Hz: the loop goes on where it began
+    captions: bool = False
+    large: bool = False
+    limit: int = 400_000
+    source: Callable = pictures
+    quality: int = 50
+    fps: float = 20.0
+
+
+MEDIA = (
+    Media("docs/films/robots.webp", IN_PLACE, 2, (600, 400), 20, limit=950_000, source=in_place, quality=75, fps=_FPS),
+    Media("docs/robots.png", ROBOTS, 2, (640, 400), 0, True, limit=700_000),
+    Media("docs/tasks.png", TASKS, 4, (360, 216), 0, True, True, 800_000),
+    *(Media(f"docs/films/{name}.webp", {name: view}) for name, view in {**ROBOTS, **TASKS}.items()),
+)
+
+
+def arranged(views: list[np.ndarray], media: Media) -> np.ndarray:
+    """Return pictures in a grid, the first of them in four cells where it is large."""
+    columns = media.columns
+    if not media.large:
+        return films.grid(views, columns)
+    near = 1 + 2 * (columns - 2)
+    top = [views[0], films.grid(views[1:near], columns - 2)]
+    return np.concatenate([np.concatenate(top, axis=1), films.grid(views[near:], columns)])
+
+
 def draw(media: Media) -> None:
     """Draw a picture or film, and write it."""
     views = []
-    for name, view in media.views.items():
-        drawn = pictures(view, media.size, media.steps)
+    for number, (name, view) in enumerate(media.views.items()):
+        size = tuple(pixels * (1 + (media.large and number == 0)) for pixels in media.size)
+        drawn = media.source(view, size, media.steps)
         views.append([films.captioned(picture, name) if media.captions else picture for picture in drawn])
-        if not media.steps:  # where a row is not full, it is transparent
-            views[-1] = [np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)]) for picture in views[-1]]
-    frames = [films.grid(list(row), media.columns) for row in zip(*views, strict=True)]
-    path, view = ROOT / media.path, next(iter(media.views.values()))
+    frames = [arranged(list(row), media) for row in zip(*views, strict=True)]
+    path = ROOT / media.path
     path.parent.mkdir(exist_ok=True)
     with files.writing(path) as temporary:
-        films.WRITERS[path.suffix](temporary, frames, Setup.of(view.robot, view.task).definition.scene.control_timestep)
+        if path.suffix == ".webp":
+            films.write_webp(temporary, frames, 1.0 / media.fps, media.quality)
+        else:
+            films.write_png(temporary, frames, 0.0)
     size = path.stat().st_size
     if size > media.limit:
         raise ValueError(f"{media.path}: {size} bytes, at most {media.limit}")

@@ -11,9 +11,11 @@ import pathlib
 import subprocess
 import sys
 
-from matplotlib.figure import Figure
+import numpy as np
 
-from arc_suite.evaluation import published
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors, published
+from arc_suite.learning.agents import plots
 
 
 def evaluate(policy: pathlib.Path, robot: str, task: str, episodes: int) -> None:
@@ -24,22 +26,15 @@ def evaluate(policy: pathlib.Path, robot: str, task: str, episodes: int) -> None
 
 
 def plot(folder: pathlib.Path, robot: str, task: str) -> None:
-    """Draw the mean returns of a folder's evaluations over steps, and the paper's final returns as lines."""
-    reports = {int(path.stem): json.loads(path.read_text()) for path in folder.glob("*.json")}
-    steps = sorted(reports)
-    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
-    axis = figure.subplots()
-    axis.plot(steps, [reports[step]["robots"][robot]["return"]["mean"] for step in steps], marker=".")
-    lines = (
-        {**published.FINALS.get(robot, {}), "demonstrator": published.DEMONSTRATORS.get(robot)}
-        if task == "walk"
-        else {}
-    )
-    for name, value in lines.items():
-        axis.axhline(value, color="gray", linestyle="--", linewidth=0.8)
-        axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
-    axis.set(xlabel="environment steps", ylabel="return", title=f"{robot}, {task}; lines: the paper, 1,000,000 steps")
-    figure.savefig(folder / "curve.png")
+    """Draw the returns of a folder's evaluations over steps, over standing still, the demonstrator and the paper."""
+    reports = {int(path.stem): json.loads(path.read_text())["robots"][robot] for path in folder.glob("*.json")}
+    rows = [(step, episode["total"]) for step in sorted(reports) for episode in reports[step]["episodes"]]
+    steps, returns = np.array(rows).T
+    scale = anchors.anchors(Setup.of(robot, task))
+    lines = {"standing still": scale.zero, f"demonstrator {scale.preset}": scale.demonstrator}
+    finals = published.FINALS.get(robot, {}) if task == "walk" else {}
+    evaluations = {"step": steps, "return": returns}
+    plots.returns(evaluations, folder.name, f"{robot}, {task}", lines, finals).savefig(folder / "curve.png")
     print(f"wrote {folder / 'curve.png'}")
 
 

@@ -25,7 +25,9 @@ _SOLID = pictures.QUALITIES["still"]  # of many pixels, body or not, whose mean 
 _GROUNDED = pictures.QUALITIES["film"]
 
 
-def loop(body: Body, clip: Clip, size: int, transparent: bool = False, turntable: bool = False) -> Iterator[np.ndarray]:
+def loop(
+    body: Body, clip: Clip, size: int, transparent: bool = False, turntable: bool = False, heading: float = 0.0
+) -> Iterator[np.ndarray]:
     """Yield the pictures of a film that plays forever, one for each frame of the clip.
 
     Args:
@@ -34,6 +36,7 @@ def loop(body: Body, clip: Clip, size: int, transparent: bool = False, turntable
         size: of the square pictures, pixels.
         transparent: whether all but the body is left out.
         turntable: whether the body turns once while the clip is repeated.
+        heading: of the body, rad; at 0 it goes to the right, at -pi / 2 towards the viewer.
 
     Yields:
         (size, size, 3 or 4) uint8; the last value is the alpha of a transparent picture.
@@ -43,7 +46,7 @@ def loop(body: Body, clip: Clip, size: int, transparent: bool = False, turntable
     """
     count = _count(clip)
     rounds = max(1, round(_AROUND / clip.motion.seconds)) if turntable else 1
-    headings = np.linspace(0.0, 2.0 * np.pi * turntable, rounds * count, endpoint=False)
+    headings = heading + np.linspace(0.0, 2.0 * np.pi * turntable, rounds * count, endpoint=False)
     yield from _views(body, clip, np.arange(rounds * count) % count, headings, size, transparent)
 
 

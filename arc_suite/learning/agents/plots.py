@@ -63,8 +63,8 @@ def returns(
     """Draw the learning curve of a run: the mean return of each evaluation, from the lowest to the highest episode.
 
     Args:
-        evaluations: table of a run (`run_folder.table`).
-        algorithm: of the run.
+        evaluations: table of a run (`run_folder.table`): a `step` and a `return` of each episode.
+        algorithm: of the run, named at the end of the curve.
         title: of the picture.
         lines: returns to compare with, by name.
         finals: of the paper, by algorithm.
@@ -77,8 +77,8 @@ def returns(
     color, marker = _styles([algorithm])[algorithm]
     axis.fill_between(steps, low, high, color=color, alpha=0.15, linewidth=0)
     axis.plot(steps, mean, color=color, marker=marker, markevery=_every(steps))
-    _finish(axis, title, lines, finals, _styles([algorithm, *finals]))
-    axis.set_ylabel("return: mean, lowest and highest of ten episodes")
+    _finish(axis, title, lines, finals, _styles([algorithm, *finals]), {algorithm: mean[-1]})
+    axis.set_ylabel("return: mean, lowest and highest episode")
     return figure
 
 
@@ -142,12 +142,20 @@ def _every(steps: np.ndarray) -> int:
     return -(-len(steps) // _MARKERS)
 
 
-def _finish(axis, title: str, lines: Mapping[str, float], finals: Mapping[str, float], styles: Mapping) -> None:
-    """Draw levels to compare with, labeled on the right of the axis, where no line runs."""
+def _finish(
+    axis,
+    title: str,
+    lines: Mapping[str, float],
+    finals: Mapping[str, float],
+    styles: Mapping,
+    ends: Mapping[str, float] | None = None,
+) -> None:
+    """Draw levels to compare with, and label them and ends of curves on the right of the axis, where no line runs."""
     levels = [(value, name, _GRAY, "--") for name, value in lines.items()]
     levels += [(value, f"{name}, paper", styles[name][0], ":") for name, value in finals.items()]
     for value, _, color, dashes in levels:
         axis.axhline(value, color=color, linestyle=dashes, linewidth=1.0, zorder=0)
+    levels += [(value, name, styles[name][0], "-") for name, value in (ends or {}).items()]
     low, high = axis.get_ylim()
     low, high = min(low, 0.0), max([high, *(1.03 * value for value, *_ in levels)])
     axis.set_ylim(low, high)

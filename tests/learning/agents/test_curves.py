@@ -106,4 +106,4 @@ def test_a_run_stands_over_its_anchors():
     evaluations = {"step": np.repeat([100.0, 200.0], 10), "return": np.arange(20.0)}
     figure = plots.returns(evaluations, "ppo", "mine", {"standing still": 1640.0}, {"sope": 3610.0})
     texts = [each.get_text() for each in figure.axes[0].get_children() if isinstance(each, Annotation)]
-    assert texts == ["standing still 1640", "sope, paper 3610"]
+    assert texts == ["ppo 14", "standing still 1640", "sope, paper 3610"]
