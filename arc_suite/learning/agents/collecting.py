@@ -7,6 +7,7 @@ import numpy as np
 
 from arc_suite.learning.agents import architectures, critic_blocks, learner
 from arc_suite.learning.agents import proximal_policy as ppo
+from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext, generator
 from arc_suite.learning.agents.normalizer import Normalizer
@@ -18,6 +19,14 @@ TRANSITIONS = ("observations", "actions", "means", "rewards", "terminated", "end
 def ages(num_envs: int, step_limit: float) -> np.ndarray:
     """Return the control steps (num_envs,) that environments count as taken at the start of learning."""
     return np.arange(num_envs) * (int(step_limit) if math.isfinite(step_limit) else 0) // num_envs
+
+
+def viewed(architecture: Architecture, observation, privileged, columns):
+    """Return observations (..., size) as networks view them, with columns of privileged ones, None for none."""
+    if privileged is not None:
+        numpy = observation.__array_namespace__()
+        observation = numpy.concatenate([observation, privileged[..., columns]], axis=-1)
+    return architecture.viewed(observation)
 
 
 class Environments:
@@ -35,8 +44,7 @@ class Environments:
         self._hp, self._seed, self._names = hp, context.seed, hp.critic_blocks
         self.environment = context.environment(hp.num_envs, privileged=bool(self._names))
         self.task = self.environment.task.definition
-        if self._names:
-            self._columns = critic_blocks.privileged_columns(self.task, self._names)
+        self._columns = critic_blocks.privileged_columns(self.task, self._names)
         self.architecture = architectures.of_environment(
             self.environment, hp.network, self._names, hp.symmetry_augmentation
         )
@@ -93,7 +101,5 @@ class Environments:
         self.observation = arrays[f"{ENVIRONMENT}seen"]
 
     def _seen(self, observation: np.ndarray, info: Mapping, place: int | slice = slice(None)) -> np.ndarray:
-        """Observations (..., size) of environments, and the critic's privileged blocks, as networks view them."""
-        if self._names:
-            observation = np.concatenate([observation, info["privileged"][place][..., self._columns]], axis=-1)
-        return self.architecture.viewed(observation)
+        more = info["privileged"][place] if self._names else None
+        return viewed(self.architecture, observation, more, self._columns)

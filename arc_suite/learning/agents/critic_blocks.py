@@ -29,4 +29,4 @@ def privileged_columns(task: Task, critic_blocks: Sequence[str]) -> np.ndarray:
     """
     there = blocks.places(privileged.sizes(task))
     names = checks.names("critic_blocks", critic_blocks, there, "block")
-    return np.concatenate([np.arange(there[name].start, there[name].stop) for name in names])
+    return np.array([place for name in names for place in range(there[name].start, there[name].stop)], int)

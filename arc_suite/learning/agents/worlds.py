@@ -10,7 +10,7 @@ import numpy as np
 from arc_suite.envs.worlds import mjx
 from arc_suite.learning.agents import architectures, critic_blocks, networks
 from arc_suite.learning.agents import proximal_policy as ppo
-from arc_suite.learning.agents.collecting import TRANSITIONS, ages
+from arc_suite.learning.agents.collecting import TRANSITIONS, ages, viewed
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
 from arc_suite.learning.agents.normalizer import Normalizer
@@ -33,8 +33,7 @@ class Worlds:
         self.env = mjx.load(setup.body, setup.task, setup.task_kwargs, impl, **options)
         self.task = self.env.task
         self.architecture = architectures.of(self.task, hp.network, hp.critic_blocks, hp.symmetry_augmentation)
-        if hp.critic_blocks:
-            self._columns = critic_blocks.privileged_columns(self.task, hp.critic_blocks)
+        self._columns = critic_blocks.privileged_columns(self.task, hp.critic_blocks)
         self._key = jax.random.key(context.seed)
         self._state = jax.jit(jax.vmap(self.env.start))(np.uint32(first) + np.arange(hp.num_envs, dtype=np.uint32))
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
@@ -72,11 +71,7 @@ class Worlds:
         return carry, dict(zip(TRANSITIONS, values, strict=True))
 
     def _seen(self, state):
-        """Observations, and the critic's privileged blocks, as networks view them."""
-        observation = state.obs
-        if self._hp.critic_blocks:
-            observation = jnp.concatenate([observation, state.info["privileged"][:, self._columns]], axis=-1)
-        return self.architecture.viewed(observation)
+        return viewed(self.architecture, state.obs, state.info.get("privileged"), self._columns)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the state of the worlds, from which simulation goes on."""

@@ -13,7 +13,7 @@ from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.policies import network
 
 STEER = Setup.of("tick", "steer", {"time_limit": 1.0})
-SMALL = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 1, "hidden": 16}
+SMALL = {"network": "perceptron", "num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 1, "hidden": 16}
 CRITIC = SMALL | {"critic_blocks": ["ground", "velocity"]}
 KICKS = {"kicks": 1.5, "friction": [0.5, 1.0]}
 
