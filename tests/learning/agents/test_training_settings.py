@@ -172,4 +172,4 @@ def test_a_privileged_critic_resumes_bit_exactly(begun):
 def test_critic_blocks_that_there_are_not(tmp_path, setup, blocks, line):
     pytest.importorskip("jax", reason="of the extra learn: make check-agents")
     with pytest.raises(ValueError, match=line):
-        learning("ppo", SMALL | {"critic_blocks": blocks}, tmp_path, setup).advance()
+        learning("ppo", SMALL | {"network": "legs", "critic_blocks": blocks}, tmp_path, setup).advance()
