@@ -7,13 +7,20 @@ Example:
   python tools/run_notebooks.py first_steps
 """
 
+import base64
+import io
+import re
 import tempfile
 from pathlib import Path
+
+from PIL import Image, ImageSequence
 
 from arc_suite.cli import program
 
 ROOT = Path(__file__).parents[1]
 MOST = 300_000  # bytes of a notebook
+_FILM = re.compile(r"(?<=data:image/webp;base64,)[^\"]+")
+_SIZE = (200, 150)  # of a film that stays, in pixels
 _SECONDS = 3600  # of a cell, at most
 
 
@@ -21,7 +28,20 @@ def kept(cell) -> list:
     """Return the outputs of a cell that stay."""
     if cell.source.startswith("%pip"):
         return []
-    return [output for output in cell.outputs if output.get("name") != "stderr"]
+    outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
+    for output in outputs:
+        for kind, data in output.get("data", {}).items():
+            output["data"][kind] = _FILM.sub(lambda found: smaller(found[0]), data) if kind == "text/html" else data
+    return outputs
+
+
+def smaller(film: str) -> str:
+    """Return a film, WebP in base64, with every second frame, of fewer pixels."""
+    image, found = Image.open(io.BytesIO(base64.b64decode(film))), io.BytesIO()
+    first, *others = [frame.convert("RGB").resize(_SIZE) for frame in ImageSequence.Iterator(image)][::2]
+    duration = 2 * image.info["duration"]
+    first.save(found, "WEBP", save_all=True, append_images=others, duration=duration, loop=0, quality=25)
+    return base64.b64encode(found.getvalue()).decode()
 
 
 def executed(path: Path) -> str:
