@@ -10,7 +10,7 @@ from arc_suite.robots.shaping import Shape
 _SHAPE = (*Shape._fields[: Shape._fields.index("links")], "lengths")
 
 
-def without_effect(creature: Creature, command: Command) -> frozenset[str]:
+def idle_fields(creature: Creature, command: Command) -> frozenset[str]:
     """Return the fields of a state that change nothing of a creature, by name.
 
     Args:

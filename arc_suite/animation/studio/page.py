@@ -22,7 +22,7 @@ from arc_suite.animation.studio import layout, saving, texts
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.charts import Charts
 from arc_suite.animation.studio.creature import Creature
-from arc_suite.animation.studio.effects import without_effect
+from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.gate import Server, offers
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import OWN, Sketch, cured, dragged, length, lengthened, opened_file
@@ -127,8 +127,8 @@ class Page:
             self._creatures = creatures
             self._view.show(*creatures)
             self._fit(walker.creature)
-        beside = kept and kept.episodes.qpos(kept.share)
-        self._view.pose(walker.episodes.qpos(walker.share), walker.episodes.markers(walker.share), beside)
+        next_to = kept and kept.episodes.qpos(kept.share)
+        self._view.pose(walker.episodes.qpos(walker.share), walker.episodes.markers(walker.share), next_to)
         if time.monotonic() - self._drawn > _CHARTS_EVERY:
             self._drawn = time.monotonic()
             self._status.content = texts.status(session)
@@ -145,7 +145,7 @@ class Page:
             command.on_trigger(lambda event, call=calls[label]: call())
         charts = self._gui.add_checkbox("Charts", True)
         charts.on_update(lambda event: setattr(self._panel, "visible", event.target.value))
-        keep = self._gui.add_checkbox("Keep beside", False, hint="This creature walks beside all later ones")
+        keep = self._gui.add_checkbox("Keep", False, hint="This creature walks next to all later ones")
         keep.on_update(lambda event: self._session.keep(event.target.value))
 
     def _add_body(self, first: Sketch) -> None:
@@ -229,7 +229,7 @@ class Page:
         """Have the widgets say the state, as far as they can; what has no effect is not shown."""
         with self._lock:
             state, creature = self._edits.now, self._session.creature
-            idle = without_effect(creature, state.command) | self._fixed
+            idle = idle_fields(creature, state.command) | self._fixed
             self._widgets["source"].options = layout.listed(state.sketch.source, sketches.sources())
             for name, widget in self._widgets.items():
                 widget.value = _shown(widget, state.value(name))

@@ -54,13 +54,13 @@ class Walker:
 
 
 class Session:
-    """The creature that walks, one that was kept beside it, and the sketch that is asked for next.
+    """The creature that walks, one that was kept next to it, and the sketch that is asked for next.
 
     A creature is made in a thread of its own while the one before walks on. All else happens in the loop of `run`.
 
     Attributes:
         walker: of the latest sketch.
-        kept: that walks beside it under the same command, or None.
+        kept: that walks next to it under the same command, or None.
         error: one line, why the latest sketch made no creature; empty if it did.
         desired: (3,) command that visitors have set; None for that of the task.
         pose: (6,) that they have set, or None; see `posture`.
@@ -104,7 +104,7 @@ class Session:
         self._maker.submit(self._make)
 
     def keep(self, kept: bool) -> None:
-        """Have the present creature walk beside all later ones, or the kept one leave, from any thread."""
+        """Have the present creature walk next to all later ones, or the kept one leave, from any thread."""
         self._maker.submit(self._keep, self.creature.sketch if kept else None)
 
     def refuse(self, line: str) -> None:

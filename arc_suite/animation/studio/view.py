@@ -52,7 +52,7 @@ class View:
         server.on_client_connect(_aim)
 
     def show(self, creature: Creature, kept: Creature | None = None) -> None:
-        """Take the creature of the one before, in its pose of now, and one that is kept beside it."""
+        """Take the creature of the one before, in its pose of now, and one that is kept next to it."""
         self._creature, self._unit, self._lane = creature, creature.reach, np.zeros(3)
         if kept is not None:
             self._lane[1] = _LANE * (creature.reach + kept.reach)
@@ -78,7 +78,7 @@ class View:
         with self._server.atomic():
             place = self._figure.pose(qpos, lambda place: place)
             if self._kept is not None:
-                self._kept.pose(kept, functools.partial(self._beside, place))
+                self._kept.pose(kept, functools.partial(self._next_to, place))
             middle, place = (place + 0.5 * self._lane) / self._unit, place / self._unit
             if self._ground_is_stale(place):
                 self._draw_ground()
@@ -93,10 +93,10 @@ class View:
         with self._server.atomic():
             self._figure.handles(dragged)
 
-    def _beside(self, place: np.ndarray, own: np.ndarray) -> np.ndarray:
+    def _next_to(self, place: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Return where the scene shows the kept creature, whose torso is at a place of its `own`, m.
 
-        It walks as far as it does, and is set beside the other one again where it would leave the picture.
+        It walks as far as it does, and is set next to the other one again where it would leave the picture.
         """
         if not np.linalg.norm(own + self._aside - place - self._lane) < self._lane[1]:
             self._aside = (place + self._lane - own) * (1.0, 1.0, 0.0)

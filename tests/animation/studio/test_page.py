@@ -280,7 +280,7 @@ def test_a_joint_is_dragged(served, tab):
     served.until(lambda: served.session.paused and served.session.episodes.steps == 0 and view._figure._balls)
     time.sleep(2.0)  # for the browser to draw them
     box = tab.locator("canvas").first.bounding_box()
-    (place,) = seen(view, client.camera, "r2_lower")
+    unit, (place,) = view._unit, seen(view, client.camera, "r2_lower")
     x, y = box["x"] + 0.5 * (1.0 + place[0]) * box["width"], box["y"] + 0.5 * (1.0 + place[1]) * box["height"]
     tab.mouse.move(x, y)
     tab.mouse.down()
@@ -291,17 +291,19 @@ def test_a_joint_is_dragged(served, tab):
     ends = dict(served.session.creature.sketch.ends)
     x, y, z = ends["r2_lower"]
     assert ends["l2_lower"] == (x, -y, z)
-    (moved,) = seen(view, client.camera, "r2_lower")
-    assert moved[0] - place[0] == pytest.approx(24.0 / box["width"], rel=0.25)
+    own = shaping.link_ends(generator.generate(8, 2))["r2_lower"]
+    pixel = 2.0 * np.linalg.norm(client.camera.position) * np.tan(0.5 * client.camera.fov) / box["height"]  # units
+    moved = np.linalg.norm(np.subtract(ends["r2_lower"], own)) / unit
+    assert moved == pytest.approx(12.0 * pixel, rel=0.4)  # a foot is nearer than the middle of the body
     tab.get_by_role("button", name="Undo").click()
     served.until(lambda: served.session.creature.sketch.ends == ())
     tab.get_by_role("checkbox", name="Drag joints").click()
     served.until(lambda: not served.session.paused and not view._figure._balls)
 
 
-def test_a_kept_creature_walks_beside(served, tab):
+def test_a_kept_creature_walks_next_to(served, tab):
     view = served.page._view
-    tab.get_by_role("checkbox", name="Keep beside").click()
+    tab.get_by_role("checkbox", name="Keep").click()
     served.until(lambda: view._kept)
     press(tab, "Size", "End")
     served.until(lambda: view._figure.creature.sketch.scale == 4.0)
@@ -310,7 +312,7 @@ def test_a_kept_creature_walks_beside(served, tab):
     apart = (view._kept._frames[0].position - view._figure._frames[0].position) * view._unit
     reach = view._figure.creature.reach + view._kept.creature.reach
     assert 0.0 < np.linalg.norm(apart[:2] - (0.0, 0.9 * reach)) < 0.9 * reach
-    tab.get_by_role("checkbox", name="Keep beside").click()
+    tab.get_by_role("checkbox", name="Keep").click()
     tab.get_by_role("button", name="Undo").click()
     served.until(lambda: view._kept is None and view._figure.creature.sketch.scale == 1.0)
 

@@ -95,7 +95,7 @@ def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
         assert list(session.commands) == ["command"]
 
 
-def test_a_kept_creature_walks_beside_later_ones():
+def test_a_kept_creature_walks_next_to_later_ones():
     with running() as (session, shown):
         session.keep(True)
         shown.until(lambda: session.kept)
