@@ -29,7 +29,7 @@ class Inline:
         html: an element with nothing to fetch: a page in a frame, or a film.
     """
 
-    html: str
+    html: str = dataclasses.field(repr=False)  # or a notebook holds it twice
 
     def _repr_html_(self) -> str:
         return self.html
