@@ -28,11 +28,8 @@ GROUPS = {
 }
 
 _GROUP_OF = {name: heading for heading, names in GROUPS.items() for name in names}
-_VALUES = {  # by absl's name of a type
-    **{"int": "N", "float": "X", "string": "TEXT", "multi string": "TEXT", "string enum": "NAME"},
-    "comma separated list of strings": "A,B",
-}
-_NOISE = ";\n    repeat this option to specify a list of values"  # which absl adds
+_VALUES = {"int": "N", "float": "X", "comma separated list of strings": "A,B"}  # by absl's name; others are TEXT
+_NOISE = re.compile(r"^<[^>]*>: |;\n    repeat this option to specify a list of values$")  # which absl adds
 _DEFAULT = re.compile(r"\s*\[default: (.*)\]$", re.DOTALL)
 _INDENT = 23  # columns before a text; a longer flag has a line of its own
 
@@ -66,12 +63,12 @@ def _usage(flag: flags.Flag) -> str:
     short = f"-{flag.short_name}, " if flag.short_name else ""
     if flag.boolean:
         return f"{short}--{'[no]' if flag.default else ''}{flag.name}"
-    return f"{short}--{flag.name}={_VALUES[flag.flag_type()]}"
+    return f"{short}--{flag.name}={_VALUES.get(flag.flag_type(), 'TEXT')}"
 
 
 def _text(flag: flags.Flag) -> str:
     """Return the help of a flag; notes in brackets say which values it takes, and the default."""
-    text = flag.help.removesuffix(_NOISE)
+    text = _NOISE.sub("", flag.help)
     said = _DEFAULT.search(text)
     default = said[1] if said else _default(flag.default)
     repeatable = "repeatable" if isinstance(flag, flags.MultiFlag) else ""
@@ -85,7 +82,9 @@ def _values(parser: flags.ArgumentParser) -> str:
     if isinstance(parser, flags.EnumParser):
         return " or ".join(parser.enum_values)
     low, high = (getattr(parser, name, None) for name in ("lower_bound", "upper_bound"))
-    return "" if low is None else f"{low:.10g} or more" if high is None else f"{low:.10g} to {high:.10g}"
+    if low is None:
+        return ""
+    return f"{low:.10g} or more" if high is None else f"{low:.10g} to {high:.10g}"
 
 
 def _default(value) -> str:

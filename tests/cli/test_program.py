@@ -29,6 +29,7 @@ from arc_suite import files
 from arc_suite.simulation.opengl import RenderingUnavailable
 
 COUNT = flags.DEFINE_integer("count", 1, "How many.", lower_bound=0)
+KINDS = flags.DEFINE_multi_enum("kind", [], ["a", "b"], "Which.")
 RAISES = flags.DEFINE_string("raises", None, "What goes wrong.")
 OUTPUT = flags.DEFINE_string("output", None, "File to write after many lines.")
 
@@ -53,6 +54,7 @@ if __name__ == "__main__":
 HELP = """\
 Run:
   --count=N            How many. [0 or more; default: 1]
+  --kind=TEXT          Which. [a or b; repeatable]
   --raises=TEXT        What goes wrong.
 
 Output:
@@ -108,9 +110,9 @@ def test_without_a_reader_the_work_goes_on(tool, tmp_path, redirection):
     [
         ("--count=-1", "flag --count=-1: expected a non-negative integer\n"),
         ("--count=many", "flag --count=many: expected a non-negative integer\n"),
-        ("--cuont=1", "unknown flag 'cuont'; did you mean 'count'? (there are: count, help, output, raises, "),
+        ("--cuont=1", "unknown flag 'cuont'; did you mean 'count'? (there are: count, help, kind, output, "),
         ("--cou-nt=1", "unknown flag 'cou_nt'; did you mean 'count'? (there are: "),
-        ("--xyz=1", "unknown flag 'xyz' (there are: count, help, output, raises, version)\n"),
+        ("--xyz=1", "unknown flag 'xyz' (there are: count, help, kind, output, raises, version)\n"),
         ("--version=maybe", "flag --version=maybe: expected true or false\n"),
         ("stray", "unexpected argument 'stray'; see --help"),
     ],
