@@ -309,9 +309,12 @@ def test_a_kept_creature_walks_next_to(served, tab):
     served.until(lambda: view._figure.creature.sketch.scale == 4.0)
     assert view._kept.creature.sketch.scale == 1.0
     tab.get_by_text("kept").wait_for()
-    apart = (view._kept._frames[0].position - view._figure._frames[0].position) * view._unit
-    reach = view._figure.creature.reach + view._kept.creature.reach
-    assert 0.0 < np.linalg.norm(apart[:2] - (0.0, 0.9 * reach)) < 0.9 * reach
+    lane = 0.9 * (view._figure.creature.reach + view._kept.creature.reach)
+
+    def apart():
+        return (view._kept._frames[0].position - view._figure._frames[0].position)[:2] * view._unit
+
+    served.until(lambda: 0.0 < np.linalg.norm(apart() - (0.0, lane)) < lane)
     tab.get_by_role("checkbox", name="Keep").click()
     tab.get_by_role("button", name="Undo").click()
     served.until(lambda: view._kept is None and view._figure.creature.sketch.scale == 1.0)
