@@ -123,8 +123,10 @@ def clips(
 
 def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     """Return a draft as frames: a whole number of them at 30 and at 60 a second."""
-    seconds = max(1, round(draft.motion.seconds * _RATE)) / _RATE
-    cycle = draft.cycle * seconds / draft.motion.seconds
+    # A loop was found in whole control steps, which gait cycles need not fill: these give the pace.
+    lasts = draft.cycles * draft.cycle if draft.loops and draft.cycles else draft.motion.seconds
+    seconds = max(1, round(lasts * _RATE)) / _RATE
+    cycle = draft.cycle * seconds / lasts
     draft = draft._replace(motion=draft.motion.stretched(seconds), cycle=cycle)
     frames = max(1, round(seconds * fps))
     motion, contacts = draft.motion.at(np.linspace(0.0, seconds, frames + 1)), tuple(draft.contacts(body)[1])

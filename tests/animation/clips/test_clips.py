@@ -15,7 +15,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import drafts, foot_contacts, recordings
+from arc_suite.animation.clips import drafts, foot_contacts, loops, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.gestures import HITS
 from arc_suite.envs.setup import Setup
@@ -239,17 +239,21 @@ def test_forward_is_z_and_left_is_x():
     ("robot", "preset"), tiers(PRESETS, never, lambda robot, preset: (robot, preset) == ("leaper", "tuned"))
 )
 def test_presets_return(robot, preset):
-    """Within half a degree before the seam is mended; as fast as the walk; two events a foot and cycle for tuned."""
+    """Within half a degree before the seam is mended; in the walk's strides; two events a foot and cycle for tuned."""
     body = ROBOTS[robot]
     (clip,) = export.clips(Setup(body), ["walk"], preset=preset)
     assert np.degrees(clip.motion.seam) <= 0.5
     environment = arc_suite.load(body, "walk", {"random": 0})
     recording = recordings.record(environment, policy("cpg", body, preset), 200, 700)
     # Of the torso, whose sway is taken out by a mean over a gait cycle.
-    cycle, sums = round(clip.motion.seconds / clip.cycles / recording.step), recording.poses[:, :2].cumsum(axis=0)
-    path = (sums[cycle:] - sums[:-cycle]) / cycle
+    period = loops.period(recording)
+    samples, sums = round(period / recording.step), recording.poses[:, :2].cumsum(axis=0)
+    path = (sums[samples:] - sums[:-samples]) / samples
     speed = np.hypot(*np.diff(path, axis=0).T).mean() / recording.step
-    assert np.hypot(*clip.motion.twist[:2]) == pytest.approx(speed, rel=0.01)
+    # A stride, as time is stretched to whole frames: by less than one.
+    cycle = clip.motion.seconds / clip.cycles
+    assert np.hypot(*clip.motion.twist[:2]) * cycle == pytest.approx(speed * period, rel=0.01)
+    assert cycle == pytest.approx(period, abs=0.5 / 30.0 / clip.cycles + 1e-9)
     if preset == "tuned":
         assert len(clip.foot_contacts) == 2 * len(body.legs) * clip.cycles
         (showcase,) = export.clips(Setup.of(body, "steer"), ["tuned"])
