@@ -13,7 +13,8 @@ import re
 import tempfile
 from pathlib import Path
 
-from PIL import Image, ImageSequence
+from PIL import ImageSequence
+from PIL.WebPImagePlugin import WebPImageFile
 
 from arc_suite.cli import program
 
@@ -37,7 +38,7 @@ def kept(cell) -> list:
 
 def smaller(film: str) -> str:
     """Return a film, WebP in base64, with every second frame, of fewer pixels."""
-    image, found = Image.open(io.BytesIO(base64.b64decode(film))), io.BytesIO()
+    image, found = WebPImageFile(io.BytesIO(base64.b64decode(film))), io.BytesIO()
     first, *others = [frame.convert("RGB").resize(_SIZE) for frame in ImageSequence.Iterator(image)][::2]
     duration = 2 * image.info["duration"]
     first.save(found, "WEBP", save_all=True, append_images=others, duration=duration, loop=0, quality=25)

@@ -5,6 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
+pytest.importorskip("jax", reason="of the extra learn: make check-agents")
+
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.critic_blocks import privileged_columns, symmetry
 from arc_suite.learning.agents.inputs import Inputs
