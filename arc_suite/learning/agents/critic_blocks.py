@@ -27,6 +27,8 @@ def privileged_columns(task: Task, critic_blocks: Sequence[str]) -> np.ndarray:
     Raises:
         ValueError: the task has no such block.
     """
+    if not critic_blocks:
+        return np.arange(0)
     there = blocks.places(privileged.sizes(task))
     names = checks.names("critic_blocks", critic_blocks, there, "block")
-    return np.array([place for name in names for place in range(there[name].start, there[name].stop)], int)
+    return np.concatenate([np.arange(there[name].start, there[name].stop) for name in names])
