@@ -47,7 +47,7 @@ NOT_HERE = {
     r"\S+ .*(--checkpoint|--quality|--verify)": "what another command left",
     r"\S+ .*(crouching|ice|ramps)": "a module that the page's own test saves",
     r"render (?!.* (-o|--output) )": "without a file to write",
-    r"design": "minutes: make check-bodies has searches",
+    r"design|tune_cpg": "minutes: make check-bodies has searches",
 }
 EVERY = [
     command
@@ -57,7 +57,7 @@ EVERY = [
 ]
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("command", dict.fromkeys(EVERY))
 def test_a_quick_command_runs(command, tmp_path, monkeypatch):
     """With one episode in place of many."""

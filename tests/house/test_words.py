@@ -116,7 +116,7 @@ def test_american_spelling():
         ]
         if path != pathlib.Path(__file__)
         for number, line in enumerate(path.read_text().splitlines(), 1)
-        for word in BRITISH.findall(line)
+        for word in BRITISH.findall(re.sub(r"[\w+/]{80,}", "", line))  # without base64
     ]
     assert not found, "\n".join(["", *found])
 
