@@ -11,7 +11,7 @@ import pytest
 import arc_suite
 from arc_suite import models
 from arc_suite.robots import ROBOTS
-from arc_suite.simulation import opengl
+from arc_suite.simulation import opengl, pictures
 
 # Imports, simulates and renders, and prints what came of it.
 SCRIPT = """
@@ -46,6 +46,7 @@ REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJO
 NO_DRIVER = {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}  # libEGL loads, and finds nobody to draw
 UNSET = dict.fromkeys(("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL"))
 EGL = {"MUJOCO_GL": "egl"}
+FAST = pictures.QUALITIES["fast"]
 PICTURE = "picture (48, 64, 3)"
 NO_LIBRARY, NO_EGL = "the OpenGL library is missing", "Cannot initialize a headless EGL display"
 NO_DISPLAY = "(65550) b'X11: The DISPLAY environment variable is missing'"
@@ -142,11 +143,16 @@ def test_pictures_are_those_of_a_context_of_ones_own():
     for height, width in ((120, 60), (60, 120)):  # grows in one direction, then in the other
         for environment in environments:
             own = Physics.from_xml_string(models.assemble(environment.task.body, decorated=True).to_xml_string())
+            drawing = own.model.vis.quality
+            (drawing.numslices, drawing.numstacks), drawing.shadowsize = FAST.faces, FAST.shadows
+            drawing.offsamples = 0
             own.set_state(environment.physics.get_state())
             own.forward()
-            for depth in (False, True):
-                picture = environment.physics.render(height, width, "portrait", depth=depth)
-                np.testing.assert_array_equal(picture, own.render(height, width, "portrait", depth=depth))
+            drawn = own.render(FAST.scale * height, FAST.scale * width, "portrait")
+            picture = environment.physics.render(height, width, "portrait")
+            np.testing.assert_array_equal(picture, pictures.smaller(drawn, FAST.scale))
+            picture = environment.physics.render(height, width, "portrait", depth=True)
+            np.testing.assert_array_equal(picture, own.render(height, width, "portrait", depth=True))
             own.free()
 
 

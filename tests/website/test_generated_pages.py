@@ -130,4 +130,4 @@ def test_links_that_sphinx_can_follow():
 def test_the_command_line_has_every_program():
     page = reference.commands_page()
     assert re.findall("^## `(.*)`$", page, re.MULTILINE) == list(PROGRAMS)
-    assert page.count("--[no]help") == len(PROGRAMS)
+    assert page.count("  -h, --help ") == len(PROGRAMS)
