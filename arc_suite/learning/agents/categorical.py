@@ -91,8 +91,7 @@ def _joint(hp, critic: Sequence[Mapping], x):
         found.append({**layer, "mean": x.mean(axis=axes), "variance": x.var(axis=axes)})
         x = networks.activated(found[-1], x, "relu")
         x = networks.shared(x) if legs and len(found) == 1 else x
-    logits = networks.linear(critic[-1], x)
-    return logits.mean(axis=1) if legs else logits, found
+    return networks.of_body(networks.linear(critic[-1], x), legs), found
 
 
 def _projected(critic: Sequence[Mapping]) -> tuple:

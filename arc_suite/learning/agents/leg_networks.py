@@ -64,7 +64,7 @@ class Legs:
     def viewed(self, observations):
         """Return what legs see of observations (..., size), privileged blocks after them if there are any."""
         seen = slice(self.own if observations.shape[-1] == self.size else None)
-        sources, factors, bias = (self._flat(values)[..., seen] for values in self.views[:3])
+        sources, factors, bias = (values[..., seen] for values in self._flat_views)
         return sum((observations[..., sources[i]] * factors[i] for i in range(2)), bias)
 
     def drawn(self, random, hidden, last_gain=1.0):
@@ -83,7 +83,7 @@ class Legs:
     def values(self, parameters, views):
         """Return the values (...) of normalized views."""
         legs = self._by_leg(views) * networks.scale(self.views.sizes)
-        return _of_legs(parameters, legs, np.ones(self.legs, bool))[..., 0].mean(axis=-1)
+        return networks.of_body(_of_legs(parameters, legs, np.ones(self.legs, bool)), legs=True)[..., 0]
 
     def seen(self, views):
         """Return the vectors (..., legs, inputs) whose moments normalize views."""
@@ -121,6 +121,11 @@ class Legs:
     def scale(self) -> np.ndarray:
         """(features,) factors of normalized features; see `networks.scale`."""
         return networks.scale(self.views.sizes[: 1 + self.blocks])
+
+    @functools.cached_property
+    def _flat_views(self) -> list[np.ndarray]:
+        """Sources, factors and bias in the order of a view, which is asked for in every step."""
+        return [self._flat(values) for values in (self.views.sources, self.views.factors, self.views.bias)]
 
     def _flat(self, values: np.ndarray) -> np.ndarray:
         """Values (..., legs, inputs) in the order of a view: those of all legs that actions depend on come first."""
@@ -214,10 +219,14 @@ def exported_halves(legs, layers):
     there = _there(legs)
     found = activated(linear(legs.node("Pick", there), first), first).node("Place", there)
     half = found.shape[-1] // 2
-    mean = (found[:, :, half:].sum(axis=1) / np.float32(found.shape[1]))[:, None]
-    mean = np.broadcast_to(mean, (*found.shape[:2], mean.shape[-1]))
+    mean = _for_all(found[:, :, half:].sum(axis=1) / np.float32(found.shape[1]), there)
     found = np.concatenate([found[:, :, :half], mean], axis=-1)
     return perceptron(found.node("Pick", there), others).node("Place", there)
+
+
+def _for_all(x, there):
+    """Numbers (1, size) of the body for each of its legs (1, legs, size)."""
+    return np.broadcast_to(x[:, None], (1, *there.shape[1:], x.shape[-1]))
 
 
 def _there(legs):
@@ -231,8 +240,7 @@ def _exported(parameters, legs, there):
     own, mean = np.split(np.asarray(head["weight"]), 2)
     found = perceptron(legs.node("Pick", there), features, ACTIVATION).node("Elu")
     context = found.node("Place", there).sum(axis=1) / there.sum(axis=1)[:, None]
-    context = context.node("Linear", mean, head["bias"])[:, None]
-    context = np.broadcast_to(context, (1, *there.shape[1:], context.shape[-1])).node("Pick", there)
+    context = _for_all(context.node("Linear", mean, head["bias"]), there).node("Pick", there)
     hidden = found.node("Product", own) + context
     return hidden.node("Elu").node("Linear", last["weight"], last["bias"]).node("Place", there)
 

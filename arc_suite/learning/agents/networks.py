@@ -114,6 +114,11 @@ def shared(x):
     return jnp.concatenate([own, jnp.broadcast_to(common.mean(axis=-2, keepdims=True), common.shape)], axis=-1)
 
 
+def of_body(outputs, legs: bool):
+    """Return the outputs (..., outputs) of a body; if they are those of its legs (..., legs, outputs), their means."""
+    return outputs.mean(axis=-2) if legs else outputs
+
+
 def dropped(x, kept, dropout: float):
     """Return x with 0 where units are not kept, and the others divided by 1 - dropout."""
     return jnp.where(kept, x * (1.0 / (1.0 - dropout)), 0.0)

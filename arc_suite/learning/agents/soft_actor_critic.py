@@ -138,13 +138,8 @@ def values(hp: SoftActorCritic, critics, observations, actions, kept=None):
         x = networks.activated(first, x, "relu")
         x = networks.shared(x) if hp.network == "legs" else x
         x = networks.hidden(others, x, "relu", None if masks is None else masks[1:], hp.dropout)
-        results.append(KINDS[hp.critics].value(of_body(hp, networks.linear(last, x))))
+        results.append(KINDS[hp.critics].value(networks.of_body(networks.linear(last, x), hp.network == "legs")))
     return results
-
-
-def of_body(hp: SoftActorCritic, outputs):
-    """Return the outputs (batch, outputs) of a critic, means over legs if it is theirs."""
-    return outputs.mean(axis=1) if hp.network == "legs" else outputs
 
 
 def targets(hp: SoftActorCritic, critics, batch: Transitions, next_actions, bonus, kept):
