@@ -20,8 +20,6 @@ SHORTER = {
     "style": "--episodes=1",
     "survey": "--count=2",
     "transfer": "--families=varied",
-    "design": "--bodies=20 --random=20 --steps=10",
-    "tune_cpg": "--generations=1 --steps=20 --starts=0 --resets=1",
 }
 
 

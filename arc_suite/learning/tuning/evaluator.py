@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
+from arc_suite import checks, rotations
 from arc_suite.cpg.law import Clocked, checked, proprioception
 from arc_suite.cpg.prescribed import Prescribed, Preset
 from arc_suite.envs.setup import Setup
@@ -45,8 +45,9 @@ class Evaluator:
             skipped: first steps that count for neither rewards nor style.
 
         Raises:
-            ValueError: a task whose reward has other terms.
+            ValueError: a task whose reward has other terms, or no steps that count.
         """
+        checks.integer("steps", steps, skipped + 1)
         self._body, self._shape, self._steps, self._skipped = setup.body, (presets, episodes), steps, skipped
         self._environment = setup.make_vec(presets * episodes)
         there = self._environment.task.settings.weights

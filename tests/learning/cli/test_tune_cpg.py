@@ -27,7 +27,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     lines = programs.killed(command("--generations=100000", f"--output={broken}"), journal, 3)
     journal.write_bytes(b"".join(lines[:3]) + lines[1][:30])  # two generations, and a third that was being written
     again = tune("--generations=4", f"--output={broken}")
-    assert (again.returncode, again.stdout) == (done.returncode, done.stdout)
+    assert (again.returncode, again.stdout.replace(str(broken), str(straight))) == (done.returncode, done.stdout)
     for name in ("journal.jsonl", "result.json"):
         assert (broken / name).read_bytes() == (straight / name).read_bytes()
 

@@ -67,3 +67,8 @@ def test_the_evaluator_needs_the_terms_of_style():
     line = "task stay: expected a reward with terms posture and smoothness, got upright, control"
     with gaitless.registered(), refused(line):
         Evaluator(Setup.of("tick", "stay"), 1, 1, 5)
+
+
+def test_some_steps_count():
+    with refused("steps: expected an integer from 21, got 20"):
+        Evaluator(Setup.of("tick"), 1, 1, 20, skipped=20)
