@@ -43,7 +43,8 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     picture = imageio.imread(straight / "course.png")
     assert picture.shape[0] > 500 and picture.std() > 10.0
 
-    lines = done.stdout.splitlines()
+    first, *lines = done.stdout.splitlines()
+    assert first == f"{straight}: 4 generations"
     assert lines[0].split() == ["preset", "return", "falls", "of", "2", "posture", "smoothness", "tilt"]
     assert [line.split()[0] for line in lines[2:4]] == ["found", "medium"]
     assert lines[5].startswith("Preset(stiffness=")
