@@ -15,6 +15,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.hyperparameters import UNSEEN
 from arc_suite.learning.agents.learner import MOST_SEEDS, RunContext
+from arc_suite.policies import network
 from arc_suite.tasks.contract import CURRICULUM
 
 # Names in the file of a configuration.
@@ -68,13 +69,18 @@ class Configuration:
         Args:
             setup: body, or bodies, task and settings by which the policy is judged.
             algorithm, seed, steps, evaluate_every, prior: see `Configuration`.
-            hyperparameters: those that differ from the algorithm's.
+            hyperparameters: those that differ from the algorithm's. Where `start` names a policy of one body,
+                `network` and `hidden` are that policy's, unless they are given.
             training: settings of the task in training alone, such as kicks or a curriculum.
 
         Raises:
-            ValueError: an unknown algorithm or hyperparameter, or a value out of its range.
+            ValueError: an unknown algorithm or hyperparameter, a value out of its range, or a damaged policy to start
+                from.
         """
         definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters or {})
+        if getattr(definition.hyperparameters, "start", "") and not setup.several:
+            own = _network(definition.hyperparameters.start)
+            definition = definition.with_hyperparameters(own | dict(hyperparameters or {}))
         if setup.several and not definition.several:
             those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
             raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
@@ -202,6 +208,19 @@ class Configuration:
         packages = {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")}
         own = {"episodes": evaluation.CURVE_EPISODES, "versions": provenance["versions"] | packages}
         return self.to_dict() | provenance | own
+
+
+def _network(start: str) -> dict[str, Any]:
+    """Return the hyperparameters of the network of a policy file; none if there is no file, as a run may resume."""
+    try:
+        graph = network.load(start).graph
+    except OSError:
+        return {}
+    operators = {node.operator: node.inputs for node in reversed(graph.nodes)}  # of the first node of each operator
+    if "Linear" not in operators:
+        return {}
+    width = graph.arrays[str(operators["Linear"][-1])].size
+    return {"network": "legs" if "Product" in operators else "perceptron", "hidden": width}
 
 
 def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Mapping[str, Any]) -> None:

@@ -102,6 +102,19 @@ def test_the_policy_of_a_run_is_read_again(tmp_path, name):
     assert np.isfinite(found.actions(np.zeros((3, found.size), np.float32))).all()
 
 
+@pytest.mark.parametrize(("task", "shape"), [("steer", ("legs", 64)), ("walk", ("perceptron", 128))])
+def test_it_starts_from_a_policy_of_either_network(tmp_path, task, shape):
+    start, setup = network.PACKAGED / f"leaper-{task}.npz", Setup.of("leaper", task, {"time_limit": 0.5})
+    few = {"start": str(start), "num_envs": 2, "horizon": 4, "minibatch": 8}
+    hp = Configuration.of(setup, "finetune", few).hyperparameters
+    assert (hp.network, hp.hidden) == shape
+    agent, policy = learning("finetune", few, tmp_path, setup, steps=64), network.load(start)
+    observations = np.random.default_rng(0).normal(size=(5, policy.size)).astype(np.float32)
+    assert_allclose(agent.advance().policy(observations), policy.actions(observations), atol=1e-5)  # values learn first
+    with refused(f"{start}: expected 32 hidden units, got {shape[1]}"):
+        learning("finetune", few | {"hidden": 32}, tmp_path, setup).advance()
+
+
 def test_a_network_is_one_of_two():
     with refused("unknown network 'leg'; did you mean 'legs'? (there are: perceptron, legs)"):
         ProximalPolicy(network="leg")
