@@ -210,7 +210,7 @@ def length(sketch: Sketch, link: str) -> float:
         sketch: of the body.
         link: name of a link of all legs, or of the part that it is of one leg.
     """
-    own = link_ends(source_body(sketch))
+    own = _own_ends(sketch)
     if link not in own:
         return dict(sketch.lengths).get(link, 1.0)
     return math.hypot(*dict(sketch.ends).get(link, own[link])) / math.hypot(*own[link])
@@ -218,7 +218,7 @@ def length(sketch: Sketch, link: str) -> float:
 
 def lengthened(sketch: Sketch, link: str, factor: float, symmetric: bool) -> Sketch:
     """Return the sketch with another length of a link, as `length` returns it; `symmetric` as for `moved`."""
-    own = link_ends(source_body(sketch))
+    own = _own_ends(sketch)
     if link in own:
         ratio, end = factor / length(sketch, link), dict(sketch.ends).get(link, own[link])
         return moved(sketch, link, tuple(ratio * number for number in end), symmetric)
@@ -228,7 +228,9 @@ def lengthened(sketch: Sketch, link: str, factor: float, symmetric: bool) -> Ske
 
 def dragged(sketch: Sketch, part: str, by: Sequence[float], symmetric: bool) -> Sketch:
     """Return the sketch with the end of a link of one leg moved in its frame, m as the body is; see `moved`."""
-    own = link_ends(source_body(sketch))
+    own = _own_ends(sketch)
+    if part not in own:
+        return sketch
     factor = sketch.scale * next((each for name, each in sketch.lengths if part.endswith(f"_{name}")), 1.0)
     end = dict(sketch.ends).get(part, own[part])
     return moved(sketch, part, tuple(old + new / factor for old, new in zip(end, by, strict=True)), symmetric)
@@ -248,6 +250,14 @@ def moved(sketch: Sketch, part: str, end: Vector, symmetric: bool) -> Sketch:
     ends = dict(sketch.ends) | {part: (x, y, z)} | ({across: (x, -y, z)} if across else {})
     changed = tuple((name, each) for name, each in ends.items() if not _near(each, own.get(name, each[:0])))
     return dataclasses.replace(sketch, ends=changed)
+
+
+def _own_ends(sketch: Sketch) -> Mapping[str, Vector]:
+    """The ends of links before proportions change; none of a sketch that makes no body, while widgets change it."""
+    try:
+        return link_ends(source_body(sketch))
+    except ValueError:
+        return {}
 
 
 def _across(made: Body, part: str) -> str | None:

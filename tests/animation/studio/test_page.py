@@ -145,8 +145,10 @@ def test_a_bad_combination_stands_in_the_page_and_the_creature_walks_on(served, 
     press(tab, "Legs", "ArrowLeft")
     tab.get_by_role("alert").get_by_text("layout: expected radial for an odd number of legs").wait_for()
     assert served.session.creature.setup.body.name == before.setup.body.name
+    press(tab, "lower", "ArrowRight")
     choose(tab, "Layout", "own")
     served.until(lambda: served.session.creature.sketch.legs == 5 and not served.session.error)
+    assert dict(served.session.creature.sketch.lengths)["lower"] == pytest.approx(1.25)
 
 
 def test_the_command_is_followed(served, tab):

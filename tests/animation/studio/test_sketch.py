@@ -80,6 +80,14 @@ def test_a_link_of_one_leg_and_of_the_leg_across():
     assert ends["l2_lower"] == pytest.approx([3.0 * number for number in own["l2_lower"]])
 
 
+def test_links_change_while_other_widgets_make_no_body():
+    """A page shows and changes lengths of the creature that walks on."""
+    odd = Sketch(legs=5, links=2, layout="pairs")
+    longer = sketches.lengthened(odd, "lower", 1.2, True)
+    assert (sketches.length(odd, "lower"), sketches.length(longer, "lower")) == (1.0, 1.2)
+    assert sketches.dragged(odd, "l1_lower", (0.1, 0.0, 0.0), True) == odd
+
+
 def test_factors_of_links_that_the_body_lacks_are_ignored():
     sketch = Sketch(legs=6, links=2, lengths=(("middle", 1.5), ("lower", 1.0)))
     assert sketches.body(sketch) == generator.generate(6, 2)
