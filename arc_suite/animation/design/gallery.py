@@ -7,6 +7,7 @@ import base64
 import csv
 import html
 import io
+import itertools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple, cast
@@ -107,7 +108,7 @@ def pictures(best: Iterable[Elite], cells: Map, trial: Trial) -> dict[tuple[int,
 
 
 def write_picture(path: Path, views: Mapping[tuple[int, ...], np.ndarray]) -> None:
-    """Write pictures as one, in columns of the map's first axis and rows of its second."""
+    """Write pictures as one; see `_arranged`."""
     shown, columns = _arranged(views)
     nothing = np.zeros((*_SIZE[::-1], 3), np.uint8)
     with files.writing(path) as temporary:
@@ -151,8 +152,10 @@ def _item(label: str, view: np.ndarray | None) -> str:
 
 
 def _arranged(views: Mapping[tuple[int, ...], np.ndarray]) -> tuple[list[tuple[int, ...]], int]:
-    """Return the cells to show, row by row, and how many columns there are."""
-    columns, rows = sorted({cell[0] for cell in views}), sorted({cell[1:] for cell in views})
-    if len(rows) == 1 or len(columns) == 1:
+    """Return the cells to show, row by row, and how many columns there are: the axis with fewer values has columns."""
+    axes = [sorted(set(values)) for values in zip(*views, strict=True)]
+    if min(map(len, axes)) == 1 or len(axes) == 1:
         return sorted(views), min(4, len(views))
-    return [(column, *row) for row in rows for column in columns], len(columns)
+    across = int(len(axes[1]) < len(axes[0]))
+    cells = sorted(itertools.product(*axes), key=lambda cell: (cell[1 - across], cell[across]))
+    return cells, len(axes[across])
