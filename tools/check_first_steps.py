@@ -35,7 +35,7 @@ SUCCESSES = {
 }
 ELSEWHERE = ("pip install", "python learn.py", "python play.py")  # the last two are of docs/clients.md
 
-_SHORT = flags.DEFINE_bool("short", False, "One episode in place of many, wherever the page's command allows it.")
+_SHORT = flags.DEFINE_bool("short", False, "One episode in place of many, and at most two minutes of a training.")
 _ONLY = flags.DEFINE_multi_enum("only", [], list(SUCCESSES), "Success to make; all without it.")
 
 

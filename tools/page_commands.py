@@ -13,8 +13,9 @@ _SAVED = re.compile(r"[Ss]ave this as\s+`(?P<file>[^`]+)`[^`]*\Z")
 _COMMAND = re.compile(r"(?:^|`)((?:python (?:tools/|-m arc_suite)|arc-suite )[^`\n]*(?:\n[^`\n]+(?=`))?)", re.MULTILINE)
 _COMMENT = re.compile(r"\s+#.*")
 
-# Programs whose work fewer episodes, bodies or steps shorten: what a check adds to a command of a page.
+# Programs whose work fewer episodes, bodies or minutes shorten: what a check adds to a command of a page.
 SHORTER = {
+    "train": "--minutes=2",
     "evaluate": "--episodes=1",
     "collect": "--episodes=1",
     "style": "--episodes=1",

@@ -13,9 +13,10 @@ from website import markdown, returns, settings
 API = {
     "Environments": ("arc_suite", "arc_suite.envs.vector", "arc_suite.envs.bodies", "arc_suite.envs.pixels"),
     "Demonstrators and policies": ("arc_suite.cpg", "arc_suite.policies"),
-    "Evaluation": ("arc_suite.evaluation", "arc_suite.evaluation.published"),
+    "Training and evaluation": ("arc_suite.learning", "arc_suite.evaluation", "arc_suite.evaluation.published"),
     "Style": ("arc_suite.style", "arc_suite.style.metrics"),
-    "Datasets and export": ("arc_suite.data", "arc_suite.animation.clips"),
+    "Datasets": ("arc_suite.data",),
+    "Pictures and clips": ("arc_suite.animation", "arc_suite.animation.clips"),
     "Bodies": ("arc_suite.robots.spec", "arc_suite.robots.spec_files", "arc_suite.robots.generator"),
     "Gaits and shapes": ("arc_suite.robots.gaits", "arc_suite.robots.shaping", "arc_suite.models.families"),
     "Tasks": (
