@@ -36,7 +36,11 @@ def api_name(title: str) -> str:
 
 
 # Pages by name.
-TITLES = {"commands": "Command line", "settings": "Settings of all tasks", **{api_name(title): title for title in API}}
+TITLES = {
+    "commands": "Command line",
+    "settings": "Settings of all tasks",
+    **{api_name(title): f"API: {title.lower()}" for title in API},
+}
 
 
 def pages() -> Iterator[tuple[str, str]]:
@@ -76,4 +80,6 @@ def _help(program: str) -> str:
 def api_page(title: str, modules: tuple[str, ...]) -> str:
     """Return a page of Sphinx directives that take the docstrings of modules."""
     parts = [f"```{{eval-rst}}\n.. automodule:: {name}\n   :members:\n```" for name in modules]
-    return markdown.page(title, *(f"## `{name}`\n\n{part}" for name, part in zip(modules, parts, strict=True)))
+    return markdown.page(
+        TITLES[api_name(title)], *(f"## `{name}`\n\n{part}" for name, part in zip(modules, parts, strict=True))
+    )
