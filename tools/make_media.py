@@ -89,6 +89,7 @@ TASKS = {
 }
 _FPS = 30.0  # of clips
 _ABOVE = 0.82  # share of what is cut from a square, where it is empty, that is cut above
+_CAPTION = 22  # height of a caption, pixels: legible where a page shows a picture at half its width
 _FRAMES = 67  # control steps of a view, on whose path the camera is fitted
 
 
@@ -213,7 +214,7 @@ def draw(media: Media) -> None:
     for number, (name, view) in enumerate(media.views.items()):
         size = tuple(pixels * (1 + (media.large and number == 0)) for pixels in media.size)
         drawn = media.source(view, size, media.steps)
-        views.append([films.captioned(picture, name) if media.captions else picture for picture in drawn])
+        views.append([films.captioned(picture, name, _CAPTION) if media.captions else picture for picture in drawn])
     frames = [arranged(list(row), media) for row in zip(*views, strict=True)]
     path = ROOT / media.path
     path.parent.mkdir(exist_ok=True)

@@ -164,10 +164,10 @@ def check_fps(fps: float, extension: str) -> None:
         raise ValueError(f"fps: expected at most {1.0 / _SHORTEST_FRAME:g} for a GIF, got {fps:g}")
 
 
-def captioned(picture: np.ndarray, text: str) -> np.ndarray:
-    """Return the picture with a text in its lower left corner."""
+def captioned(picture: np.ndarray, text: str, size: int | None = None) -> np.ndarray:
+    """Return the picture with a text in its lower left corner, of a size in pixels that by default suits its height."""
     image = Image.fromarray(picture)
-    size = max(11, image.height // 22)
+    size = size or max(11, image.height // 22)
     font = ImageFont.load_default(size)
     ImageDraw.Draw(image).text((size, image.height - size), text, (235, 240, 245), font, anchor="ls")
     return np.asarray(image)
