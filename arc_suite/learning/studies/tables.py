@@ -164,12 +164,10 @@ _PARTS = {
 }
 
 
-def _seeing_forces(robot, algorithm, steps, seed=0, task="walk", label="", **fields) -> Run:
-    """A run whose networks see contact forces, as all did once; those of `ppo` are perceptrons of 256 units."""
-    perceptron = {"network": "perceptron", "hidden": 256, "minibatch": 1024}
-    own = {"exclude_blocks": []} | (perceptron if algorithm == "ppo" else {})
-    label = f"{label or algorithm}-forces"
-    return run(robot, algorithm, steps, seed, task, hyperparameters=own, label=label, **fields)
+def _seeing_forces(robot, steps, seed=0, task="walk", label="ppo-forces", **fields) -> Run:
+    """A run of `ppo` as it was once: a perceptron of 256 units, which sees contact forces."""
+    own = {"exclude_blocks": [], "network": "perceptron", "hidden": 256, "minibatch": 1024}
+    return run(robot, "ppo", steps, seed, task, hyperparameters=own, label=label, **fields)
 
 
 # `sac_parallel` with prior data, or with phases.
@@ -179,7 +177,7 @@ _ADDED = (
     ("sac_parallel-refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
     ("sac_parallel-phases", _SHORT, None),
 )
-_FEEDBACK = ("steer", "rough", "slopes", "stairs", "navigate")  # tasks in which it pays
+_UNEVEN = ("rough", "slopes", "stairs", "navigate")  # tasks of uneven ground or pillars, without trenches
 _ROBOTS = ("tick", "leaper", "queen", "bastion")
 
 # The paper's own study is `paper`: 3,000 hours of a core. The others fit fewer hours.
@@ -214,27 +212,36 @@ STUDIES = {
     ),
     # Half a minute of a core a run, two on `gaps`.
     "imitation": Study(
-        "imitation of the demonstrators by DAgger in tasks in which feedback pays",
+        "imitation of the demonstrators by DAgger",
         (
-            *(_seeing_forces("tick", "dagger", 38_400, task=task, evaluate_every=38_400) for task in _FEEDBACK),
+            *(run(robot, "dagger", 25_600) for robot in ROBOTS),
+            *(run(robot, "dagger", 38_400, task="steer", evaluate_every=38_400) for robot in ROBOTS),
+            *(run("tick", "dagger", 38_400, task=task, evaluate_every=38_400) for task in _UNEVEN),
             # A foot misses a trench in a few steps of an episode alone: that takes more episodes.
-            _seeing_forces("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
-            _seeing_forces("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
+            run("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
         ),
     ),
-    # Steps as on the division `top`.
+    # `ppo`, then as it was, with the steps of the division `top`.
     "from-nothing": Study(
-        "PPO from nothing in the other tasks, Tick; uneven ground and pillars three million steps; with contact forces",
+        "PPO from nothing in the other tasks, Tick; then as it was, with contact forces",
         (
+            *(run("tick", "ppo", 1_000_000, task=task, evaluate_every=200_000) for task in ("limp", "roam", "course")),
+            # A leg that fails keeps it from learning: it learns without, and is judged with it.
+            run(
+                *("tick", "ppo", 1_000_000, 0, "limp"),
+                evaluate_every=200_000,
+                label="ppo-undisturbed",
+                training={"actuator_failure": False},
+            ),
             *(
-                _seeing_forces("tick", "ppo", DIVISIONS["top"].steps_in(task), task=task)
+                _seeing_forces("tick", DIVISIONS["top"].steps_in(task), task=task)
                 for task in TASKS
                 if task not in _LATER
             ),
             # Without a curriculum it learns to stand at the first trench.
             _seeing_forces(
-                *("tick", "ppo", DIVISIONS["top"].far_steps, 0, "gaps"),
-                label="ppo-curriculum",
+                *("tick", DIVISIONS["top"].far_steps, 0, "gaps"),
+                label="ppo-curriculum-forces",
                 training={"curriculum": True},
             ),
         ),
@@ -263,17 +270,10 @@ STUDIES = {
             for robot, (label, changes, prior) in itertools.product(("tick", "leaper"), _ADDED)
         ),
     ),
-    "beyond": Study(
-        "beyond the paper: imitation of the demonstrators by DAgger, and PPO from nothing",
-        (
-            *(_seeing_forces(robot, "dagger", 25_600) for robot in ROBOTS),
-            *(_seeing_forces(robot, "ppo", 1_000_000, seed) for seed, robot in itertools.product(range(3), ROBOTS)),
-        ),
-    ),
     "ppo-forces": Study(
         "division top of the benchmark: PPO with contact forces and 256 units",
         tuple(
-            _seeing_forces(robot, "ppo", DIVISIONS["top"].steps_in(task), seed, task)
+            _seeing_forces(robot, DIVISIONS["top"].steps_in(task), seed, task)
             for seed, (robot, task) in itertools.product(range(SEEDS), PLACES)
         ),
     ),
