@@ -69,7 +69,7 @@ TASKS = {
     "directed": View("queen", "directed", 5, 45, 50, azimuth=-75.0, elevation=10.0, distance=4.5),
     "shoved": View("bastion", "shoved", 1, 45, 30, (1.0, 0.0, 0.0), azimuth=35.0, elevation=18.0, distance=5.0),
     "limp": View("tick", "limp", 1, 60, 20, (1.0, 0.0, 0.0), azimuth=60.0),
-    "rough": View("tick", "rough", **_SIDE),
+    "rough": View("tick", "rough", **{**_SIDE, "distance": 7.0}),
     "slopes": View(
         "queen",
         "slopes",

@@ -183,7 +183,7 @@ class Page:
         self._pause.on_update(lambda event: self._session.pause(event.target.value))
 
     def _add_files(self) -> None:
-        self._gui.add_button("Save Design", hint="All that the page says").on_click(self._save_design)
+        self._gui.add_button("Save Design", hint="Body, task and command").on_click(self._save_design)
         for file in saving.FILES:
             button = self._gui.add_button(f"Save {file.label}")
             button.on_click(functools.partial(self._save, file))
