@@ -9,6 +9,7 @@ from arc_suite.animation.studio.sketch import Sketch
 
 _REAL = 0.97  # of real time, from which the pace is called so
 _SMALL = "font-size:0.85em"
+_INDENTED = "padding:0 0.8em"  # as far from the edges as widgets are
 # Browsers have a clipboard on pages of this machine alone; on others the text is selected.
 _COPY = (
     "const text = this.nextElementSibling; getSelection().selectAllChildren(text);"
@@ -49,12 +50,12 @@ def copied(sketch: Sketch) -> str:
     for name, text in texts.items():
         parts.append(_element("button", f"Copy {name}", onclick=_COPY, style="min-height:24px"))
         parts.append(_element("pre", text, style=f"white-space:pre-wrap;{_SMALL}"))
-    return _html(_element("div", *parts))
+    return _html(_element("div", *parts, style=_INDENTED))
 
 
 def line(text: str) -> str:
     """Return a line of text, as HTML."""
-    return _html(_element("p", text, style=_SMALL))
+    return _html(_element("p", text, style=f"{_SMALL};{_INDENTED}"))
 
 
 def _element(tag: str, *inside: str | ElementTree.Element, **attributes: str) -> ElementTree.Element:
