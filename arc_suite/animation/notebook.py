@@ -85,7 +85,7 @@ def _film(environment: Environment, policy: Policy, seed: int, steps: int) -> st
     with contextlib.closing(footage):
         frame = films.frame_seconds(footage.control_timestep)
         views = films.frames([footage], steps * footage.control_timestep, frame)
-        films.write_webp(file, [footage.view(), *itertools.chain(*views)], frame, quality=35, method=4)
+        films.write_webp(file, [footage.view(), *itertools.chain(*views)], frame, quality=35)
     source = f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"
     return _element("img", src=source, width=str(_SIZE[0]), height=str(_SIZE[1]), alt=body)
 

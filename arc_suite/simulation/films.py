@@ -230,14 +230,15 @@ def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: flo
     first.save(path, "GIF", save_all=True, append_images=others, duration=durations, loop=0)
 
 
-def write_webp(
-    path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float, quality: int = 50, method: int = 6
-) -> None:
-    """Write a film that plays forever, in full colors; arguments as of `write_gif`, and Pillow's."""
+def write_webp(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float, quality: int = 50) -> None:
+    """Write a film that plays forever, in full colors; arguments as of `write_gif`, and Pillow's `quality`.
+
+    The encoder's best method takes twenty times as long for a size that is at most 5 % smaller.
+    """
     first, *others = map(Image.fromarray, frames)
     durations = _durations(1 + len(others), seconds, 1)
     first.save(
-        path, "WEBP", save_all=True, append_images=others, duration=durations, loop=0, quality=quality, method=method
+        path, "WEBP", save_all=True, append_images=others, duration=durations, loop=0, quality=quality, method=_METHOD
     )
 
 
@@ -247,6 +248,7 @@ def _durations(count: int, seconds: float, unit: int) -> list[int]:
     return [unit * (end - start) for start, end in itertools.pairwise(ends)]
 
 
+_METHOD = 4  # of WebP's encoder
 _GIF_COLORS = 128
 _GIF_SAMPLES = 4  # frames that the palette is made from
 WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif, ".webp": write_webp}

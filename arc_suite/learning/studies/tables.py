@@ -225,7 +225,10 @@ STUDIES = {
     "from-nothing": Study(
         "PPO from nothing in the other tasks, Tick; then as it was, with contact forces",
         (
-            *(run("tick", "ppo", 1_000_000, task=task, evaluate_every=200_000) for task in ("limp", "roam", "course")),
+            *(
+                run("tick", "ppo", 1_000_000, task=task, evaluate_every=200_000)
+                for task in ("limp", "roam", "course", "gaps")
+            ),
             # A leg that fails keeps it from learning: it learns without, and is judged with it.
             run(
                 *("tick", "ppo", 1_000_000, 0, "limp"),
