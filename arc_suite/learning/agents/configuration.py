@@ -77,10 +77,11 @@ class Configuration:
             ValueError: an unknown algorithm or hyperparameter, a value out of its range, or a damaged policy to start
                 from.
         """
-        definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters or {})
-        if getattr(definition.hyperparameters, "start", "") and not setup.several:
-            own = _network(definition.hyperparameters.start)
-            definition = definition.with_hyperparameters(own | dict(hyperparameters or {}))
+        given = hyperparameters or {}
+        definition = algorithms.algorithm(algorithm).with_hyperparameters(given)
+        start = getattr(definition.hyperparameters, "start", "")
+        if start and not setup.several and not {"network", "hidden"} <= given.keys():
+            definition = definition.with_hyperparameters({**_network(start), **given})
         if setup.several and not definition.several:
             those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
             raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")

@@ -115,6 +115,16 @@ def test_it_starts_from_a_policy_of_either_network(tmp_path, task, shape):
         learning("finetune", few | {"hidden": 32}, tmp_path, setup).advance()
 
 
+def test_a_file_of_a_run_is_read_without_the_policy_that_it_started_from(tmp_path):
+    setup, damaged = Setup.of("leaper", "walk"), tmp_path / "policy.npz"
+    damaged.write_bytes((network.PACKAGED / "leaper-walk.npz").read_bytes())
+    run = Configuration.of(setup, "finetune", {"start": str(damaged)})
+    damaged.write_bytes(b"no policy")
+    assert Configuration.from_dict(run.to_dict()) == run
+    with refused(f"{damaged}: ", begins=True):
+        Configuration.of(setup, "finetune", {"start": str(damaged)})
+
+
 def test_a_network_is_one_of_two():
     with refused("unknown network 'leg'; did you mean 'legs'? (there are: perceptron, legs)"):
         ProximalPolicy(network="leg")
