@@ -3,7 +3,7 @@
 import collections
 import functools
 import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,8 +83,10 @@ def play(case: Case) -> tuple[control.Environment, Trajectory]:
         The environment as the walk left it, and the walk.
 
     Raises:
-        ValueError: a task without a target velocity or command.
+        ValueError: a task without a target velocity or command, a walk that need not end, or a setting that does not
+            fit.
     """
+    protocol.check_ends(case.setup.task_kwargs["time_limit"])
     environment = case.setup.load(case.seed)
     task, data = environment.task.definition, environment.physics.data.ptr
     demonstrator = Demonstrator(environment, suited_preset(task))
@@ -123,11 +125,14 @@ def run(case: Case) -> Outcome:
     return assess(case, trajectory)
 
 
-def survey(cases: Sequence[Case], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
-    """Run many cases.
+def survey(
+    cases: Iterable[Case], count: int, processes: int | None = None, progress: Callable = tqdm
+) -> Iterator[Outcome]:
+    """Run many cases, each as soon as it is made.
 
     Args:
         cases: to run.
+        count: their number.
         processes: to run them on, at most one for each; None for one per core.
         progress: makes a progress bar as `tqdm` does.
 
@@ -137,14 +142,12 @@ def survey(cases: Sequence[Case], processes: int | None = None, progress: Callab
     Raises:
         ValueError: a walk that need not end, or a setting that does not fit.
     """
-    for case in cases:
-        protocol.check_ends(case.setup.task_kwargs["time_limit"])
-    progress = functools.partial(progress, total=len(cases), unit="body", desc="walk")
+    progress = functools.partial(progress, total=count, unit="body", desc="walk")
     if processes == 1:
         yield from progress(map(run, cases))
         return
     # Spawned, not forked: a fork would share whatever OpenGL or threads the caller has open.
-    with multiprocessing.get_context("spawn").Pool(processes and min(processes, len(cases))) as pool:
+    with multiprocessing.get_context("spawn").Pool(processes and min(processes, count)) as pool:
         yield from progress(pool.imap(run, cases))
 
 

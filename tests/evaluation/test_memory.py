@@ -41,7 +41,10 @@ class Replay:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("robot", "task", "preset"), [("queen", "walk", "medium"), ("tick", "steer", "reactive")])
+@pytest.mark.parametrize(
+    ("robot", "task", "preset"),
+    [("queen", "walk", "medium"), pytest.param("tick", "steer", "reactive", marks=pytest.mark.release)],
+)
 def test_a_replay_of_the_data_earns_on_evaluations_seeds_what_it_earns_on_others(
     tmp_path, monkeypatch, robot, task, preset
 ):

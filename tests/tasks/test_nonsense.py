@@ -23,7 +23,7 @@ def deep(levels=3000):
     return value
 
 
-NONSENSE = {"nested": nested(), "deep": deep(), "long": "x" * 10**6, "many": [0] * 10**6, "object": object()}
+NONSENSE = {"nested": nested(), "deep": deep(), "long": "x" * 10**6, "many": [0] * 10**5, "object": object()}
 TOGETHER = ("time_limit", "arena", "on_divergence", "random", *modifiers.NAMES)
 
 

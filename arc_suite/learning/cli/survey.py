@@ -72,12 +72,12 @@ def main() -> None:
     name, settings = task()
     settings = {"time_limit": FLAGS.seconds} | settings
     seeds = range(FLAGS.first, FLAGS.first + FLAGS.count)
-    cases = [survey.Case(Setup.of(member(seed), name, settings), seed) for seed in seeds]
+    cases = (survey.Case(Setup.of(member(seed), name, settings), seed) for seed in seeds)
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:
             checks.extension(FLAGS.picture, [".png"])
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
-        outcomes = list(survey.survey(cases, FLAGS.processes, progress))
+        outcomes = list(survey.survey(cases, len(seeds), FLAGS.processes, progress))
         print(survey.table(outcomes))
         print(survey.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]

@@ -151,20 +151,20 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
 @pytest.mark.slow
 def test_the_style_is_that_of_the_latest_whole_evaluation(tmp_path):
     """A later policy is there already while its episodes are still played."""
-    each = tiny_studies.WITH_NUMPY.runs[0]
-    each = each._replace(configuration=dataclasses.replace(each.configuration, steps=100))
+    each = tiny_studies.PAIR.runs[0]
+    each = each._replace(configuration=dataclasses.replace(each.configuration, steps=20))
     folder = tmp_path / "runs" / each.name
     assert train(each.configuration, folder)
     publication.publish([each], tmp_path / "runs", tmp_path / "results")
     before = (tmp_path / "results" / "evaluations.csv").read_text()
     (folder / "policy.npz").write_bytes(b"another")
     with (folder / "evaluations.csv").open("a") as file:
-        file.write((folder / "evaluations.csv").read_text().splitlines()[1].replace("100,", "200,", 1) + "\n")
+        file.write((folder / "evaluations.csv").read_text().splitlines()[1].replace("20,", "40,", 1) + "\n")
     (folder / "style.csv").unlink()
     publication.publish([each], tmp_path / "runs", tmp_path / "results")
     assert (tmp_path / "results" / "evaluations.csv").read_text() == before
     (found,) = results.results([each], tmp_path / "results")
-    assert found.steps.tolist() == [100]
+    assert found.steps.tolist() == [20]
 
 
 @pytest.mark.long
@@ -305,8 +305,9 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
         ("navigate", {"zero", "planned", "steered", "surefooted", "refined", "tuned", "medium"}),
     ],
 )
-def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, task, presets):
+def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, monkeypatch, task, presets):
+    monkeypatch.setattr(evaluation, "EPISODES", 10)
     each = run("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
     publication._publish_demonstrators([each], tmp_path)
     found = results.demonstrators(tmp_path)[each.place]
-    assert set(found) == presets and all(len(totals) == evaluation.EPISODES for totals in found.values())
+    assert set(found) == presets and all(len(totals) == 10 for totals in found.values())
