@@ -28,7 +28,7 @@ SHELL := /bin/bash
 # Tests start some hundred programs; without bytecode each compiles the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 VENV ?= .venv
-PYTHON := $(VENV)/bin/python
+PYTHON = $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
 .PHONY: demo test check lint docs media notebooks web dist bench bench-gpu golden clean
