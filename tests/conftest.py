@@ -1,9 +1,13 @@
-"""What all tests share: a browser, and a garbage collector that spares what pytest collects, half a million objects."""
+"""What all tests share: a browser, the interrupt, and a garbage collector that spares what pytest collects."""
 
 import gc
 import shutil
+import signal
 
 import pytest
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in the background of a shell; programs would inherit it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(wrapper=True)

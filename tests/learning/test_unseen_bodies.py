@@ -44,7 +44,7 @@ def seen(body):
     return np.concatenate([description.legs.ravel(), description.torso])
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_no_body_that_tests_equals_one_of_training_up_to_size():
     """Lengths in h, angles in rad: some number of every test body differs by 0.03 from each training body's."""
     assert np.abs(seen(generator.scaled(generator.random_body(3), 2.0)) - seen(generator.random_body(3))).max() < 1e-5

@@ -38,7 +38,7 @@ def test_they_earn_what_is_listed(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("task", ["walk", "steer"])
+@pytest.mark.parametrize("task", ["walk", pytest.param("steer", marks=pytest.mark.release)])
 def test_those_of_any_body_earn_what_is_listed(task):
     packaged = universal.load("universal", Setup.of("queen", task).definition)
     count = evaluation.EPISODES  # as many bodies; fewer are others
