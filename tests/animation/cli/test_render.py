@@ -121,7 +121,7 @@ def test_a_film_keeps_the_sum_of_frames_between_the_units_of_its_format(tmp_path
     assert (film.n_frames, total, film.info["loop"]) == (20, milliseconds, 0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_loop_holds_whole_cycles_at_any_frames_a_second(tmp_path):
     """Leaper's gait of 1.2 Hz: of 20 steps one cycle, 5 / 6 s, is the nearest; its last frame leads to the first."""
     programs.passed(render(tmp_path, "--robot=leaper", "--steps=20", "--fps=60", "--loop", "-o", "leaper.webp"))

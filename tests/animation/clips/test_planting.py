@@ -46,7 +46,7 @@ def test_feet_in_stance_neither_slide_nor_sink():
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_planted_clips_connect():
     clips = made(True)
     for before, after in (("walk", "stop"), ("stop", "idle")):
