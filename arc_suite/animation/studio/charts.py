@@ -83,7 +83,8 @@ def contacts_image(contacts: tuple[np.ndarray, np.ndarray] | None, names: tuple[
     return np.asarray(picture)
 
 
-_OPTIONS: dict = {"scales": {"x": {"time": False}}, "legend": {"live": False}}
+# Without space above, a number at the top of an axis is cut.
+_OPTIONS: dict = {"scales": {"x": {"time": False}}, "legend": {"live": False}, "padding": (8, 24, 0, 0)}
 
 
 def _series(colors: dict[str, str]) -> list[dict]:

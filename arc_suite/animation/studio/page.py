@@ -45,6 +45,7 @@ from arc_suite.robots.spec_files import MAX_IMPORTED
 from arc_suite.simulation.opengl import RenderingUnavailable
 
 _CHARTS_EVERY = 0.25  # s
+_ROOM = 1000  # pixels of a window's width, from which charts leave room for a picture
 _ALL = "all"  # legs
 _PRESS = 0.25  # of the body's own speed, by which a key changes the command
 _KEYS = (
@@ -89,7 +90,7 @@ class Page:
 
     def __init__(self, server: viser.ViserServer, session: Session):
         """Lay out the page."""
-        self._gui, self._session, self._drawn = server.gui, session, -math.inf
+        self._server, self._gui, self._session, self._drawn = server, server.gui, session, -math.inf
         self._creatures: tuple[Creature | None, Creature | None] = None, None
         self._first = State(session.creature.sketch)
         self._edits, self._lock = Edits(self._first), threading.Lock()
@@ -100,6 +101,7 @@ class Page:
         self._view = View(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
+        self._gui.add_html(texts.styles())
         self._status = self._gui.add_html("")
         self._add_changes()
         tabs, first = self._gui.add_tab_group(), session.creature.sketch
@@ -118,6 +120,7 @@ class Page:
             self._charts = Charts(self._gui)
         panel.dock_left()
         panel.set_width(330)
+        server.on_client_connect(self._greet)
 
     def show(self, session: Session) -> None:
         """Send a state to all visitors, in the loop's thread; see `Session.run`."""
@@ -135,6 +138,11 @@ class Page:
             if self._panel.visible:
                 self._charts.update(session.history, tuple(leg.name for leg in session.creature.setup.body.legs))
 
+    def _greet(self, client: viser.ClientHandle) -> None:
+        """Hide the charts from a visitor who is alone and has a narrow window."""
+        if len(self._server.get_clients()) == 1 and client.camera.image_width < _ROOM:
+            self._charting.value = False
+
     def _add_changes(self) -> None:
         """Add undo, redo and reset, as buttons and as keys."""
         calls = {"Undo": self._undo, "Redo": self._redo, "Reset": self._reset}
@@ -143,8 +151,8 @@ class Page:
         for label, modifier in (("Undo", "cmd/ctrl"), ("Redo", "cmd/ctrl+shift")):
             command = self._gui.add_command(label, hotkey="Z", modifier=modifier)
             command.on_trigger(lambda event, call=calls[label]: call())
-        charts = self._gui.add_checkbox("Charts", True)
-        charts.on_update(lambda event: setattr(self._panel, "visible", event.target.value))
+        self._charting = self._gui.add_checkbox("Charts", True)
+        self._charting.on_update(lambda event: setattr(self._panel, "visible", event.target.value))
         keep = self._gui.add_checkbox("Keep", False, hint="This creature walks next to all later ones")
         keep.on_update(lambda event: self._session.keep(event.target.value))
 

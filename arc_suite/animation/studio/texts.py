@@ -10,6 +10,23 @@ from arc_suite.animation.studio.sketch import Sketch
 _REAL = 0.97  # of real time, from which the pace is called so
 _SMALL = "font-size:0.85em"
 _INDENTED = "padding:0 0.8em"  # as far from the edges as widgets are
+_BUTTON = (  # as viser's own look that are outlined
+    "min-height:26px;padding:0 1em;font-size:0.85em;cursor:pointer;background:none;border:1px solid;"
+    "color:var(--mantine-primary-color-filled)"
+)
+# viser's sheet of widgets leaves a third of a phone's width, and its controls are 7 to 26 px high.
+_STYLES = """
+@media (max-width: 36em) { [style*="width: 20em"] { width: 100% !important } }
+@media (pointer: coarse) {
+  button { min-width: 40px !important; min-height: 40px !important }
+  input.mantine-Input-input { height: 36px !important; min-height: 36px !important }
+  .mantine-Checkbox-inner, .mantine-Checkbox-input { width: 28px !important; height: 28px !important }
+  .mantine-Checkbox-icon { width: 60% !important }
+  .mantine-Slider-root { padding-block: 12px !important }
+  .mantine-Slider-trackContainer { margin-block: -12px; height: 36px !important }
+  .mantine-Slider-thumb { width: 16px !important; height: 28px !important }
+}
+"""
 # Browsers have a clipboard on pages of this machine alone; on others the text is selected.
 _COPY = (
     "const text = this.nextElementSibling; getSelection().selectAllChildren(text);"
@@ -48,9 +65,14 @@ def copied(sketch: Sketch) -> str:
     texts = {"Python": sketches.python_lines(sketch), "command": sketches.command_line(sketch)}
     parts = []
     for name, text in texts.items():
-        parts.append(_element("button", f"Copy {name}", onclick=_COPY, style="min-height:24px"))
+        parts.append(_element("button", f"Copy {name}", onclick=_COPY, style=_BUTTON))
         parts.append(_element("pre", text, style=f"white-space:pre-wrap;{_SMALL}"))
     return _html(_element("div", *parts, style=_INDENTED))
+
+
+def styles() -> str:
+    """Return styles for narrow windows and for fingers, as HTML."""
+    return _html(_element("style", _STYLES))
 
 
 def line(text: str) -> str:

@@ -405,3 +405,24 @@ def test_another_visitor_sees_the_same_creature(served, tab):
     served.session.pause(False)
     steps = served.session.episodes.steps
     served.until(lambda: served.session.episodes.steps > steps)
+
+
+def test_a_phone_has_controls_for_fingers_and_no_charts(served, tab):
+    """Of a visitor who is alone: a sheet as wide as the window, and nothing to press that is too small."""
+    page = served.page
+    context = tab.context.browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    phone = context.new_page()
+    phone.set_default_timeout(1000.0 * _PATIENCE)
+    phone.goto(served.addresses[0])
+    undo = phone.get_by_role("button", name="Undo", exact=True)
+    undo.wait_for()
+    assert undo.bounding_box()["height"] >= 40.0
+    sheet = undo.locator("xpath=ancestor::div[contains(@class, 'Paper-root')][1]").bounding_box()
+    assert sheet["width"] == 390.0
+    assert page._panel.visible  # for the other visitor
+    context.close()
+    tab.goto("about:blank")
+    served.until(lambda: not page._server.get_clients())
+    tab.set_viewport_size({"width": 820, "height": 1180})
+    tab.goto(served.addresses[0])
+    served.until(lambda: not page._panel.visible)
