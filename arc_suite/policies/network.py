@@ -77,7 +77,9 @@ class Network(NamedTuple):
         if sizes != dict(self.blocks):
             names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
             wrong = ", ".join(f"{name} has {sizes.get(name, 0)} for {self.blocks.get(name, 0)}" for name in names)
-            raise ValueError(f"policy of {self.setup.kind.name}: the observation does not fit: {wrong}")
+            further = set(names).isdisjoint(self.blocks)
+            hint = f"; exclude_blocks={json.dumps(names)} leaves out what it does not read" if further else ""
+            raise ValueError(f"policy of {self.setup.kind.name}: the observation does not fit: {wrong}{hint}")
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
 
