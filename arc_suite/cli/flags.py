@@ -204,7 +204,7 @@ def setups(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[
     fitting = [each for each in found.values() if own and (own.several or each.body == own.body)]
     if fitting and not stored:
         others = [each for each in fitting if (each.task, each.task_kwargs) != (own.task, own.task_kwargs)]
-        print(f"{FLAGS.policy}: of {own}" + "".join(f"; plays in {each}" for each in others))
+        print(f"{FLAGS.policy}: trained on {own}" + "".join(f"; plays in {each}" for each in others))
     return found
 
 

@@ -18,9 +18,10 @@ from absl import flags
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import checks, files
+from arc_suite import checks, files, policies, registry
 from arc_suite.cli.help_text import help_text
 from arc_suite.simulation.opengl import RenderingUnavailable
+from arc_suite.tasks import TASKS
 
 _MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
@@ -107,7 +108,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
             return print(VERSION)
         places = len(inspect.signature(main).parameters)
         if len(rest) > places:
-            raise ValueError(f"unexpected argument {checks.shown(rest[places])}; see --help")
+            raise ValueError(f"unexpected argument {checks.shown(rest[places])}; {_meant(rest[places])}see --help")
         return main(*rest)
 
     guard(work, name or Path(script).name)
@@ -187,6 +188,17 @@ def _parsed(arguments: Sequence[str], module: ModuleType) -> list[str]:
         parser = flags.FLAGS[given.removeprefix("flag --").partition("=")[0]].parser
         choices = getattr(parser, "enum_values", ("true", "false"))
         raise ValueError(f"{checks.quoted(given)}: expected {parser.syntactic_help or ' or '.join(choices)}") from None
+
+
+def _meant(argument: str) -> str:
+    """Return the flag that an argument without one may belong to, for an error; "" where none takes it."""
+    guesses = {
+        "robot": registry.words(),
+        "task": TASKS,
+        "policy": [*policies.POLICIES, *filter(os.path.exists, [argument])],
+    }
+    fitting = (flag for flag, names in guesses.items() if flag in flags.FLAGS and argument in names)
+    return next((f"did you mean --{flag}={argument}? " for flag in fitting), "")
 
 
 def _flags(module: ModuleType) -> Iterator[flags.Flag]:

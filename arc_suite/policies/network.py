@@ -76,10 +76,11 @@ class Network(NamedTuple):
         sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
             names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
-            wrong = ", ".join(f"{name} has {sizes.get(name, 0)} for {self.blocks.get(name, 0)}" for name in names)
-            further = set(names).isdisjoint(self.blocks)
-            hint = f"; exclude_blocks={json.dumps(names)} leaves out what it does not read" if further else ""
-            raise ValueError(f"policy of {self.setup.kind.name}: the observation does not fit: {wrong}{hint}")
+            wrong = ", ".join(f"{name} has {sizes.get(name, 0)}, not {self.blocks.get(name, 0)}" for name in names)
+            kind, further = self.setup.kind.name, set(names).isdisjoint(self.blocks)
+            unread = f"exclude_blocks={json.dumps(names)} leaves out what it does not read"
+            remedy = unread if further else "train in this task"
+            raise ValueError(f"policy of {kind}: observations differ from those of {kind}: {wrong} numbers; {remedy}")
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
 
@@ -123,7 +124,8 @@ def load(path: str | os.PathLike) -> Network:
         _ = setup.excluded_blocks  # finds out at once whether they are names
         return Network(graph, setup, blocks, seed_ranges.from_json(known.get("training_seeds")))
     except FileNotFoundError:
-        raise OSError(f"cannot read {path}: no such file") from None
+        near = [str(each) for each in path.parent.glob("*")]
+        raise OSError(f"cannot read {path}: no such file{checks.hint(str(path), near)}") from None
     except registry.NotImported as error:
         raise ValueError(f"policy {path}: {error}") from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:

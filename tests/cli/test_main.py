@@ -155,5 +155,14 @@ def test_errors_of_a_program_name_it(program):
     programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; see --help\n")
 
 
+@pytest.mark.parametrize(
+    ("argument", "flag"), [("tick", "--robot=tick"), ("steer", "--task=steer"), (".", "--policy=.")]
+)
+def test_an_argument_without_its_flag_is_one_line_with_the_flag(argument, flag):
+    done = run("evaluate", argument)
+    line = f"unexpected argument {argument!r}; did you mean {flag}? see --help"
+    programs.refused(done, f"arc-suite evaluate: {line}\n")
+
+
 def test_the_tool_is_the_program():
     assert programs.passed(programs.run(ROOT / "tools" / "build_model.py", "--help")) == help_of("build_model")

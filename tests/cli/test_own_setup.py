@@ -26,7 +26,9 @@ def test_a_run_is_evaluated_by_its_folder_alone(folder, tmp_path):
     for path, flags in zip(paths, ([], FLAGS), strict=True):
         done = run("evaluate", f"--policy={folder}", "--episodes=2", f"--json={path}", *flags)
         assert done.returncode == 0, done.stderr
-        assert done.stdout.splitlines()[0] == f"{folder}: of tick, rough, {json.dumps(SETTINGS, sort_keys=True)}"
+        assert (
+            done.stdout.splitlines()[0] == f"{folder}: trained on tick, rough, {json.dumps(SETTINGS, sort_keys=True)}"
+        )
     alone, flags = (json.loads(path.read_text()) for path in paths)
     assert alone == flags and alone["task_kwargs"] == SETTINGS
 
@@ -51,7 +53,8 @@ def one_line(done, line):
         (
             "evaluate",
             ["--task=walk", "--episodes=1"],
-            "policy of rough: the observation does not fit: command has 0 for 6, scan has 0 for 175",
+            "policy of rough: observations differ from those of rough: command has 0, not 6, scan has 0, not 175 "
+            "numbers; train in this task",
         ),
         ("animate", ["--spec=spider", "-o=a.glb"], "policy {0}: made for tick, and not for spider"),
     ],

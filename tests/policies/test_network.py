@@ -147,7 +147,7 @@ def test_blocks_that_its_task_excluded_are_left_out(saved):
 def test_of_another_task(saved):
     policy = policies.policy(str(saved), "tick")
     with refused(
-        "policy of walk: the observation does not fit: command has 6 for 0, scan has 175 for 0; "
+        "policy of walk: observations differ from those of walk: command has 6, not 0, scan has 175, not 0 numbers; "
         'exclude_blocks=["command", "scan"] leaves out what it does not read'
     ):
         evaluation.run(arc_suite.load("tick", "roam"), policy, 0)
@@ -158,6 +158,12 @@ def test_no_file_is_one_line(tmp_path):
         policies.policy(str(tmp_path), "tick")
     with pytest.raises(ValueError, match=r"^unknown policy 'run'"):
         policies.policy("run", "tick")
+
+
+def test_no_run_of_that_name_is_one_line_with_one_that_is_there(saved, monkeypatch):
+    monkeypatch.chdir(saved)
+    with pytest.raises(OSError, match=r"^cannot read polisy\.npz: no such file; did you mean 'policy\.npz'\?$"):
+        network.load("polisy.npz")
 
 
 @pytest.mark.parametrize("kept", [0, 30, 1000, -20])

@@ -27,7 +27,7 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
         ValueError: no dataset, or one that does not fit.
     """
     if context.prior is None:
-        raise ValueError("prior: the algorithm takes prior data, the id of a dataset, got None")
+        raise ValueError("prior: the algorithm needs the id of a dataset, which arc-suite collect makes, got None")
     with contextlib.closing(context.environment()) as environment:
         task = environment.task.definition
     data = priors.mapped(context, task)

@@ -158,7 +158,7 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
     for name, there, here in _differences(config_of(path), json.loads(json.dumps(config))):
         if name.partition(".")[0] not in (*left_out, *_FORMER):
             raise ValueError(
-                f"{path}: of another run, whose {name} is {checks.shown(there)}, and not {checks.shown(here)}; "
+                f"{path}: of another run, with {name} {checks.shown(there)}, not {checks.shown(here)}; "
                 "write to another folder"
             )
 

@@ -183,7 +183,7 @@ def end(folder: Path, step: int | None, finished: bool, killed: bool) -> str:
         return "finished"
     if killed:
         return "stopped; the same command resumes it"
-    return f"stopped after {FLAGS.minutes:g} minutes of CPU time; more minutes resume it"
+    return f"stopped at --minutes={FLAGS.minutes:g} of CPU time; more minutes resume it"
 
 
 def several(runs: Sequence[Configuration]) -> int:

@@ -93,7 +93,8 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
             raise ValueError(f"{path}: {error}") from None
         totals = _totals(report)
         if len(totals) != EPISODES:
-            raise ValueError(f"{path}: expected {EPISODES} episodes of {setup.body.name}, got {len(totals)}")
+            wanted = f"expected {EPISODES} episodes of {setup.body.name}"
+            raise ValueError(f"{path}: {wanted}, got {len(totals)}; evaluate without --episodes")
         known = provenance.of_setup(setup)
         for field in provenance.FIELDS:
             _same(path, field, stated.get(field), known[field])

@@ -52,5 +52,7 @@ def test_it_resumes_bit_exactly(begun, prior):
 
 
 def test_without_a_dataset_it_says_what_it_takes(begun):
-    with pytest.raises(ValueError, match=r"^prior: the algorithm takes prior data, the id of a dataset, got None$"):
+    with pytest.raises(
+        ValueError, match=r"^prior: the algorithm needs the id of a dataset, which arc-suite collect makes, got None$"
+    ):
         begun(None).advance()

@@ -199,7 +199,11 @@ def test_dropout_keeps_the_right_share_each_on_its_own(dropout):
     ("name", "context", "line"),
     [
         ("sac", {"prior": "arc_suite/tick/walk/x-v0"}, r"^prior: the algorithm takes no prior data, got 'arc_suite/"),
-        ("sope", {"prior": None}, r"^prior: the algorithm takes prior data, the id of a dataset, got None$"),
+        (
+            "sope",
+            {"prior": None},
+            r"^prior: the algorithm needs the id of a dataset, which arc-suite collect makes, got None$",
+        ),
         (
             "sope",
             {"setup": Setup.of("tick", "walk", {"target_velocity": 0.2})},

@@ -55,7 +55,7 @@ def test_what_never_began_leaves_the_folder_to_others(tmp_path):
         pass
     with opened(tmp_path / "run", CONFIG | {"seed": 1}) as folder:
         folder.append("training", {"step": 1, "loss": 0.5})
-    one_line(tmp_path / "run", "of another run, whose seed is 1, and not 0")
+    one_line(tmp_path / "run", "of another run, with seed 1, not 0")
 
 
 def test_a_rejected_run_leaves_no_folder(tmp_path):
@@ -100,10 +100,10 @@ def test_tables_are_read_also_while_a_line_is_written(path):
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
-        ({"seed": 1}, r"whose seed is 0, and not 1; write to another folder$"),
-        ({"hyperparameters": {"hidden": 4, "batch": 9}}, r"whose hyperparameters\.batch is 8, and not 9;"),
-        ({"versions": {"numpy": "3"}}, r"whose versions\.numpy is '2', and not '3';"),
-        ({"prior": "a"}, r"whose prior is None, and not 'a';"),
+        ({"seed": 1}, r"with seed 0, not 1; write to another folder$"),
+        ({"hyperparameters": {"hidden": 4, "batch": 9}}, r"with hyperparameters\.batch 8, not 9;"),
+        ({"versions": {"numpy": "3"}}, r"with versions\.numpy '2', not '3';"),
+        ({"prior": "a"}, r"with prior None, not 'a';"),
     ],
 )
 def test_another_run(path, changed, named):
@@ -116,7 +116,7 @@ def test_steps_may_grow(path):
         assert folder.progress["evaluated"] == 2
     assert run_folder.config_of(path)["steps"] == 9
     for config, growing in (({"steps": 8}, ["steps"]), ({"steps": 10}, []), ({"steps": 10, "seed": 1}, ["steps"])):
-        with pytest.raises(ValueError, match="of another run, whose"), opened(path, CONFIG | config, growing):
+        with pytest.raises(ValueError, match="of another run, with"), opened(path, CONFIG | config, growing):
             pass
     assert run_folder.config_of(path)["steps"] == 9
 

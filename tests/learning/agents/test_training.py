@@ -137,7 +137,7 @@ def test_other_prior_data_under_the_same_id_are_another_run(tiny, tmp_path, prio
     held = run_folder.config_of(tmp_path / "run")["prior_sha256"]
     assert held == priors.digest(prior)
     monkeypatch.setattr(priors, "digest", lambda prior: "0" * 64)
-    with pytest.raises(ValueError, match=f"of another run, whose prior_sha256 is '{held}', and not '0000"):
+    with pytest.raises(ValueError, match=f"of another run, with prior_sha256 '{held}', not '0000"):
         train(run, tmp_path / "run", progress=silent)
 
 
@@ -156,7 +156,7 @@ def test_a_run_is_extended_to_what_a_longer_one_is(name, tiny, tmp_path):
     long, extended = (contents(tmp_path / each) for each in ("long", "extended"))
     own = ("training.csv", "checkpoint.npz/count", "checkpoint.npz/sums")  # a line of metrics more, at 100
     assert [key for key in long if long[key] != extended[key] and not key.startswith(own)] == []
-    with pytest.raises(ValueError, match=r"of another run, whose steps is 300, and not 200; write to another folder$"):
+    with pytest.raises(ValueError, match=r"of another run, with steps 300, not 200; write to another folder$"):
         train(tiny(name, steps=200), tmp_path / "extended", progress=silent)
 
 
@@ -168,13 +168,13 @@ def test_a_run_with_a_schedule_is_not_extended(tmp_path):
         if steps == 20:
             assert train(run, tmp_path / "run", progress=silent)
         else:
-            with pytest.raises(ValueError, match=r"of another run, whose steps is 20, and not 40;"):
+            with pytest.raises(ValueError, match=r"of another run, with steps 20, not 40;"):
                 train(run, tmp_path / "run", progress=silent)
 
 
 def test_another_seed_is_another_run(tiny, tmp_path):
     train(tiny("sac", steps=50), tmp_path / "run", progress=silent)
-    with pytest.raises(ValueError, match=r"run: of another run, whose seed is 0, and not 1; write to another folder$"):
+    with pytest.raises(ValueError, match=r"run: of another run, with seed 0, not 1; write to another folder$"):
         train(tiny("sac", steps=50, seed=1), tmp_path / "run", progress=silent)
     train(tiny("sac", steps=50, seed=1), tmp_path / "other", progress=silent)
     assert contents(tmp_path / "run") != contents(tmp_path / "other")

@@ -104,7 +104,7 @@ def test_export_of_what_is_no_run(tmp_path, arguments, message):
 CLIMB = ["--robot=tick", "--algorithm=tiny_studies:CLIMB", "--set", "time_limit=0.2", "--steps=40"]
 CLIMB += ["--evaluate_every=20"]
 REACHED = r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+ \+- \S+, score \S+ \(.*"
-STOPPED = "other: stopped after 0 minutes of CPU time; more minutes resume it, no evaluation yet\n"
+STOPPED = "other: stopped at --minutes=0 of CPU time; more minutes resume it, no evaluation yet\n"
 
 
 def test_until_a_score(tmp_path):
@@ -182,7 +182,7 @@ class TestRun:
 
     def test_another_command_is_refused(self, folder):
         done = run("train", *TINY, "--hp=dropout=0.02", cwd=folder.parents[1])
-        line = "runs/tick-walk-sope_eo-0: of another run, whose hyperparameters.dropout is 0.01, and not 0.02;"
+        line = "runs/tick-walk-sope_eo-0: of another run, with hyperparameters.dropout 0.01, not 0.02;"
         programs.refused(done, f"arc-suite train: {line} write to another folder")
 
     @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def _changed(report, *keys, value):
         (("robots", "tick", "provenance", "body_sha256"), "00", 'body_sha256: the file says "00", and here it is '),
         (("robots", "tick", "provenance", "task"), "nowhere:stroll", "task 'nowhere:stroll': files import nothing; "),
         (("robots", "tick", "provenance"), [], "no entry: provenance: expected a mapping of names to values, got []"),
-        (("robots", "tick", "episodes"), [], "expected 100 episodes of tick, got 0\n"),
+        (("robots", "tick", "episodes"), [], "expected 100 episodes of tick, got 0; evaluate without --episodes\n"),
         (("policy",), "mine:make", 'policy: the file says "mine:make", and here it is "random"\n'),
         (("robots", "tick", "episodes", 3, "total"), 3999.0, "returns of tick: the file says ["),
         (("robots",), {}, "expected robots, got none"),

@@ -123,7 +123,7 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     assert (folder / first.name / "checkpoint.npz").stat().st_mtime_ns == before
 
     other = tiny_studies.tiny("tiny_studies:CLIMB", 0, hyperparameters={"spread": 0.3})
-    with pytest.raises(ValueError, match=r"of another run, whose hyperparameters.spread is 0.02, and not 0.3; write "):
+    with pytest.raises(ValueError, match=r"of another run, with hyperparameters.spread 0.02, not 0.3; write "):
         runner.is_finished(other, folder / first.name)
 
     # What is published of the policy's style is what the style room measures of it, also a second time.
