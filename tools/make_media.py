@@ -66,7 +66,7 @@ IN_PLACE["leaper"] = IN_PLACE["leaper"]._replace(settings={"gait_frequency": 1.5
 TASKS = {
     "walk": View("queen", azimuth=-60.0, distance=4.0),
     "steer": View("bastion", "steer", 39, 105, 60, azimuth=-25.0, elevation=32.0, distance=6.2),
-    "directed": View("queen", "directed", 5, 45, 50, azimuth=-75.0, elevation=10.0, distance=4.5),
+    "directed": View("queen", "directed", 4, 65, 50, (0.7, 0.0, 0.4), azimuth=-60.0, elevation=14.0, distance=4.5),
     "shoved": View("bastion", "shoved", 1, 45, 30, (1.0, 0.0, 0.0), azimuth=35.0, elevation=18.0, distance=5.0),
     "limp": View("tick", "limp", 1, 60, 20, (1.0, 0.0, 0.0), azimuth=60.0),
     "rough": View("tick", "rough", **{**_SIDE, "distance": 7.0}),
