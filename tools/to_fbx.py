@@ -29,6 +29,8 @@ import numpy as np
 
 FPS = 60  # clips last whole frames at this rate
 LARGEST = 64 * 2**20  # bytes of a .clips.json
+NUDGE = 1e-7  # m
+ROUNDED = 1e-3  # frames, by which times that the file rounds may miss a frame
 HINGED = 1e-4  # by which a quaternion may turn about other axes than that of a hinge
 ARMATURE = "Armature"  # a name that importers of engines leave out of the skeleton
 
@@ -70,6 +72,7 @@ def converted(glb: pathlib.Path, output: pathlib.Path) -> list[pathlib.Path]:
         try:  # Blender's importers and exporters tell their progress, and the tracebacks of what they cannot read
             with contextlib.redirect_stdout(silent), contextlib.redirect_stderr(silent):
                 armature = opened(glb)
+                put_on_frames(armature)
                 annotate(armature, clips)
                 one_curve_a_joint(armature)
                 write(armature, pathlib.Path(folder) / output.name)
@@ -118,6 +121,23 @@ def opened(path: pathlib.Path) -> bpy.types.Object:
     return armatures[0]
 
 
+def put_on_frames(armature: bpy.types.Object) -> None:
+    """Put keys and ends of clips on the frames that they miss: what ends a little early would lose its last frame."""
+    for action in bpy.data.actions:
+        for curve in (curve for bag in _bags(action) for curve in bag.fcurves):
+            points = np.empty((len(curve.keyframe_points), 2), np.float32)
+            curve.keyframe_points.foreach_get("co", points.ravel())
+            near = abs(points[:, 0] - points[:, 0].round()) < ROUNDED
+            points[near, 0] = points[near, 0].round()
+            curve.keyframe_points.foreach_set("co", points.ravel())
+            curve.update()
+    for track in armature.animation_data.nla_tracks:
+        for strip in track.strips:
+            strip.action_frame_start, strip.action_frame_end = strip.action.curve_frame_range
+            strip.scale = 1.0
+            strip.frame_end = strip.frame_start + strip.action_frame_end - strip.action_frame_start
+
+
 def annotate(armature: bpy.types.Object, clips: dict[str, dict[str, Any]]) -> None:
     """Give actions what Blender's importer drops: whether they repeat, their frames, and markers at foot contacts.
 
@@ -154,12 +174,17 @@ def one_curve_a_joint(armature: bpy.types.Object) -> None:
             _curve(bag, bone, axis, frames, 2.0 * half)
 
 
+def _bags(action: bpy.types.Action) -> list:
+    """Return the bags of an action's curves."""
+    return [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+
+
 def _rotations() -> dict[str, list[tuple[Any, list]]]:
     """Return by bones that only turn, for each action, the bag of its curves and the four curves of the quaternion."""
     found: dict[str, list[tuple[Any, list]]] = {}
     moving = set()
     for action in bpy.data.actions:
-        for bag in (bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags):
+        for bag in _bags(action):
             own: dict[str, list] = {}
             for curve in bag.fcurves:
                 if curve.data_path.endswith("].location"):
@@ -173,6 +198,7 @@ def _rotations() -> dict[str, list[tuple[Any, list]]]:
 
 def write_fbx(armature: bpy.types.Object, path: pathlib.Path) -> None:
     """Write all clips as takes of one FBX file."""
+    _part(armature)
     armature.animation_data.action = None
     for track in armature.animation_data.nla_tracks:
         track.mute = False
@@ -225,6 +251,16 @@ def _shorten_feet(armature: bpy.types.Object) -> None:
     for bone in armature.data.edit_bones:
         if not bone.children and bone.head.z > 0.0:
             bone.length = min(bone.length, bone.head.z)
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def _part(armature: bpy.types.Object) -> None:
+    """Move the torso off the end of the root's bone: Blender's importer would tie it to there and drop its path."""
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in armature.data.edit_bones:
+        if bone.parent is not None and bone.parent.parent is None:
+            bone.head.x, bone.tail.x = bone.head.x + NUDGE, bone.tail.x + NUDGE
     bpy.ops.object.mode_set(mode="OBJECT")
 
 

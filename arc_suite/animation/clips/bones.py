@@ -72,8 +72,9 @@ def _bone(hinge: np.ndarray | None, link: np.ndarray | None, above: np.ndarray) 
     if hinge is not None and abs(cosine := hinge @ link) <= _ALONG:
         return _frame(hinge, _across(link, hinge))
     y = link if hinge is None else np.sign(cosine) * hinge
-    # Of the axes above, that which is the most across.
-    return _frame(_across(above[:, np.argmin(abs(y @ above))], y), y)
+    # x of glTF is, across, that of the bone above, or its y; with its z Euler angles of FBX would be near gimbal lock.
+    _, *others = above.T
+    return _frame(_across(min(others, key=lambda other: abs(y @ other)), y), y)
 
 
 def _frame(x: np.ndarray, y: np.ndarray) -> np.ndarray:
