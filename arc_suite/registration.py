@@ -68,7 +68,7 @@ def register(
     for kind, table, new in added:
         for name, value in new.items():
             if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:
-                raise ValueError(f"{kind} {checks.shown(name)} is already registered")
+                raise ValueError(f"{kind} {checks.shown(name)} is already registered; choose another name")
     if body is None:
         if (parameters, presets, visuals) != (None, None, None):
             raise ValueError("parameters, presets and visuals belong to a body, and none is given")

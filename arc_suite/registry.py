@@ -218,7 +218,11 @@ def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
             importlib.import_module(module)
         except ImportError as error:
             cause = f"cannot import {module[:80]}: {checks.quoted(error)}"
-            raise ValueError(f"{kind} {name[:80]!r}: {cause}") from None
+            remedy = f"; start in the folder of {module}.py, or put it on Python's path" if error.name == module else ""
+            raise ValueError(f"{kind} {name[:80]!r}: {cause}{remedy}") from None
+        if name not in table:
+            near = checks.hint(name, [own for own in table if MODULES.get((kind, own)) == module])
+            raise ValueError(f"{kind} {name[:80]!r}: {module} registers no such {kind} by arc_suite.register{near}")
         if name in table and (kind, name) not in MODULES:
             raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
     return table[checks.name(name, table, kind, near)]

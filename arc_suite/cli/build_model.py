@@ -69,6 +69,8 @@ def main() -> None:
             imageio.imwrite(path, physics.render(camera_id="portrait", quality="still"))
         if FLAGS.summary:
             print(summary(body))
+    for path in filter(None, (FLAGS.output, FLAGS.render)):
+        print(f"wrote {path}")
 
 
 def _body() -> Body:

@@ -97,6 +97,6 @@ def suited_preset(task: Task) -> str:
     if names := suited_presets(task):
         return names[0]
     raise ValueError(
-        f"task {task.name}: nothing suits a task that observes no command and prescribes no gait; "
-        f"choose one of {', '.join(presets_of(task.scene.body))}"
+        f"task {task.name}: no demonstrator suits a task that observes no command and prescribes no gait; choose "
+        f"another policy, such as zero, or a preset: {', '.join(presets_of(task.scene.body))}"
     )

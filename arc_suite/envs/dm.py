@@ -294,7 +294,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             RuntimeError: before the first reset.
         """
         self._check_begun()
-        return self.definition.progress(self._now.memory)
+        return {name: float(figure) for name, figure in self.definition.progress(self._now.memory).items()}
 
     def simulated_by(self, physics: Physics) -> None:
         """Remember the simulation, in which privileged observations are looked up."""

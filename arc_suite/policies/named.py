@@ -60,7 +60,8 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
     path = PACKAGED / f"{body.name}-{task.name if task else 'walk'}{network.EXTENSION}"
     if not (is_robot(body) and path.is_file()):
         there = ", ".join(sorted(each.stem for each in PACKAGED.glob(f"*{network.EXTENSION}")))
-        raise ValueError(f"policy ppo: none for {path.stem} (there are: {there}); arc-suite train makes others")
+        others = "arc-suite train makes others, and universal moves any body"
+        raise ValueError(f"policy ppo: none for {path.stem} (there are: {there}); {others}")
     return _from_file(path, body, task)
 
 

@@ -29,7 +29,7 @@ def test_three_links_are_the_default():
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_robot_dumps_and_reloads_bit_for_bit(robot, tmp_path):
     path = tmp_path / "robot.xml"
-    assert programs.passed(build_model("--robot", robot, "--output", path)) == ""
+    assert programs.passed(build_model("--robot", robot, "--output", path)) == f"wrote {path}\n"
     assert saved(without_keyframe(path.read_text())) == saved(compiled(ROBOTS[robot]))
     assert [entry.name for entry in tmp_path.iterdir()] == ["robot.xml"]
 
@@ -66,7 +66,7 @@ def test_without_arena_a_scene_of_dm_control_takes_it(tmp_path):
 
 def test_json_is_the_spec_and_builds_the_same_model(tmp_path):
     path = tmp_path / "body.json"
-    assert programs.passed(build_model("--seed=5", "--json", "--output", path)) == ""
+    assert programs.passed(build_model("--seed=5", "--json", "--output", path)) == f"wrote {path}\n"
     assert load_body(path) == sound_body(5)
     assert build_model("--spec", path).stdout == build_model("--seed=5").stdout
     assert build_model("--spec", path, "--json").stdout == path.read_text()

@@ -128,5 +128,5 @@ def test_what_suits_a_task_follows_from_its_attributes(monkeypatch):
     monkeypatch.setitem(arc_suite.tasks.TASKS, "stay", Stay)
     assert suited_preset(arc_suite.load("tick", "ragged").task.definition) == "surefooted"
     assert suited_preset(arc_suite.load("tick", "ragged", {"kicks": 1.0}).task.definition) == "surefooted"
-    with pytest.raises(ValueError, match="^task stay: nothing suits .*steered"):
+    with pytest.raises(ValueError, match="^task stay: no demonstrator suits .* such as zero, or a preset: .*steered"):
         suited_preset(arc_suite.load("tick", "stay").task.definition)

@@ -143,7 +143,12 @@ CASES = [
     (load(7, "walk"), f"unknown robot 7 {DOMAINS}"),
     (load(["queen"], "walk"), f"unknown robot ['queen']; did you mean 'queen'? {DOMAINS}"),
     (load("queen", None), f"unknown task None {TASK_NAMES}"),
-    (load("creature:hopper", "walk"), "robot 'hopper': cannot import creature: No module named 'creature'"),
+    (
+        load("creature:hopper", "walk"),
+        "robot 'hopper': cannot import creature: No module named 'creature'; "
+        "start in the folder of creature.py, or put it on Python's path",
+    ),
+    (load("queen", "email:crouch"), "task 'crouch': email registers no such task by arc_suite.register"),
     (load("..:queen", "walk"), f"robot '..:queen': {MODULE}"),
     (load(":queen", "walk"), f"robot ':queen': {MODULE}"),
     (load("os:queen", "walk"), f"robot 'os:queen': queen {OWN}"),
