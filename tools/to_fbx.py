@@ -66,8 +66,11 @@ def converted(glb: pathlib.Path, output: pathlib.Path) -> list[pathlib.Path]:
         raise ValueError(f"{output}: expected one of {', '.join(WRITERS)}")
     if not output.absolute().parent.is_dir():
         raise ValueError(f"cannot write {output}: no such folder")
+    if glb.suffix.lower() != ".glb":
+        raise ValueError(f"{glb}: expected a .glb of arc-suite animate")
+    glb.open("rb").close()  # the error of a missing file is that of the file that was named
     clips = sidecar(glb.with_suffix(".clips.json"))
-    with glb.open("rb"), tempfile.TemporaryDirectory(dir=output.absolute().parent) as folder:
+    with tempfile.TemporaryDirectory(dir=output.absolute().parent) as folder:
         silent = io.StringIO()
         try:  # Blender's importers and exporters tell their progress, and the tracebacks of what they cannot read
             with contextlib.redirect_stdout(silent), contextlib.redirect_stderr(silent):

@@ -26,6 +26,7 @@ def main(folder: str) -> None:
     """Check every skin of a folder."""
     files = sorted(pathlib.Path(folder).glob("*-skin.glb"))
     assert files
+    refusals(files[0])
     for path in files:
         name = path.name.removesuffix("-skin.glb")
         truth = dict(np.load(path.with_name(f"{name}.npz")))
@@ -38,6 +39,23 @@ def main(folder: str) -> None:
         told = f"{name}: {len(truth)} actions, bones within {posed(armature, truth, parts):.1e} m, "
         told += limbs(armature, parts, **np.load(path.with_name(f"{name}.bound.npz")))
         print(f"{told}, {converted(path, truth, parts, name in CONVERTED)}", flush=True)
+
+
+def refusals(path: pathlib.Path) -> None:
+    """Assert that tools/to_fbx.py names the file that is wrong."""
+    wrong = (
+        ("missing.glb", "a.fbx", "missing.glb"),
+        (path.with_suffix(".clips.json"), "a.fbx", "expected a .glb of arc-suite animate"),
+        (path, "a.obj", "expected one of .fbx, .bvh, .blend"),
+        (path, "missing/a.fbx", "no such folder"),
+    )
+    for glb, output, message in wrong:
+        try:
+            to_fbx.converted(pathlib.Path(glb), pathlib.Path(output))
+        except (ValueError, OSError) as error:
+            assert message in str(error), error
+        else:
+            raise AssertionError(message)
 
 
 def only(kind: str) -> bpy.types.Object:

@@ -44,10 +44,15 @@ def loop(
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
-    count = _count(clip)
+    total = length(clip, turntable)
+    headings = heading + np.linspace(0.0, 2.0 * np.pi * turntable, total, endpoint=False)
+    yield from _views(body, clip, np.arange(total) % _count(clip), headings, size, transparent)
+
+
+def length(clip: Clip, turntable: bool = False) -> int:
+    """Return the number of pictures of a film; see `loop`."""
     rounds = max(1, round(_AROUND / clip.motion.seconds)) if turntable else 1
-    headings = heading + np.linspace(0.0, 2.0 * np.pi * turntable, rounds * count, endpoint=False)
-    yield from _views(body, clip, np.arange(rounds * count) % count, headings, size, transparent)
+    return rounds * _count(clip)
 
 
 def sheet(body: Body, clip: Clip, size: int, directions: int, transparent: bool = False) -> np.ndarray:

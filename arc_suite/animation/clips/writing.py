@@ -141,7 +141,8 @@ def _write_pictures(
     """Write a film or a sheet of a clip."""
     if extension != ".png":
         frames = filming.loop(body, clip, size, transparent, turntable)
-        films.WRITERS[extension](path, progress(frames, "rendering", leave=False), clip.motion.step)
+        frames = progress(frames, "rendering", filming.length(clip, turntable), leave=False)
+        films.WRITERS[extension](path, frames, clip.motion.step)
         return
     if (width := size * len(clip.times)) > _WIDEST:
         raise ValueError(f"the sheet is {width} pixels wide, more than {_WIDEST}; lower fps or size")
