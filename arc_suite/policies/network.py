@@ -45,6 +45,9 @@ class Network(NamedTuple):
     blocks: Mapping[str, int]
     training_seeds: seed_ranges.Ranges | None = None
 
+    def __repr__(self) -> str:
+        return f"Network({self.setup}: {self.size} observations)"  # without the weights
+
     @property
     def size(self) -> int:
         """Of a flat observation."""
@@ -77,10 +80,11 @@ class Network(NamedTuple):
         if sizes != dict(self.blocks):
             names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
             wrong = ", ".join(f"{name} has {sizes.get(name, 0)}, not {self.blocks.get(name, 0)}" for name in names)
-            kind, further = self.setup.kind.name, set(names).isdisjoint(self.blocks)
+            further = set(names).isdisjoint(self.blocks)
             unread = f"exclude_blocks={json.dumps(names)} leaves out what it does not read"
-            remedy = unread if further else "train in this task"
-            raise ValueError(f"policy of {kind}: observations differ from those of {kind}: {wrong} numbers; {remedy}")
+            remedy = unread if further else "train with this body and task"
+            own = f"{self.setup.name}, {self.setup.kind.name}"
+            raise ValueError(f"policy of {own}: observations differ from those in training: {wrong} numbers; {remedy}")
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
 

@@ -53,8 +53,8 @@ def one_line(done, line):
         (
             "evaluate",
             ["--task=walk", "--episodes=1"],
-            "policy of rough: observations differ from those of rough: command has 0, not 6, scan has 0, not 175 "
-            "numbers; train in this task",
+            "policy of tick, rough: observations differ from those in training: command has 0, not 6, scan has 0, "
+            "not 175 numbers; train with this body and task",
         ),
         ("animate", ["--spec=spider", "-o=a.glb"], "policy {0}: made for tick, and not for spider"),
     ],

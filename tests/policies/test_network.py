@@ -147,10 +147,14 @@ def test_blocks_that_its_task_excluded_are_left_out(saved):
 def test_of_another_task(saved):
     policy = policies.policy(str(saved), "tick")
     with refused(
-        "policy of walk: observations differ from those of walk: command has 6, not 0, scan has 175, not 0 numbers; "
-        'exclude_blocks=["command", "scan"] leaves out what it does not read'
+        "policy of tick, walk: observations differ from those in training: command has 6, not 0, scan has 175, "
+        'not 0 numbers; exclude_blocks=["command", "scan"] leaves out what it does not read'
     ):
         evaluation.run(arc_suite.load("tick", "roam"), policy, 0)
+
+
+def test_repr_has_no_weights(saved):
+    assert repr(network.load(saved)) == "Network(tick, walk: 199 observations)"
 
 
 def test_no_file_is_one_line(tmp_path):
