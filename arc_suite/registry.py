@@ -218,7 +218,9 @@ def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
             importlib.import_module(module)
         except ImportError as error:
             cause = f"cannot import {module[:80]}: {checks.quoted(error)}"
-            remedy = f"; start in the folder of {module}.py, or put it on Python's path" if error.name == module else ""
+            remedy = (
+                f"; start in the folder of {module[:80]}.py, or put it on Python's path" if error.name == module else ""
+            )
             raise ValueError(f"{kind} {name[:80]!r}: {cause}{remedy}") from None
         if name not in table:
             near = checks.hint(name, [own for own in table if MODULES.get((kind, own)) == module])
