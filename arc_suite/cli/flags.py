@@ -56,13 +56,14 @@ def define_task(default: str = "walk") -> None:
     )
 
 
-def define_policy(text: str = policies.HELP) -> None:
+def define_policy(text: str = policies.HELP, default: str | None = "cpg") -> None:
     """Define --policy and --vecnormalize, for programs that take any policy.
 
     Args:
         text: help of --policy.
+        default: of --policy.
     """
-    flags.DEFINE_string("policy", "cpg", text)
+    flags.DEFINE_string("policy", default, text)
     define_vecnormalize()
 
 

@@ -26,7 +26,7 @@ from arc_suite.simulation.cores import usable_cores
 FLAGS = flags.FLAGS
 flags.DEFINE_string("algorithm", "ppo", "As in arc-suite train.")
 flags.DEFINE_integer("seeds", SEEDS, "Seeds of each place.", 1, SEEDS)
-flags.DEFINE_list("places", ["-".join(each) for each in PLACES], "Places to run, ROBOT-TASK.")
+flags.DEFINE_list("places", ["-".join(each) for each in PLACES], "Places to run, ROBOT-TASK. [default: all ten]")
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_string("policies", None, "Folder of policies to score in place of runs.")
 flags.DEFINE_string("name", None, "Of these policies in the table. [default: the name of the folder]")

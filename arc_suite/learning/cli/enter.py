@@ -12,12 +12,13 @@ from pathlib import Path
 
 from absl import flags
 
+from arc_suite import policies
 from arc_suite.cli.flags import define_policy, define_task, policy_name, task
 from arc_suite.cli.program import progress
 from arc_suite.learning.studies import entries, leaderboard
 
 FLAGS = flags.FLAGS
-define_policy()
+define_policy(f"{policies.HELP} [default: that which the entry names]", default=None)
 define_task()
 flags.DEFINE_string("name", None, "Of the algorithm in the leaderboard. [default: the stem of the policy's name]")
 flags.DEFINE_string("results", "studies", "Folder of the leaderboard.")
@@ -28,7 +29,7 @@ def main(entry: str | None = None) -> None:
     if entry is None:
         raise ValueError("expected a file that arc-suite evaluate --json wrote; see --help")
     task()
-    given = policy_name(FLAGS.policy) if FLAGS["policy"].present else None
+    given = policy_name(FLAGS.policy) if FLAGS.policy else None
     found = entries.checked(Path(entry), given, lambda seeds: progress(seeds, unit="episode", leave=False))
     name = FLAGS.name or Path(found[0].policy).stem
     page = leaderboard.enter(Path(entry), name, found, Path(FLAGS.results))
