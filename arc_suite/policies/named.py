@@ -76,11 +76,12 @@ POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, universa
 _UNTRAINED = ("zero", "random")
 
 HELP = (
-    f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
-    "saved, whose pickles run code; or module:attribute or file.py:attribute, a function that makes a policy from a "
-    "robot's name, or from any other Body."
+    "cpg, the demonstrator; zero, which stands still; random, uniform actions; ppo, trained for a robot; universal, "
+    "trained for any body; the folder of a run of arc-suite train; a zip that stable-baselines3 has saved, whose "
+    "pickles run code; or module:attribute or file.py:attribute, a function that makes a policy from a robot's name, "
+    "or from any other Body."
 )
-PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the robot has."
+PRESET_HELP = f"Of the demonstrator: {', '.join(preset_names())}, or another that the robot has."
 
 
 def policy(

@@ -15,6 +15,7 @@ import arc_suite
 from arc_suite.cli import main
 from arc_suite.cli.help_text import GROUPS
 from arc_suite.cli.programs import summary
+from arc_suite.policies import POLICIES
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
@@ -146,6 +147,12 @@ def test_help_of_a_program(program):
     assert "\n  --output" not in text
     assert not re.search(r"repeat this option|\(default|integer", text)
     assert {"--task", "--set"} & set(names) == (set() if program in WITHOUT_TASK else {"--task", "--set"})
+
+
+def test_help_says_what_each_policy_is():
+    text = " ".join(help_of("enter").split("--policy=TEXT")[1].split())
+    assert [name for name in POLICIES if not re.search(rf"\b{name}, \w+ ", text)] == []
+    assert "any other Body. [default: that which the entry names]" in text
 
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
