@@ -277,7 +277,7 @@ def check_extension(extension: str, own: Mapping[str, Iterable[str]]) -> None:
     """
     for flag, extensions in own.items():
         if FLAGS[flag].present and extension not in extensions:
-            raise ValueError(f"--{flag}: it is for {' and '.join(extensions)}, not for {extension}")
+            raise ValueError(f"--{flag}: it is for {', '.join(extensions)}, not for {extension}")
 
 
 def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:

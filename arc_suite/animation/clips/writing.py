@@ -99,7 +99,7 @@ def _checked(path: Path, names: Sequence[str], fps: float, options: Mapping[str,
     for name in options:
         fitting = OPTIONS[checks.name(name, OPTIONS, "option of clips")]
         if extension not in fitting:
-            raise ValueError(f"{name}: it is for {' and '.join(fitting)}, not for {extension}")
+            raise ValueError(f"{name}: it is for {', '.join(fitting)}, not for {extension}")
     if extension != ".glb" and (len(names) != 1 or names == [ALL]):
         raise ValueError(f"clips: expected one for {extension}, got {', '.join(names)}")
     films.check_fps(fps, extension)

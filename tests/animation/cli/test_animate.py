@@ -53,7 +53,7 @@ def test_any_body_as_rigid_parts(tmp_path):
         ((), "no file to write; say --output=FILE.glb"),
         (("-o", "a.gltf"), "unknown extension '.gltf'; did you mean '.glb'?"),
         (("-o", "a.fbx"), "a.fbx: clips are written as .glb; tools/to_fbx.py makes .fbx of it, by Blender"),
-        (("-o", "a.glb", "--transparent"), "transparent: it is for .webp and .png, not for .glb"),
+        (("-o", "a.glb", "--transparent"), "transparent: it is for .webp, .png, not for .glb"),
         (("-o", "a.png", "--rig=nodes"), "rig: it is for .glb, not for .png"),
         (("-o", "a.mp4", "--clips=all"), "clips: expected one for .mp4, got all"),
         (("-o", "a.gif", "--clips=walk"), "fps: expected at most 50 for a GIF, got 60"),

@@ -183,7 +183,7 @@ def test_a_take_stays_at_its_end():
         (["--output=a.jpg"], f"unknown extension '.jpg'; did you mean '.png'? {EXTENSIONS}"),
         (["--steps=0", "--output=a.html"], "--steps=0: expected 1 or more for a film or a page"),
         (["--fps=60", "--output=a.gif"], "fps: expected at most 50 for a GIF, got 60"),
-        (["--loop", "--output=a.png"], "--loop: it is for .mp4 and .gif and .webp, not for .png"),
+        (["--loop", "--output=a.png"], "--loop: it is for .mp4, .gif, .webp, not for .png"),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
         ([], "no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html"),
     ],
