@@ -144,7 +144,7 @@ FAMILIES = "random, varied, few_legs, few_links"
             "robot 'varied:4294967296': seed: expected an integer from 0 to 4294967295, got 4294967296",
         ),
         ("json:varied:3", "family 'json:varied': varied is the suite's own, expected without a module"),
-        ("json:vared:3", f"unknown family 'vared'; did you mean 'varied'? (there are: {FAMILIES})"),
+        ("json:vared:3", "family 'vared': json registers no such family by arc_suite.register"),
     ],
 )
 def test_wrong_names_are_one_line(name, message):
@@ -181,7 +181,7 @@ def test_families_of_other_packages_come_before_modules_of_their_names(tmp_path)
     )
     assert interpreters.printed(code, folder=tmp_path) == [
         "crab_3 5",
-        "family 'crab' is already registered",
+        "family 'crab' is already registered; choose another name",
         "family 'cr ab': expected a name of letters, digits and underscores",
     ]
     done = programs.arc_suite("build_model", "--robot=creatures:crab:3", "--summary", cwd=tmp_path)
