@@ -104,7 +104,8 @@ for call in (
     assert package(code) == [
         f"unknown robot 'hoper'; did you mean 'hopper'? (there are: {', '.join(words)})",
         f"unknown task 'strol'; did you mean 'stroll'? (there are: {', '.join(TASKS)}, stroll)",
-        "robot 'hopper': cannot import nowhere: No module named 'nowhere'",
+        "robot 'hopper': cannot import nowhere: No module named 'nowhere'; "
+        "start in the folder of nowhere.py, or put it on Python's path",
     ]
 
 
