@@ -26,8 +26,7 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
     Raises:
         ValueError: no dataset, or one that does not fit.
     """
-    if context.prior is None:
-        raise ValueError("prior: the algorithm needs the id of a dataset, which arc-suite collect makes, got None")
+    priors.check(context.prior, True)
     with contextlib.closing(context.environment()) as environment:
         task = environment.task.definition
     data = priors.mapped(context, task)

@@ -14,7 +14,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite import checks
 from arc_suite.learning.agents import learner, networks, priors
 from arc_suite.learning.agents import soft_actor_critic as sac
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
@@ -66,9 +65,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
         OSError: the disk is too small for the buffer.
         Diverged: an action is not finite.
     """
-    if (context.prior is None) != (hp.prior == "none"):
-        expected = "no prior data" if hp.prior == "none" else "prior data, the id of a dataset"
-        raise ValueError(f"prior: the algorithm takes {expected}, got {checks.shown(context.prior)}")
+    priors.check(context.prior, hp.prior != "none")
     seed, core, environment = context.seed, sac.core(hp), context.environment(hp.num_envs)
     task, joints = environment.task.definition, environment.single_action_space.shape[0]
     inputs = Inputs.of(task, hp.normalize, hp.symmetry_augmentation, hp.network)

@@ -17,6 +17,17 @@ from arc_suite.tasks import Task
 _COUNT = "count.json"  # written last: without it the files are incomplete
 
 
+def check(prior: str | None, needed: bool) -> None:
+    """Check that a run names prior data if its algorithm needs them, and else none.
+
+    Raises:
+        ValueError: they are missing, or not taken.
+    """
+    if (prior is not None) != needed:
+        expected = "needs the id of a dataset, which arc-suite collect makes" if needed else "takes no prior data"
+        raise ValueError(f"prior: the algorithm {expected}, got {checks.shown(prior)}")
+
+
 def digest(prior: str) -> str:
     """Return the sha256 of the content of a dataset.
 
