@@ -128,8 +128,10 @@ def load(path: str | os.PathLike) -> Network:
         _ = setup.excluded_blocks  # finds out at once whether they are names
         return Network(graph, setup, blocks, seed_ranges.from_json(known.get("training_seeds")))
     except FileNotFoundError:
-        near = [str(each) for each in path.parent.glob("*")]
-        raise OSError(f"cannot read {path}: no such file{checks.hint(str(path), near)}") from None
+        early = path.name == FILE and path.parent.is_dir()
+        near = checks.hint(str(path), map(str, path.parent.glob("*")))
+        remedy = "; a run writes it at its first evaluation" if early else near
+        raise OSError(f"cannot read {path}: no such file{remedy}") from None
     except registry.NotImported as error:
         raise ValueError(f"policy {path}: {error}") from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
