@@ -218,13 +218,11 @@ def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
             importlib.import_module(module)
         except ImportError as error:
             cause = f"cannot import {module[:80]}: {checks.quoted(error)}"
-            remedy = (
-                f"; start in the folder of {module[:80]}.py, or put it on Python's path" if error.name == module else ""
-            )
-            raise ValueError(f"{kind} {name[:80]!r}: {cause}{remedy}") from None
+            start = f"; start in the folder of {module[:80]}.py, or put it on Python's path"
+            raise ValueError(f"{kind} {name[:80]!r}: {cause}{start if error.name == module else ''}") from None
         if name not in table:
-            near = checks.hint(name, [own for own in table if MODULES.get((kind, own)) == module])
-            raise ValueError(f"{kind} {name[:80]!r}: {module} registers no such {kind} by arc_suite.register{near}")
-        if name in table and (kind, name) not in MODULES:
+            hint = checks.hint(name, [own for own in table if MODULES.get((kind, own)) == module])
+            raise ValueError(f"{kind} {name[:80]!r}: {module} registers no such {kind} by arc_suite.register{hint}")
+        if (kind, name) not in MODULES:
             raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
     return table[checks.name(name, table, kind, near)]

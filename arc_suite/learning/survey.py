@@ -3,7 +3,7 @@
 import collections
 import functools
 import multiprocessing
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,10 +83,8 @@ def play(case: Case) -> tuple[control.Environment, Trajectory]:
         The environment as the walk left it, and the walk.
 
     Raises:
-        ValueError: a task without a target velocity or command, a walk that need not end, or a setting that does not
-            fit.
+        ValueError: a task without a target velocity or command.
     """
-    protocol.check_ends(case.setup.task_kwargs["time_limit"])
     environment = case.setup.load(case.seed)
     task, data = environment.task.definition, environment.physics.data.ptr
     demonstrator = Demonstrator(environment, suited_preset(task))
@@ -125,14 +123,11 @@ def run(case: Case) -> Outcome:
     return assess(case, trajectory)
 
 
-def survey(
-    cases: Iterable[Case], count: int, processes: int | None = None, progress: Callable = tqdm
-) -> Iterator[Outcome]:
-    """Run many cases, each as soon as it is made.
+def survey(cases: Sequence[Case], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
+    """Run many cases.
 
     Args:
         cases: to run.
-        count: their number.
         processes: to run them on, at most one for each; None for one per core.
         progress: makes a progress bar as `tqdm` does.
 
@@ -142,12 +137,14 @@ def survey(
     Raises:
         ValueError: a walk that need not end, or a setting that does not fit.
     """
-    progress = functools.partial(progress, total=count, unit="body", desc="walk")
+    for case in cases:
+        protocol.check_ends(case.setup.task_kwargs["time_limit"])
+    progress = functools.partial(progress, total=len(cases), unit="body", desc="walk")
     if processes == 1:
         yield from progress(map(run, cases))
         return
     # Spawned, not forked: a fork would share whatever OpenGL or threads the caller has open.
-    with multiprocessing.get_context("spawn").Pool(processes and min(processes, count)) as pool:
+    with multiprocessing.get_context("spawn").Pool(processes and min(processes, len(cases))) as pool:
         yield from progress(pool.imap(run, cases))
 
 

@@ -129,8 +129,8 @@ def load(path: str | os.PathLike) -> Network:
         return Network(graph, setup, blocks, seed_ranges.from_json(known.get("training_seeds")))
     except FileNotFoundError:
         early = path.name == FILE and path.parent.is_dir()
-        near = checks.hint(str(path), map(str, path.parent.glob("*")))
-        remedy = "; a run writes it at its first evaluation" if early else near
+        near = map(str, path.parent.glob("*"))
+        remedy = "; a run writes it at its first evaluation" if early else checks.hint(str(path), near)
         raise OSError(f"cannot read {path}: no such file{remedy}") from None
     except registry.NotImported as error:
         raise ValueError(f"policy {path}: {error}") from None

@@ -19,6 +19,7 @@ from arc_suite import checks, files, registry
 from arc_suite.cli.flags import MOST, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import protocol
 from arc_suite.learning import survey
 from arc_suite.models.families import FAMILIES, sound_body
 from arc_suite.robots import generator
@@ -72,12 +73,15 @@ def main() -> None:
     name, settings = task()
     settings = {"time_limit": FLAGS.seconds} | settings
     seeds = range(FLAGS.first, FLAGS.first + FLAGS.count)
-    cases = (survey.Case(Setup.of(member(seed), name, settings), seed) for seed in seeds)
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:
             checks.extension(FLAGS.picture, [".png"])
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
-        outcomes = list(survey.survey(cases, len(seeds), FLAGS.processes, progress))
+        first = Setup.of(member(seeds[0]), name, settings)
+        _ = first.definition  # finds out before all bodies are made, and processes, whether the settings fit
+        protocol.check_ends(first.task_kwargs["time_limit"])
+        cases = [survey.Case(Setup.of(member(seed), name, settings), seed) for seed in seeds]
+        outcomes = list(survey.survey(cases, FLAGS.processes, progress))
         print(survey.table(outcomes))
         print(survey.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]
