@@ -47,7 +47,7 @@ def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
     views = []
     for outcome in outcomes[:12]:
         environment, _ = survey.play(outcome.case)
-        caption = f"seed {outcome.case.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
+        caption = ", ".join((f"seed {outcome.case.seed}: {outcome.legs} x {outcome.links}", *outcome.failures))
         view = environment.physics.render(300, 400, "portrait", quality="still")
         views.append(films.captioned(view, caption))
         environment.close()
