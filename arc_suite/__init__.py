@@ -9,9 +9,10 @@ As a dm_env and as a Gymnasium environment::
     env = gymnasium.make("arc_suite/queen-walk-v0")
 """
 
-from arc_suite import versions
+from arc_suite import moved, versions
 from arc_suite.simulation import opengl
 
+moved.install_finder()
 with versions.explained():
     opengl.select_backend()  # before anything imports dm_control
 

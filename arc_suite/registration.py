@@ -10,10 +10,9 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import law
 from arc_suite.envs.prepare import prepared
-from arc_suite.models.families import FAMILIES
 from arc_suite.models.visuals import VISUALS
 from arc_suite.models.visuals.spec import Visuals
-from arc_suite.registry import MODULES
+from arc_suite.registry import BODIES_ENV, FAMILIES, MODULES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
@@ -52,7 +51,7 @@ def register(
         tasks: classes by the contract of `tasks.contract`, each with its name.
         arenas: functions by name, from a body to the `Arena` that suits it.
         families: functions by name, from a seed to a body, always the same for the same seed; see
-            `models.families.sound`. `name:seed` then stands for the body wherever a domain does, and comes before
+            `bodies.families.sound`. `name:seed` then stands for the body wherever a domain does, and comes before
             a module of that name.
 
     Raises:
@@ -159,6 +158,6 @@ def register_ids() -> None:
         if env_id not in gymnasium.registry:
             gymnasium.register(
                 env_id,
-                vector_entry_point="arc_suite.envs.bodies:BodiesEnv",
+                vector_entry_point=BODIES_ENV,
                 kwargs={"task_name": registry.importable("task", task_name)},
             )

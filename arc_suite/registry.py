@@ -3,19 +3,33 @@
 import importlib
 import itertools
 import os
+import pkgutil
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from arc_suite import checks
 from arc_suite.arenas import ARENAS, Arena
-from arc_suite.models import importing
-from arc_suite.models.families import FAMILIES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, load_body
 from arc_suite.tasks import TASKS, Task
+
+# Functions from a seed to a body, by name, or where they are; `registration.register` adds those of other packages.
+FAMILIES: dict[str, Callable[[int], Body] | str] = {
+    "random": "arc_suite.bodies.families:sound_body",
+    "varied": "arc_suite.bodies.families:varied_body",
+    "few_legs": "arc_suite.bodies.families:few_legs",
+    "few_links": "arc_suite.bodies.families:few_links",
+}
+
+# Functions from a path to a body, by extension of the file: robots of others.
+READERS = {".xml": "arc_suite.importing:body_of", ".urdf": "arc_suite.importing:body_of"}
+
+# The vector environment of different bodies.
+BODIES_ENV = "arc_suite.bodies:BodiesEnv"
 
 MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
@@ -27,6 +41,14 @@ _SEVERAL = re.compile(r",|:\d+-\d+$")
 
 class NotImported(ValueError):
     """A file names a module that has not been imported."""
+
+
+def resolve(entry: Any) -> Any:
+    """Return what an entry of a table stands for: itself, or what `module:name` has where it is imported.
+
+    Tables of the core name what only some users need, which is imported when it is asked for.
+    """
+    return pkgutil.resolve_name(entry) if isinstance(entry, str) else entry
 
 
 def tasks_by_domain() -> dict[str, tuple[str, ...]]:
@@ -99,7 +121,7 @@ def family_of(name: str) -> Callable[[int], Body]:
     Raises:
         ValueError: an unknown name.
     """
-    return _find(name, FAMILIES, "family")
+    return resolve(_find(name, FAMILIES, "family"))
 
 
 def _bodies(robot, near: Iterable[str]) -> Iterator[Body]:
@@ -120,13 +142,14 @@ def _bodies(robot, near: Iterable[str]) -> Iterator[Body]:
 
 
 def _read(path: Path) -> Body:
-    return importing.body_of(path) if path.suffix.lower() in importing.EXTENSIONS else load_body(path)
+    reader = READERS.get(path.suffix.lower())
+    return load_body(path) if reader is None else resolve(reader)(path)
 
 
 def _is_path(robot) -> bool:
     if isinstance(robot, str):
         path = Path(robot)
-        return path.suffix.lower() in (".json", *importing.EXTENSIONS) or (
+        return path.suffix.lower() in (".json", *READERS) or (
             ":" not in robot and bool(path.suffix or path.name != robot)
         )
     return isinstance(robot, os.PathLike)

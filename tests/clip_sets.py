@@ -19,8 +19,8 @@ from arc_suite.animation.clips import planting
 from arc_suite.animation.clips.catalog import CLIPS, DEFAULT, WalkLoop
 from arc_suite.animation.clips.drafts import drafts, passage
 from arc_suite.animation.clips.recorder import Recorder
+from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
-from arc_suite.models.families import sound_body
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots import ROBOTS, spec_files
 from arc_suite.simulation.model import compiled

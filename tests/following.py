@@ -15,7 +15,7 @@ sys.path[:0] = [str(pathlib.Path(__file__).parent / folder) for folder in ("cpg"
 
 from test_steering import COMMANDS, obeyed  # noqa: E402
 
-from arc_suite.models.families import FAMILIES  # noqa: E402
+from arc_suite.registry import family_of  # noqa: E402
 
 BODIES, MOST, SHARE = 60, 0.15, 0.9
 
@@ -24,7 +24,7 @@ def followed(family: str) -> bool:
     """Try the bodies of a family, print how they follow, and return whether they do."""
     errors, fell = [], []
     for seed in trange(BODIES, desc=family, disable=None):
-        motion, falls = obeyed(FAMILIES[family](seed))
+        motion, falls = obeyed(family_of(family)(seed))
         errors.append(abs(motion - COMMANDS).mean())
         fell.append(falls.sum())
         told = f"mean error {errors[-1]:.3f}, fell in {fell[-1]} of {len(COMMANDS)} commands"

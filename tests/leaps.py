@@ -15,9 +15,9 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite.arenas import terrain
+from arc_suite.bodies.families import sound_body
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.models.families import FAMILIES
 from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS
 
@@ -79,7 +79,7 @@ def main(count: int = BODIES, agility: float = 1.0) -> bool:
     print("| body | feet ahead | in the air | clearance | trench: sighted | leaping | hurdle: sighted | leaping |")
     print("|---|---|---|---|---|---|---|---|", flush=True)
     found = {}
-    random = [FAMILIES["random"](seed).replace(agility=agility) for seed in range(FIRST, FIRST + count)]
+    random = [sound_body(seed).replace(agility=agility) for seed in range(FIRST, FIRST + count)]
     for body in tqdm([*ROBOTS.values(), *random], disable=None):
         told = flight(body)
         counts = [crossed(body, kind, preset) for kind in ("trenches", "hurdles") for preset in ("sighted", "leaping")]

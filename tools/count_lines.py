@@ -1,4 +1,4 @@
-"""Counts lines of code of the package, its parts and the tests, and functions of more than 40 lines.
+"""Counts lines of code of the package, its core, annexes and wings, and the tests, and functions of more than 40 lines.
 
 Docstrings, comments and blank lines do not count.
 
@@ -20,7 +20,7 @@ from arc_suite.cli import program
 
 ROOT = Path(__file__).resolve().parents[1]
 LONG = 40
-WINGS = ("learning", "animation")
+APART = ("importing", "bodies", "learning", "animation")  # from the core
 _LAYOUT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 _FUNCTIONS = flags.DEFINE_bool("functions", False, f"List the package's functions of more than {LONG} lines of code.")
@@ -61,10 +61,10 @@ def long_functions(folder: Path) -> list[str]:
 def counts(root: Path) -> dict[str, int]:
     """Return the lines of code of each part of a checkout."""
     sizes = {path.relative_to(root): len(code_lines(text)) for path, text in sources(root / "arc_suite").items()}
-    wings = {wing: sum(size for path, size in sizes.items() if path.parts[1] == wing) for wing in WINGS}
+    apart = {room: sum(size for path, size in sizes.items() if path.parts[1] == room) for room in APART}
     package = sum(sizes.values())
     tests = sum(len(code_lines(text)) for text in sources(root / "tests").values())
-    return {"package": package, "core": package - sum(wings.values())} | wings | {"tests": tests}
+    return {"package": package, "core": package - sum(apart.values())} | apart | {"tests": tests}
 
 
 def main(root: str = str(ROOT)) -> None:

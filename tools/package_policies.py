@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import evaluation, files, policies
+from arc_suite.bodies import universal
 from arc_suite.cli import program
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import configuration, run_folder
-from arc_suite.policies import network, universal
+from arc_suite.policies import network
 from arc_suite.policies.network import PACKAGED
 
 INDEX = PACKAGED / "policies.json"

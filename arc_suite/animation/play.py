@@ -16,6 +16,8 @@ import numpy as np
 
 from arc_suite import models, policies
 from arc_suite.animation import direction, pages
+from arc_suite.bodies import universal
+from arc_suite.bodies.universal import Universal
 from arc_suite.cpg import Demonstrator, leaps
 from arc_suite.cpg.presets import DEFAULTS
 from arc_suite.cpg.selection import presets_of
@@ -24,9 +26,8 @@ from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import GRAVITY
-from arc_suite.policies import universal, zips
+from arc_suite.policies import zips
 from arc_suite.policies.network import Network
-from arc_suite.policies.universal import Universal
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 

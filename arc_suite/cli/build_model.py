@@ -19,11 +19,12 @@ from absl import flags
 
 from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.bodies import generator
+from arc_suite.bodies.families import sound_body
 from arc_suite.cli.flags import define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
 from arc_suite.envs.setup import Setup
-from arc_suite.models.families import sound_body
-from arc_suite.robots import generator, spec_files
+from arc_suite.robots import spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
 

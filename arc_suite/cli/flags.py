@@ -8,10 +8,11 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, policies, registry
+from arc_suite.bodies import generator, shaping
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
-from arc_suite.robots import ROBOTS, generator, palettes, shaping, spec_files
+from arc_suite.robots import ROBOTS, palettes, spec_files
 from arc_suite.robots.spec import PALETTES, Body
 from arc_suite.tasks import TASKS
 

@@ -15,7 +15,7 @@ import contextlib
 from absl import flags
 
 from arc_suite import checks, files
-from arc_suite.models.importing import imported
+from arc_suite.importing import imported
 from arc_suite.robots.spec_files import body_to_json
 
 FLAGS = flags.FLAGS

@@ -14,7 +14,6 @@ from gymnasium.envs.registration import EnvSpec
 
 from arc_suite import checks, registry, versions
 from arc_suite.envs import dm
-from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import is_robot
@@ -31,7 +30,7 @@ class Setup:
     """A body or several in a task with settings; make it by `Setup.of`, which checks names.
 
     Equal setups have equal content, however their tasks and settings were written. Several bodies share one policy:
-    joints take positions, and environments are those of `envs.bodies`.
+    joints take positions, and environments are those of `arc_suite.bodies`.
 
     Attributes:
         domain: the body, or the text that names several: `family:first-last`, or names with commas.
@@ -204,7 +203,7 @@ class Setup:
         """
         options["task_kwargs"] = self._seeded(seed)
         if self.several:
-            return BodiesEnv(self.task, num_envs, self.bodies, flat=True, **options)
+            return registry.resolve(registry.BODIES_ENV)(self.task, num_envs, self.bodies, flat=True, **options)
         return VectorEnv(self.domain, self.task, num_envs, **options)
 
     def spec(self, max_episode_steps: int = STEPS) -> EnvSpec:

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
-from arc_suite.envs.vector import VectorEnv
+from arc_suite.envs.together import Together
 from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
 
@@ -108,7 +107,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 
 
 def episodes_in_batch(
-    environment: VectorEnv | BodiesEnv,
+    environment: Together,
     policy: Policy,
     seeds: Sequence[int] | None = None,
     watch: Callable[[np.ndarray, np.ndarray], None] | None = None,
@@ -118,7 +117,7 @@ def episodes_in_batch(
     They are bit-equal to those of `episodes` if the policy takes observations as float32, as networks do.
 
     Args:
-        environment: one environment for each seed, in the mode Disabled.
+        environment: a `VectorEnv` or `BodiesEnv` with one environment for each seed, in the mode Disabled.
         policy: made for as many environments.
         seeds: of the episodes; by default from 0 on.
         watch: called after the reset and after each control step with two masks (num_envs,): of the environments

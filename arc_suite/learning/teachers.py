@@ -5,8 +5,8 @@ from typing import cast
 
 import numpy as np
 
+from arc_suite.bodies import BodiesEnv
 from arc_suite.cpg import Demonstrator, suited_preset
-from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.named import policy
 from arc_suite.policies.protocol import Positioned

@@ -15,13 +15,13 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.bodies import BodiesEnv, generator
+from arc_suite.bodies.families import sound_body, varied_body
 from arc_suite.evaluation import protocol, walking
 from arc_suite.learning.teachers import Teacher
-from arc_suite.models.families import sound_body, varied_body
 from arc_suite.policies import Policy, Script
 from arc_suite.policies.network import Network
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 
 TEST = 200_000  # first seed of the bodies of a family that test a policy; nobody trains or validates with them

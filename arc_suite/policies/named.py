@@ -18,15 +18,15 @@ from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import network, universal, zips
+from arc_suite.policies import network, zips
 from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
-from arc_suite.policies.universal import Universal
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
 MODULE = ".py"  # extension of a file that holds a function which makes a policy
+_MANY_BODIES = "arc_suite.bodies.universal"  # the module of policies that were trained with many bodies
 _CHUNK = 256  # control steps that are drawn at once
 
 
@@ -68,11 +68,12 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
 def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
     """A trained policy of any body that comes with the package, for walk or for tasks with a command."""
     task = task or prepared(body, "walk")[0]
-    return Universal(universal.load(universal.NAME, task), task)
+    universal = registry.resolve(_MANY_BODIES)
+    return universal.Universal(universal.load(universal.NAME, task), task)
 
 
 # By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
-POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, universal.NAME: _universal}
+POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, "universal": _universal}
 _UNTRAINED = ("zero", "random")
 
 HELP = (
@@ -286,7 +287,7 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
         return _from_zip(*zipped, body, task)
     made = network.load(path)
     if made.setup.several:
-        return Universal(made, task or prepared(body, "walk")[0])
+        return registry.resolve(_MANY_BODIES).Universal(made, task or prepared(body, "walk")[0])
     _check(path, made.setup, body, task)
     _check_joints(path, made.joints, body)
     return made

@@ -1,7 +1,7 @@
 """What the source of an imported body may hold: named parts, their numbers, and nothing that names a file.
 
 A source comes from a file that anybody may have written, and MuJoCo reads it. Tags, attributes and what they hold are
-therefore those of a list; `arc_suite.models.importing` writes no others.
+therefore those of a list; `arc_suite.importing` writes no others.
 """
 
 import collections

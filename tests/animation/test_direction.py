@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from arc_suite.animation import direction
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.models.outline import torso_box
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 
 BODIES = [*ROBOTS.values(), generator.random_body(4)]
 

@@ -13,12 +13,13 @@ import pytest
 from page_data import data_of
 
 from arc_suite.animation import pages, play
+from arc_suite.bodies import generator, universal
 from arc_suite.cpg import leaps
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.models.kinematics import Legs
-from arc_suite.policies import alone, network, policy, universal
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.policies import alone, network, policy
+from arc_suite.robots import ROBOTS
 
 OTHERS = [imports.quadruped(), imports.hexapod(), imports.body("a1_like.urdf"), imports.with_arm()]
 BODIES = {body.name: body for body in (*ROBOTS.values(), *map(generator.random_body, range(10)), *OTHERS)}

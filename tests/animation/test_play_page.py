@@ -8,7 +8,8 @@ import pytest
 import tabs
 
 from arc_suite.animation import play
-from arc_suite.robots import ROBOTS, gaits, generator
+from arc_suite.bodies import generator
+from arc_suite.robots import ROBOTS, gaits
 
 ASKED = "play.panel.asked(play.inputs.command, play.inputs.pose)"
 SIZES = [(1440, 900), (390, 844), (844, 390), (320, 256)]

@@ -12,8 +12,9 @@ from tiers import tiers, turns
 import arc_suite
 from arc_suite import models
 from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 
 BODIES = {**ROBOTS, "small": generator.scaled(generator.generate(6, 3), 0.1)}
 every_body = pytest.mark.parametrize("body", tiers(BODIES, lambda body: body in ("bastion", "small")))

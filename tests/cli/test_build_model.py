@@ -7,8 +7,9 @@ from dm_control import mjcf
 from saved_models import saved, without_keyframe
 
 from arc_suite import models, registry
-from arc_suite.models.families import sound_body
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.bodies import generator
+from arc_suite.bodies.families import sound_body
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"

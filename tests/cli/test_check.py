@@ -8,7 +8,8 @@ import imports
 import programs
 import pytest
 
-from arc_suite.robots import generator, spec_files
+from arc_suite.bodies import generator
+from arc_suite.robots import spec_files
 from arc_suite.tasks import TASKS
 
 ROOT = Path(__file__).parents[2]

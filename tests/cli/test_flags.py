@@ -8,10 +8,10 @@ import pytest
 
 import arc_suite
 from arc_suite import registry
+from arc_suite.bodies import generator
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.gym import Env
-from arc_suite.models.families import FAMILIES
-from arc_suite.robots import generator
+from arc_suite.registry import FAMILIES
 from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 

@@ -4,7 +4,7 @@ import pathlib
 
 import programs
 
-from arc_suite.models.importing import imported
+from arc_suite.importing import imported
 from arc_suite.robots.spec_files import load_body
 
 FOLDER = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"

@@ -6,11 +6,12 @@ from crossings import crossed
 from numpy.testing import assert_allclose
 
 import arc_suite
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.balancing import Balanced
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import presets_of
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 
 
 def fitted(body):

@@ -12,12 +12,13 @@ from tiers import tiers
 
 import arc_suite
 from arc_suite import rotations
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.prescribed import Bend, Prescribed, Preset, pattern
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.models.sizing import control_timestep
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.style import record
 
 

@@ -9,11 +9,12 @@ from refusals import refused
 from tiers import tiers
 
 import arc_suite
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.law import checked
 from arc_suite.cpg.selection import law, presets_of
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks.suite import Rough
 
 PRESETS = [

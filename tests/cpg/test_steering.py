@@ -8,9 +8,10 @@ from refusals import refused
 from tiers import never, tiers
 
 import arc_suite
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 
 # In the body's own units.
 COMMANDS = np.transpose(

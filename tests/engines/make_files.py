@@ -17,9 +17,10 @@ from tqdm import tqdm
 
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips.catalog import CLIPS
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
-from arc_suite.models.importing import imported
-from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.importing import imported
+from arc_suite.robots import ROBOTS, spec_files
 from arc_suite.simulation.model import compiled
 
 OTHERS = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"  # files of robots that are imported

@@ -10,7 +10,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from refusals import refused
 
 import arc_suite
-from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.simulation.model import FIELDS, field

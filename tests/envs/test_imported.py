@@ -11,16 +11,15 @@ import pytest
 from refusals import refused
 
 import arc_suite
+from arc_suite.bodies import BodiesEnv, generator, shaping
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import PRESETS
-from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.gym import Env
 from arc_suite.envs.prepare import prepared, symmetry
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models import source
 from arc_suite.models.standing import standing
-from arc_suite.robots import generator, shaping
 from arc_suite.robots.spec import SpecError
 from arc_suite.tasks import TASKS
 

@@ -10,8 +10,9 @@ from numpy.testing import assert_array_equal
 
 from arc_suite import registry
 from arc_suite.arenas import FLAT
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import body_to_json
 
 QUEEN = ROBOTS["queen"]

@@ -8,9 +8,9 @@ from returns import RETURNS
 
 import arc_suite
 from arc_suite import evaluation, policies
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
-from arc_suite.robots import generator
 
 
 def test_episodes_are_seeded_and_sum_up_what_the_environment_says():

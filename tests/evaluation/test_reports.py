@@ -7,9 +7,9 @@ import programs
 import pytest
 from refusals import refused
 
+from arc_suite.bodies import generator
 from arc_suite.evaluation import evaluate
 from arc_suite.policies import network
-from arc_suite.robots import generator
 
 SHORT = {"time_limit": 0.5}
 

@@ -1,9 +1,15 @@
 """What import-linter's contracts in pyproject.toml do not say of imports."""
 
+import contextlib
 import graphlib
+import importlib
 
 import grimp
+import gymnasium
 import interpreters
+import pytest
+
+from arc_suite import moved
 
 
 def test_no_import_goes_round():
@@ -19,3 +25,36 @@ def test_import_is_light():
     heavy += ("arc_suite.learning", "arc_suite.animation")
     code = f"import sys, arc_suite; print(sorted(sys.modules.keys() & {set(heavy)}))"
     assert interpreters.printed(code) == ["[]"]
+
+
+# Loads a robot, and plays a step with its demonstrator.
+_STEP = """
+import sys
+import arc_suite
+from arc_suite.cpg import Demonstrator
+environment = arc_suite.load("queen", "walk")
+demonstrator = Demonstrator(environment)
+environment.step(demonstrator(environment.reset()))
+rooms = ("importing", "bodies", "learning", "animation")
+print(sorted(name for name in sys.modules if name.startswith(tuple(f"arc_suite.{room}" for room in rooms))))
+"""
+
+
+def test_step_imports_neither_wing_nor_annex():
+    assert interpreters.printed(_STEP) == ["[]"]
+
+
+@pytest.mark.parametrize("former", moved.MOVED)
+def test_former_paths_are_aliases(former):
+    assert importlib.import_module(former) is importlib.import_module(moved.MOVED[former])
+
+
+def test_saved_spec_of_different_bodies_opens():
+    """By the path that specs of before name."""
+    spec = gymnasium.envs.registration.EnvSpec(
+        id="arc_suite/bodies-walk-v0",
+        vector_entry_point="arc_suite.envs.bodies:BodiesEnv",
+        kwargs={"task_name": "walk"},
+    )
+    with contextlib.closing(gymnasium.make_vec(spec, num_envs=2, bodies=["queen", "tick"])) as environments:
+        assert [body.name for body in environments.unwrapped.bodies] == ["queen", "tick"]

@@ -10,13 +10,13 @@ from networks import made, of_many_bodies
 
 import arc_suite
 from arc_suite import policies
+from arc_suite.bodies import generator, universal
+from arc_suite.bodies.universal import Universal
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import onnx_file
-from arc_suite.policies import alone, universal
+from arc_suite.policies import alone
 from arc_suite.policies.graph import INPUT
 from arc_suite.policies.network import PACKAGED
-from arc_suite.policies.universal import Universal
-from arc_suite.robots import generator
 
 pytest.importorskip("onnx", reason="of the extra learn: make check-agents")
 runtime = pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from networks import of_many_bodies as drawn
 
+from arc_suite.bodies import families, generator, tokens
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.learning.transfer import Comparison, Judged
-from arc_suite.models import families
-from arc_suite.robots import ROBOTS, generator
-from arc_suite.tasks import tokens
+from arc_suite.robots import ROBOTS
 
 
 def compared(policy, demonstrator, zero, walked=True, speed=1.0):

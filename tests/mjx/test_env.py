@@ -11,11 +11,11 @@ import pytest
 from conftest import WORLDS, compiled
 
 import arc_suite
+from arc_suite.bodies import generator
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.envs.worlds import mjx
 from arc_suite.envs.worlds.randomization import randomization_fn
-from arc_suite.robots import generator
 from arc_suite.simulation import device
 from arc_suite.tasks import privileged
 

@@ -8,8 +8,8 @@ from conftest import WORLDS, recorded, stepped
 from mujoco import mjx as upstream
 from mujoco.mjx._src import collision_driver
 
+from arc_suite.bodies import generator
 from arc_suite.envs.worlds import mjx
-from arc_suite.robots import generator
 from arc_suite.simulation import device
 
 CAPSULE = collision_driver.GeomType.PLANE, collision_driver.GeomType.CAPSULE

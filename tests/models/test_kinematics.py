@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from arc_suite.bodies import generator
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import posed
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 
 BODIES = [*ROBOTS.values(), *map(generator.random_body, (1, 2, 8))]
 

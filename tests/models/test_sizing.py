@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from arc_suite import models
+from arc_suite.bodies import generator
 from arc_suite.models import stride
 from arc_suite.models.sizing import control_timestep, natural_frequency, sized
 from arc_suite.models.standing import posed, stability_margin, standing
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Motor, Simulation
 
 BODY = generator.generate(6, 3)

@@ -6,12 +6,13 @@ import pytest
 from refusals import refused
 
 import arc_suite
+from arc_suite.bodies import generator
+from arc_suite.bodies.families import sound_body
 from arc_suite.cpg import Demonstrator
 from arc_suite.evaluation import first_walk
-from arc_suite.models.families import sound_body
 from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body, Foot, Joint, Leg, Link, Motor, Solid, Torso
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 

@@ -6,8 +6,9 @@ import pytest
 
 import arc_suite
 from arc_suite import models
+from arc_suite.bodies import generator
 from arc_suite.models import direct, standing
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 BODIES = [*ROBOTS.values(), *map(load_body, EXAMPLES), *map(generator.random_body, range(5))]

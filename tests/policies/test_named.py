@@ -9,10 +9,10 @@ from refusals import refused
 
 import arc_suite
 from arc_suite import policies, registry
+from arc_suite.bodies.generator import generate
 from arc_suite.evaluation import provenance
 from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.generator import generate
 
 ALL = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, leaping, planned, balanced"
 GENERAL = "slow, medium, fast, steered, surefooted, reactive, sighted, leaping, planned"

@@ -11,12 +11,12 @@ from refusals import refused
 
 import arc_suite
 from arc_suite import evaluation, policies
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
 from arc_suite.policies.graph import OPERATORS
 from arc_suite.policies.tracing import traced
-from arc_suite.robots import generator
 
 
 @pytest.fixture

@@ -7,10 +7,9 @@ import pytest
 from tiers import never, tiers
 
 from arc_suite import evaluation, policies
+from arc_suite.bodies import generator, universal
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import universal
 from arc_suite.policies.network import PACKAGED
-from arc_suite.robots import generator
 
 INDEX = json.loads((PACKAGED / "policies.json").read_text())
 

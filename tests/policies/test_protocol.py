@@ -9,8 +9,9 @@ from tiers import tiers
 
 import arc_suite
 from arc_suite import evaluation
+from arc_suite.bodies import generator
 from arc_suite.policies import POLICIES, Individuals, Mixture, Script, Sum, alone, policy
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 
 # (environment, control step at which it begins, seed) of episodes; its last step is that before the next begins.
 EPISODES = ((0, 0, 4), (1, 0, 5), (2, 0, 6), (1, 7, 7), (0, 20, 8), (2, 20, 4), (1, 31, 9), (1, 32, 0))

@@ -5,8 +5,9 @@ import pytest
 from refusals import refused
 
 import arc_suite
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
-from arc_suite.robots import ROBOTS, gaits, generator
+from arc_suite.robots import ROBOTS, gaits
 
 QUAD, HEXAPOD, OCTOPOD = (generator.generate(legs, 3) for legs in (4, 6, 8))
 STARFISH = generator.generate(5, 3)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.bodies import generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.mirror import image
 from arc_suite.robots.spec import Foot, Joint, Leg, Link, Solid
 

@@ -6,7 +6,7 @@ import pathlib
 import pytest
 from refusals import refused
 
-from arc_suite.models.importing import imported
+from arc_suite.importing import imported
 from arc_suite.robots import sources
 from arc_suite.robots.spec import MAX_SOURCE, SpecError
 from arc_suite.robots.spec_files import MAX_BYTES, MAX_IMPORTED, body_from_json, body_to_json, load_body, save_body

@@ -8,8 +8,9 @@ import tracemalloc
 import pytest
 from refusals import refused
 
+from arc_suite.bodies import generator
 from arc_suite.models.sizing import sized
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import SpecError
 from arc_suite.robots.spec_files import EXAMPLES, MAX_BYTES, body_from_json, body_to_json, load_body, save_body
 

@@ -30,7 +30,7 @@ from arc_suite.cli import program  # noqa: E402
 from arc_suite.cpg import Demonstrator  # noqa: E402
 from arc_suite.envs.setup import Setup  # noqa: E402
 from arc_suite.evaluation import protocol, walking  # noqa: E402
-from arc_suite.models.importing import imported  # noqa: E402
+from arc_suite.importing import imported  # noqa: E402
 from arc_suite.models.soundness import flaws  # noqa: E402
 from arc_suite.robots.spec import Body  # noqa: E402
 

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import mujoco
 import numpy as np
 
-from arc_suite.models.importing import urdf
+from arc_suite.importing import urdf
 from arc_suite.robots.spec import Body
 
 STATES = 200

@@ -14,11 +14,11 @@ from tiers import tiers, turn
 import arc_suite
 from arc_suite import models, registry
 from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.bodies.generator import random_body
 from arc_suite.cpg import Demonstrator
 from arc_suite.models import direct
 from arc_suite.models.sizing import sized
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.generator import random_body
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 from arc_suite.simulation.model import compiled, euler_suffices, list_contacts
 

@@ -8,9 +8,10 @@ from numpy.testing import assert_array_equal
 from tiers import never, tiers
 
 from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.bodies import generator
 from arc_suite.markers import Marker
 from arc_suite.models.outline import torso_box
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.simulation.physics import Physics
 from arc_suite.simulation.pictures import QUALITIES, Decorated, check_camera, picture

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from synthetic import CLEARANCE, CYCLE, DT, LEGS, RADIUS, TWO_PI, synthetic
 
 from arc_suite import style
+from arc_suite.bodies.generator import generate
 from arc_suite.envs.setup import Setup
-from arc_suite.robots.generator import generate
 from arc_suite.style import METRICS, measure
 from arc_suite.style.metrics import phase_error
 from arc_suite.style.tracks import UNTIMED

@@ -9,9 +9,10 @@ from synthetic import assert_same
 
 import arc_suite
 from arc_suite import data, style
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.style import record, source
 from arc_suite.tasks import walk
 

@@ -13,9 +13,9 @@ from synthetic import assert_same
 import arc_suite
 from arc_suite import style
 from arc_suite.arenas import FLAT
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import Script, policy
-from arc_suite.robots import generator
 from arc_suite.style import load, record, save
 
 BODY = generator.generate(5, 2)

@@ -10,10 +10,11 @@ from tiers import tiers
 
 import arc_suite
 from arc_suite import models, policies, rotations
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.models.standing import standing
 from arc_suite.models.stride import fitted_gait
-from arc_suite.robots import ROBOTS, gaits, generator, spec_files
+from arc_suite.robots import ROBOTS, gaits, spec_files
 from arc_suite.robots.spec_files import body_to_json, load_body
 from arc_suite.tasks.walk import Walk
 

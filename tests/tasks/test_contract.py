@@ -13,10 +13,11 @@ from tiers import tiers, turn, turns
 
 import arc_suite
 from arc_suite.arenas import ARENAS
+from arc_suite.bodies import generator
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import TASKS

@@ -6,10 +6,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
 import arc_suite
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.posture import moved, room
-from arc_suite.robots import ROBOTS, gaits, generator, mirror
+from arc_suite.robots import ROBOTS, gaits, mirror
 from arc_suite.tasks import mirrors
 from arc_suite.tasks.direction import CYCLE, counted, glided
 

@@ -15,10 +15,11 @@ from tiers import never, tiers
 
 import arc_suite
 from arc_suite.arenas import terrain
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.ground import LEVELS, Lanes, Stream, next_level

@@ -7,8 +7,9 @@ import types
 import numpy as np
 import pytest
 
+from arc_suite.bodies import generator
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS, terms
 
 jax = pytest.importorskip("jax", reason="of the extra `jax`: make check-jax")

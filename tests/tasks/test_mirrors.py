@@ -7,7 +7,8 @@ from refusals import refused
 from tiers import tiers, turns
 
 import arc_suite
-from arc_suite.robots import ROBOTS, generator, mirror
+from arc_suite.bodies import generator
+from arc_suite.robots import ROBOTS, mirror
 from arc_suite.tasks import TASKS, mirrors, randomization
 from arc_suite.tasks.sensors import RAYS, SCAN
 

@@ -75,7 +75,7 @@ def test_errors_of_a_family_name_family_and_seed():
     def broken(seed):
         raise ValueError("no legs")
 
-    from arc_suite.models.families import FAMILIES
+    from arc_suite.registry import FAMILIES
 
     FAMILIES["broken"] = broken
     try:

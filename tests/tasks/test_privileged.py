@@ -8,11 +8,11 @@ from episodes import begun, load
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import rotations
-from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.bodies import BodiesEnv, tokens
 from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks import privileged, tokens
+from arc_suite.tasks import privileged
 from arc_suite.tasks.modifiers import FAILS_FROM
 
 DRAWN = {"friction": (0.5, 1.0), "mass": (0.8, 1.2), "payload": (0.1, 0.3), "center_of_mass": 0.1}

@@ -17,8 +17,8 @@ API = {
     "Style": ("arc_suite.style", "arc_suite.style.metrics"),
     "Datasets": ("arc_suite.data",),
     "Pictures and clips": ("arc_suite.animation", "arc_suite.animation.clips"),
-    "Bodies": ("arc_suite.robots.spec", "arc_suite.robots.spec_files", "arc_suite.robots.generator"),
-    "Gaits and shapes": ("arc_suite.robots.gaits", "arc_suite.robots.shaping", "arc_suite.models.families"),
+    "Bodies": ("arc_suite.robots.spec", "arc_suite.robots.spec_files", "arc_suite.bodies.generator"),
+    "Gaits and shapes": ("arc_suite.robots.gaits", "arc_suite.bodies.shaping", "arc_suite.bodies.families"),
     "Tasks": (
         "arc_suite.tasks.contract",
         "arc_suite.tasks.modifiers",

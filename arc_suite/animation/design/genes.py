@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.bodies import generator
+from arc_suite.bodies.generator import Proportions
 from arc_suite.models.outline import outline
 from arc_suite.models.standing import standing
-from arc_suite.robots import generator
-from arc_suite.robots.generator import Proportions
 from arc_suite.robots.spec import Body
 
 DEVIATIONS = 2.0  # standard deviations of a mutation that a gene spans to either side

@@ -11,12 +11,12 @@ from arc_suite.animation.parts import Material, Part
 from arc_suite.animation.parts import parts as described
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.sketch import Sketch
+from arc_suite.bodies.shaping import link_names
 from arc_suite.envs import dm
 from arc_suite.envs.setup import Setup
 from arc_suite.models.outline import outline
 from arc_suite.models.soundness import Flaw, flaws
 from arc_suite.policies import Policy, alone
-from arc_suite.robots.shaping import link_names
 
 
 class Creature(NamedTuple):

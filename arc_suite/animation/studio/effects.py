@@ -5,7 +5,7 @@ from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.sketch import LEGS, RANDOM
 from arc_suite.animation.studio.states import POSE, VELOCITY, Command
-from arc_suite.robots.shaping import Shape
+from arc_suite.bodies.shaping import Shape
 
 _SHAPE = (*Shape._fields[: Shape._fields.index("links")], "lengths")
 

@@ -10,9 +10,10 @@ from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.sketch import OWN, Sketch
 from arc_suite.animation.studio.states import POSE, VELOCITY, State
 from arc_suite.arenas import ARENAS
+from arc_suite.bodies import generator
 from arc_suite.cpg.selection import preset_names
 from arc_suite.policies import POLICIES
-from arc_suite.robots import gaits, generator
+from arc_suite.robots import gaits
 from arc_suite.robots.spec import PALETTES
 from arc_suite.tasks import TASKS
 

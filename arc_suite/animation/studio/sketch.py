@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from arc_suite import checks, registry
+from arc_suite.bodies import families, generator
+from arc_suite.bodies.shaping import Shape, link_ends, link_names, shaped
 from arc_suite.envs.setup import Setup
-from arc_suite.models import families
-from arc_suite.robots import ROBOTS, generator, palettes
-from arc_suite.robots.shaping import Shape, link_ends, link_names, shaped
+from arc_suite.robots import ROBOTS, palettes
 from arc_suite.robots.spec import Body, Leg, Vector
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.leg_networks import AnyLegs, Legs

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from arc_suite import checks, seed_ranges
-from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning import teachers

@@ -12,14 +12,15 @@ from typing import NamedTuple, Self
 import jax.numpy as jnp
 import numpy as np
 
+from arc_suite.bodies import tokens
+from arc_suite.bodies.tokens import JOINTS, LEGS
 from arc_suite.learning.agents import critic_blocks as behind
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.networks import ACTIVATION
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.policies.tracing import activated, linear, perceptron
-from arc_suite.tasks import Task, tokens
+from arc_suite.tasks import Task
 from arc_suite.tasks.leg_views import LegViews, leg_views
-from arc_suite.tasks.tokens import JOINTS, LEGS
 
 _LEAST = -1e4  # less than any feature, and finite in policies of 16 bits
 
@@ -142,7 +143,7 @@ class Legs:
 class AnyLegs(NamedTuple):
     """Networks of the legs of any body, which see a leg, with torso, command and description, as tokens.
 
-    Observations are those of a flat `BodiesEnv`; see `arc_suite.tasks.tokens`.
+    Observations are those of a flat `BodiesEnv`; see `arc_suite.bodies.tokens`.
     """
 
     inputs: int = tokens.LEG_INPUTS

@@ -16,13 +16,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
+from arc_suite.bodies import universal
 from arc_suite.learning.agents import architectures, collecting, critic_blocks, learner, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
-from arc_suite.policies import universal
 from arc_suite.policies.network import Network
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, policies
+from arc_suite.bodies import universal
 from arc_suite.cli.flags import (
     completed,
     define_body,
@@ -31,7 +32,6 @@ from arc_suite.cli.flags import (
 )
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import onnx_file
-from arc_suite.policies import universal
 
 FLAGS = flags.FLAGS
 define_body(None, "; for a policy of many bodies")

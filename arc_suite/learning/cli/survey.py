@@ -16,13 +16,14 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, files, registry
+from arc_suite.bodies import generator
+from arc_suite.bodies.families import sound_body
 from arc_suite.cli.flags import MOST, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.learning import survey
-from arc_suite.models.families import FAMILIES, sound_body
-from arc_suite.robots import generator
+from arc_suite.registry import FAMILIES
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
 

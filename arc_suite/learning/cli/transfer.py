@@ -21,12 +21,12 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, policies
+from arc_suite.bodies import universal
 from arc_suite.cli.flags import completed, define_task, task
 from arc_suite.cli.program import marked_page
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.learning.studies import bodies
-from arc_suite.policies import universal
 
 FLAGS = flags.FLAGS
 define_task()

@@ -12,9 +12,10 @@ from PIL import Image
 from tiers import never, tiers
 
 import arc_suite
+from arc_suite.bodies import generator
 from arc_suite.models.sizing import control_timestep
 from arc_suite.policies import alone, policy
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
 

@@ -8,8 +8,8 @@ from arc_suite import rotations
 from arc_suite.animation.clips import bones
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.animation.parts import frames, parts
+from arc_suite.bodies.generator import random_body
 from arc_suite.robots import ROBOTS, spec_files
-from arc_suite.robots.generator import random_body
 
 BODIES = {**ROBOTS, "six legs": imports.hexapod(), "spider": spec_files.load_body("spider"), "random": random_body(3)}
 

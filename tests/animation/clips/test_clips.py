@@ -18,10 +18,10 @@ from arc_suite.animation import clips as export
 from arc_suite.animation.clips import drafts, foot_contacts, loops, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.gestures import HITS
+from arc_suite.bodies.generator import random_body
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS, spec_files
-from arc_suite.robots.generator import random_body
 from arc_suite.simulation.model import compiled
 
 PRESETS = [(robot, preset) for robot in ROBOTS for preset in ("slow", "medium", "fast", "tuned")]

@@ -9,8 +9,8 @@ from refusals import refused
 
 from arc_suite.animation.clips.meshes import body_meshes
 from arc_suite.animation.parts import parts
+from arc_suite.bodies.generator import generate
 from arc_suite.robots import ROBOTS, spec_files
-from arc_suite.robots.generator import generate
 
 BODIES = {"queen": ROBOTS["queen"], "spider": spec_files.load_body("spider"), "many": generate(12, 4)}
 BODIES["an arm"] = imports.with_arm()

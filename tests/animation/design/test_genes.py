@@ -7,10 +7,10 @@ import pytest
 
 from arc_suite.animation.design.axes import AXES, Map
 from arc_suite.animation.design.genes import Around, Budget, Made, extent, within
+from arc_suite.bodies.generator import deformations, mutated, random_body
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.generator import deformations, mutated, random_body
 
 BUDGET = Budget(mass=12.0, span=1.5)
 

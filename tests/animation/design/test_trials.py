@@ -6,7 +6,7 @@ import pytest
 
 from arc_suite.animation.design.genes import Budget
 from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, evaluate, excluded, walk
-from arc_suite.robots.generator import generate
+from arc_suite.bodies.generator import generate
 
 BUDGET = Budget(12.0, 1.5)
 GOOD = WalkMeans(0.5, 0.9, math.nan, 1.5, 6.0, 0.0)

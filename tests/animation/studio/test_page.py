@@ -13,7 +13,8 @@ from arc_suite.animation import direction
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import FILE, Sketch
-from arc_suite.robots import gaits, generator, shaping
+from arc_suite.bodies import generator, shaping
+from arc_suite.robots import gaits
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 
 viser = pytest.importorskip("viser", reason="no viser here: make check-studio")

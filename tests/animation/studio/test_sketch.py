@@ -11,9 +11,10 @@ from refusals import refused
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import opened
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
-from arc_suite.models.families import sound_body
+from arc_suite.bodies import generator, shaping
+from arc_suite.bodies.families import sound_body
 from arc_suite.models.soundness import flaws
-from arc_suite.robots import ROBOTS, generator, shaping
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import body_to_json, load_body
 
 HIGH = generator.generate(6, 3)

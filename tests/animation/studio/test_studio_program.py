@@ -3,7 +3,7 @@
 import interpreters
 
 from arc_suite.animation.studio.sketch import FILE, OWN, Sketch
-from arc_suite.robots import generator
+from arc_suite.bodies import generator
 from arc_suite.robots.spec_files import body_to_json
 
 # In an interpreter of its own: programs define flags of the same names.

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -14,7 +15,6 @@ from arc_suite.learning.agents import dagger, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
-from arc_suite.robots import generator
 
 SMALL = {"num_envs": 8, "round": 10, "left_out": 2, "updates": 20, "last_updates": 40, "batch": 64, "hidden": 16}
 

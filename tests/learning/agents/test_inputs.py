@@ -7,11 +7,12 @@ from refusals import refused
 
 pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.critic_blocks import privileged_columns, symmetry
 from arc_suite.learning.agents.inputs import Inputs
 from arc_suite.learning.agents.replay import Transitions
-from arc_suite.robots import generator, queen
+from arc_suite.robots import queen
 
 TASK = Setup.of("tick").definition
 

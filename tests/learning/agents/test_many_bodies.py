@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 
+from arc_suite.bodies import tokens
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import architectures
@@ -17,7 +18,6 @@ from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network, policy
 from arc_suite.policies.tracing import traced
-from arc_suite.tasks import tokens
 
 SETUP = Setup.of("random:0-1", "steer", {"time_limit": 0.5})
 SMALL = {"num_envs": 4, "round": 8, "left_out": 2, "updates": 20, "last_updates": 40, "batch": 32, "hidden": 8}

@@ -13,6 +13,7 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 import jax
 
+from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import architectures, on_policy, run_folder
@@ -23,7 +24,6 @@ from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
-from arc_suite.robots import generator
 from arc_suite.tasks import command
 
 CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16, "network": "perceptron"}

@@ -5,7 +5,7 @@ import re
 import programs
 import pytest
 
-from arc_suite.models.families import FAMILIES
+from arc_suite.registry import FAMILIES
 
 BODIES = ("--first=40", "--legs=6", "--links=3", "--seconds=12")
 IN_PHASE = ("--set=duty_factor=0.6", "--set=phase_offsets=0.0")

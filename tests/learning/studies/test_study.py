@@ -21,13 +21,13 @@ import tiny_studies
 from refusals import refused
 
 from arc_suite import data, evaluation, policies, registry, style
+from arc_suite.bodies import generator
 from arc_suite.envs.dm import load
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.training import train
 from arc_suite.learning.studies import csv_files, publication, results, runner, tables
 from arc_suite.learning.studies.publication import METRICS
 from arc_suite.learning.studies.tables import Prior, run
-from arc_suite.robots import generator
 
 ROOT = pathlib.Path(__file__).parents[3]
 FIXTURES = ROOT / "tests" / "fixtures"

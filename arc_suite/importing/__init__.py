@@ -12,15 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.models.importing import motors, notes, opening, poses, sketch, tree, urdf, writing
-from arc_suite.models.importing.naming import clean, names_of
-from arc_suite.models.importing.opening import Opened
-from arc_suite.models.importing.poses import Stance
-from arc_suite.models.importing.tree import Robot
+from arc_suite.importing import motors, notes, opening, poses, sketch, tree, urdf, writing
+from arc_suite.importing.naming import clean, names_of
+from arc_suite.importing.opening import Opened
+from arc_suite.importing.poses import Stance
+from arc_suite.importing.tree import Robot
 from arc_suite.robots import ROBOTS, sources
 from arc_suite.robots.spec import MAX_NAME, Body, Held, Simulation, SpecError
-
-EXTENSIONS = (".xml", ".urdf")
 
 _CONTROL_STEP = 0.02  # s
 _LARGEST_TIMESTEP = 0.004  # s

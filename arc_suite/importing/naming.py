@@ -3,8 +3,8 @@
 import re
 from typing import NamedTuple
 
-from arc_suite.models.importing.poses import Leg
-from arc_suite.models.importing.tree import Robot
+from arc_suite.importing.poses import Leg
+from arc_suite.importing.tree import Robot
 from arc_suite.robots.spec import MAX_NAME
 
 _MIDLINE = 1e-4  # m; a foot that is nearer to it than that stands on the left

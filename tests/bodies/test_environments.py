@@ -15,13 +15,13 @@ from refusals import refused
 
 import arc_suite
 from arc_suite import registry
+from arc_suite.bodies import BodiesEnv, generator, tokens
+from arc_suite.bodies.families import sound_body, varied_body
 from arc_suite.envs import stacked
-from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.models.families import sound_body, varied_body
-from arc_suite.robots import ROBOTS, generator
-from arc_suite.tasks import command, tokens
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import command
 from arc_suite.tasks.walk import Walk
 
 LAYOUTS = [

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.robots import bastion, generator, leaper, queen, tick
-from arc_suite.robots.generator import JOINT_NAMES, LEGS, LINK_NAMES, PROFILES
+from arc_suite.bodies import generator
+from arc_suite.bodies.generator import JOINT_NAMES, LEGS, LINK_NAMES, PROFILES
+from arc_suite.robots import bastion, leaper, queen, tick
 from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
 LINKS = (2, 4)  # fewest and most; a leg of one link cannot lift its foot

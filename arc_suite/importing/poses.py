@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.models.importing import tree
-from arc_suite.models.importing.tree import Robot
+from arc_suite.importing import tree
+from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots.spec import SpecError
 

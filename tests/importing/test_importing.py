@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from arc_suite import registry
-from arc_suite.models.importing import imported
+from arc_suite.importing import imported
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots import sources
 from arc_suite.robots.spec import SpecError
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 
-TESTS = pathlib.Path(__file__).parents[2]
+TESTS = pathlib.Path(__file__).parents[1]
 FOLDER = TESTS / "fixtures" / "robots"
 GO2, A1, HEXAPOD = (FOLDER / name for name in ("go2_like.xml", "a1_like.urdf", "hexapod.urdf"))
 THREE = pytest.mark.parametrize("path", [GO2, A1, HEXAPOD], ids=lambda path: path.stem)

@@ -7,10 +7,11 @@ import pytest
 from refusals import refused
 
 import arc_suite
+from arc_suite.bodies import generator
+from arc_suite.bodies.shaping import link_names, shaped
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import standing
-from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.shaping import link_names, shaped
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Ballast, Solid
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 

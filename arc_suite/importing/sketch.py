@@ -5,10 +5,10 @@ import math
 import mujoco
 import numpy as np
 
-from arc_suite.models.importing import tree
-from arc_suite.models.importing.naming import Names
-from arc_suite.models.importing.poses import Leg, Stance
-from arc_suite.models.importing.tree import Robot
+from arc_suite.importing import tree
+from arc_suite.importing.naming import Names
+from arc_suite.importing.poses import Leg, Stance
+from arc_suite.importing.tree import Robot
 from arc_suite.robots import spec
 from arc_suite.robots.spec import MAX_ALIAS, Foot, Joint, Link, Servo, Solid, Torso, TrackingCamera
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import mujoco
 
 from arc_suite import checks, files
-from arc_suite.models.importing import urdf
-from arc_suite.models.importing.meshes import Mesh, file_of, meshes_of
+from arc_suite.importing import urdf
+from arc_suite.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.robots import sources
 from arc_suite.robots.spec import SpecError
 

@@ -9,12 +9,12 @@ import pytest
 from refusals import refused
 
 from arc_suite import registry
+from arc_suite.bodies import families, generator
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
-from arc_suite.models import families
 from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import SpecError
 from arc_suite.robots.spec_files import body_from_json, body_to_json, load_body
 
@@ -84,10 +84,10 @@ def test_seeds_stand_for_the_same_bodies_for_good():
     assert hashlib.sha256(text.encode()).hexdigest()[:16] == "8a68ff0ee14d7f36"
 
 
-@pytest.mark.parametrize("family", families.FAMILIES)
+@pytest.mark.parametrize("family", registry.FAMILIES)
 @pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 200), marks=pytest.mark.long)], ids=str)
 def test_bodies_of_every_family_are_sound(family, seeds):
-    assert [seed for seed in seeds if flaws(families.FAMILIES[family](seed))] == []
+    assert [seed for seed in seeds if flaws(registry.family_of(family)(seed))] == []
 
 
 def test_a_sound_first_draw_is_the_body_and_later_ones_keep_legs_and_links():
@@ -154,8 +154,8 @@ def test_wrong_names_are_one_line(name, message):
 
 FAMILY = """
 import arc_suite
-from arc_suite.models.families import sound
-from arc_suite.robots.generator import generate, mutated
+from arc_suite.bodies.families import sound
+from arc_suite.bodies.generator import generate, mutated
 
 def crab(seed):
     return sound(lambda random: mutated(generate(8, 3), int(random.integers(1000))), "crab", seed)

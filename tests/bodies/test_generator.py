@@ -9,8 +9,9 @@ from dm_control import mjcf
 from refusals import refused
 
 from arc_suite import models
+from arc_suite.bodies import generator
 from arc_suite.models.standing import standing
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import SpecError
 from arc_suite.tasks.fitting import fitted_parameters
 from arc_suite.tasks.walk import Walk

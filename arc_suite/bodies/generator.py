@@ -95,7 +95,7 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
 
 
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
-    """Make a random body, the same for the same arguments; its legs may overlap, unlike `models.families.sound_body`'s.
+    """Make a random body, the same for the same arguments; its legs may overlap, unlike `bodies.families.sound_body`'s.
 
     Args:
         seed: 0 or more.

@@ -6,12 +6,12 @@ from networks import of_many_bodies as drawn
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation, policies
-from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.bodies import BodiesEnv, generator, universal
+from arc_suite.bodies.universal import Universal
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import network, universal
+from arc_suite.policies import network
 from arc_suite.policies.tracing import traced
-from arc_suite.policies.universal import Universal
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS
 
 SETTINGS = {"time_limit": 1.0}
 BODIES = (generator.random_body(3), generator.generate(5, 2))

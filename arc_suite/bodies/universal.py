@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from arc_suite.bodies import tokens
+from arc_suite.bodies.tokens import Tokens
 from arc_suite.cpg.law import Clocked, checked, proprioception, torques
 from arc_suite.envs.setup import Setup
 from arc_suite.models.sizing import position_gains, sized
@@ -14,8 +16,7 @@ from arc_suite.policies import network
 from arc_suite.policies.graph import Graph
 from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.tracing import repeated, traced
-from arc_suite.tasks import Task, tokens
-from arc_suite.tasks.tokens import Tokens
+from arc_suite.tasks import Task
 
 NAME = "universal"  # of the policies that come with the package
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.models.importing.tree import colliding, vertices
+from arc_suite.importing.tree import colliding, vertices
 from arc_suite.robots.spec import MAX_SOURCE
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH

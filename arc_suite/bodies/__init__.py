@@ -1,5 +1,5 @@
 """Environments of different bodies as one Gymnasium vector environment."""
 
-from arc_suite.envs.bodies.environments import BodiesEnv
+from arc_suite.bodies.environments import BodiesEnv
 
 __all__ = ["BodiesEnv"]

@@ -11,10 +11,10 @@ from xml.etree.ElementTree import SubElement
 import mujoco
 import numpy as np
 
-from arc_suite.models.importing.meshes import Mesh
-from arc_suite.models.importing.naming import Names
-from arc_suite.models.importing.poses import Leg, Stance
-from arc_suite.models.importing.tree import HINGE, Robot
+from arc_suite.importing.meshes import Mesh
+from arc_suite.importing.naming import Names
+from arc_suite.importing.poses import Leg, Stance
+from arc_suite.importing.tree import HINGE, Robot
 from arc_suite.models.writing import exact
 from arc_suite.robots import sources
 

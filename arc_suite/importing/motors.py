@@ -7,8 +7,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.models.importing.poses import Leg, Stance
-from arc_suite.models.importing.tree import Robot
+from arc_suite.importing.poses import Leg, Stance
+from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import foot_loads
 from arc_suite.robots.spec import Servo
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from arc_suite import checks
-from arc_suite.robots import generator
+from arc_suite.bodies import generator
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Leg, Solid, Vector
 
 FACTOR = (0.1, 10.0)  # of a length

@@ -4,10 +4,10 @@ import pathlib
 
 import pytest
 
-from arc_suite.models.importing import imported
+from arc_suite.importing import imported
 from arc_suite.robots.spec import SpecError
 
-FOLDER = pathlib.Path(__file__).parents[2] / "fixtures" / "robots"
+FOLDER = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"
 GO2, A1, HEXAPOD = "go2_like.xml", "a1_like.urdf", "hexapod.urdf"
 
 # Parts of these files, and of notes.

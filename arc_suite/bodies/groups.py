@@ -6,11 +6,12 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
+from arc_suite.bodies import tokens
+from arc_suite.bodies.tokens import Tokens
 from arc_suite.envs import stacked
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.simulation.batch import layout
-from arc_suite.tasks import Task, tokens
-from arc_suite.tasks.tokens import Tokens
+from arc_suite.tasks import Task
 
 
 class Member(NamedTuple):

@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from arc_suite.models.importing import motors
-from arc_suite.models.importing.naming import Names
-from arc_suite.models.importing.opening import Opened
-from arc_suite.models.importing.poses import Stance
-from arc_suite.models.importing.tree import Robot
+from arc_suite.importing import motors
+from arc_suite.importing.naming import Names
+from arc_suite.importing.opening import Opened
+from arc_suite.importing.poses import Stance
+from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import GRAVITY
 
 

@@ -11,13 +11,13 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks, registry, rotations
-from arc_suite.envs.bodies.groups import Group, Member, Place, grouped, scatter
+from arc_suite.bodies import tokens
+from arc_suite.bodies.groups import Group, Member, Place, grouped, scatter
+from arc_suite.bodies.tokens import Description, Tokens
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.together import MOST_ENVS, Together
-from arc_suite.tasks import tokens
 from arc_suite.tasks.contract import CURRICULUM
-from arc_suite.tasks.tokens import Description, Tokens
 
 
 class BodiesTask(NamedTuple):
@@ -56,7 +56,7 @@ class BodiesEnv(KnownAttributes, Together):
     """Environments of different bodies, `gymnasium.make_vec("arc_suite/bodies-<task>-v0", num_envs=n, bodies=...)`.
 
     Observations are legs (num_envs, 12, 12), torso (num_envs, 12) and command (num_envs, 6), float32 without
-    dimension and 0 where a body has no leg or joint; see `tasks.tokens.Tokens.observed`. Actions are (num_envs, 12, 4)
+    dimension and 0 where a body has no leg or joint; see `bodies.tokens.Tokens.observed`. Actions are (num_envs, 12, 4)
     in [-1, 1], positions of joints as with `actions="position"`; entries without a joint are ignored. `description`
     holds what does not change. With `flat=True`, for plain learners, observations are vectors (num_envs, 664) that
     include legs and torso of the description, and actions are (num_envs, 48).
@@ -73,7 +73,7 @@ class BodiesEnv(KnownAttributes, Together):
         tasks: of each environment, for demonstrators.
         task: of all, for learners.
         step_limit: control steps after which every episode is over, may be infinite.
-        description: of each environment, (num_envs, ...) float32; see `tasks.tokens.Description`.
+        description: of each environment, (num_envs, ...) float32; see `bodies.tokens.Description`.
         autoreset_mode: what happens to an environment whose episode has ended.
     """
 

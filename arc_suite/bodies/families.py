@@ -1,13 +1,13 @@
-"""Families of bodies: a body for every seed, by name of the family."""
+"""Families of bodies: a body for every seed. `registry.FAMILIES` names them."""
 
 from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.bodies import generator, varied
 from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
-from arc_suite.robots import generator, varied
 from arc_suite.robots.spec import Body, SpecError
 
 TRIES = 100  # draws of one seed
@@ -90,12 +90,3 @@ def few_legs(seed: int) -> Body:
 def few_links(seed: int) -> Body:
     """Return a random body of 2 or 3 links a leg, for policies that are tested with 4; see `sound_body`."""
     return sound_body(seed, links=2 + checks.seed(seed) % 2).replace(name=f"few_links_{seed}")
-
-
-# Functions from a seed to a body, by name. `registration.register` adds those of other packages.
-FAMILIES: dict[str, Callable[[int], Body]] = {
-    "random": sound_body,
-    "varied": varied_body,
-    "few_legs": few_legs,
-    "few_links": few_links,
-}
