@@ -14,13 +14,32 @@ import numpy as np
 from arc_suite.models.sizing import position_gains, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import blocks, privileged
+from arc_suite.tasks import blocks
+from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach, velocity_units
+from arc_suite.tasks.parts import (
+    Joints,
+    Padding,
+    Phase,
+    Quaternion,
+    RigidParts,
+    Scalar,
+    Vector,
+    join_padding,
+    joint_places,
+)
 
 LEGS, JOINTS = 12, 4  # at most, of a body, and of a leg
 
-BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock")  # of a task, that tokens are made from
+# The blocks that tokens are made from, and the parts that each has to have.
+BLOCKS = {
+    "posture": (Scalar, Quaternion, Joints),
+    "velocities": (Vector, Vector, Joints),
+    "contact_forces": (RigidParts,),
+    "gait_clock": (Phase,),
+}
+_UPWARD = 5  # place of the upward force among the torque and force on a rigid part
 
 # Sizes: of a leg, of the torso and of the command in every step, and of a leg and the torso in the description.
 LEG, TORSO, COMMAND = 2 * JOINTS + 4, 12, 6
@@ -38,9 +57,6 @@ FLAT = {
 # What a network of legs sees of one leg: its token and description, and those of the torso, and the command.
 LEG_INPUTS = LEG + LEG_DESCRIPTION + TORSO + COMMAND + TORSO_DESCRIPTION
 _COUNTS = slice(8, 12)  # of a leg's description: the number of joints, as one of four
-
-# Sizes of privileged blocks that a leg or a joint has a number of.
-_PADDED = {"ground": LEGS, "joint_offset": LEGS * JOINTS, "strength": LEGS * JOINTS}
 
 _CARRIES = 0.05  # share of the weight from which on a foot counts as loaded
 _LARGEST_FORCE = 0.5  # that is asked for, as observed forces are clipped to 1
@@ -74,26 +90,25 @@ def padded(body: Body, values: np.ndarray) -> np.ndarray:
 
 def privileged_sizes(task: Task) -> dict[str, int]:
     """Return the sizes of the blocks of a task's privileged observation, padded to 12 legs of 4 joints."""
-    return {name: _PADDED.get(name, size) for name, size in privileged.sizes(task).items()}
+    return {name: _padding(block).size for name, block in task.privileged_blocks.items()}
 
 
 def padded_privileged(task: Task, vectors: np.ndarray) -> np.ndarray:
     """Return privileged observations (environments, size) with 12 legs of 4 joints, 0 where there is none."""
-    found = np.zeros((len(vectors), sum(privileged_sizes(task).values())), vectors.dtype)
-    places = {LEGS: np.arange(len(task.scene.body.legs)), LEGS * JOINTS: slots(task.scene.body)}
-    parts = privileged.split(privileged_sizes(task), found)
-    for name, block in privileged.split(privileged.sizes(task), vectors).items():
-        parts[name][:, places.get(_PADDED.get(name), slice(None))] = block
-    return found
+    padding = join_padding([_padding(block) for block in task.privileged_blocks.values()])
+    padded_vectors = np.zeros((len(vectors), padding.size), vectors.dtype)
+    padded_vectors[:, padding.places] = vectors
+    return padded_vectors
+
+
+def _padding(block: Block) -> Padding:
+    """Return the places of a block's numbers in that of a body of 12 legs of 4 joints."""
+    return join_padding([part.padding(LEGS, JOINTS) for part in block.parts])
 
 
 @functools.lru_cache(maxsize=256)
 def _slots(body: Body) -> tuple[int, ...]:
-    counts = [len(leg.joints) for leg in body.legs]
-    if len(counts) > LEGS or max(counts) > JOINTS:
-        most = f"at most {LEGS} legs of at most {JOINTS} joints"
-        raise ValueError(f"{body.name}: expected {most}, got {len(counts)} legs of up to {max(counts)}")
-    return tuple(JOINTS * leg + joint for leg, count in enumerate(counts) for joint in range(count))
+    return joint_places(body, LEGS, JOINTS)
 
 
 def slots(body: Body) -> np.ndarray:
@@ -228,7 +243,7 @@ class Tokens(NamedTuple):
     def _of_one(cls, task: Task) -> tuple:
         if "history" in task.blocks:
             raise ValueError("history: expected 0 for different bodies, as tokens of legs hold the present alone")
-        if not set(BLOCKS) <= task.blocks.keys():
+        if any(name not in task.blocks or task.blocks[name].kinds != kinds for name, kinds in BLOCKS.items()):
             raise ValueError(f"task {task.name}: expected the blocks {', '.join(BLOCKS)}, got {', '.join(task.blocks)}")
         body, parameters, pose = task.scene.body, task.parameters, standing(task.scene.body)
         # Forces are in N, or in weights where a task has a command.
@@ -256,15 +271,17 @@ class Tokens(NamedTuple):
     @staticmethod
     def _places(task: Task) -> np.ndarray:
         body = task.scene.body
-        first = {name: part.start for name, part in blocks.places(task.sizes).items()}
-        posture, velocities, forces, clock = (first[name] for name in BLOCKS)
-        joints = padded(body, np.arange(len(body.joint_names))).astype(int).ravel()
+        numbers = {name: np.arange(part.start, part.stop) for name, part in blocks.places(task.sizes).items()}
+        parts = {name: [numbers[name][part] for part in task.blocks[name].places] for name in BLOCKS}
+        (height, orientation, angles), (linear, angular, speeds) = parts["posture"], parts["velocities"]
+        (forces,) = parts["contact_forces"]
         upward = np.zeros(LEGS, int)
-        upward[: len(body.legs)] = [6 * body.part_names.index(name) + 5 for name in body.foot_names]
-        torso = [posture + np.arange(5), velocities + np.arange(6)]
-        command = first["command"] + np.arange(COMMAND) if "command" in first else []
-        parts = [*torso, posture + 5 + joints, velocities + 6 + joints, forces + upward, clock + np.arange(2), command]
-        return np.concatenate(parts).astype(int)
+        rigid_parts = task.blocks["contact_forces"].parts[0]
+        upward[: len(body.legs)] = [forces[rigid_parts.places(name)[_UPWARD]] for name in body.foot_names]
+        joints = [padded(body, places).ravel() for places in (angles, speeds)]
+        command = numbers.get("command", [])
+        places = [height, orientation, linear, angular, *joints, upward, numbers["gait_clock"], command]
+        return np.concatenate(places).astype(int)
 
     def gathered(self, vectors: np.ndarray) -> np.ndarray:
         """Return the numbers (environments, n) of observation vectors (environments, size) that tokens are made from.

@@ -34,8 +34,8 @@ _FLAT = "observations"  # dm_control's name of a flat observation
 
 # What `dm_control.suite.load` hands on to an environment and this suite fixes, and why.
 _FIXED = {
-    "control_timestep": "reward and observation are made for control steps of 25 substeps",
-    "n_sub_steps": "reward and observation are made for control steps of 25 substeps",
+    "control_timestep": "reward and observation are made for the body's own control steps",
+    "n_sub_steps": "reward and observation are made for the body's own control steps",
     "legacy_step": "observed contact forces and foot heights stand one substep behind the state",
     "time_limit": "it is a setting of the task: task_kwargs={'time_limit': seconds}",
 }

@@ -1,9 +1,8 @@
-"""Blocks of an observation: the size, the mirror image and the noise of each, declared once."""
+"""Blocks of an observation: the parts of each and its noise, declared once."""
 
-import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,8 @@ from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
-from arc_suite.tasks.mirrors import AXIAL, POLAR, QUATERNION, SAME, Mirror
+from arc_suite.tasks.mirrors import Mirror
+from arc_suite.tasks.parts import HEADED, ROTATIONS, WORLD, Joints, Part, Phase, Quaternion, RigidParts, Scalar, Vector
 
 # Half-widths of noise at level 1, about those of legged_gym (joints 0.01 rad and 1.5 rad/s, velocity 0.1 m/s and
 # 0.2 rad/s, gravity 0.05, heights 0.1 m) for a robot that stands half a meter high.
@@ -29,28 +29,51 @@ class Block(NamedTuple):
     """A block of the observation.
 
     Attributes:
-        size: how many numbers it has.
-        mirror: its left-right map, or a function that returns the map for the `Image` of the body and raises a
-            ValueError where there is none; None for a block that declares none.
-        noise: half-widths (size,) of its noise at level 1, or one for all numbers; None for what is known exactly.
+        parts: that it is made of, in order.
+        noise: half-widths of the noise of each part at level 1, in its unit, or one for all of them; None for what is
+            known exactly.
     """
 
-    size: int
-    mirror: Mirror | Callable[[Image], Mirror] | None = None
-    noise: np.ndarray | float | None = None
+    parts: tuple[Part, ...]
+    noise: tuple[float, ...] | float | None = None
 
-    def map(self, image: Image) -> Mirror:
-        """Return the left-right map of a block that declares one.
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        return sum(part.size for part in self.parts)
 
-        Raises:
-            ValueError: there is none for this body.
-        """
-        return self.mirror if isinstance(self.mirror, Mirror) else self.mirror(image)
+    @property
+    def kinds(self) -> tuple[type[Part], ...]:
+        """The classes of its parts."""
+        return tuple(map(type, self.parts))
+
+    @property
+    def places(self) -> list[slice]:
+        """Where each of its parts lies in it."""
+        ends = itertools.accumulate(part.size for part in self.parts)
+        return [slice(end - part.size, end) for part, end in zip(self.parts, ends, strict=True)]
+
+    @property
+    def measures_joints(self) -> bool:
+        """Whether it holds angles or other numbers of joints, as what a history keeps does."""
+        return any(isinstance(part, Joints) for part in self.parts)
 
     @property
     def widths(self) -> np.ndarray:
         """The half-widths (size,) of the noise at level 1 of a block that declares it."""
-        return np.broadcast_to(self.noise, self.size)
+        return np.repeat(np.broadcast_to(self.noise, len(self.parts)), [part.size for part in self.parts])
+
+    def mirror(self, image: Image) -> Mirror:
+        """Return the left-right map.
+
+        Raises:
+            ValueError: there is none for this body.
+        """
+        return mirrors.joined([part.mirror(image) for part in self.parts])
+
+    def entries(self) -> list[tuple[str, str]]:
+        """Return the name and the unit of every number."""
+        return [entry for part in self.parts for entry in part.entries()]
 
 
 def places(sizes: Mapping[str, int]) -> dict[str, slice]:
@@ -61,56 +84,64 @@ def places(sizes: Mapping[str, int]) -> dict[str, slice]:
 
 def posture(body: Body) -> Block:
     """Return the block of the torso's height and quaternion, and the joint angles: (5 + joints)."""
-    joints = len(body.joint_names)
-    widths = HEIGHT * body.torso.standing_height, ORIENTATION, JOINT_ANGLE
-    return Block(5 + joints, _mirrored_posture, np.repeat(widths, (1, 4, joints)))
+    parts = Scalar("torso height", "m"), Quaternion("torso quaternion"), Joints(body, "angle of {}", "rad")
+    return Block(parts, (HEIGHT * body.torso.standing_height, ORIENTATION, JOINT_ANGLE))
 
 
-def velocities(body: Body) -> Block:
-    """Return the block of the torso's linear and angular velocity, and the joint velocities: (6 + joints)."""
-    joints, height = len(body.joint_names), body.torso.standing_height
+def velocities(body: Body, headed: bool = False) -> Block:
+    """Return the block of the torso's linear and angular velocity, and the joint velocities: (6 + joints).
+
+    Args:
+        body: that moves.
+        headed: whether the linear velocity is as the torso heads; else it is in the world's frame.
+    """
+    height = body.torso.standing_height
     unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
-    widths = LINEAR_VELOCITY * unit, ANGULAR_VELOCITY * rate, JOINT_VELOCITY * rate
-    return Block(6 + joints, _mirrored_velocities, np.repeat(widths, (3, 3, joints)))
+    parts = (
+        Vector("torso velocity", "m/s", HEADED if headed else WORLD),
+        Vector("torso angular velocity", "rad/s", ROTATIONS, axial=True),
+        Joints(body, "velocity of {}", "rad/s"),
+    )
+    return Block(parts, (LINEAR_VELOCITY * unit, ANGULAR_VELOCITY * rate, JOINT_VELOCITY * rate))
 
 
-def contact_forces(body: Body) -> Block:
-    """Return the block of torque and force on each part: (6 * parts)."""
-    return Block(6 * len(body.part_names), _mirrored_forces, CONTACT_FORCE)
+def contact_forces(body: Body, headed: bool = False) -> Block:
+    """Return the block of torque and force on each rigid part: (6 * parts).
+
+    Args:
+        body: that moves.
+        headed: whether they are as the torso heads and in the body's weight; else in the world's frame and in N.
+    """
+    axes = HEADED if headed else ("x", "y", "z")
+    torque, force = ("weight x h", "weight") if headed else ("N m", "N")
+    parts = Vector("torque on {}", torque, axes, axial=True), Vector("force on {}", force, axes)
+    return Block((RigidParts(body, parts),), CONTACT_FORCE)
 
 
-def gait_clock(phase_offsets: np.ndarray, default_angles: np.ndarray) -> Block:
-    """Return the block of sine and cosine of the phase of a gait: (2)."""
-    return Block(2, functools.partial(_mirrored_clock, phase_offsets, default_angles))
+def gait_clock(phase_offsets: np.ndarray | None = None, default_angles: np.ndarray | None = None) -> Block:
+    """Return the block of sine and cosine of the phase of a gait: (2).
+
+    Args:
+        phase_offsets: (legs,) of the gait, rad; None where they change.
+        default_angles: (joints,) of the pose around which the gait moves, rad; None where it changes.
+    """
+    return Block((Phase("the phase", phase_offsets, default_angles),))
 
 
-def of_gait(body: Body, phase_offsets: np.ndarray, default_angles: np.ndarray) -> dict[str, Block]:
-    """Return the blocks of the paper's observation (Section 3), for a body in a gait; see `parameters.Parameters`."""
+def of_gait(
+    body: Body, phase_offsets: np.ndarray, default_angles: np.ndarray, headed: bool = False
+) -> dict[str, Block]:
+    """Return the blocks of the paper's observation (Section 3), for a body in a gait.
+
+    Args:
+        body: that moves.
+        phase_offsets: see `parameters.Parameters`.
+        default_angles: see `parameters.Parameters`.
+        headed: whether vectors are as the torso heads; see `velocities` and `contact_forces`.
+    """
     return {
         "posture": posture(body),
-        "velocities": velocities(body),
-        "contact_forces": contact_forces(body),
+        "velocities": velocities(body, headed),
+        "contact_forces": contact_forces(body, headed),
         "gait_clock": gait_clock(phase_offsets, default_angles),
     }
-
-
-def _mirrored_posture(image: Image) -> Mirror:
-    return mirrors.joined([SAME, QUATERNION, mirrors.joints(image)])
-
-
-def _mirrored_velocities(image: Image) -> Mirror:
-    return mirrors.joined([POLAR, AXIAL, mirrors.joints(image)])
-
-
-def _mirrored_forces(image: Image) -> Mirror:
-    return mirrors.of_each(image.parts, mirrors.joined([AXIAL, POLAR]))
-
-
-def _mirrored_clock(offsets: np.ndarray, default: np.ndarray, image: Image) -> Mirror:
-    """Where left and right legs take turns, the clock is half a cycle later: its sine and cosine change sign."""
-    if not np.allclose(mirrors.joints(image)(default), default):
-        raise ValueError("default_angles: expected mirrored poses left and right")
-    for sign in (1, -1):  # of the clock's sine and cosine, whose leads over the legs across are 0 or half a cycle
-        if np.allclose(np.exp(1j * offsets[image.legs]), sign * np.exp(1j * offsets)):
-            return Mirror.signed(sign, sign)
-    raise ValueError("phase_offsets: expected legs across from each other to move together, or half a cycle apart")

@@ -19,7 +19,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import terms
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.context import Context
-from arc_suite.tasks.mirrors import Mirror
+from arc_suite.tasks.parts import Planar, Scalar
 from arc_suite.tasks.readings import component
 from arc_suite.tasks.sensors import FAR
 
@@ -424,7 +424,8 @@ class ToGoal(Command):
 
     def blocks(self, body: Body) -> dict[str, Block]:
         """Return the block of the goal's direction and distance."""
-        return {"goal": Block(3, Mirror.signed(1, -1, 1))}
+        direction = Planar(axes=("cosine of the goal's direction", "sine of the goal's direction"))
+        return {"goal": Block((direction, Scalar("distance of the goal", f"{FAR:g} R")))}
 
     def start(self, context: Context, random, schedule: Scheduled) -> Chain:
         """Draw the chain of goals."""

@@ -19,7 +19,7 @@ from arc_suite.arenas import Arena
 from arc_suite.markers import Marker
 from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import blocks, clock, energy, mirrors, parameters, terms
+from arc_suite.tasks import blocks, clock, energy, parameters, terms
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.clock import Clock
@@ -28,8 +28,8 @@ from arc_suite.tasks.context import Context
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.ground import Ground, Level
 from arc_suite.tasks.health import Condition, Upright
-from arc_suite.tasks.mirrors import PLANAR
 from arc_suite.tasks.parameters import Noise, Parameters
+from arc_suite.tasks.parts import Part, Planar, Scalar
 from arc_suite.tasks.readings import Readings, component
 
 COST_LIMIT = 0.6  # a third of it is what standing costs, twice as much uniform torques
@@ -183,9 +183,13 @@ class CommandTask(Task):
     @functools.cached_property
     def blocks(self) -> Mapping[str, Block]:
         """The paper's observation, the command with the motion that is to follow it, what command and ground add."""
-        own = blocks.of_gait(self.scene.body, self.parameters.phase_offsets, self.parameters.default_angles)
-        own["command"] = Block(6, mirrors.joined([PLANAR, PLANAR]))
-        return {**own, **self.settings.command.blocks(self.scene.body), **self.settings.ground.blocks}
+        body, gait = self.scene.body, self.parameters
+        return {
+            **blocks.of_gait(body, gait.phase_offsets, gait.default_angles, headed=True),
+            "command": Block((*_velocity("desired"), *_velocity("measured"))),
+            **self.settings.command.blocks(body),
+            **self.settings.ground.blocks,
+        }
 
     @property
     def commands(self) -> Mapping[str, int]:
@@ -452,6 +456,12 @@ class CommandTask(Task):
         lifted = straight + (heights - straight).max() + _SHAFT * self.context.reach
         start, tip = (np.array((*points[i], lifted[i])) for i in (0, -1))
         return Marker("arrow", start, tip, _SHAFT * self.context.reach, color)
+
+
+def _velocity(name: str) -> tuple[Part, ...]:
+    """Return the parts of a velocity (3,) in units of the command."""
+    planar = Planar(unit="v*", axes=(f"{name} forward", f"{name} left"))
+    return planar, Scalar(f"{name} turning", "v* / R", sign=-1)
 
 
 def _place(readings: Sensed):

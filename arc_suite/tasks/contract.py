@@ -45,6 +45,7 @@ from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block, places
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.parameters import Parameters
+from arc_suite.tasks.parts import Unframed
 from arc_suite.tasks.readings import Layout, Readings
 
 STEPS = 1000  # control steps of an episode
@@ -146,12 +147,14 @@ class Observed(ABC):
         the image walks on mirrored ground.
 
         Raises:
-            ValueError: the body, the gait or its default angles are not symmetric, or a block declares no mirror.
+            ValueError: the body, the gait or its default angles are not symmetric, or a block has numbers without a
+                frame.
         """
         image = mirror.image(self.scene.body)
-        if undeclared := [name for name, block in self.blocks.items() if block.mirror is None]:
-            raise ValueError(f"task {self.name}: block {undeclared[0]!r} declares no mirror")
-        observation = mirrors.joined(block.map(image) for block in self.blocks.values())
+        for name, block in self.blocks.items():
+            if Unframed in block.kinds:
+                raise ValueError(f"task {self.name}: block {name!r} has numbers without a frame, so no mirror image")
+        observation = mirrors.joined(block.mirror(image) for block in self.blocks.values())
         return Symmetry(observation, mirrors.joints(image))
 
     @functools.cached_property

@@ -15,14 +15,13 @@ from arc_suite import checks, rotations
 from arc_suite.models import posture
 from arc_suite.models.standing import GRAVITY
 from arc_suite.robots import gaits
-from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import mirrors, terms
-from arc_suite.tasks.blocks import Block
+from arc_suite.tasks import terms
+from arc_suite.tasks.blocks import Block, gait_clock
 from arc_suite.tasks.clock import TWO_PI
 from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, Followed, Schedule, Scheduled, begins, held
 from arc_suite.tasks.context import Context
-from arc_suite.tasks.mirrors import Mirror
+from arc_suite.tasks.parts import ROTATIONS, Legs, Planar, Scalar
 
 CYCLE = 1 << 20  # units of the clock
 STEADY = ("trot", "walk", "tripod", "tetrapod", "ripple")  # gaits that are drawn, where they fit
@@ -159,10 +158,23 @@ class Direction(Schedule):
         """Return the blocks that it adds: the clock and the pose that hold, and of the gait sine and cosine of the
         phase of each leg, the duty factor and the frequency by sqrt(g / h)."""
         return {
-            # Half a cycle later in the mirror, as offsets are half a cycle earlier there: legs change places.
-            "gait_clock": Block(2, Mirror.signed(-1, -1)),
-            "pose": Block(6, Mirror.signed(1, 1, -1, -1, 1, -1)),
-            "gait": Block(2 * len(body.legs) + 2, _mirrored_gait),
+            "gait_clock": gait_clock(),
+            "pose": Block(
+                (
+                    Scalar("height", "h"),
+                    Planar(unit="h"),
+                    Planar(unit="rad", axes=ROTATIONS[:2], axial=True),
+                    Scalar("yaw", "rad", sign=-1),
+                )
+            ),
+            "gait": Block(
+                (
+                    Legs(body, "sine of the phase of {}"),
+                    Legs(body, "cosine of the phase of {}"),
+                    Scalar("duty factor"),
+                    Scalar("frequency", "sqrt(g / h)"),
+                )
+            ),
         }
 
     def start(self, context: Context, random, schedule: Scheduled) -> Directed:
@@ -348,8 +360,3 @@ def _circle(phase, like):
     """Sine and cosine (..., 2) of phases (...), in units of the clock."""
     numpy, angle = like.__array_namespace__(), phase * (TWO_PI / CYCLE)
     return numpy.stack([numpy.sin(angle), numpy.cos(angle)], axis=-1)
-
-
-def _mirrored_gait(image: Image) -> Mirror:
-    legs = mirrors.joined([Mirror.moved(image.legs)] * 2)
-    return mirrors.joined([legs, mirrors.SAME, mirrors.SAME])

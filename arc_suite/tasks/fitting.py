@@ -27,7 +27,7 @@ JOINT_VELOCITY_NOISE = 0.02  # of sqrt(g / h); published: 0.014 to 0.03
 
 
 def fitted_parameters(body: Body) -> dict:
-    """Return parameters of walk for any body: units as in `terms.Parameters`, every noise by itself."""
+    """Return parameters of walk for any body: units as in `parameters.Parameters`, every noise by itself."""
     height = body.torso.standing_height
     unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
     speed = TARGET_FROUDE * unit

@@ -20,10 +20,10 @@ from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.contract import CURRICULUM, STEPS
 from arc_suite.tasks.fitting import reach
-from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.parameters import Parameters
+from arc_suite.tasks.parts import Grid, Rays
 from arc_suite.tasks.readings import Readings
-from arc_suite.tasks.sensors import FORWARD, LEFT, RAYS, SCAN, SIGHT
+from arc_suite.tasks.sensors import RAYS, SCAN, SIGHT
 
 STARTS = ("standing", "belly")  # poses in which an episode starts
 LEVELS = 10  # of a curriculum, with difficulties from 0 to 1
@@ -34,10 +34,6 @@ SUNK = 0.05  # depth of a foot's center under the ground that a contact never re
 LONGEST = 300.0  # length of a lane ahead of the start
 END = 1.0  # before the end of a lane, at which an episode is truncated
 SINKING = 5  # consecutive control steps after which a foot has sunk for good
-
-# The places of the scan and the rays across the x-z plane: ground and pillars are seen as in a mirror.
-_ACROSS = np.arange(SCAN.shape[1]).reshape(len(FORWARD), len(LEFT))[:, ::-1].ravel()
-_AROUND = -np.arange(RAYS.shape[1]) % RAYS.shape[1]
 
 
 class Nothing(NamedTuple):
@@ -306,7 +302,9 @@ class Lanes(Ground):
     width: float | None = None
 
     own_arena: ClassVar[bool] = True
-    blocks: ClassVar[Mapping[str, Block]] = {"scan": Block(len(_ACROSS), Mirror.moved(_ACROSS), noise=0.1)}  # h
+    blocks: ClassVar[Mapping[str, Block]] = {
+        "scan": Block((Grid(SCAN, "ground {:.2f} R forward, {:.2f} R left", "h"),), noise=0.1)
+    }
 
     @property
     def settings(self) -> tuple[str, ...]:
@@ -414,8 +412,9 @@ class PillarField(Ground):
     """A floor with pillars, seen by a range sensor. Lengths are multiples of R, as bodies fit between by their legs."""
 
     own_arena: ClassVar[bool] = True
-    # With noise as a share of the farthest that is seen.
-    blocks: ClassVar[Mapping[str, Block]] = {"ranges": Block(len(_AROUND), Mirror.moved(_AROUND), noise=0.02)}
+    blocks: ClassVar[Mapping[str, Block]] = {
+        "ranges": Block((Rays(RAYS, "range at {:.0f} degrees to the left", f"{SIGHT:g} R"),), noise=0.02)
+    }
 
     def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return a floor with pillars that suits the body's size."""

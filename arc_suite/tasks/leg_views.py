@@ -2,12 +2,11 @@
 
 Legs are alike up to a turn and a reflection. A leg on the right sees the mirrored observation. The torso's planar
 vectors are turned about the vertical, and signs of joints chosen, so that each foot moves as that of the first leg.
-A command to the left is then to one leg what a command forward is to another. Every view is linear.
+A command to the left is then to one leg what a command forward is to another. Every view is linear: the parts of
+blocks say what a leg sees of them, see `parts.Part.view`.
 """
 
-import itertools
-import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +14,13 @@ import numpy as np
 from arc_suite.models.standing import by_leg, standing
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.contract import Task
+from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.mirrors import Mirror, Symmetry
+from arc_suite.tasks.parts import Unframed, ViewingLeg, diagonal, rotation
 
-# Of blocks: where planar vectors begin, and where joints do.
-_PLANAR = {"posture": (2,), "velocities": (0, 3), "command": (0, 3)}
-_JOINTS = {"posture": 5, "velocities": 6}
+VERSION = 1  # of what legs see; runs without one have turned the blocks `TURNED_BEFORE` alone
+TURNED_BEFORE = ("posture", "velocities", "gait_clock", "command")
 
 
 class LegViews(NamedTuple):
@@ -45,93 +45,103 @@ class LegViews(NamedTuple):
     sizes: tuple[int, ...]
 
 
-def leg_views(task: Task, sizes: Mapping[str, int], symmetry: Symmetry | None) -> LegViews:
-    """Return the views of the legs of a task's body.
+def leg_views(body: Body, blocks: Mapping[str, Block], symmetry: Symmetry | None) -> LegViews:
+    """Return the views of the legs of a body.
 
     Args:
-        task: whose observations they are.
-        sizes: of the blocks of a vector, in order: those of the observation, and others after them.
+        body: with the legs.
+        blocks: of the vectors that they see, by name, in order: those of an observation, and others after them.
         symmetry: mirror maps of such vectors; None for legs that are not each other's images.
+
+    Raises:
+        ValueError: a block has numbers without a frame, or a feature is made from more than two numbers.
     """
-    body = task.scene.body
-    kinds, right = np.arange(len(body.legs)), np.zeros(len(body.legs), bool)
-    if symmetry is not None:
-        right = standing(body).soles[:, 1] < 0.0
-        kinds = np.where(right, mirror.image(body).legs, kinds)
-    phases = np.zeros(len(kinds)) if task.parameters is None else task.parameters.phase_offsets
-    jacobians, joints = _jacobians(body), by_leg(body, np.eye(len(body.joint_names)))
-    weights, actions = [], []
-    for kind, reflected in zip(kinds, right, strict=True):
-        turn, signs = _alignment(jacobians[kind], jacobians[kinds[0]])
-        action = signs[:, None] * _padded(joints[kind], len(signs))
-        weight = _features(sizes, action, turn, phases[kind])
-        if reflected:
-            weight, action = _matrix(symmetry.observation) @ weight, action @ _matrix(symmetry.action)
+    kinds, is_mirrored = _kinds(body, symmetry)
+    pairs = kinds[:, None] == np.unique(kinds)
+    weights, biases, actions = [], [], []
+    for leg, pair, mirrored in zip(_viewing_legs(body, kinds), pairs, is_mirrored, strict=True):
+        views = [_view_block(name, block, leg) for name, block in blocks.items()]
+        weight = diagonal(np.zeros((0, len(pair))), *(view.weights for view in views))
+        action = leg.joints
+        if mirrored:
+            weight = _matrix(symmetry.observation) @ weight
+            action = action @ _matrix(symmetry.action)
         weights.append(weight)
+        biases.append(np.concatenate([pair, *(view.bias for view in views)]))
         actions.append(action)
-    pairs, weight, action = kinds[:, None] == np.unique(kinds), np.stack(weights, axis=1), np.concatenate(actions)
-    weight = np.concatenate([np.zeros((len(weight), *pairs.shape)), weight], axis=-1)
+    weight = np.stack(weights, axis=1)
     sources = np.argsort(-abs(weight), axis=0, kind="stable")[:2]
+    action = np.concatenate(actions)
     places = abs(action).argmax(axis=0)
     return LegViews(
         sources,
         np.take_along_axis(weight, sources, axis=0).astype(np.float32),
-        np.pad(pairs, ((0, 0), (0, weight.shape[-1] - pairs.shape[1]))).astype(np.float32),
+        np.stack(biases).astype(np.float32),
         places,
         action[places, range(len(places))].astype(np.float32),
-        len(signs),
-        (pairs.shape[1], *(_JOINTS[name] + len(signs) if name in _JOINTS else size for name, size in sizes.items())),
+        len(action) // len(body.legs),
+        (len(pair), *(len(view.bias) for view in views)),
     )
 
 
-def _features(sizes: Mapping[str, int], joints: np.ndarray, turn: float, phase: float) -> np.ndarray:
-    """Return the weight (size, features) of the features of vectors whose blocks have these sizes.
+class _BlockView(NamedTuple):
+    """What a leg sees of a block: weights (size, features) of its numbers, and the bias (features,)."""
 
-    Args:
-        sizes: of the blocks.
-        joints: (joints of a leg, joints) signs of the leg's own joints.
-        turn: of planar vectors, rad.
-        phase: by which the leg is ahead of the clock, rad.
-    """
-    numbers, starts = np.eye(sum(sizes.values())), itertools.accumulate(sizes.values(), initial=0)
-    parts = []
-    for (name, size), start in zip(sizes.items(), starts, strict=False):
-        part = numbers[:, start : start + size].copy()
-        for place in _PLANAR.get(name, ()):
-            part[:, place : place + 2] @= _rotation(turn)
-        if name == "gait_clock":
-            part @= _rotation(-phase)
-        if name in _JOINTS:
-            part = np.concatenate([part[:, : _JOINTS[name]], part[:, _JOINTS[name] :] @ joints.T], axis=-1)
-        parts.append(part)
-    return np.concatenate(parts, axis=-1)
+    weights: np.ndarray
+    bias: np.ndarray
 
 
-def _alignment(jacobian: np.ndarray, first: np.ndarray) -> tuple[float, np.ndarray]:
+def _view_block(name: str, block: Block, leg: ViewingLeg) -> _BlockView:
+    if Unframed in block.kinds:
+        raise ValueError(f"network legs: block {name!r} has numbers without a frame, expected other parts")
+    weights, biases = [], []
+    for part in block.parts:
+        features, constants = part.view(leg), part.constants(leg)
+        weights.append(np.pad(features, ((0, 0), (0, len(constants)))))
+        biases += [np.zeros(features.shape[1]), constants]
+    weight = diagonal(*weights)
+    if (most := np.count_nonzero(weight, axis=0).max(initial=0)) > 2:
+        raise ValueError(f"network legs: block {name!r}: expected features of two numbers at most, got {most}")
+    return _BlockView(weight, np.concatenate(biases))
+
+
+def _kinds(body: Body, symmetry: Symmetry | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the leg (legs,) whose views each leg has, and whether (legs,) it has them in the mirror."""
+    indices = np.arange(len(body.legs))
+    if symmetry is None:
+        return indices, np.zeros(len(indices), bool)
+    is_right = standing(body).soles[:, 1] < 0.0
+    return np.where(is_right, mirror.image(body).legs, indices), is_right
+
+
+def _viewing_legs(body: Body, kinds: Iterable[int]) -> Iterator[ViewingLeg]:
+    """Yield the legs that observations are transformed for."""
+    jacobians, soles = _jacobians(body), standing(body).soles[:, :2]
+    joints = by_leg(body, np.eye(len(body.joint_names)))
+    for kind in kinds:
+        turn, signs = _align(jacobians[kind], jacobians[kinds[0]])
+        yield ViewingLeg(kind, turn, signs[:, None] * _pad(joints[kind], len(signs)), soles[kind] / reach(body))
+
+
+def _align(jacobian: np.ndarray, first: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the turn, rad, and the signs of joints, for which a foot's Jacobian (joints, 3) is most like the first."""
     turns = np.radians(range(360))
-    planar = np.einsum("ji,tik->tjk", jacobian[:, :2], [_rotation(turn) for turn in turns])
+    planar = np.einsum("ji,tik->tjk", jacobian[:, :2], [rotation(turn) for turn in turns])
     products = (planar * first[:, :2]).sum(axis=-1) + jacobian[:, 2] * first[:, 2]
     best = abs(products).sum(axis=-1).round(9).argmax()
     return turns[best], np.where(products[best] < 0.0, -1.0, 1.0)
 
 
-def _rotation(angle: float) -> np.ndarray:
-    """Return the matrix (2, 2) that turns planar vectors (..., 2) by an angle, rad, from the right."""
-    cos, sin = math.cos(angle), math.sin(angle)
-    return np.array(((cos, sin), (-sin, cos)))
-
-
 def _jacobians(body: Body) -> list[np.ndarray]:
     """Velocities (joints, 3) of each sole per joint velocity, with as many rows for each leg."""
     most = max(len(leg.joints) for leg in body.legs)
-    return [_padded(jacobian.T, most) for jacobian in standing(body).jacobians]
+    return [_pad(jacobian.T, most) for jacobian in standing(body).jacobians]
 
 
-def _padded(rows: np.ndarray, count: int) -> np.ndarray:
+def _pad(rows: np.ndarray, count: int) -> np.ndarray:
     return np.concatenate([rows, np.zeros((count - len(rows), *rows.shape[1:]))])
 
 
-def _matrix(mirrored: Mirror) -> np.ndarray:
+def _matrix(mirror_map: Mirror) -> np.ndarray:
     """Return the matrix (n, n) that maps vectors (..., n) as a mirror does, from the right."""
-    return mirrored(np.eye(len(mirrored.signs)))
+    return mirror_map(np.eye(len(mirror_map.signs)))

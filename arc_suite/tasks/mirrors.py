@@ -42,8 +42,6 @@ class Mirror(NamedTuple):
 POLAR = Mirror.signed(1, -1, 1)  # positions, velocities, forces
 AXIAL = Mirror.signed(-1, 1, -1)  # angular velocities, torques
 QUATERNION = Mirror.signed(1, -1, 1, -1)  # w first
-PLANAR = Mirror.signed(1, -1, -1)  # velocities forward, left and turning left
-SAME = Mirror.signed(1)
 
 
 class Symmetry(NamedTuple):

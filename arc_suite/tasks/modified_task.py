@@ -7,7 +7,7 @@ adds kicks, and changes fields of the model. Its memory holds that of the other.
 import dataclasses
 import functools
 import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,11 +17,12 @@ from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, reaches, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots import mirror
-from arc_suite.tasks import mirrors, noise, overruled, privileged, randomization
+from arc_suite.tasks import noise, overruled, privileged, randomization
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
-from arc_suite.tasks.modifiers import FAILS_FROM, REMEMBERED, Modifiers, checked
+from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, blocks_of_history, checked
+from arc_suite.tasks.parts import Joints, Repeated
 from arc_suite.tasks.randomization import LONGEST, SCHEDULE, SHORTEST, Hidden, Pushes
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.wrapper import Wrapper
@@ -172,15 +173,17 @@ class Modified(Wrapper):
     @property
     def blocks(self) -> Mapping[str, Block]:
         """The other task's blocks without the excluded ones, and the history of some."""
-        count, joints = self.changes.history, len(self.scene.body.joint_names)
         kept = {name: block for name, block in self.task.blocks.items() if name not in self.changes.exclude_blocks}
-        return {**kept, "history": history(self._remembered, joints, count)} if count else kept
+        if not self.changes.history:
+            return kept
+        parts = [part for block in self._remembered.values() for part in block.parts]
+        step = (*parts, Joints(self.scene.body, "action of {}"))
+        return {**kept, "history": Block((Repeated(step, self.changes.history),))}
 
-    @property
-    def _remembered(self) -> tuple[Block, ...]:
-        """The blocks of a history."""
-        names = [name for name in REMEMBERED if name not in self.changes.exclude_blocks]
-        return tuple(self.task.blocks[name] for name in names if name in self.task.blocks)
+    @functools.cached_property
+    def _remembered(self) -> dict[str, Block]:
+        """The blocks that a history keeps, by name."""
+        return blocks_of_history(self.task.blocks, self.changes.exclude_blocks)
 
     @functools.cached_property
     def members(self) -> np.ndarray:
@@ -216,7 +219,7 @@ class Modified(Wrapper):
         drawn = draw(random, len(body.legs))
         joints = len(body.joint_names)
         later = randomization.draw(drawn.noise_key, joints)
-        size = sum(block.size for block in self._remembered) * (changes.history > 0)
+        size = sum(block.size for block in self._remembered.values()) * (changes.history > 0)
         directions = np.stack([np.cos(drawn.kick_directions), np.sin(drawn.kick_directions)], axis=-1)
         unit = changes.kicks * math.sqrt(GRAVITY * body.torso.standing_height)
         low, high = changes.delay
@@ -330,7 +333,7 @@ class Modified(Wrapper):
         if not self.changes.history:
             return memory
         found = self._sensed_blocks(memory, readings)
-        blocks = [found[name] for name in REMEMBERED if name in found]
+        blocks = [found[name] for name in self._remembered]
         now = blocks[0].__array_namespace__().concatenate(blocks, axis=-1)
         return memory._replace(changes=memory.changes._replace(now=now))
 
@@ -437,16 +440,6 @@ class Modified(Wrapper):
         rest = numpy.zeros((*push.shape[:-1], self.scene.standing.shape[-1] - 3))
         push = numpy.concatenate([push, rest], axis=-1)
         return push if kick is None else kick + push
-
-
-def history(blocks: Sequence[Block], joints: int, steps: int) -> Block:
-    """Return the block of earlier observations, of blocks with mirrors, and of the actions (joints,) after them."""
-
-    def mirrored(image):
-        once = mirrors.joined([*(block.map(image) for block in blocks), mirrors.joints(image)])
-        return mirrors.of_each(np.arange(steps), once)
-
-    return Block(steps * (sum(block.size for block in blocks) + joints), mirrored)
 
 
 def _remembered(changes: Changes, action) -> Changes:

@@ -15,7 +15,6 @@ from arc_suite.tasks.blocks import Block
 FAILS_FROM = 40  # control steps after which the motors of a leg fail
 LONGEST_DELAY = 100  # control steps
 LONGEST_HISTORY = 50  # control steps
-REMEMBERED = ("posture", "velocities")  # blocks of a history
 ACTIONS = ("torque", "position")
 _DELAYS = (0, LONGEST_DELAY)
 
@@ -48,8 +47,8 @@ class Modifiers(NamedTuple):
         armature: multiple of the armatures of all joints, or two of them.
         force: the greatest force on the torso, of the body's weight: each of a schedule is uniform from 0 up to it, in
             any horizontal direction, lasts 1 to 4 control steps, and begins 40 to 120 after the one before.
-        history: number of earlier control steps of which the block `history` holds the blocks `REMEMBERED` and the
-            actions after them, the newest first; before the start they are those of the start, and 0.
+        history: number of earlier control steps of which the block `history` holds the blocks that measure joints,
+            and the actions after them, the newest first; before the start they are those of the start, and 0.
     """
 
     kicks: float = 0.0
@@ -114,7 +113,7 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]
             values["observation_noise"], [name for name in blocks if blocks[name].noise is not None]
         ),
         delay=_delay(values["delay"]),
-        history=_history(values["history"], set(blocks) - set(_exclude_blocks(values["exclude_blocks"], blocks))),
+        history=_history(values["history"], blocks, _exclude_blocks(values["exclude_blocks"], blocks)),
         actions=_actions(values["actions"], body),
         exclude_blocks=_exclude_blocks(values["exclude_blocks"], blocks),
         **{name: checks.number(name, values[name], *BOUNDS[name]) for name in _NUMBERS},
@@ -152,11 +151,17 @@ def _delay(value) -> tuple[int, int]:
     return low, checks.integer("delay", high, low, most)
 
 
-def _history(value, blocks: set[str]) -> int:
+def _history(value, blocks: Mapping[str, Block], excluded: tuple[str, ...]) -> int:
     count = checks.integer("history", value, *BOUNDS["history"])
-    if count and not blocks & set(REMEMBERED):
-        raise ValueError(f"history: expected a task that observes {' or '.join(REMEMBERED)}, got {', '.join(blocks)}")
+    if count and not blocks_of_history(blocks, excluded):
+        kept = ", ".join(name for name in blocks if name not in excluded)
+        raise ValueError(f"history: expected a task that observes joints, as posture and velocities do, got {kept}")
     return count
+
+
+def blocks_of_history(blocks: Mapping[str, Block], excluded: Iterable[str]) -> dict[str, Block]:
+    """Return the blocks that a history keeps, by name: those that measure joints and are not left out."""
+    return {name: block for name, block in blocks.items() if block.measures_joints and name not in excluded}
 
 
 def _exclude_blocks(value, blocks: Iterable[str]) -> tuple[str, ...]:

@@ -11,13 +11,9 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.models.standing import GRAVITY
-from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import mirrors
 from arc_suite.tasks.blocks import Block, places
-from arc_suite.tasks.mirrors import AXIAL, POLAR, SAME, Mirror
-
-PLANAR = Mirror.signed(1, -1)  # forward, left
+from arc_suite.tasks.parts import ROTATIONS, Joints, Legs, Planar, Scalar, Vector
 
 
 def blocks(body: Body) -> dict[str, Block]:
@@ -27,8 +23,13 @@ def blocks(body: Body) -> dict[str, Block]:
     height of the ground under each foot, 0 where it would be if the torso stood over it at its standing height.
     """
     return {
-        "velocity": Block(6, mirrors.joined([POLAR, AXIAL])),
-        "ground": Block(len(body.legs), _across_legs),
+        "velocity": Block(
+            (
+                Vector("torso velocity", "sqrt(g h)"),
+                Vector("torso angular velocity", "sqrt(g / h)", ROTATIONS, axial=True),
+            )
+        ),
+        "ground": Block((Legs(body, "ground under the foot of {}", "h"),)),
     }
 
 
@@ -39,18 +40,17 @@ def blocks_of_modifiers(body: Body) -> dict[str, Block]:
     torso's velocity by a kick in the latest step, forward and left. `force` (2): on the torso in the latest step, of
     the body's weight.
     """
-    joints = len(body.joint_names)
     return {
-        "friction": Block(1, SAME),
-        "mass": Block(1, SAME),
-        "payload": Block(4, mirrors.joined([SAME, POLAR])),
-        "center_of_mass": Block(3, POLAR),
-        "joint_offset": Block(joints, mirrors.joints),
-        "gains": Block(2, Mirror.signed(1, 1)),
-        "armature": Block(1, SAME),
-        "strength": Block(joints, _across_joints),
-        "kick": Block(2, PLANAR),
-        "force": Block(2, PLANAR),
+        "friction": Block((Scalar("multiple of the friction"),)),
+        "mass": Block((Scalar("multiple of the mass"),)),
+        "payload": Block((Scalar("mass of the payload", "body's mass"), Vector("place of the payload", "h"))),
+        "center_of_mass": Block((Vector("displacement of the center of mass", "h"),)),
+        "joint_offset": Block((Joints(body, "offset of the sensor of {}", "rad"),)),
+        "gains": Block((Scalar("multiple of the stiffness"), Scalar("multiple of the damping"))),
+        "armature": Block((Scalar("multiple of the armatures"),)),
+        "strength": Block((Joints(body, "strength of {}", signed=False),)),
+        "kick": Block((Planar("kick", "sqrt(g h)"),)),
+        "force": Block((Planar("force", "weight"),)),
     }
 
 
@@ -95,11 +95,3 @@ def sizes(task) -> dict[str, int]:
 def split(named: Mapping[str, int], vectors) -> dict[str, np.ndarray]:
     """Return vectors (..., size) as blocks by name, views of them, given the sizes of all."""
     return {name: vectors[..., part] for name, part in places(named).items()}
-
-
-def _across_legs(image: Image) -> Mirror:
-    return Mirror.moved(image.legs)
-
-
-def _across_joints(image: Image) -> Mirror:
-    return Mirror.moved(image.joints)

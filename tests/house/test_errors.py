@@ -200,7 +200,7 @@ CASES = [
     (load("queen", "walk", None, "flat"), "environment_kwargs: expected a mapping of names to values, got 'flat'"),
     (
         load("queen", "walk", None, {"control_timestep": 0.02}),
-        "environment setting 'control_timestep': reward and observation are made for control steps of 25 substeps",
+        "environment setting 'control_timestep': reward and observation are made for the body's own control steps",
     ),
     (
         load("queen", "walk", None, {"time_limit": 5}),

@@ -147,7 +147,7 @@ def test_privileged_observations_are_those_of_the_declared_blocks_in_every_drive
     image = mirror.image(body)
     for block in definition.privileged_blocks.values():
         numbers = np.arange(1.0, block.size + 1.0)
-        assert_array_equal(block.map(image)(block.map(image)(numbers)), numbers)
+        assert_array_equal(block.mirror(image)(block.mirror(image)(numbers)), numbers)
 
 
 @every_task

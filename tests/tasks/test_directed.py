@@ -173,8 +173,8 @@ def test_the_mirror_image_of_a_directed_walk():
         begun = start(random, stream)
         asked = begun.memory.command
         asked = asked._replace(
-            schedule=mirrors.PLANAR(asked.schedule),
-            poses=task.blocks["pose"].mirror(asked.poses),
+            schedule=asked.schedule * (1, -1, -1),
+            poses=task.blocks["pose"].mirror(image)(asked.poses),
             gaits=gait(asked.gaits),
             gait=gait(asked.gait),
             phase=np.int64(CYCLE // 2),

@@ -24,7 +24,7 @@ def done(views, legs):
 
 def made(body, symmetric=True):
     task = Setup.of(body, "steer", LEVEL).definition
-    return task, leg_views(task, task.sizes, task.symmetry if symmetric else None)
+    return task, leg_views(task.scene.body, task.blocks, task.symmetry if symmetric else None)
 
 
 @pytest.mark.parametrize("body", BODIES)

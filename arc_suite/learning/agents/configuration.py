@@ -15,7 +15,9 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.hyperparameters import UNSEEN
 from arc_suite.learning.agents.learner import MOST_SEEDS, RunContext
+from arc_suite.learning.agents.run_folder import LEG_VIEWS
 from arc_suite.policies import network
+from arc_suite.tasks import leg_views
 from arc_suite.tasks.contract import CURRICULUM
 
 # Names in the file of a configuration.
@@ -25,7 +27,7 @@ CONFIGURATION = ("robot", "task", "task_kwargs", *_OWN)
 # records of earlier versions.
 PRIOR_SHA256, TRAINING_SEEDS = "prior_sha256", "training_seeds"
 OF_DATA = (PRIOR_SHA256, TRAINING_SEEDS)
-PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", *OF_DATA, "versions")
+PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", LEG_VIEWS, *OF_DATA, "versions")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +83,7 @@ class Configuration:
         definition = algorithms.algorithm(algorithm).with_hyperparameters(given)
         start = getattr(definition.hyperparameters, "start", "")
         if start and not setup.several and not {"network", "hidden"} <= given.keys():
-            definition = definition.with_hyperparameters({**_network(start), **given})
+            definition = definition.with_hyperparameters({**network_of(start), **given})
         if setup.several and not definition.several:
             those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
             raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
@@ -208,10 +210,17 @@ class Configuration:
         provenance = self.setup.provenance()
         packages = {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")}
         own = {"episodes": evaluation.CURVE_EPISODES, "versions": provenance["versions"] | packages}
-        return self.to_dict() | provenance | own
+        return self.to_dict() | provenance | own | self._views()
+
+    def _views(self) -> dict[str, int]:
+        """Return the version of what legs see, of a run whose legs see blocks that earlier versions did not turn."""
+        if getattr(self.hyperparameters, "network", "") != "legs" or self.setup.several:
+            return {}
+        seen = [*self.policy_setup.definition.blocks, *getattr(self.hyperparameters, "critic_blocks", ())]
+        return {LEG_VIEWS: leg_views.VERSION} if set(seen) - set(leg_views.TURNED_BEFORE) else {}
 
 
-def _network(start: str) -> dict[str, Any]:
+def network_of(start: str | os.PathLike) -> dict[str, Any]:
     """Return the hyperparameters of the network of a policy file; none if there is no file, as a run may resume."""
     try:
         graph = network.load(start).graph

@@ -15,7 +15,7 @@ def symmetry(task: Task, critic_blocks: Iterable[str] = ()) -> Symmetry | None:
     try:
         own = task.symmetry
         image = mirror.image(task.scene.body)
-        more = [task.privileged_blocks[name].map(image) for name in critic_blocks]
+        more = [task.privileged_blocks[name].mirror(image) for name in critic_blocks]
     except ValueError:
         return None
     return own._replace(observation=mirrors.joined([own.observation, *more]))

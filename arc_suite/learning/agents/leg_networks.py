@@ -59,8 +59,9 @@ class Legs:
             symmetric: whether to treat left and right alike, if the task is symmetric.
         """
         symmetry = behind.symmetry(task, critic_blocks) if symmetric else None
-        sizes = task.sizes | {f"privileged {name}": task.privileged_blocks[name].size for name in critic_blocks}
-        return cls(leg_views(task, sizes, symmetry), task.size, len(task.sizes), symmetry is not None)
+        privileged = {f"privileged {name}": task.privileged_blocks[name] for name in critic_blocks}
+        views = leg_views(task.scene.body, {**task.blocks, **privileged}, symmetry)
+        return cls(views, task.size, len(task.sizes), symmetry is not None)
 
     def viewed(self, observations):
         """Return what legs see of observations (..., size), privileged blocks after them if there are any."""

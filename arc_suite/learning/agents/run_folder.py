@@ -24,6 +24,7 @@ from arc_suite import archives, checks, files
 
 CONFIG, CHECKPOINT, LOCK = "config.json", "checkpoint.npz", ".lock"
 TABLES = ("evaluations", "training", "times")
+LEG_VIEWS = "leg_views"  # name in configurations: the version of what legs see; see `tasks.leg_views`
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
 _NUMBERS = {"evaluated", "wall", "cpu", "return"}  # of the progress, once they are known
@@ -156,6 +157,10 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
         ValueError: the folder is of another run, or of none.
     """
     for name, there, here in _differences(config_of(path), json.loads(json.dumps(config))):
+        if name == LEG_VIEWS:
+            raise ValueError(
+                f"{path}: of another version, whose legs saw some blocks as the body has them; write to another folder"
+            )
         if name.partition(".")[0] not in (*left_out, *_FORMER):
             raise ValueError(
                 f"{path}: of another run, with {name} {checks.shown(there)}, not {checks.shown(here)}; "

@@ -13,7 +13,7 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 import jax
 
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import architectures
+from arc_suite.learning.agents import architectures, configuration
 from arc_suite.learning.agents import critic_blocks as behind
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
@@ -21,6 +21,7 @@ from arc_suite.learning.agents.leg_networks import Legs
 from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
+from arc_suite.tasks import leg_views
 
 CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16}
 
@@ -65,6 +66,40 @@ def test_a_network_is_exported_and_imported_as_it_acts(body):
         assert_allclose(one, other, rtol=1e-6)
     with pytest.raises(ValueError, match="^a policy of dagger, bc or ppo, of the same network$"):
         architectures.read(architectures.of(task), graph)
+
+
+@pytest.mark.parametrize("path", sorted(network.PACKAGED.glob("*.npz")), ids=lambda path: path.stem)
+def test_packaged_policies_are_traced_to_the_nodes_that_they_hold(path):
+    """What legs and networks see is what it was when these policies were trained."""
+    packaged = network.load(path)
+    if packaged.setup.several:
+        architecture = architectures.AnyLegs()
+    else:
+        kind = configuration.network_of(path)["network"]
+        architecture = architectures.of(packaged.setup.definition, kind)
+    normalize, parameters = architectures.read(architecture, packaged.graph)
+    traced = architectures.policy(architecture, normalize, parameters)
+    assert traced.nodes == packaged.graph.nodes and traced.arrays.keys() == packaged.graph.arrays.keys()
+    for name, array in packaged.graph.arrays.items():  # which a file rounds to 16 bits
+        assert_allclose(traced.arrays[name], array, rtol=2e-3, atol=1e-6)
+
+
+def test_goals_and_rays_are_mirrored_on_the_right():
+    task = Setup.of("tick", "navigate").definition
+    architecture, policy, _, normalize, vectors = drawn(task)
+    mirror, mirror_action = task.symmetry
+    acted = architecture.actions(policy, normalize(architecture.viewed(vectors)))
+    there = architecture.actions(policy, normalize(architecture.viewed(mirror(vectors))))
+    assert_allclose(there, mirror_action(np.asarray(acted)), atol=1e-5)
+
+
+def test_runs_of_legs_hold_the_version_of_their_views():
+    for blocks, holds in ((["contact_forces"], False), ([], True)):
+        run = Configuration.of(Setup.of("tick", "steer"), "ppo", {"exclude_blocks": blocks})
+        record = run.record()
+        assert record.get("leg_views") == (leg_views.VERSION if holds else None)
+        assert Configuration.from_dict(record) == run
+    assert "leg_views" not in Configuration.of(Setup.of("tick", "walk"), "ppo", {"network": "perceptron"}).record()
 
 
 def test_moments_are_those_of_all_legs():

@@ -49,6 +49,12 @@ def test_without_a_checkpoint_it_starts_over(path):
         assert (path / "training.csv").read_text() == ""
 
 
+def test_a_run_whose_legs_saw_other_views_is_refused(path):
+    """By the version of the views, which records of before lack."""
+    line = "run: of another version, whose legs saw some blocks as the body has them; write to another folder$"
+    one_line(path, line, CONFIG | {"leg_views": 1})
+
+
 def test_what_never_began_leaves_the_folder_to_others(tmp_path):
     """A rejected run leaves a folder that the mended command can use."""
     with opened(tmp_path / "run", CONFIG):
