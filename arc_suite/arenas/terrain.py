@@ -197,10 +197,15 @@ class Terrain(Arena):
 
     def torso_clearance(self, positions):
         """Return the heights (...) of torsos over the highest ground within half a standing height about them, m."""
-        near = _NEAR * self.unit * np.array([(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
-        near = positions.__array_namespace__().asarray(near)
-        x, y = (positions[..., None, i] + near[:, i] for i in (0, 1))
+        around = positions.__array_namespace__().asarray(self._around)
+        x = positions[..., None, 0] + around[:, 0]
+        y = positions[..., None, 1] + around[:, 1]
         return positions[..., 2] - self.height(x, y).max(axis=-1)
+
+    @functools.cached_property
+    def _around(self) -> np.ndarray:
+        """(9, 2) places about the torso, m."""
+        return _NEAR * self.unit * np.array([(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
     @property
     def lists_contacts(self) -> bool:

@@ -23,13 +23,12 @@ _STEPS = 3  # of inverse kinematics in a control step
 _MOST_OFF = 0.2  # standing heights or rad, by which feedback changes a pose
 _LARGEST = 0.05  # standing heights or rad, of the error that feedback adds up
 _OF_LEGS = ("mount", "turn", "axes", "ends", "radius", "joints", "moves", "low", "high")  # fields of `Legs`, of one leg
-_BY_COMMAND = ("pose", "gait")  # blocks of a task
 _FEEDBACK = np.array((0, 3, 4))  # numbers of a pose that the torso shows: height, roll and pitch
 
 
 def directed(task: Task) -> bool:
     """Return whether a task observes pose and gait by command."""
-    return task.blocks.keys() >= {*_BY_COMMAND}
+    return task.gait_and_pose is not None and task.blocks.keys() >= {*task.gait_and_pose.observed}
 
 
 class Paths(NamedTuple):
@@ -70,7 +69,7 @@ class Stepping(CommandLaw):
         # In place of an integral; with both, gaits are disturbed.
         self.proportional = 0.0 if parameters.integral else min(1.0, parameters.gain[0])
         if self.directed:
-            self.reads, self._rest = (*self.reads, *_BY_COMMAND), posture.rest(task.scene.body)
+            self.reads, self._rest = (*self.reads, *task.gait_and_pose.observed), posture.rest(task.scene.body)
         self._damping, self.lift = self.damping * self.pose.height, parameters.lift * self.pose.height
         self.legs, self.places, self.angles = self._eased(task)
 

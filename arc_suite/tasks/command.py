@@ -8,7 +8,7 @@ torso's frame, m, and its yaw, rad.
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -51,17 +51,64 @@ class Followed(NamedTuple):
     arrived: np.ndarray | bool = False
 
 
+class WithLive(Protocol):
+    """What the memory of a command must have that can be set live, see `Command.live`: a NamedTuple with this field.
+
+    Attributes:
+        live: (..., 3) velocity that is set from outside; NaN for what the task itself would do.
+    """
+
+    live: np.ndarray
+
+
 @dataclasses.dataclass(frozen=True)
 class Command(ABC):
     """What a body is to follow.
 
+    A command of a new kind writes the five abstract methods. Unless its `live` is empty, its memory is a `WithLive`.
+
     Attributes:
         settings: names of the fields that a caller may set.
-        sees_feet: whether readings are to have the places of the feet.
     """
 
     settings: ClassVar[tuple[str, ...]] = ()
-    sees_feet: ClassVar[bool] = False
+
+    @abstractmethod
+    def start(self, context: Context, random: np.random.RandomState, schedule: "Scheduled") -> Any:
+        """Return the memory at the start; see `CommandTask.start` for the order of draws."""
+
+    @abstractmethod
+    def desired(self, context: Context, memory, steps, place):
+        """Return the velocity (..., 3) that holds at a place after control steps (...)."""
+
+    @abstractmethod
+    def follow(self, context: Context, memory, steps, before, place, motion, readings) -> Followed:
+        """Return the command after a control step.
+
+        Args:
+            context: of the task.
+            memory: of the command, before the step.
+            steps: (...) control steps since the start.
+            before: (..., 3) the place before the step.
+            place: (..., 3) the place after it.
+            motion: (..., 3) mean velocity of the torso.
+            readings: after the step.
+        """
+
+    @abstractmethod
+    def terms(self, memory, followed, upright, stepped) -> dict:
+        """Return the bonuses for following, each (...), by name.
+
+        Args:
+            memory: of the command, after the step.
+            followed: (...) tracking of the step.
+            upright: (...) cosine of the torso's tilt.
+            stepped: (...) share of the feet that followed the contact schedule.
+        """
+
+    @abstractmethod
+    def observe(self, context: Context, memory) -> dict:
+        """Return the blocks that it adds to the observation, those of `blocks`."""
 
     def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> Self:
         """Return the command with checked settings in place of its own.
@@ -75,22 +122,6 @@ class Command(ABC):
         """Return the sizes of what may be set from outside while an episode runs, by name."""
         return {"command": 3}
 
-    def limits(self, body: Body, step: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Return the lowest and highest numbers of those that are bounded, by name, given a control step, s."""
-        return {}
-
-    def named(self, body: Body, name: str, value: str) -> np.ndarray | None:
-        """Return the numbers of what is set by a name; None where names stand for nothing.
-
-        Raises:
-            ValueError: no such name.
-        """
-        return None
-
-    def reference(self, scene, parameters) -> Any:
-        """Return what else it measures a body by, `Context.reference`."""
-        return None
-
     def blocks(self, body: Body) -> dict[str, Block]:
         """Return the blocks that it adds to the observation, by name."""
         return {}
@@ -99,84 +130,13 @@ class Command(ABC):
         """Draw a schedule, which every command does; `share` says how far a curriculum has widened its ranges."""
         return draw_schedule(random)
 
-    @abstractmethod
-    def start(self, context: Context, random: np.random.RandomState, schedule: "Scheduled") -> Any:
-        """Return the memory at the start; see `CommandTask.start` for the order of draws."""
-
     def begin(self, context: Context, memory, place) -> Any:
         """Return the memory from which the first step starts."""
         return memory
 
-    def stepped(self, context: Context, memory, steps, going) -> Any:
-        """Return the memory whose gait the feet follow in step `steps` (...), as far as the body is `going` (...)."""
-        return memory
-
-    def phase(self, clock, tick, memory):
-        """Return the phase (...) of the gait, rad, given the task's clock and its tick."""
-        return clock.at(clock.phases, tick)
-
-    def circle(self, clock, tick, memory):
-        """Return sine and cosine (..., 2) of the phase."""
-        return clock.at(clock.circle, tick)
-
-    def stance(self, clock, tick, memory):
-        """Return which feet (..., feet) the gait has on the ground."""
-        return clock.at(clock.stance, tick)
-
-    def leg_phases(self, memory, prescribed) -> tuple[Any, Any]:
-        """Return the phase (..., legs) of each leg, rad, and the duty factor (...), given those of the task's gait."""
-        return prescribed
-
-    def crouch(self, memory):
-        """Return the share (...) of its height that the torso is asked to keep, at most 1."""
-        return 1.0
-
-    def default_angles(self, context: Context, memory, default_angles):
-        """Return the angles (..., joints) from which the posture is measured, given those of the task, rad."""
-        return default_angles
-
-    @abstractmethod
-    def desired(self, context: Context, memory, steps, place):
-        """Return the velocity (..., 3) that holds at a place after control steps (...)."""
-
-    @abstractmethod
-    def follow(self, context: Context, memory, steps, before, place, motion, readings, stepped) -> Followed:
-        """Return the command after a control step.
-
-        Args:
-            context: of the task.
-            memory: of the command, before the step.
-            steps: (...) control steps since the start.
-            before: (..., 3) the place before the step.
-            place: (..., 3) the place after it.
-            motion: (..., 3) mean velocity of the torso.
-            readings: after the step.
-            stepped: (...) share of the feet that followed the contact schedule.
-        """
-
     def resampled(self, memory, steps) -> Any:
         """Return whether (...) another drawn command holds since control step `steps` (...)."""
         return False
-
-    def with_command(self, memory, name: str, value):
-        """Return the memory with a live command (..., 3) in place of the task's own where it is not NaN."""
-        return memory._replace(live=value)
-
-    def terms(self, memory, followed, upright, stepped) -> dict:
-        """Return the bonuses for following.
-
-        Args:
-            memory: of the command, after the step.
-            followed: (...) tracking of the step.
-            upright: (...) cosine of the torso's tilt.
-            stepped: (...) share of the feet that followed the contact schedule.
-        """
-        earned = {"progress": _bounded(memory.gained) * upright, "tracking": followed}
-        return {**earned, "obedient_gait": followed * stepped}
-
-    def observe(self, context: Context, memory) -> dict:
-        """Return the blocks that it adds to the observation."""
-        return {}
 
     def progress(self, context: Context, memory, judged) -> dict:
         """Return the metrics that it adds to progress, given the steps (...) over which the episode is judged."""
@@ -245,7 +205,8 @@ def draw_command(random: np.random.RandomState, ranges=RANGES) -> np.ndarray:
 def tracking(desired, motion):
     """Return how well a motion (..., 3) follows a velocity (..., 3): the product of course and turning, 0 to 1."""
     numpy, error = motion.__array_namespace__(), desired - motion
-    speed, miss = (numpy.hypot(vector[..., 0], vector[..., 1]) for vector in (desired, error))
+    speed = numpy.hypot(desired[..., 0], desired[..., 1])
+    miss = numpy.hypot(error[..., 0], error[..., 1])
     course = terms.triangle(miss, BAND * numpy.maximum(speed, 0.5))
     return course * terms.triangle(error[..., 2], BAND * numpy.maximum(abs(desired[..., 2]), 0.5))
 
@@ -300,11 +261,19 @@ class Schedule(Command):
         numpy = memory.ends.__array_namespace__()
         return numpy.where(numpy.isnan(memory.live), held(memory.ends, memory.schedule, steps), memory.live)
 
-    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion, readings, stepped) -> Followed:
+    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step, and how far the motion reaches in its direction."""
         desired = self.desired(context, memory, steps, place)
         memory = memory._replace(gained=along(desired, motion))
         return Followed(memory, desired, tracking(desired, motion))
+
+    def terms(self, memory: Scheduled, followed, upright, stepped) -> dict:
+        """Return the bonuses for progress in the command's direction, and for following it."""
+        return velocity_bonuses(memory.gained, followed, upright, stepped)
+
+    def observe(self, context: Context, memory: Scheduled) -> dict:
+        """Return no blocks."""
+        return {}
 
     def resampled(self, memory: Scheduled, steps) -> Any:
         """Return whether (...) the next command of the schedule holds since step `steps`, unless a live one does."""
@@ -349,13 +318,21 @@ class AlongLane(Command):
         along = numpy.stack([numpy.cos(heading), -numpy.sin(heading), turn], axis=-1)
         return numpy.where(numpy.isnan(memory.live), along, memory.live)
 
-    def follow(self, context: Context, memory: Live, steps, before, place, motion, readings, stepped) -> Followed:
+    def follow(self, context: Context, memory: Live, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step, and the distance."""
         desired = self.desired(context, memory, steps, place)
         displacement = component(place, 0) - component(before, 0)
         gained = _gained(context, memory.gained, displacement)
         memory = Live(memory.live, memory.distance + displacement, gained)
         return Followed(memory, desired, tracking(desired, motion))
+
+    def terms(self, memory: Live, followed, upright, stepped) -> dict:
+        """Return the bonuses for progress along the lane, and for following the command."""
+        return velocity_bonuses(memory.gained, followed, upright, stepped)
+
+    def observe(self, context: Context, memory: Live) -> dict:
+        """Return no blocks."""
+        return {}
 
     def progress(self, context: Context, memory: Live, judged) -> dict:
         """Return the distance along the lane as a share of that at the target velocity."""
@@ -441,7 +418,7 @@ class ToGoal(Command):
         goal, numpy = memory.to_goal, memory.goals.__array_namespace__()
         return at_goal(numpy.arctan2(goal[..., 1], goal[..., 0]))
 
-    def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings, stepped) -> Followed:
+    def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step: progress to the goal, and the next goal where it is reached."""
         numpy, unit = place.__array_namespace__(), context.arena.unit
         far = numpy.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])
@@ -479,6 +456,22 @@ class ToGoal(Command):
         unit = context.arena.unit
         middle = np.array((*_goal(memory.goals, memory.reached), 0.0))
         return [Marker("cylinder", middle, middle + (0.0, 0.0, _DISK * unit), NEAR * unit, _GOAL)]
+
+
+def velocity_bonuses(gained, followed, upright, stepped) -> dict:
+    """Return the bonuses for progress and for following a velocity, each (...).
+
+    Args:
+        gained: (...) progress as a share of what the command asks for.
+        followed: (...) tracking of the step.
+        upright: (...) cosine of the torso's tilt.
+        stepped: (...) share of the feet that followed the contact schedule.
+    """
+    return {
+        "progress": _bounded(gained) * upright,
+        "tracking": followed,
+        "obedient_gait": followed * stepped,
+    }
 
 
 def _gained(context: Context, before, displacement):

@@ -1,10 +1,10 @@
 """Tasks in which a body follows a command of velocities, on some ground, in the prescribed gait.
 
-A task is composed of three frozen values: a command, a ground and a health. This module defines
-the order in which they draw, remember, observe and earn. Nothing in it has a scale: lengths are in
-standing heights h, speeds in the body's own target velocity or sqrt(g h), rates in sqrt(g / h), contact
-forces in the body's weight. Directions are the body's own, as the torso heads, so that an episode may
-start in any. What standing still would earn is gated by how well the command is followed.
+A task is composed of frozen values: a command, a ground, a health, and in some tasks a gait and a pose by
+command. This module defines the order in which they draw, remember, observe and earn. Nothing in it has a
+scale: lengths are in standing heights h, speeds in the body's own target velocity or sqrt(g h), rates in
+sqrt(g / h), contact forces in the body's weight. Directions are the body's own, as the torso heads,
+so that an episode may start in any. What standing still would earn is gated by how well the command is followed.
 """
 
 import functools
@@ -23,9 +23,10 @@ from arc_suite.tasks import blocks, clock, energy, parameters, terms
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.clock import Clock
-from arc_suite.tasks.command import Command
+from arc_suite.tasks.command import Command, Scheduled
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.contract import Inputs, Start, Task
+from arc_suite.tasks.gait_and_pose import GaitAndPose, GaitAndPoseMemory
 from arc_suite.tasks.ground import Ground, Level
 from arc_suite.tasks.health import Condition, Upright
 from arc_suite.tasks.parameters import Noise, Parameters
@@ -62,6 +63,7 @@ class CommandTaskSettings(NamedTuple):
         noise: of the start.
         ground: the ground with its own settings.
         command: the command with its own settings.
+        gait_and_pose: the gait and pose by command with its own settings; None where the task prescribes them.
     """
 
     parameters: Parameters
@@ -70,6 +72,7 @@ class CommandTaskSettings(NamedTuple):
     noise: Noise
     ground: Ground
     command: Command
+    gait_and_pose: GaitAndPose | None = None
 
 
 class Sensed(
@@ -80,7 +83,7 @@ class Sensed(
     Attributes:
         heading: (...) yaw of the torso, rad.
         touches: (...) whether the body touches an obstacle; None where there are none.
-        feet: (..., feet, 2) places from the torso's frame, forward and left, m; None where the command sees none.
+        feet: (..., feet, 2) places from the torso's frame, forward and left, m; None where no pose is by command.
     """
 
     torso_height, effort = Readings.torso_height, Readings.effort
@@ -121,12 +124,13 @@ class Core(NamedTuple):
 
 
 class CommandTaskMemory(NamedTuple):
-    """Memory of an episode: what all tasks with a command have, and that of each of the three values."""
+    """Memory of an episode: what all tasks with a command have, and that of each of the values."""
 
     core: Core
     command: Any
     ground: Any
     health: Condition
+    gait_and_pose: GaitAndPoseMemory | None = None
 
 
 class CommandTask(Task):
@@ -134,12 +138,14 @@ class CommandTask(Task):
 
     Attributes:
         command: what to follow.
+        gait_and_pose: which gait and pose to follow, in addition; None for the prescribed gait.
         ground: where, with the settings that a caller does not give.
         health: when a body has fallen.
         yaw: half-width of the heading at the start, rad.
     """
 
     command: ClassVar[Command]
+    gait_and_pose: ClassVar[GaitAndPose | None] = None
     ground: ClassVar[Ground] = Level()
     health: ClassVar[Upright] = Upright()
     weights: ClassVar[Mapping[str, float]] = {
@@ -159,7 +165,8 @@ class CommandTask(Task):
     @classmethod
     def names(cls) -> tuple[str, ...]:
         """Return the names of the settings."""
-        return (*cls.ground.settings, *cls.command.settings, *parameters.NAMES, "cost_limit")
+        gait_and_pose = () if cls.gait_and_pose is None else cls.gait_and_pose.settings
+        return (*cls.ground.settings, *cls.command.settings, *gait_and_pose, *parameters.NAMES, "cost_limit")
 
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> CommandTaskSettings:
@@ -173,6 +180,7 @@ class CommandTask(Task):
             parameters.noise(given),
             cls.ground.with_settings(overrides),
             cls.command.with_settings(body, overrides),
+            cls.gait_and_pose and cls.gait_and_pose.with_settings(body, overrides),
         )
 
     @classmethod
@@ -183,27 +191,31 @@ class CommandTask(Task):
     @functools.cached_property
     def blocks(self) -> Mapping[str, Block]:
         """The paper's observation, the command with the motion that is to follow it, what command and ground add."""
-        body, gait = self.scene.body, self.parameters
+        body, gait, gait_and_pose = self.scene.body, self.parameters, self.settings.gait_and_pose
         return {
             **blocks.of_gait(body, gait.phase_offsets, gait.default_angles, headed=True),
             "command": Block((*_velocity("desired"), *_velocity("measured"))),
             **self.settings.command.blocks(body),
+            **({} if gait_and_pose is None else gait_and_pose.blocks(body)),
             **self.settings.ground.blocks,
         }
 
     @property
     def commands(self) -> Mapping[str, int]:
         """Sizes of what may be set from outside while an episode runs, by name."""
-        return self.settings.command.live(self.scene.body)
+        body, gait_and_pose = self.scene.body, self.settings.gait_and_pose
+        return self.settings.command.live(body) | ({} if gait_and_pose is None else gait_and_pose.live(body))
 
     @property
     def command_limits(self) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
         """The lowest and highest numbers of the commands that are bounded, by name."""
-        return self.settings.command.limits(self.scene.body, self.scene.control_timestep)
+        gait_and_pose, scene = self.settings.gait_and_pose, self.scene
+        return {} if gait_and_pose is None else gait_and_pose.limits(scene.body, scene.control_timestep)
 
     def named_command(self, name: str, value: str) -> np.ndarray | None:
         """Return the numbers of a command that is given by a name."""
-        return self.settings.command.named(self.scene.body, name, value)
+        gait_and_pose = self.settings.gait_and_pose
+        return None if gait_and_pose is None else gait_and_pose.named(self.scene.body, name, value)
 
     @property
     def lies(self) -> bool:
@@ -228,7 +240,8 @@ class CommandTask(Task):
     @functools.cached_property
     def context(self) -> Context:
         """Lengths and speeds of the body."""
-        reference = self.settings.command.reference(self.scene, self.parameters)
+        gait_and_pose = self.settings.gait_and_pose
+        reference = None if gait_and_pose is None else gait_and_pose.reference(self.scene, self.parameters)
         return Context.of(self.scene, self.parameters, self.step_limit, reference)
 
     @functools.cached_property
@@ -241,20 +254,27 @@ class CommandTask(Task):
 
     def phase(self, memory: CommandTaskMemory):
         """Return the phase (...) of the gait, rad."""
-        return self.settings.command.phase(self.clock, memory.core.tick, memory.command)
+        if self.settings.gait_and_pose is None:
+            return self.clock.at(self.clock.phases, memory.core.tick)
+        return self.settings.gait_and_pose.phase(memory.gait_and_pose)
 
     def leg_phases(self, memory: CommandTaskMemory) -> tuple[Any, Any]:
         """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds."""
-        return self.settings.command.leg_phases(memory.command, super().leg_phases(memory))
+        if self.settings.gait_and_pose is None:
+            return super().leg_phases(memory)
+        return self.settings.gait_and_pose.leg_phases(memory.gait_and_pose)
 
     def first(self) -> Any:
         """Return the ground's stream state."""
         return self.settings.ground.first()
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
-        """Draw the start, in this order: ground, state, yaw, schedule, obstacles, and what the command draws.
+        """Draw the start, in this order: ground, state, yaw, schedule, obstacles, command, gait and pose.
 
         The schedule is drawn for every command, and used by `command.Schedule` alone.
+
+        Raises:
+            ValueError: the memory of a command that can be set live has no field `live`.
         """
         context, ground = self.context, self.settings.ground
         ground_memory, displacement = ground.place(context, random, stream)
@@ -263,29 +283,38 @@ class CommandTask(Task):
         qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
         schedule = self.settings.command.schedule(random, ground.share(ground_memory))
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
-        command_memory = self.settings.command.start(context, random, schedule)
+        command_memory = self._start_command(random, schedule)
+        gait_and_pose = self.settings.gait_and_pose
+        gait_memory = None if gait_and_pose is None else gait_and_pose.start(context, random)
         still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
         spent, none = energy.start(len(still)), np.zeros(3)
         core = Core(0, 0, still, still, zero, zero, spent, zero, none, none, none, zero, zero)
         health = self.health.start(lies=ground.lies)
-        return Start(qpos, qvel, CommandTaskMemory(core, command_memory, ground_memory, health), obstacles)
+        memory = CommandTaskMemory(core, command_memory, ground_memory, health, gait_memory)
+        return Start(qpos, qvel, memory, obstacles)
+
+    def _start_command(self, random: np.random.RandomState, schedule: Scheduled) -> Any:
+        command = self.settings.command
+        memory = command.start(self.context, random, schedule)
+        if command.live(self.scene.body) and not hasattr(memory, "live"):
+            kind = type(command).__name__
+            raise ValueError(f"command {kind}: expected a memory with a field 'live', or no live commands, got neither")
+        return memory
 
     def read(self, data) -> Sensed:
         """Take the readings."""
         layout, heading = self.scene.layout, rotations.yaw(data.qpos[..., 3:7])
         forces = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit
         numpy, across = forces.__array_namespace__(), heading[..., None]
-        torque, force = (rotations.headed(forces[..., i : i + 2], across) for i in (0, 3))
+        torque = rotations.headed(forces[..., 0:2], across)
+        force = rotations.headed(forces[..., 3:5], across)
         forces = numpy.concatenate([torque, forces[..., 2:3], force, forces[..., 5:6]], axis=-1)
         readings = reading.read(data, layout, self.scene.arena, forces)
-        return Sensed(*readings, heading, self.settings.ground.touches(data), self._feet(data, heading))
-
-    def _feet(self, data, heading):
-        layout = self.scene.layout
-        if not self.settings.command.sees_feet:
-            return None
+        touches = self.settings.ground.touches(data)
+        if self.settings.gait_and_pose is None:
+            return Sensed(*readings, heading, touches, None)
         apart = data.xpos[..., layout.feet, :2] - data.xpos[..., layout.torso, None, :2]
-        return rotations.headed(apart, heading[..., None])
+        return Sensed(*readings, heading, touches, rotations.headed(apart, across))
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
@@ -310,14 +339,21 @@ class CommandTask(Task):
         core, context, place = memory.core, self.context, _place(readings)
         numpy, steps = place.__array_namespace__(), core.steps + 1
         going = core.desired.any(axis=-1)
-        tick, asked = core.tick + going, self.settings.command
-        command = asked.stepped(context, memory.command, steps, going)
-        stance = asked.stance(self.clock, tick, command) | ~going[..., None]  # all feet, while the command says stop
+        tick = core.tick + going
+        gait_and_pose, gait_memory = self.settings.gait_and_pose, memory.gait_and_pose
+        if gait_and_pose is None:
+            stance, crouch = self.clock.at(self.clock.stance, tick), 1.0
+        else:
+            gait_memory = gait_and_pose.before_feet(context, gait_memory, steps, going)
+            stance, crouch = gait_and_pose.stance(gait_memory), gait_and_pose.crouch(gait_memory)
+        stance = stance | ~going[..., None]  # all feet, while the command says stop
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
-        health = self.health.after(context, memory.health, readings, steps, asked.crouch(command))
+        health = self.health.after(context, memory.health, readings, steps, crouch)
         motion = self._motion(core, place)
-        stepped = 1.0 - schedule_errors / self.parameters.feet
-        followed = asked.follow(context, command, steps, core.place, place, motion, readings, stepped)
+        if gait_and_pose is not None:
+            stepped = 1.0 - schedule_errors / self.parameters.feet
+            gait_memory = gait_and_pose.after(context, gait_memory, readings, stepped)
+        followed = self.settings.command.follow(context, memory.command, steps, core.place, place, motion, readings)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
         core = Core(
             steps=steps,
@@ -334,7 +370,7 @@ class CommandTask(Task):
             followed=followed.tracking,
             tracking=core.tracking + followed.tracking,
         )
-        return CommandTaskMemory(core, followed.memory, ground, health)
+        return CommandTaskMemory(core, followed.memory, ground, health, gait_memory)
 
     @functools.cached_property
     def _torques(self) -> np.ndarray:
@@ -349,7 +385,10 @@ class CommandTask(Task):
 
     def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
         """Return the memory with a live command."""
-        command = self.settings.command.with_command(memory.command, name, value)
+        if name not in self.settings.command.live(self.scene.body):
+            gait_memory = self.settings.gait_and_pose.with_command(memory.gait_and_pose, name, value)
+            return memory._replace(gait_and_pose=gait_memory)
+        command = memory.command._replace(live=value)
         desired = self.settings.command.desired(self.context, command, memory.core.steps, memory.core.place)
         return memory._replace(core=memory.core._replace(desired=desired), command=command)
 
@@ -358,9 +397,12 @@ class CommandTask(Task):
 
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
         """
-        core, command, height, feet = memory.core, self.settings.command, self.context.height, self.parameters.feet
-        stepped = 1.0 - core.schedule_errors / feet
-        default = command.default_angles(self.context, memory.command, self.parameters.default_angles)
+        core, height, gait_and_pose = memory.core, self.context.height, self.settings.gait_and_pose
+        default, stepped = self.parameters.default_angles, 1.0 - core.schedule_errors / self.parameters.feet
+        earned = self.settings.command.terms(memory.command, core.followed, memory.health.upright, stepped)
+        if gait_and_pose is not None:
+            default = gait_and_pose.default_angles(self.context, memory.gait_and_pose, default)
+            earned = gait_and_pose.terms(memory.gait_and_pose, earned, core.followed)
         costs = terms.costs(readings, core.action, core.previous_action, core.schedule_errors, default)
         return {
             **costs,
@@ -368,7 +410,7 @@ class CommandTask(Task):
             "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
             "transport": core.energy.step / self.context.pace,
             **self.health.terms(memory.health),
-            **command.terms(memory.command, core.followed, memory.health.upright, stepped),
+            **earned,
         }
 
     def observe(self, memory: CommandTaskMemory, readings: Sensed) -> dict:
@@ -377,7 +419,12 @@ class CommandTask(Task):
         numpy, posture, velocities = core.motion.__array_namespace__(), readings.posture, readings.velocities
         quaternion = rotations.turned(readings.torso_quaternion, -heading)
         velocity = rotations.headed(velocities[..., :2], heading)
-        circle = self.settings.command.circle(self.clock, core.tick, memory.command)
+        gait_and_pose = self.settings.gait_and_pose
+        if gait_and_pose is None:
+            circle, more = self.clock.at(self.clock.circle, core.tick), {}
+        else:
+            circle = gait_and_pose.circle(memory.gait_and_pose)
+            more = gait_and_pose.observe(context, memory.gait_and_pose)
         observed = {
             "posture": numpy.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
             "velocities": numpy.concatenate([velocity, velocities[..., 2:]], axis=-1),
@@ -385,6 +432,7 @@ class CommandTask(Task):
             "gait_clock": circle * core.desired.any(axis=-1)[..., None],
             "command": numpy.concatenate([core.desired, core.motion], axis=-1),
             **self.settings.command.observe(context, memory.command),
+            **more,
             **self.settings.ground.observe(context, memory.ground, core.place, readings),
         }
         return {name: block + 0.0 for name, block in observed.items()}
@@ -398,10 +446,11 @@ class CommandTask(Task):
 
         The cost of transport divides by the path of the leaky motion, whatever its direction.
         """
-        core = memory.core
+        core, gait_and_pose, judged = memory.core, self.settings.gait_and_pose, self.judged(memory)
         steps = core.steps + (core.steps == 0)
         return {
-            **self.settings.command.progress(self.context, memory.command, self.judged(memory)),
+            **self.settings.command.progress(self.context, memory.command, judged),
+            **({} if gait_and_pose is None else gait_and_pose.progress(memory.gait_and_pose, judged)),
             "tracking": core.tracking / steps,
             **self.health.progress(memory.health),
             "gait_compliance": clock.compliance(core.all_schedule_errors, steps, self.parameters.feet),
@@ -411,7 +460,9 @@ class CommandTask(Task):
 
     def resampled(self, memory: CommandTaskMemory) -> Any:
         """Return whether the latest step began another drawn command."""
-        return self.settings.command.resampled(memory.command, memory.core.steps)
+        steps, gait_and_pose = memory.core.steps, self.settings.gait_and_pose
+        velocity = self.settings.command.resampled(memory.command, steps)
+        return velocity if gait_and_pose is None else velocity | gait_and_pose.resampled(memory.gait_and_pose, steps)
 
     def judged(self, memory: CommandTaskMemory):
         """Return the steps (...) over which an episode is judged: a full episode once it is over, else those so far."""

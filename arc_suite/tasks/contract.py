@@ -223,6 +223,7 @@ class Task(Observed):
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
+        gait_and_pose: gait and pose by command, see `gait_and_pose.GaitAndPose`; None where there are none.
         from_body: cached attributes with numbers that follow from the body or the settings. With these and the settings
             stacked along a leading axis, its functions serve a batch of different bodies or settings. A class that
             inherits declares its own, as it may have further ones; without it, each body has a batch of its own.
@@ -241,6 +242,7 @@ class Task(Observed):
     own_arena: ClassVar[bool] = False
     modifiers: ClassVar[Mapping[str, Any]] = {}
     demonstrators: ClassVar[tuple[str, ...]] = ()
+    gait_and_pose: ClassVar[Any] = None
     from_body: ClassVar[tuple[str, ...]] = ()
     structure: ClassVar[Hashable] = ()
 

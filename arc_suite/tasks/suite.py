@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
 from arc_suite.tasks.command_task import COSTS, CommandTask
-from arc_suite.tasks.direction import Direction
+from arc_suite.tasks.gait_and_pose import GaitAndPose
 from arc_suite.tasks.ground import Lanes, PillarField
 
 _STACKED = ("clock", "clearances", "context", "_torques")  # what follows from body and settings
@@ -32,7 +32,7 @@ class Limp(CommandTask):
 class Directed(CommandTask):
     """Following a velocity in a pose and a gait by command."""
 
-    name, command, from_body = "directed", Direction(), _STACKED
+    name, command, gait_and_pose, from_body = "directed", Schedule(), GaitAndPose(), _STACKED
     demonstrators = ("balanced", "steered")
     weights: ClassVar[Mapping[str, float]] = {
         "progress": 0.25,

@@ -23,7 +23,10 @@ def costs(readings: Readings, action, previous_action, schedule_errors, default_
         default_angles: (joints,) rad, from which the posture is measured.
     """
     # Products, since numpy's `x**2` rounds otherwise for scalars.
-    vertical, roll, pitch = (component(readings.velocities, i) for i in (2, 3, 4))
+    velocities = readings.velocities
+    vertical = component(velocities, 2)
+    roll = component(velocities, 3)
+    pitch = component(velocities, 4)
     return {
         "gait_cost": schedule_errors,
         "control": (action**2).sum(axis=-1),

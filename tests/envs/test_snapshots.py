@@ -145,3 +145,16 @@ def test_a_snapshot_from_elsewhere_is_refused_before_anything_changes(change, me
         environment.restore(change(arrays))
     after = environment.snapshot()
     assert all(np.array_equal(array, after[name], equal_nan=True) for name, array in before.items())
+
+
+def test_a_snapshot_of_directed_with_gait_and_pose_in_the_command_is_refused():
+    """Earlier versions held them in the memory of the command, before that of the health."""
+    environments = envs("directed", random=1)
+    environments.reset()
+    arrays = environments.snapshot()
+    memory = [name for name in arrays if name.startswith("memory/")]
+    *others, upright, fell, counts = range(len(memory) - 13)
+    order = [*others, *range(len(memory) - 13, len(memory)), upright, fell, counts]
+    former = arrays | {f"memory/{place}": arrays[f"memory/{index}"] for place, index in enumerate(order)}
+    with refused("snapshot: of another task or number of environments: memory: expected", begins=True):
+        environments.restore(former)

@@ -12,7 +12,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.posture import moved, room
 from arc_suite.robots import ROBOTS, gaits, mirror
 from arc_suite.tasks import mirrors
-from arc_suite.tasks.direction import CYCLE, counted, glided
+from arc_suite.tasks.gait_and_pose import CYCLE, counted, glided
 
 STILL = {"poses": 0.0, "gaits": ()}
 
@@ -40,8 +40,8 @@ def test_a_walk_keeps_the_pose(command):
     environment, walk = directed("tick", command=command, pose=pose)
     timestep = walk(120)
     assert_allclose(timestep.observation["pose"], pose)
-    off = environment.task.memory.command.off
-    assert abs(off[[0, 3, 4]]).max() <= 0.01 and environment.task.memory.command.posed >= 0.7
+    off = environment.task.memory.gait_and_pose.off
+    assert abs(off[[0, 3, 4]]).max() <= 0.01 and environment.task.memory.gait_and_pose.posed >= 0.7
     assert timestep.observation["posture"][0] == pytest.approx(0.18 * (0.71 - 0.2), abs=0.003)
 
 
@@ -55,17 +55,17 @@ def test_nan_leaves_a_number_to_the_task():
 def test_a_gait_by_name_takes_hold_within_a_cycle():
     environment, walk = directed("queen", command=(0.7, 0.0, 0.0))
     walk(40)
-    before = environment.task.memory.command
+    before = environment.task.memory.gait_and_pose
     environment.command("gait", "ripple")
     walk(1)
-    clock = environment.task.memory.command
+    clock = environment.task.memory.gait_and_pose
     assert clock.phase == (before.phase + clock.gait[-1]) % CYCLE  # it goes on
     cycle = int(np.ceil(CYCLE / clock.gait[-1]))
     walk(cycle)
     made = gaits.gait(ROBOTS["queen"], "ripple")
     step = environment.control_timestep()
     asked = counted(np.array((*made.offsets, made.duty_factor, 1.5)), step)
-    assert_array_equal(environment.task.memory.command.gait, asked)
+    assert_array_equal(environment.task.memory.gait_and_pose.gait, asked)
     errors = [int(walk(1) and environment.task.memory.core.schedule_errors) for _ in range(2 * cycle)]
     assert np.mean(errors) / 6 <= 0.2
 
@@ -145,7 +145,8 @@ def test_the_room_of_a_body():
 def test_drawn_poses_lie_within_the_room():
     task = arc_suite.load("queen", "directed", {"poses": 1.0}).task.definition
     low, high = room(ROBOTS["queen"], planted=False).T
-    poses = np.concatenate([task.start(np.random.RandomState(seed), None).memory.command.poses for seed in range(30)])
+    starts = [task.start(np.random.RandomState(seed), None) for seed in range(30)]
+    poses = np.concatenate([start.memory.gait_and_pose.poses for start in starts])
     assert ((low - 1e-9 <= poses) & (poses <= high + 1e-9)).all()
     assert (np.ptp(poses, axis=0) >= 0.8 * (high - low)).all()
 
@@ -171,15 +172,15 @@ def test_the_mirror_image_of_a_directed_walk():
 
     def mirrored(random, stream):
         begun = start(random, stream)
-        asked = begun.memory.command
+        command, asked = begun.memory.command, begun.memory.gait_and_pose
+        command = command._replace(schedule=command.schedule * (1, -1, -1))
         asked = asked._replace(
-            schedule=asked.schedule * (1, -1, -1),
             poses=task.blocks["pose"].mirror(image)(asked.poses),
             gaits=gait(asked.gaits),
             gait=gait(asked.gait),
             phase=np.int64(CYCLE // 2),
         )
-        memory = begun.memory._replace(command=asked)
+        memory = begun.memory._replace(command=command, gait_and_pose=asked)
         return begun._replace(qpos=poses(begun.qpos), qvel=velocities(begun.qvel), memory=memory)
 
     vars(other.task.definition)["start"] = mirrored

@@ -9,7 +9,7 @@ from interpreters import ROOT, printed
 from tiers import never, tiers
 
 GUIDE = (ROOT / "docs" / "adding_a_task.md").read_text()
-CROUCHING, USING_A_TASK, LEVEL_STEER, USING_A_TERM, RAMPS, USING_AN_ARENA = re.findall(
+CROUCHING, USING_A_TASK, LEVEL_STEER, USING_A_TERM, CIRCLING, USING_A_COMMAND, RAMPS, USING_AN_ARENA = re.findall(
     r"```python\n(.*?)```", GUIDE, re.DOTALL
 )
 COMMANDS = re.findall(r"(?:^|`)(arc-suite [^`\n]*)", GUIDE, re.MULTILINE)
@@ -26,6 +26,7 @@ def package(tmp_path):
     """Writes the guide's modules and returns a function that runs Python in their folder."""
     (tmp_path / "crouching.py").write_text(CROUCHING)
     (tmp_path / "level_steer.py").write_text(LEVEL_STEER)
+    (tmp_path / "circling.py").write_text(CIRCLING)
     (tmp_path / "ramps.py").write_text(RAMPS)
     return functools.partial(printed, folder=tmp_path)
 
@@ -64,6 +65,39 @@ assert (reward, weights["level"]) == (timestep.reward, 1.0)
 def test_a_term_and_a_block(package):
     """In a dm_env as the guide shows them, and in a batch; test_jax runs them under `jit`."""
     assert package(USING_A_TERM + BATCH)[-1] == f"None {23 + 24 + 150 + 2 + 6 + 18 - 1}"
+
+
+ROUND = """
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import conformance
+setup = Setup.of("tick", "circling", {"kicks": 1.0})
+print(conformance.difference(setup, 20), *setup.definition.commands, setup.definition.symmetry.observation.signs[-6:])
+"""
+
+
+def test_a_command_of_a_new_kind(package):
+    """It walks, is set live, is like itself in a batch and under modifiers, and has a mirror image."""
+    tracked, last = package(USING_A_COMMAND + ROUND)
+    assert float(tracked) > 0.3 and last == "None command [ 1 -1 -1  1 -1 -1]"
+
+
+WITHOUT_TERMS = re.sub(r"    def terms.*?\n\n", "", CIRCLING, count=1, flags=re.DOTALL)
+WITHOUT_LIVE = re.sub(r"    live: .*?\n", "", CIRCLING, count=1).replace(", np.full(3, np.nan)", "")
+
+
+@pytest.mark.parametrize(
+    ("module", "message"),
+    [
+        (WITHOUT_TERMS, "Can't instantiate abstract class Circle with abstract method terms"),
+        (WITHOUT_LIVE, "command Circle: expected a memory with a field 'live', or no live commands, got neither"),
+    ],
+    ids=["a method is missing", "the field of live commands is missing"],
+)
+def test_mistakes_in_a_command_are_one_line(module, message, tmp_path):
+    (tmp_path / "circling.py").write_text(module)
+    arguments = ("--task=circling:circling", "--robot=tick", "--policy=zero", "--episodes=1")
+    done = programs.arc_suite("evaluate", *arguments, cwd=tmp_path)
+    assert done.returncode == 1 and message in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from arc_suite.robots import ROBOTS, gaits
 from arc_suite.tasks import modifiers, parameters, walk
 from arc_suite.tasks.command import Schedule
 from arc_suite.tasks.contract import STEPS, Task
-from arc_suite.tasks.direction import Direction
+from arc_suite.tasks.gait_and_pose import GaitAndPose
 from arc_suite.tasks.ground import LEVELS, Lanes, Level
 from arc_suite.tasks.modifiers import Modifiers
 from arc_suite.tasks.parameters import Noise, Parameters
@@ -32,7 +32,7 @@ _MEANINGS = {
 MEANINGS = {
     **{
         name: text
-        for kind in (Parameters, Noise, walk.WalkSettings, Schedule, Direction, Level, Lanes, Modifiers)
+        for kind in (Parameters, Noise, walk.WalkSettings, Schedule, GaitAndPose, Level, Lanes, Modifiers)
         for name, text in markdown.fields(kind).items()
     },
     **_MEANINGS,

@@ -1,4 +1,4 @@
-"""Direction: a velocity, a pose of the torso and a gait by command, drawn for the episode or set while it runs.
+"""A gait and a pose of the torso by command, drawn for the episode or set while it runs.
 
 Pose and gait glide to the command. The clock counts integers: every gait's edges are exact, whatever its numbers,
 and the phase goes on when another gait is asked for.
@@ -7,7 +7,7 @@ and the phase goes on when another gait is asked for.
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import terms
 from arc_suite.tasks.blocks import Block, gait_clock
 from arc_suite.tasks.clock import TWO_PI
-from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, Followed, Schedule, Scheduled, begins, held
+from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, begins, held
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.parts import ROTATIONS, Legs, Planar, Scalar
 
@@ -74,15 +74,8 @@ class Reference(NamedTuple):
     choices: Choices
 
 
-_Directed = NamedTuple(
-    "_Directed",
-    [(field, np.ndarray) for field in (*Scheduled._fields, "pose_ends", "poses", "live_pose", "gait_ends", "gaits")]
-    + [(field, np.ndarray) for field in ("live_gait", "pose", "gait", "phase", "off", "posed", "all_posed", "stepped")],
-)
-
-
-class Directed(_Directed):
-    """Memory of a direction: that of a schedule of velocities, and these.
+class GaitAndPoseMemory(NamedTuple):
+    """Memory of a gait and a pose by command.
 
     Attributes:
         pose_ends: (..., COMMANDS) steps at which the poses of the schedule end.
@@ -100,39 +93,73 @@ class Directed(_Directed):
         stepped: (...) share of the feet that follow the contact schedule, a leaky mean over the same cycle.
     """
 
-    __slots__ = ()
+    pose_ends: np.ndarray
+    poses: np.ndarray
+    live_pose: np.ndarray
+    gait_ends: np.ndarray
+    gaits: np.ndarray
+    live_gait: np.ndarray
+    pose: np.ndarray
+    gait: np.ndarray
+    phase: np.ndarray
+    off: np.ndarray
+    posed: np.ndarray
+    all_posed: np.ndarray
+    stepped: np.ndarray
 
 
-_LIVE = {"command": "live", "pose": "live_pose", "gait": "live_gait"}
+_LIVE = {"pose": "live_pose", "gait": "live_gait"}
 
 
 @dataclasses.dataclass(frozen=True)
-class Direction(Schedule):
-    """Velocities, poses and gaits, each held for some seconds.
+class GaitAndPose:
+    """A gait and a pose of the torso by command, in addition to a velocity; each is held for some seconds.
 
     Attributes:
         poses: share of the body's room from which poses are drawn; 0 for none.
         gaits: names of gaits that are drawn, with their frequencies; None for the steady ones that fit, and none of
             them for the prescribed gait alone.
+        settings: names of the fields that a caller may set.
+        observed: names of the blocks that show the gait and the pose that hold.
     """
 
     poses: float = 0.8
     gaits: tuple[str, ...] | None = None
 
-    settings: ClassVar[tuple[str, ...]] = ("commands", "poses", "gaits")
-    sees_feet: ClassVar[bool] = True
+    settings: ClassVar[tuple[str, ...]] = ("poses", "gaits")
+    observed: ClassVar[tuple[str, ...]] = ("pose", "gait")
 
-    def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> "Direction":
-        """Return the direction with checked settings in place of its own."""
-        asked = super().with_settings(body, overrides)
+    def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> Self:
+        """Return the value with checked settings in place of its own.
+
+        Raises:
+            ValueError: a value that does not fit.
+        """
         poses = checks.number("poses", overrides.get("poses", self.poses), 0.0, 1.0)
         names = overrides.get("gaits", self.gaits)
         names = None if names is None else checks.names("gaits", names, gaits.fitting(body), "gait")
-        return dataclasses.replace(asked, poses=poses, gaits=names)
+        return dataclasses.replace(self, poses=poses, gaits=names)
 
     def live(self, body: Body) -> dict[str, int]:
         """Return the sizes of what may be set from outside while an episode runs, by name."""
-        return {"command": 3, "pose": 6, "gait": len(body.legs) + 2}
+        return {"pose": 6, "gait": len(body.legs) + 2}
+
+    def limits(self, body: Body, step: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return the lowest and highest numbers of poses and gaits, by name, given a control step, s."""
+        most = np.append(np.ones(len(body.legs)), (_DUTIES[1], _FASTEST / step))
+        least = np.append(-np.ones(len(body.legs)), (_DUTIES[0], 1.0 / (CYCLE * step)))
+        return {"pose": (-np.ones(6), np.ones(6)), "gait": (least, most)}
+
+    def named(self, body: Body, name: str, value: str) -> np.ndarray | None:
+        """Return the numbers of a gait that is named, at the frequency that the task asks for; None for other commands.
+
+        Raises:
+            ValueError: no such gait, or one that does not fit the body.
+        """
+        if name != "gait":
+            return None
+        made = gaits.gait(body, value)
+        return np.array((*made.offsets, made.duty_factor, np.nan))
 
     def reference(self, scene, parameters) -> Reference:
         """Return what poses and gaits of a body are measured by, in a task with `parameters.Parameters`."""
@@ -157,27 +184,21 @@ class Direction(Schedule):
     def blocks(self, body: Body) -> dict[str, Block]:
         """Return the blocks that it adds: the clock and the pose that hold, and of the gait sine and cosine of the
         phase of each leg, the duty factor and the frequency by sqrt(g / h)."""
-        return {
-            "gait_clock": gait_clock(),
-            "pose": Block(
-                (
-                    Scalar("height", "h"),
-                    Planar(unit="h"),
-                    Planar(unit="rad", axes=ROTATIONS[:2], axial=True),
-                    Scalar("yaw", "rad", sign=-1),
-                )
-            ),
-            "gait": Block(
-                (
-                    Legs(body, "sine of the phase of {}"),
-                    Legs(body, "cosine of the phase of {}"),
-                    Scalar("duty factor"),
-                    Scalar("frequency", "sqrt(g / h)"),
-                )
-            ),
-        }
+        pose = (
+            Scalar("height", "h"),
+            Planar(unit="h"),
+            Planar(unit="rad", axes=ROTATIONS[:2], axial=True),
+            Scalar("yaw", "rad", sign=-1),
+        )
+        gait = (
+            Legs(body, "sine of the phase of {}"),
+            Legs(body, "cosine of the phase of {}"),
+            Scalar("duty factor"),
+            Scalar("frequency", "sqrt(g / h)"),
+        )
+        return {"gait_clock": gait_clock(), "pose": Block(pose), "gait": Block(gait)}
 
-    def start(self, context: Context, random, schedule: Scheduled) -> Directed:
+    def start(self, context: Context, random: np.random.RandomState) -> GaitAndPoseMemory:
         """Draw poses and gaits, and when they end; an episode begins at rest, in the prescribed gait."""
         reference = context.reference
         low, high = reference.choices.room.T
@@ -189,8 +210,7 @@ class Direction(Schedule):
         drawn = reference.choices.gaits[(which * len(reference.choices.gaits)).astype(int)]
         drawn[:, -1] = np.rint(drawn[:, -1] * tempi)
         zero, still = np.float64(0.0), np.zeros(6)
-        return Directed(
-            *schedule,
+        return GaitAndPoseMemory(
             pose_ends=ends,
             poses=np.where(poses < 0.0, -low, high) * poses,
             live_pose=np.full(6, np.nan),
@@ -206,104 +226,109 @@ class Direction(Schedule):
             stepped=np.float64(1.0),
         )
 
-    def stepped(self, context: Context, memory: Directed, steps, going) -> Directed:
-        """Return the memory with pose and gait a control step nearer to the command, and the clock a step on."""
-        numpy, reference = memory.pose.__array_namespace__(), context.reference
+    def before_feet(self, context: Context, memory: GaitAndPoseMemory, steps, going) -> GaitAndPoseMemory:
+        """Return the memory with pose and gait a control step nearer to the command, and the clock a step on.
+
+        Args:
+            context: of the task.
+            memory: before the step.
+            steps: (...) control steps since the start, this one included.
+            going: (...) whether the velocity is no stop, at which the clock rests.
+        """
+        xp, reference = memory.pose.__array_namespace__(), context.reference
         asked = held(memory.pose_ends, memory.poses, steps)
-        asked = numpy.where(numpy.isnan(memory.live_pose), asked, memory.live_pose)
-        glide = numpy.asarray(reference.glide)[..., None]
-        pose = memory.pose + numpy.minimum(numpy.maximum(asked - memory.pose, -glide), glide)
-        live = counted(memory.live_gait, numpy.asarray(reference.step)[..., None])
-        asked = numpy.where(numpy.isnan(memory.live_gait), held(memory.gait_ends, memory.gaits, steps), live)
+        asked = xp.where(xp.isnan(memory.live_pose), asked, memory.live_pose)
+        glide = xp.asarray(reference.glide)[..., None]
+        pose = memory.pose + xp.minimum(xp.maximum(asked - memory.pose, -glide), glide)
+        live = counted(memory.live_gait, xp.asarray(reference.step)[..., None])
+        asked = xp.where(xp.isnan(memory.live_gait), held(memory.gait_ends, memory.gaits, steps), live)
         gait = glided(memory.gait, asked)
         phase = (memory.phase + gait[..., -1] * going) % CYCLE
         return memory._replace(pose=pose, gait=gait, phase=phase)
 
-    def follow(self, context: Context, memory: Directed, steps, before, place, motion, readings, stepped) -> Followed:
-        """Return the command after a control step, and how well the torso keeps its pose."""
-        numpy = motion.__array_namespace__()
-        leaks = numpy.asarray(context.leak)[..., None]
+    def after(self, context: Context, memory: GaitAndPoseMemory, readings, stepped) -> GaitAndPoseMemory:
+        """Return the memory with how well the torso keeps its pose, and the feet their schedule.
+
+        Args:
+            context: of the task.
+            memory: of `before_feet`.
+            readings: after the step.
+            stepped: (...) share of the feet that followed the contact schedule.
+        """
+        xp = memory.pose.__array_namespace__()
+        leaks = xp.asarray(context.leak)[..., None]
         off = (1.0 - leaks) * memory.off + leaks * (measured(context, readings) - memory.pose)
         posed = kept(memory.pose[..., :3], off[..., :3]) * kept(memory.pose[..., 3:], off[..., 3:])
         stepped = (1.0 - context.leak) * memory.stepped + context.leak * stepped
-        memory = memory._replace(off=off, posed=posed, all_posed=memory.all_posed + posed, stepped=stepped)
-        return super().follow(context, memory, steps, before, place, motion, readings, stepped)
+        return memory._replace(off=off, posed=posed, all_posed=memory.all_posed + posed, stepped=stepped)
 
-    def resampled(self, memory: Directed, steps) -> Any:
-        """Return whether (...) another drawn velocity, pose or gait holds since step `steps`, unless live."""
+    def resampled(self, memory: GaitAndPoseMemory, steps) -> Any:
+        """Return whether (...) another drawn pose or gait holds since step `steps`, unless live."""
         pose = begins(memory.pose_ends, memory.live_pose, steps)
-        gait = begins(memory.gait_ends, memory.live_gait, steps)
-        return super().resampled(memory, steps) | pose | gait
+        return pose | begins(memory.gait_ends, memory.live_gait, steps)
 
-    def with_command(self, memory: Directed, name: str, value) -> Directed:
-        """Return the memory with a live velocity, pose or gait."""
+    def with_command(self, memory: GaitAndPoseMemory, name: str, value) -> GaitAndPoseMemory:
+        """Return the memory with a live pose or gait."""
         return memory._replace(**{_LIVE[name]: value})
 
-    def limits(self, body: Body, step: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Return the lowest and highest numbers of poses and gaits, by name."""
-        most = np.append(np.ones(len(body.legs)), (_DUTIES[1], _FASTEST / step))
-        least = np.append(-np.ones(len(body.legs)), (_DUTIES[0], 1.0 / (CYCLE * step)))
-        return {"pose": (-np.ones(6), np.ones(6)), "gait": (least, most)}
-
-    def named(self, body: Body, name: str, value: str) -> np.ndarray | None:
-        """Return the numbers of a gait that is named, at the frequency that the task asks for.
-
-        Raises:
-            ValueError: no such gait, or one that does not fit the body.
-        """
-        if name != "gait":
-            return None
-        made = gaits.gait(body, value)
-        return np.array((*made.offsets, made.duty_factor, np.nan))
-
-    def phase(self, clock, tick, memory: Directed):
+    def phase(self, memory: GaitAndPoseMemory):
         """Return the phase (...) of the gait, rad."""
         return memory.phase * (TWO_PI / CYCLE)
 
-    def circle(self, clock, tick, memory: Directed):
+    def circle(self, memory: GaitAndPoseMemory):
         """Return sine and cosine (..., 2) of the phase."""
         return _circle(memory.phase, memory.pose)
 
-    def stance(self, clock, tick, memory: Directed):
+    def stance(self, memory: GaitAndPoseMemory):
         """Return which feet (..., legs) the gait that holds has on the ground."""
         return _phases(memory) < memory.gait[..., -2:-1]
 
-    def leg_phases(self, memory: Directed, prescribed) -> tuple[Any, Any]:
+    def leg_phases(self, memory: GaitAndPoseMemory) -> tuple[Any, Any]:
         """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds."""
         return _phases(memory) * (TWO_PI / CYCLE), memory.gait[..., -2] / CYCLE
 
-    def crouch(self, memory: Directed):
+    def crouch(self, memory: GaitAndPoseMemory):
         """Return the share (...) of its height at rest that the torso is asked to keep, at most 1."""
         return (1.0 + memory.pose[..., 0]).clip(max=1.0)
 
-    def default_angles(self, context: Context, memory: Directed, default_angles):
-        """Return the angles (..., joints) from which the posture is measured: those of the pose that holds, rad."""
+    def default_angles(self, context: Context, memory: GaitAndPoseMemory, default_angles):
+        """Return the angles (..., joints) from which the posture is measured: those of the pose that holds, rad.
+
+        Args:
+            context: of the task.
+            memory: after the step.
+            default_angles: (joints,) of the task, rad.
+        """
         reference = context.reference
         turned = (reference.turns * memory.pose[..., None, :]).sum(axis=-1)
         return default_angles + reference.angles + turned
 
-    def terms(self, memory: Directed, followed, upright, stepped) -> dict:
-        """Return the bonuses for the velocity, and that for following it in the pose and the gait."""
-        earned = super().terms(memory, followed, upright, stepped)
-        in_gait = ((memory.stepped - _UNTIMED) / (1.0 - _UNTIMED)).clip(0.0)
-        return {name: earned[name] for name in ("progress", "tracking")} | {
-            "obedience": followed * memory.posed * in_gait
-        }
+    def terms(self, memory: GaitAndPoseMemory, earned: Mapping[str, Any], followed) -> dict:
+        """Return the bonuses for the velocity, and that for following it in the pose and the gait.
 
-    def observe(self, context: Context, memory: Directed) -> dict:
+        Args:
+            memory: after the step.
+            earned: bonuses of the velocity's command, by name.
+            followed: (...) tracking of the step.
+        """
+        in_gait = ((memory.stepped - _UNTIMED) / (1.0 - _UNTIMED)).clip(0.0)
+        obedience = followed * memory.posed * in_gait
+        return {"progress": earned["progress"], "tracking": earned["tracking"], "obedience": obedience}
+
+    def observe(self, context: Context, memory: GaitAndPoseMemory) -> dict:
         """Return the pose and the gait that hold."""
-        numpy, reference = memory.pose.__array_namespace__(), context.reference
+        xp, reference = memory.pose.__array_namespace__(), context.reference
         circles = _circle(_phases(memory), memory.pose)
-        rate = numpy.asarray(context.height / GRAVITY) ** 0.5 / numpy.asarray(reference.step)
+        rate = xp.asarray(context.height / GRAVITY) ** 0.5 / xp.asarray(reference.step)
         duty, advance = (memory.gait[..., i] / CYCLE for i in (-2, -1))
-        numbers = numpy.stack([duty, advance * rate], axis=-1)
+        numbers = xp.stack([duty, advance * rate], axis=-1)
         return {
             "pose": memory.pose,
-            "gait": numpy.concatenate([circles[..., 0], circles[..., 1], numbers], axis=-1),
+            "gait": xp.concatenate([circles[..., 0], circles[..., 1], numbers], axis=-1),
         }
 
-    def progress(self, context: Context, memory: Directed, judged) -> dict:
-        """Return how well the pose was kept, on average."""
+    def progress(self, memory: GaitAndPoseMemory, judged) -> dict:
+        """Return how well the pose was kept, on average over the steps (...) by which the episode is judged."""
         return {"pose_tracking": memory.all_posed / judged}
 
 
@@ -351,7 +376,7 @@ def kept(pose, off):
     return terms.triangle(miss, BAND * numpy.maximum(size, _LEAST / BAND))
 
 
-def _phases(memory: Directed):
+def _phases(memory: GaitAndPoseMemory):
     """The phase (..., legs) of each leg, in units of the clock."""
     return (memory.phase[..., None] + memory.gait[..., :-2]) % CYCLE
 
