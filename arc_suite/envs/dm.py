@@ -56,7 +56,7 @@ def load(
         task_name: walk, steer, or a task of another package as `module:name`.
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
             or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
-            reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers.Modifiers`;
+            reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers`;
             for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.WalkSettings`.
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Of what
             else dm_control's environments take, steps and substeps are part of the benchmark and are
@@ -309,7 +309,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """
         self._check_begun()
         found = self.definition.privileged(self.memory, self._physics.data.ptr)
-        return found | self.definition.overruled(found, self._physics.lasting)
+        return found | self.definition.read_back(found, self._physics.lasting)
 
     def privileged_vector(self) -> np.ndarray:
         """Return the same as one vector (size,) float32."""

@@ -12,9 +12,10 @@ from arc_suite.models.sizing import simulation
 from arc_suite.models.standing import stood
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import modified_task, modifiers, parameters
-from arc_suite.tasks.contract import CHANGEABLE, STEPS, Scene, Task
+from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
+from arc_suite.tasks.scene import CHANGEABLE, Scene
 
 
 def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> tuple[Task, mujoco.MjModel]:
@@ -35,7 +36,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     time_limit, arena = settings.pop("time_limit", None), settings.pop("arena", None)
     if arena is not None and kind.own_arena:
         raise ValueError(f"arena: task {kind.name} has a ground of its own, expected none")
-    changes = {**kind.modifiers, **{name: settings.pop(name) for name in modifiers.NAMES if name in settings}}
+    changes = {**kind.modifiers, **{name: settings.pop(name) for name in modifiers.MODIFIERS if name in settings}}
     settings = kind.settings_for(body, settings)
     arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
     model = compiled(body, arena)

@@ -575,7 +575,7 @@ class VectorEnv(KnownAttributes, Together):
         found = definition.privileged(memory, self.batch.data)
         for index, task in enumerate(self._tasks if self.batch.changed else ()):
             fields = self.batch.lasting(index)
-            own = task.overruled({name: block[index] for name, block in found.items()}, fields) if fields else {}
+            own = task.read_back({name: block[index] for name, block in found.items()}, fields) if fields else {}
             for name, block in own.items():
                 found[name] = found[name].copy()  # of the memory
                 found[name][index] = block

@@ -10,6 +10,7 @@ from arc_suite import checks
 from arc_suite.cpg.law import Clocked, checked, proprioception
 from arc_suite.envs.calls import checked_action
 from arc_suite.tasks.modified_task import Modified
+from arc_suite.tasks.modifiers import Control
 
 
 class Policy(Protocol):
@@ -92,7 +93,7 @@ class Positioned:
         """
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
         _, angles, speeds = proprioception(checked(observation, Clocked.reads, torques.shape[-1]))
-        return self._task.positions(torques, angles, speeds)
+        return self._task.modifier(Control).positions(torques, angles, speeds)
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return what a demonstrator remembers; see `Demonstrator.snapshot`."""

@@ -29,10 +29,9 @@ An episode, as a driver runs it, for one environment or with a leading axis for 
 import collections
 import dataclasses
 import functools
-import types
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -46,75 +45,15 @@ from arc_suite.tasks.blocks import Block, places
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.parts import Unframed
-from arc_suite.tasks.readings import Layout, Readings
+from arc_suite.tasks.readings import Readings
+from arc_suite.tasks.scene import Inputs, Scene, Start
 
 STEPS = 1000  # control steps of an episode
-
-# Fields of `MjModel` that an episode can have its own values of: masses, frictions, armatures and servos.
-CHANGEABLE = (
-    *("body_mass", "body_inertia", "body_ipos", "body_iquat", "pair_friction", "geom_friction"),
-    *("dof_armature", "jnt_actfrcrange", "actuator_gainprm", "actuator_biasprm", "actuator_gear"),
-)
 
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
 CURRICULUM = ("curriculum", "level")
 
 _CLEAR = 0.01  # of the standing height, by which a lift brings feet clear of the ground
-
-
-class Scene(NamedTuple):
-    """What a task is made for.
-
-    Attributes:
-        body: what moves.
-        arena: where.
-        layout: of the body in the simulation's arrays.
-        standing: (nq,) the pose in which it stands: torso position and quaternion, joint angles.
-        control_timestep: s between two actions.
-        substeps: of the simulation between them.
-        model: the fields of `MjModel` that `CHANGEABLE` names, as compiled.
-    """
-
-    body: Body
-    arena: Arena
-    layout: Layout
-    standing: np.ndarray
-    control_timestep: float
-    substeps: int
-    model: Mapping[str, np.ndarray]
-
-
-class Start(NamedTuple):
-    """How one episode starts; no leading axes.
-
-    Attributes:
-        qpos: (nq,) positions.
-        qvel: (nv,) velocities.
-        memory: numbers and arrays in a NamedTuple, which may hold NamedTuples in turn; replaced from step to step
-            and never written in place.
-        mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
-        model: fields of `MjModel` that differ in this episode, by name.
-    """
-
-    qpos: np.ndarray
-    qvel: np.ndarray
-    memory: Any
-    mocap_pos: np.ndarray | None = None
-    model: Mapping[str, np.ndarray] = types.MappingProxyType({})
-
-
-class Inputs(NamedTuple):
-    """What a control step writes into the simulation.
-
-    Attributes:
-        ctrl: (..., motors) in [-1, 1].
-        kick: (..., nv) added to qvel before the first substep; None for no kick.
-        force: (..., 3) on the torso's center of mass throughout the step, N, world; None for no force.
-    """
-
-    ctrl: np.ndarray
-    kick: np.ndarray | None = None
-    force: np.ndarray | None = None
 
 
 class Observed(ABC):
@@ -406,9 +345,14 @@ class Task(Observed):
         """Return the privileged observation's blocks, each (..., size), of `MjData` or anything with its fields."""
         return privileged.observed(self.scene, data)
 
-    def overruled(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
+    def read_back(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
         """Return those privileged blocks of one environment, each (size,), that changed fields of the model decide."""
         return {}
+
+    @property
+    def read_back_fields(self) -> tuple[str, ...]:
+        """The fields of the model that `read_back` takes."""
+        return ()
 
     def progress(self, memory) -> dict:
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""

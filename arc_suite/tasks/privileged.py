@@ -13,7 +13,7 @@ from arc_suite import rotations
 from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block, places
-from arc_suite.tasks.parts import ROTATIONS, Joints, Legs, Planar, Scalar, Vector
+from arc_suite.tasks.parts import ROTATIONS, Legs, Vector
 
 
 def blocks(body: Body) -> dict[str, Block]:
@@ -30,27 +30,6 @@ def blocks(body: Body) -> dict[str, Block]:
             )
         ),
         "ground": Block((Legs(body, "ground under the foot of {}", "h"),)),
-    }
-
-
-def blocks_of_modifiers(body: Body) -> dict[str, Block]:
-    """Return the blocks that modifiers add; see `randomization.Hidden` for those that an episode draws.
-
-    `strength` (joints): shares of the torque that motors give, 0 once they have failed. `kick` (2): change of the
-    torso's velocity by a kick in the latest step, forward and left. `force` (2): on the torso in the latest step, of
-    the body's weight.
-    """
-    return {
-        "friction": Block((Scalar("multiple of the friction"),)),
-        "mass": Block((Scalar("multiple of the mass"),)),
-        "payload": Block((Scalar("mass of the payload", "body's mass"), Vector("place of the payload", "h"))),
-        "center_of_mass": Block((Vector("displacement of the center of mass", "h"),)),
-        "joint_offset": Block((Joints(body, "offset of the sensor of {}", "rad"),)),
-        "gains": Block((Scalar("multiple of the stiffness"), Scalar("multiple of the damping"))),
-        "armature": Block((Scalar("multiple of the armatures"),)),
-        "strength": Block((Joints(body, "strength of {}", signed=False),)),
-        "kick": Block((Planar("kick", "sqrt(g h)"),)),
-        "force": Block((Planar("force", "weight"),)),
     }
 
 

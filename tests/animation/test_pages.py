@@ -20,7 +20,8 @@ from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.style import record
-from arc_suite.tasks.modifiers import FAILS_FROM
+from arc_suite.tasks.modifiers import Kicks
+from arc_suite.tasks.modifiers.motors import FAILS_FROM
 
 STEPS = 60
 
@@ -113,7 +114,7 @@ def test_obstacles_and_goals_come_along():
 def test_kicks_and_failed_legs_come_along():
     """Of any task: `walk` has no markers of its own."""
     found, environment = scenery_of("walk", {"kicks": 1.5, "actuator_failure": 2}, 130, "tuned")
-    first = environment.task.memory.changes.kick_steps[0]
+    first = environment.task.definition.state(environment.task.memory, Kicks).steps[0]
     kicked = [row for row, marks in enumerate(found["marks"], 1) if marks]
     assert kicked[0] == first and {style["shape"] for style in found["styles"]} == {"arrow"}
     leg = environment.task.body.legs[2]

@@ -72,9 +72,10 @@ def test_modifiers():
         observation, reward, *_ = envs.step(action)
         apart.append(abs(state.obs - observation).max(axis=0))
     ours, theirs = state.info["memory"].changes, envs._memory.changes
-    for name in ("elapsed", "strength", "delay", "noise_key"):
-        np.testing.assert_allclose(np.asarray(getattr(ours, name)), getattr(theirs, name), rtol=1e-6)
-    np.testing.assert_allclose(np.asarray(ours.waiting), theirs.waiting, atol=1e-6)
+    np.testing.assert_array_equal(np.asarray(ours.elapsed), theirs.elapsed)
+    assert len(ours.states) == len(theirs.states)
+    for one, other in zip(jax.tree.leaves(ours.states), jax.tree.leaves(theirs.states), strict=True):
+        np.testing.assert_allclose(np.asarray(one), other, rtol=1e-6, atol=1e-2)  # of angles and speeds
     assert np.median(apart[:5]) <= 1e-3
     assert np.median(apart) <= 0.02
     assert jax.tree.structure(ours) == jax.tree.structure(start(np.arange(WORLDS)).info["memory"].changes)

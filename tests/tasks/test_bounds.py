@@ -17,7 +17,7 @@ from arc_suite.tasks.ground import LEVELS
 LARGEST = parameters.LARGEST
 BOUNDS = {
     **parameters.BOUNDS,
-    **modifiers.BOUNDS,
+    **modifiers.bounds(),
     **terrain.SIZES,
     "difficulty": (0.0, 1.0),
     "level": (0, LEVELS - 1),
@@ -48,7 +48,7 @@ def values(task, name):
 
 @pytest.mark.parametrize("task", [pytest.param(task, marks=() if task in FEW else pytest.mark.long) for task in TASKS])
 def test_bounds_are_finite(task):
-    for name in (*TASKS[task].names(), "time_limit", *BOUNDS.keys() & set(modifiers.NAMES)):
+    for name in (*TASKS[task].names(), "time_limit", *BOUNDS.keys() & modifiers.MODIFIERS.keys()):
         for settings in values(task, name) if name not in NOT_NUMBERS else ():
             assert_finite(task, settings)
 

@@ -9,7 +9,8 @@ from tiers import tiers, turns
 import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.robots import ROBOTS, mirror
-from arc_suite.tasks import TASKS, mirrors, randomization
+from arc_suite.tasks import TASKS, mirrors
+from arc_suite.tasks.modifiers import Kicks, Motors, Pushes
 from arc_suite.tasks.sensors import RAYS, SCAN
 
 STEPS = 20
@@ -106,19 +107,23 @@ def test_what_modifiers_draw_has_a_mirror_image():
 
     def mirrored(random, stream):
         begun = start(random, stream)
-        own = begun.memory.changes
-        parts = {
-            name: kinds[name].mirror(image)(getattr(own.hidden, name)) for name in kinds.keys() & own.hidden._fields
-        }
-        own = own._replace(
-            hidden=own.hidden._replace(**parts),
-            strength=own.strength[image.joints],
-            failing=own.failing[image.joints],
-            kicks=own.kicks * drawn_alike,
-            pushes=own.pushes._replace(forces=own.pushes.forces * drawn_alike),
-        )
-        model = randomization.changed_model(task.scene, task.changes, own.hidden, {})
-        return begun._replace(memory=begun.memory._replace(changes=own), model=model)
+        model, states = {}, []
+        for change, state in zip(task.changes, begun.memory.changes.states, strict=True):
+            if state != ():
+                names = kinds.keys() & state._fields
+                state = state._replace(**{name: kinds[name].mirror(image)(getattr(state, name)) for name in names})
+            if isinstance(change, Motors):
+                state = state._replace(
+                    joint_strength=state.joint_strength[image.joints], failing=state.failing[image.joints]
+                )
+            if isinstance(change, Kicks):
+                state = state._replace(kicks=state.kicks * drawn_alike)
+            if isinstance(change, Pushes):
+                state = state._replace(forces=state.forces * drawn_alike)
+            model |= change.fields(task.scene, {**task.scene.model, **model}, state)
+            states.append(state)
+        changes = begun.memory.changes._replace(states=tuple(states))
+        return begun._replace(memory=begun.memory._replace(changes=changes), model=model)
 
     vars(task)["start"] = mirrored
     (observation, action), privileged = one.task.definition.symmetry, mirror_of_hidden(task)

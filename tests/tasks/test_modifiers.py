@@ -27,8 +27,21 @@ from arc_suite.models.outline import torso_box
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import load_body
-from arc_suite.tasks import TASKS, modified_task, noise, randomization
-from arc_suite.tasks.modifiers import NAMES
+from arc_suite.tasks import TASKS, modified_task, noise
+from arc_suite.tasks.modifiers import (
+    MODIFIERS,
+    Control,
+    Delay,
+    Kicks,
+    Masses,
+    Motors,
+    Pushes,
+    Sensors,
+    draws,
+    kicks,
+    motors,
+    pushes,
+)
 
 SPIDER = load_body("spider")
 BODIES = {**ROBOTS, "spider": SPIDER}
@@ -58,8 +71,19 @@ CASES = EACH | {"all": ALL}
 _TASKS = [*itertools.product(EACH, ["walk", "steer"]), *itertools.product(["all"], TASKS)]
 
 
+def state(environment, kind):
+    """The state of the modifier of a class."""
+    return environment.task.definition.state(environment.task.memory, kind)
+
+
+def settings_of(environment):
+    """The values of the settings of all modifiers."""
+    changes = environment.task.definition.changes
+    return {name: getattr(change, name) for change in changes for name in change.defaults}
+
+
 def test_every_modifier_is_tried():
-    assert set(EACH) == set(NAMES)
+    assert set(EACH) == set(MODIFIERS)
 
 
 # All at once in the fast tests, each by itself, on bodies in turn, in the slow ones.
@@ -147,7 +171,7 @@ GOLDEN += [5, 0.47232399628840227, 0.8414767148983973, 0.13111064234791392, 0.30
 
 
 def test_the_draws_are_these_in_this_order():
-    drawn = modified_task.draw(np.random.RandomState(7), 6)
+    drawn = draws.draw_from_stream(np.random.RandomState(7), 6)
     first = [*np.diff(drawn.kick_steps, prepend=0)[:5], *drawn.kick_sizes[:5], *drawn.kick_directions[:4]]
     last = [drawn.leg, drawn.strength, drawn.friction, drawn.mass, drawn.delay, drawn.noise_key]
     assert len(first + last) == 20
@@ -155,12 +179,12 @@ def test_the_draws_are_these_in_this_order():
 
 
 def test_later_draws_are_uniform_and_take_nothing_from_the_stream():
-    drawn = np.array([np.hstack(randomization.draw(key, 12)) for key in np.arange(4000) * 1_000_003 % 2**32])
+    drawn = np.array([np.hstack(draws.draw_by_key(key, 12)) for key in np.arange(4000) * 1_000_003 % 2**32])
     assert drawn.shape == (4000, 10 + 4 * 25 + 2 * 12)
     assert drawn.min() >= 0.0 and drawn.max() < 1.0
     assert_allclose(drawn.mean(axis=0), 0.5, atol=0.02)  # four standard deviations
     assert abs(np.corrcoef(drawn.T) - np.eye(134)).max() < 0.08
-    assert randomization.draw(7, 12).place.tolist() == randomization.draw(7, 18).place.tolist()
+    assert draws.draw_by_key(7, 12).place.tolist() == draws.draw_by_key(7, 18).place.tolist()
 
 
 def drawn_over(episodes, **settings):
@@ -182,7 +206,7 @@ def test_a_payload_is_as_if_a_small_ball_had_been_welded_on():
     torso, total, height = plain.body("torso").id, plain.body_mass.sum(), 0.5
     shares, places = [], []
     for environment in drawn_over(40, payload=(0.1, 0.5)):
-        model, (share, *place) = environment.physics.model.ptr, environment.task.memory.changes.hidden.payload
+        model, (share, *place) = environment.physics.model.ptr, state(environment, Masses).payload
         place, old = height * np.array(place), plain.body_ipos[torso]
         load_mass = model.body_mass[torso] - plain.body_mass[torso]
         assert load_mass == pytest.approx(share * total)
@@ -208,13 +232,13 @@ def test_each_episode_has_a_center_of_mass_an_armature_and_strengths_of_its_own(
     torso, found = plain.body("torso").id, []
     settings = {"center_of_mass": 0.1, "armature": (0.5, 2.0), "joint_strength": (0.4, 0.8), "motor_strength": 0.5}
     for environment in drawn_over(40, **settings):
-        model, own = environment.physics.model.ptr, environment.task.memory.changes
+        model, own = environment.physics.model.ptr, state(environment, Motors)
         moved = model.body_ipos - plain.body_ipos
         assert not np.delete(moved, torso, axis=0).any()
         armature = model.dof_armature[6:] / plain.dof_armature[6:]
         assert_allclose(armature, armature[0], rtol=1e-12)
         assert_array_equal(model.body_inertia, plain.body_inertia)
-        assert_array_equal(own.strength, 0.5 * own.hidden.joint_strength)
+        assert_array_equal(own.strength, 0.5 * own.joint_strength)
         found.append((*moved[torso] / 0.05, armature[0], *own.strength))
     low, high = np.min(found, axis=0), np.max(found, axis=0)
     bounds = np.array([(-1.0, 1.0)] * 3 + [(0.5, 2.0)] + [(0.2, 0.4)] * 12).T
@@ -226,7 +250,7 @@ def test_each_episode_has_a_center_of_mass_an_armature_and_strengths_of_its_own(
 @pytest.mark.parametrize("body", ["tick", imports.quadruped()], ids=["torques", "servos"])
 def test_joints_hold_where_their_displaced_sensors_say_so(body):
     environment = begun(body, "walk", joint_offset=0.1, actions="position", joint_angle_noise=0.0)
-    offsets = environment.task.memory.changes.hidden.joint_offset
+    offsets = state(environment, Sensors).joint_offset
     action = np.zeros(len(offsets))
     assert 0.05 < abs(offsets).max() <= 0.1
     for _ in range(60):
@@ -257,24 +281,24 @@ def test_a_stiffer_control_pulls_harder():
 def test_a_force_pushes_the_torso_for_its_time_and_begins_again():
     environment = begun("tick", "walk", force=0.5, time_limit=math.inf)
     task, memory, seen = environment.task.definition, environment.task.memory, {}
-    pushes = memory.changes.pushes
-    period = pushes.first[-1] + randomization.MOST_STEPS
+    schedule = state(environment, Pushes)
+    period = schedule.first[-1] + pushes.MOST_STEPS
     for step in range(1, 2 * int(period) + 1):
         memory, inputs = task.before(memory, np.zeros(18))
         assert inputs.kick is None and inputs.force.shape == (3,) and not inputs.force[2]
         if inputs.force.any():
             seen[step] = inputs.force[:2]
-    due = [step for start, end in zip(pushes.first, pushes.last, strict=True) for step in range(start, end + 1)]
+    due = [step for start, end in zip(schedule.first, schedule.last, strict=True) for step in range(start, end + 1)]
     assert list(seen) == [*due, *(step + period for step in due)]
-    assert {int(length) for length in pushes.last - pushes.first} == {0, 1, 2, 3}
-    pauses = np.diff(pushes.first, prepend=0)
+    assert {int(length) for length in schedule.last - schedule.first} == {0, 1, 2, 3}
+    pauses = np.diff(schedule.first, prepend=0)
     assert 40 <= pauses.min() < 50 and 100 < pauses.max() <= 120
-    sizes = np.hypot(*pushes.forces.T) / task.weight
+    sizes = np.hypot(*schedule.forces.T) / task.modifier(Pushes).weight
     assert sizes.min() > 0.0 and 0.4 < sizes.max() < 0.5
     for _ in range(due[0]):
         environment.step(np.zeros(18))
     applied = environment.physics.data.xfrc_applied
-    assert_array_equal(applied[1], [*pushes.forces[0], 0.0, 0.0, 0.0, 0.0])
+    assert_array_equal(applied[1], [*schedule.forces[0], 0.0, 0.0, 0.0, 0.0])
     assert not np.delete(applied, 1, axis=0).any()
     (arrow,) = kick_arrows(environment)
     way, push = (arrow.end - arrow.start)[:2], seen[due[0]]
@@ -286,20 +310,21 @@ def test_a_force_pushes_the_torso_for_its_time_and_begins_again():
 def test_kicks_change_the_velocity_of_the_torso_when_they_are_due_and_begin_again():
     environment = begun("tick", "walk", kicks=1.5, time_limit=math.inf)
     task, memory, seen = environment.task.definition, environment.task.memory, {}
-    for step in range(1, int(memory.changes.kick_steps[-1]) + 200):
+    schedule = state(environment, Kicks)
+    for step in range(1, int(schedule.steps[-1]) + 200):
         memory, inputs = task.before(memory, np.zeros(18))
         assert inputs.kick.shape == (24,) and not inputs.kick[2:].any()
         if inputs.kick.any():
             seen[step] = inputs.kick[:2]
-    period = memory.changes.kick_steps[-1]
-    due = [*memory.changes.kick_steps, *(period + memory.changes.kick_steps[: len(seen) - 25])]
+    period = schedule.steps[-1]
+    due = [*schedule.steps, *(period + schedule.steps[: len(seen) - 25])]
     assert len(seen) > 25 and list(seen) == due
-    assert_array_equal(list(seen.values())[:25], memory.changes.kicks)
-    assert_array_equal(list(seen.values())[25:], memory.changes.kicks[: len(seen) - 25])
-    sizes = np.hypot(*memory.changes.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
+    assert_array_equal(list(seen.values())[:25], schedule.kicks)
+    assert_array_equal(list(seen.values())[25:], schedule.kicks[: len(seen) - 25])
+    sizes = np.hypot(*schedule.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
     assert sizes.min() > 0.0 and sizes.max() < 1.5
     stronger = begun("tick", "walk", kicks=3.0)
-    assert_allclose(stronger.task.memory.changes.kicks, 2.0 * memory.changes.kicks, rtol=1e-15)
+    assert_allclose(state(stronger, Kicks).kicks, 2.0 * schedule.kicks, rtol=1e-15)
 
 
 def test_a_kick_is_on_the_torso_before_the_first_substep(monkeypatch):
@@ -312,12 +337,12 @@ def test_a_kick_is_on_the_torso_before_the_first_substep(monkeypatch):
         advance(nstep)
 
     monkeypatch.setattr(physics, "step", watched)
-    first = environment.task.memory.changes.kick_steps[0]
+    first = state(environment, Kicks).steps[0]
     for _ in range(first):
         after = physics.velocity().copy()
         environment.step(np.zeros(18))
     assert not np.any(changes[:-1])
-    assert_allclose(changes[-1], [*environment.task.memory.changes.kicks[0], *np.zeros(22)], atol=1e-15)
+    assert_allclose(changes[-1], [*state(environment, Kicks).kicks[0], *np.zeros(22)], atol=1e-15)
 
 
 @pytest.mark.parametrize("leg", [True, 0, 4])
@@ -328,9 +353,9 @@ def test_a_limp_leg_has_no_motors_from_step_40_on(leg):
     for step in range(60):
         environment.step(action)
         ctrl = environment.physics.data.ctrl
-        failing = environment.task.memory.changes.failing
+        failing = state(environment, Motors).failing
         assert_array_equal(ctrl, np.where(failing & (step >= 40), 0.0, action))
-    limp = np.flatnonzero(environment.task.memory.changes.failing)
+    limp = np.flatnonzero(state(environment, Motors).failing)
     assert len({names[index].rpartition("_")[0] for index in limp}) == 1 and len(limp) == 3
     if leg is not True:
         assert_array_equal(limp, [3 * leg, 3 * leg + 1, 3 * leg + 2])
@@ -345,12 +370,12 @@ def test_each_episode_draws_a_leg_a_strength_a_friction_and_a_delay_of_its_own()
     drawn = []
     for _ in range(60):
         environment.reset()
-        memory, model = environment.task.memory, environment.physics.model.ptr
-        own = memory.changes
+        model = environment.physics.model.ptr
+        own, delay = state(environment, Motors), state(environment, Delay).delay
         slide, weight = model.pair_friction / friction, (model.body_mass[1:] / mass[1:])
-        for values in (slide, weight, memory.changes.strength):
+        for values in (slide, weight, own.strength):
             assert_allclose(values, values.flat[0], rtol=1e-12)
-        drawn.append((own.failing.argmax(), own.delay, own.strength[0], slide[0, 0], weight[0]))
+        drawn.append((own.failing.argmax(), delay, own.strength[0], slide[0, 0], weight[0]))
     legs, delays, *found = zip(*drawn, strict=True)
     assert set(legs) == {0, 3, 6, 9} and set(delays) == {1, 2, 3}
     for values, (low, high) in zip(found, ranges.values(), strict=True):
@@ -418,12 +443,12 @@ def test_positions_are_held():
 def test_torques_have_positions_that_give_them():
     task, random = load("leaper", "walk", actions="position").task.definition, np.random.RandomState(0)
     angles, speeds, torques = (scale * random.uniform(-1, 1, (50, 12)) for scale in (0.5, 1.0, 1.0))
-    hidden = types.SimpleNamespace(gains=np.ones(2))
-    memory = types.SimpleNamespace(angles=angles, speeds=speeds, hidden=hidden)
-    action = task.positions(torques, angles, speeds)
+    control = task.modifier(Control)
+    held = types.SimpleNamespace(angles=angles, speeds=speeds, gains=np.ones(2))
+    action = control.positions(torques, angles, speeds)
     reached = abs(action) < 1.0
     assert reached.mean() > 0.5
-    assert_allclose(task.torques(memory, action)[reached], torques[reached], atol=1e-9)
+    assert_allclose(control.torques(held, action)[reached], torques[reached], atol=1e-9)
 
 
 def test_noise_is_uniform_and_depends_on_all_that_it_counts():
@@ -493,9 +518,9 @@ def test_named_environments_are_steer_with_modifiers_that_callers_can_change():
     for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"actuator_failure": True})):
         named, spelled = load("tick", name), load("tick", "steer", **settings)
         assert_array_equal(flat(named.reset()), flat(spelled.reset()))
-        assert named.task.definition.changes == spelled.task.definition.changes
-    changes = load("tick", "shoved", kicks=0.5, delay=1).task.definition.changes
-    assert (changes.kicks, changes.delay) == (0.5, (1, 1))
+        assert settings_of(named) == settings_of(spelled)
+    definition = load("tick", "shoved", kicks=0.5, delay=1).task.definition
+    assert (definition.modifier(Kicks).kicks, definition.modifier(Delay).delay) == (0.5, (1, 1))
 
 
 NUMBER, OR_TWO = "expected a number from 0 to 100", "or two of them, the lower first"
@@ -558,10 +583,10 @@ def kick_arrows(environment):
 @pytest.mark.parametrize("task", ["walk", "steer"])
 def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
     environment = begun("tick", task, kicks=1.5)
-    changes = environment.task.memory.changes
-    first, kick = changes.kick_steps[0], changes.kicks[0]
+    schedule = state(environment, Kicks)
+    first, kick = schedule.steps[0], schedule.kicks[0]
     shown = []
-    for _ in range(first + modified_task.SHOWN + 5):
+    for _ in range(first + kicks.SHOWN + 5):
         environment.step(np.zeros(18))
         shown.append(kick_arrows(environment))
         if len(shown) == first:
@@ -572,17 +597,17 @@ def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
             assert_allclose(off[:2] / np.hypot(*off[:2]), kick / np.hypot(*kick))  # it points at the torso
             height = environment.task.body.torso.standing_height
             assert np.linalg.norm(way) == pytest.approx(height * np.hypot(*kick) / math.sqrt(GRAVITY * height))
-    assert [len(arrows) for arrows in shown] == [0] * (first - 1) + [1] * modified_task.SHOWN + [0] * 6
+    assert [len(arrows) for arrows in shown] == [0] * (first - 1) + [1] * kicks.SHOWN + [0] * 6
 
 
 def test_a_leg_whose_motors_have_failed_is_dark():
     environment = begun("tick", "limp")
     before = environment.physics.render(60, 80, "profile")
     assert environment.task.failed_legs() == ()
-    for _ in range(modified_task.FAILS_FROM + 1):
+    for _ in range(motors.FAILS_FROM + 1):
         environment.step(np.zeros(18))
     (leg,) = environment.task.failed_legs()
-    failing = environment.task.memory.changes.failing
+    failing = state(environment, Motors).failing
     names = [name for name, fails in zip(environment.task.body.joint_names, failing, strict=True) if fails]
     assert names and all(name.startswith(leg) for name in names)
     assert not np.array_equal(environment.physics.render(60, 80, "profile"), before)

@@ -24,7 +24,7 @@ def deep(levels=3000):
 
 
 NONSENSE = {"nested": nested(), "deep": deep(), "long": "x" * 10**6, "many": [0] * 10**5, "object": object()}
-TOGETHER = ("time_limit", "arena", "on_divergence", "random", *modifiers.NAMES)
+TOGETHER = ("time_limit", "arena", "on_divergence", "random", *modifiers.MODIFIERS)
 
 
 def assert_one_line(error):

@@ -13,7 +13,8 @@ from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import privileged
-from arc_suite.tasks.modifiers import FAILS_FROM
+from arc_suite.tasks.modifiers import Kicks, Motors, Pushes
+from arc_suite.tasks.modifiers.motors import FAILS_FROM
 
 DRAWN = {"friction": (0.5, 1.0), "mass": (0.8, 1.2), "payload": (0.1, 0.3), "center_of_mass": 0.1}
 DRAWN |= {"joint_offset": 0.05, "joint_strength": (0.5, 1.0), "motor_strength": 0.8, "armature": (0.8, 1.2)}
@@ -95,17 +96,18 @@ def test_gains_of_servos_that_are_changed_are_there():
 
 def test_kicks_forces_and_failures_are_there_in_the_step_in_which_they_act():
     environment = begun("tick", "walk", kicks=1.0, force=0.4, actuator_failure=2)
-    height, own = ROBOTS["tick"].torso.standing_height, environment.task.memory.changes
-    first = int(own.kick_steps[0])
+    height, task = ROBOTS["tick"].torso.standing_height, environment.task.definition
+    kicks, pushes, motors = (task.state(environment.task.memory, kind) for kind in (Kicks, Pushes, Motors))
+    first = int(kicks.steps[0])
     assert not environment.task.privileged["kick"].any()
-    for step in range(1, max(first, FAILS_FROM, int(own.pushes.first[0])) + 1):
+    for step in range(1, max(first, FAILS_FROM, int(pushes.first[0])) + 1):
         environment.step(np.zeros(18))
         found, heading = environment.task.privileged, rotations.yaw(environment.physics.data.qpos[3:7])
-        kick = own.kicks[0] / (9.81 * height) ** 0.5 if step == first else np.zeros(2)
+        kick = kicks.kicks[0] / (9.81 * height) ** 0.5 if step == first else np.zeros(2)
         assert_allclose(found["kick"], rotations.headed(kick, heading), atol=1e-12)
-        force = environment.physics.data.xfrc_applied[1, :2] / environment.task.definition.weight
+        force = environment.physics.data.xfrc_applied[1, :2] / task.modifier(Pushes).weight
         assert_allclose(found["force"], rotations.headed(force, heading), atol=1e-12)
-        assert_array_equal(found["strength"] == 0.0, own.failing & (step > FAILS_FROM))
+        assert_array_equal(found["strength"] == 0.0, motors.failing & (step > FAILS_FROM))
     assert found["force"].any() or found["kick"].any()
 
 

@@ -70,7 +70,7 @@ def test_the_page_of_a_task_is_complete(name):
 
 def test_the_page_of_settings_names_every_modifier():
     page = reference.settings_page()
-    assert all(row(page, f"`{name}`")[-1] for name in (*modifiers.NAMES, "time_limit", "arena", "random"))
+    assert all(row(page, f"`{name}`")[-1] for name in (*modifiers.MODIFIERS, "time_limit", "arena", "random"))
 
 
 BOUNDED = [

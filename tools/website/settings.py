@@ -12,7 +12,7 @@ from arc_suite.tasks.command import Schedule
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.gait_and_pose import GaitAndPose
 from arc_suite.tasks.ground import LEVELS, Lanes, Level
-from arc_suite.tasks.modifiers import Modifiers
+from arc_suite.tasks.modifiers import OWN
 from arc_suite.tasks.parameters import Noise, Parameters
 from website import markdown
 
@@ -32,14 +32,15 @@ _MEANINGS = {
 MEANINGS = {
     **{
         name: text
-        for kind in (Parameters, Noise, walk.WalkSettings, Schedule, GaitAndPose, Level, Lanes, Modifiers)
+        for kind in (Parameters, Noise, walk.WalkSettings, Schedule, GaitAndPose, Level, Lanes)
         for name, text in markdown.fields(kind).items()
     },
+    **{name: markdown.fields(kind)[name] for kind in OWN for name in kind.defaults},
     **_MEANINGS,
 }
 _BOUNDS = {
     **parameters.BOUNDS,
-    **modifiers.BOUNDS,
+    **modifiers.bounds(),
     **terrain.SIZES,
     "poses": (0.0, 1.0),
     "difficulty": (0.0, 1.0),
@@ -58,8 +59,8 @@ def of_task(kind: type[Task]) -> str:
 
 def of_all_tasks() -> str:
     """Return the table of the settings that every task has."""
-    names = ("random", "time_limit", "arena", "on_divergence", *modifiers.NAMES)
-    defaults = {"": {name: default for name, default in Modifiers()._asdict().items()}}
+    defaults = {"": {name: default for kind in OWN for name, default in kind.defaults.items()}}
+    names = ("random", "time_limit", "arena", "on_divergence", *defaults[""])
     return table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in names))
 
 
@@ -81,5 +82,5 @@ def bounds(name: str) -> str:
 def _defaults(task: Task) -> dict[str, Any]:
     given = task.settings
     found = {**given.parameters._asdict(), **given.noise._asdict(), **given._asdict()}
-    parts = (vars(found[name]) for name in ("ground", "command") if name in found)
+    parts = (vars(found[name]) for name in ("ground", "command", "gait_and_pose") if found.get(name))
     return {**found, **{name: value for part in parts for name, value in part.items()}, "weights": "see Reward"}

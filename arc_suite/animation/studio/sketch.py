@@ -41,7 +41,7 @@ class Sketch:
         gait: name of the gait, or `OWN`.
         speed: target velocity, as a multiple of the body's own.
         ground: name of an arena; ignored by a task that has its own.
-        kicks: see `modifiers.Modifiers`.
+        kicks: see `modifiers.Kicks`.
         settings: further settings of the task, as the text of a JSON object.
         policy: see `policies.policy`.
         preset: of the demonstrator, or `OWN`.

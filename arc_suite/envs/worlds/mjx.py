@@ -23,8 +23,8 @@ from arc_suite.envs.prepare import prepared
 from arc_suite.envs.worlds import starts
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import device, pictures
-from arc_suite.tasks import overruled, terms
 from arc_suite.tasks import privileged as seen
+from arc_suite.tasks import terms
 from arc_suite.tasks.contract import Inputs
 
 _MOST_ENVS = 1 << 20
@@ -217,9 +217,10 @@ class Env:
 
         Fields that wrappers have changed for good hold in place of what was drawn.
         """
-        pairs = {name: (getattr(self._mjx_model, name), getattr(self._compiled, name)) for name in overruled.FIELDS}
-        changed = {name: new for name, (new, old) in pairs.items() if new is not old and name not in model}
-        return seen.vector(self.task, {**blocks, **self.task.overruled(blocks, changed)}, jnp.float32)
+        names = [name for name in self.task.read_back_fields if name not in model]
+        pairs = {name: (getattr(self._mjx_model, name), getattr(self._compiled, name)) for name in names}
+        changed = {name: new for name, (new, old) in pairs.items() if new is not old}
+        return seen.vector(self.task, {**blocks, **self.task.read_back(blocks, changed)}, jnp.float32)
 
     def _step(self, state: WorldState, action) -> WorldState:
         task, info, before = self.task, state.info, state.data

@@ -1,15 +1,20 @@
-"""Domain randomization in the form of MuJoCo Playground: fields of the model that differ from world to world."""
+"""Domain randomization in the form of MuJoCo Playground: fields of the model that differ from world to world.
+
+Modifiers draw for each episode, on the host, from streams of seeds. Here a trainer of another package gives keys of
+JAX, and keeps what is drawn for all episodes. So the fields are shared with the modifiers, and the draws are not.
+"""
 
 from collections.abc import Callable
 
 import jax
 
 from arc_suite import checks
+from arc_suite.tasks.modifiers.contacts import FRICTIONS
 
 # Fields of the model that each range multiplies. Others would need constants that MuJoCo derives from them, as mass
 # does: that is a setting of every task.
 _FIELDS = {
-    "friction": ("pair_friction", "geom_friction"),
+    "friction": FRICTIONS,
     "motor_strength": ("actuator_gear",),
     "damping": ("dof_damping",),
 }

@@ -11,6 +11,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.algorithms import ALGORITHMS
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.policies import network
+from arc_suite.tasks.modifiers import Kicks
 
 STEER = Setup.of("tick", "steer", {"time_limit": 1.0})
 SMALL = {"network": "perceptron", "num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 1, "hidden": 16}
@@ -120,7 +121,7 @@ def test_environments_of_training_have_its_settings(begun):
     agent = begun(SMALL, training=KICKS)
     agent.advance()
     environment = agent.collector.environment
-    assert environment.task.definition.changes.kicks == 1.5
+    assert environment.task.definition.modifier(Kicks).kicks == 1.5
 
 
 def test_a_critic_sees_privileged_blocks_and_the_policy_does_not(begun):

@@ -1,0 +1,136 @@
+"""Masses: of all parts, of a payload, and where the torso's mass lies."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from arc_suite.models.outline import torso_box
+from arc_suite.models.standing import standing
+from arc_suite.robots.spec import Body
+from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.inertia import Inertia
+from arc_suite.tasks.modifiers.draws import Episode, within
+from arc_suite.tasks.modifiers.modifier import Modifier
+from arc_suite.tasks.parts import Scalar, Vector
+from arc_suite.tasks.scene import Scene
+
+_MASSES = ("body_mass", "body_inertia")
+_INERTIA = ("body_mass", "body_ipos", "body_inertia", "body_iquat")  # in the order of `Inertia`
+
+
+class MassesState(NamedTuple):
+    """What an episode draws of masses.
+
+    Attributes:
+        mass: (..., 1) multiple.
+        payload: (..., 4) its mass, a share of the body's, and its place in the torso's frame, h.
+        center_of_mass: (..., 3) displacement in the torso's frame, h.
+    """
+
+    mass: np.ndarray
+    payload: np.ndarray
+    center_of_mass: np.ndarray
+
+
+class _MassesFields(NamedTuple):
+    mass: tuple[float, float]
+    payload: tuple[float, float]
+    center_of_mass: float
+
+
+class Masses(_MassesFields, Modifier):
+    """Masses of the body.
+
+    Attributes:
+        mass: multiple of mass and inertia of all parts, or two of them.
+        payload: mass of a load as a share of the body's, or two of them; its place, uniform in the box around
+            the torso, is drawn.
+        center_of_mass: the greatest displacement of the torso's center of mass along each axis, h.
+    """
+
+    __slots__ = ()
+
+    defaults = {"mass": (1.0, 1.0), "payload": (0.0, 0.0), "center_of_mass": 0.0}
+    bounds = {"mass": (0.01, 100.0), "payload": (0.0, 10.0), "center_of_mass": (0.0, 1.0)}
+    read_back_fields = ("body_mass", "body_ipos")
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
+        """Return the modifier that settings ask for."""
+        mass, payload = cls.check_span("mass", settings), cls.check_span("payload", settings)
+        return cls(mass, payload, cls.check_number("center_of_mass", settings))
+
+    @property
+    def is_active(self) -> bool:
+        """Whether steps have to call it: never, as the model holds it."""
+        return False
+
+    def draw(self, episode: Episode) -> MassesState:
+        """Return the masses of the episode."""
+        body, keyed = episode.scene.body, episode.keyed
+        low, high = (corner / body.torso.standing_height for corner in torso_box(body))
+        share, place = within(self.payload, keyed.payload), within((low, high), keyed.place)
+        return MassesState(
+            mass=np.array([within(self.mass, episode.stream.mass)]),
+            payload=np.array([share, *place]),
+            center_of_mass=self.center_of_mass * (2.0 * keyed.center - 1.0),
+        )
+
+    def fields(self, scene: Scene, model: Mapping[str, Any], state: MassesState) -> dict[str, Any]:
+        """Return the masses and inertias of the model."""
+        fields = {}
+        if self.mass != (1.0, 1.0):
+            fields = {name: state.mass[0] * model[name] for name in _MASSES}
+        if self.payload != (0.0, 0.0) or self.center_of_mass:
+            fields |= _change_torso(scene, state, {**model, **fields})
+        return fields
+
+    def privileged_blocks(self, body: Body) -> dict[str, Block]:
+        """Return the blocks `mass`, `payload` and `center_of_mass`."""
+        return {
+            "mass": Block((Scalar("multiple of the mass"),)),
+            "payload": Block((Scalar("mass of the payload", "body's mass"), Vector("place of the payload", "h"))),
+            "center_of_mass": Block((Vector("displacement of the center of mass", "h"),)),
+        }
+
+    def privileged(self, state: MassesState, elapsed, heading) -> dict[str, Any]:
+        """Return what was drawn."""
+        return state._asdict()
+
+    def read_back(self, scene: Scene, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the multiple of the legs' mass, the payload, and the displacement of the torso's center of mass.
+
+        What the torso weighs in addition is the payload, in the torso's center of mass.
+        """
+        if not any(name in fields for name in self.read_back_fields):
+            return {}
+        xp, height = blocks["mass"].__array_namespace__(), scene.body.torso.standing_height
+        torso, legs = scene.layout.torso, np.arange(len(scene.model["body_mass"]))[scene.layout.parts][1:]
+        own, place, whole = scene.model["body_mass"][torso], scene.model["body_ipos"][torso], standing(scene.body).mass
+        payload = whole * blocks["payload"][:1]
+        moment = own * (place + height * blocks["center_of_mass"]) + payload * height * blocks["payload"][1:]
+        center, multiple = moment / (own + payload), blocks["mass"]
+        if "body_mass" in fields:
+            multiple = fields["body_mass"][legs].sum(keepdims=True) / scene.model["body_mass"][legs].sum()
+            payload = fields["body_mass"][[torso]] / multiple - own
+        center = fields["body_ipos"][torso] if "body_ipos" in fields else center
+        return {
+            "mass": multiple,
+            "payload": xp.concatenate([payload / whole, center / height]),
+            "center_of_mass": (center - place) / height,
+        }
+
+
+def _change_torso(scene: Scene, state: MassesState, model: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the masses with a payload on the torso, and its center of mass moved."""
+    part, height = scene.layout.torso, scene.body.torso.standing_height
+    fields = {name: model[name].copy() for name in _INERTIA}
+    torso = Inertia(*(fields[name][part] for name in _INERTIA))
+    torso = torso._replace(center=torso.center + height * state.center_of_mass)
+    share, place = state.payload[0], state.payload[1:]
+    if share > 0.0:
+        torso = torso.with_point(share * state.mass[0] * standing(scene.body).mass, height * place)
+    for name, value in zip(_INERTIA, torso, strict=True):
+        fields[name][part] = value
+    return fields

@@ -1,0 +1,92 @@
+"""Noise of what is observed."""
+
+from collections.abc import Hashable, Mapping
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from arc_suite import checks
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import noise
+from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.modifiers.draws import Episode
+from arc_suite.tasks.modifiers.excluded_blocks import check_excluded
+from arc_suite.tasks.modifiers.modifier import Modifier
+
+
+class NoiseState(NamedTuple):
+    """From what the noise of an episode follows.
+
+    Attributes:
+        key: (..., 1) uint32.
+    """
+
+    key: np.ndarray
+
+
+class _ObservationNoiseFields(NamedTuple):
+    observation_noise: Mapping[str, float]
+    widths: Mapping[str, np.ndarray]
+    places: Mapping[str, slice]
+    total: int
+
+
+class ObservationNoise(_ObservationNoiseFields, Modifier):
+    """Uniform noise on what is measured.
+
+    Attributes:
+        observation_noise: level of uniform noise on what is measured, for all blocks that declare
+            `noise`, or by the name of a block.
+        widths: half-widths (size,) of the noise of each block that has some, by name.
+        places: where its noise lies among that of all blocks, by name.
+        total: how many numbers are drawn in a step.
+    """
+
+    __slots__ = ()
+
+    defaults = {"observation_noise": {}}
+    bounds = {"observation_noise": (0.0, 100.0)}
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
+        """Return the modifier that settings ask for."""
+        noisy = {name: block for name, block in blocks.items() if block.noise is not None}
+        levels = cls._check_levels(settings["observation_noise"], noisy)
+        excluded = check_excluded(settings["exclude_blocks"], blocks)
+        widths, places, last = {}, {}, 0
+        for name, block in noisy.items():
+            first, last = last, last + block.size
+            if levels.get(name) and name not in excluded:
+                widths[name], places[name] = levels[name] * block.widths, slice(first, last)
+        return cls(levels, widths, places, max((place.stop for place in places.values()), default=0))
+
+    @classmethod
+    def _check_levels(cls, value, noisy: Mapping[str, Block]) -> dict[str, float]:
+        levels = value if isinstance(value, Mapping) else dict.fromkeys(noisy, value)
+        return {
+            checks.name(name, list(noisy), "block with noise"): checks.number(
+                "observation_noise", level, *cls.bounds["observation_noise"]
+            )
+            for name, level in levels.items()
+        }
+
+    @property
+    def is_active(self) -> bool:
+        """Whether a block has noise."""
+        return bool(self.places)
+
+    @property
+    def structure(self) -> Hashable:
+        """The names of the blocks that have some."""
+        return tuple(self.places)
+
+    def draw(self, episode: Episode) -> NoiseState:
+        """Return the key of the episode."""
+        return NoiseState(np.array([episode.stream.noise_key], np.uint32))
+
+    def observe(self, state: NoiseState, observed: dict, elapsed) -> dict[str, Any]:
+        """Return the blocks with the noise of the step."""
+        numbers = noise.noise(state.key, elapsed, self.total)
+        return observed | {
+            name: observed[name] + width * numbers[..., self.places[name]] for name, width in self.widths.items()
+        }
