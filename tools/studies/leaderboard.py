@@ -1,31 +1,34 @@
-"""The leaderboard: a table of all studies and entries, and its page.
+"""The leaderboard: a table of all committed studies, and its page.
 
-studies/leaderboard.csv     rows of studies, by `report.write`, and of entries, by `enter`
-studies/entries             the entries
+studies/leaderboard.csv     rows of all studies
 studies/README.md           the page
 """
 
+import hashlib
 import json
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from arc_suite import files
-from arc_suite.evaluation import anchors, provenance
-from arc_suite.learning.studies import csv_files
-from arc_suite.learning.studies.entries import Entry
+from arc_suite.learning.studies import csv_files, report, results
+from arc_suite.learning.studies.tables import Run
+from arc_suite.learning.studies.text_tables import table
+from studies import catalog
 
-PAGE, TABLE, ENTRIES = "README.md", "leaderboard.csv", "entries"
-STYLE = ("gait compliance", "heading error, rad", "torso pitch, rad")
+PAGE, TABLE = "README.md", "leaderboard.csv"
+STYLE = {
+    "gait compliance": "gait_compliance",
+    "heading error, rad": "heading_error",
+    "torso pitch, rad": "torso_pitch",
+}
 HEADS = (
     *("robot, task", "algorithm", "phases, updates", "prior data, episodes", "seeds", "return", "score", "IQM [95 %]"),
     *("metric", *STYLE, "steps", "CPU min", "notes", "study", "command of seed 0", "configuration"),
 )
-_NAME = re.compile(r"[\w.-]+")
 _TEXT = (
-    "All committed studies, written by `arc-suite study NAME --report`, and entries, written by `arc-suite enter`. "
+    "All committed studies, written by `python tools/study.py NAME --report`. "
     "Return: mean over 100 episodes of the latest policy, unless noted. Score: (return - standing still) / (best "
     "demonstrator - standing still). IQM: interquartile mean with 95 % bootstrap interval over seeds; a single seed "
     "has none. Then the task's own metric, speed in m/s; headings are relative to the x axis, which is not the "
@@ -34,107 +37,80 @@ _TEXT = (
 )
 
 
-def write(studies: Path, study: str, lines: Iterable[dict[str, str]]) -> None:
-    """Replace the lines of a study, and write the page.
+def write(studies: Path) -> None:
+    """Write the table and the page of the studies in a folder.
 
     Args:
-        studies: folder of the leaderboard.
-        study: its name.
-        lines: cells by `HEADS`.
+        studies: folder with the tables of each study in a folder of its name.
 
     Raises:
-        ValueError: a damaged table.
-        OSError: a file cannot be written.
+        ValueError: a folder with the name of no study, or a damaged table.
+        OSError: a file cannot be read or written.
     """
-    _write(studies, [*(line for line in csv_files.read(studies / TABLE, HEADS) if line["study"] != study), *lines])
-
-
-def _write(studies: Path, lines: Iterable[dict[str, str]]) -> None:
-    lines = sorted(lines, key=lambda line: line["study"].partition("/")[0])
-    csv_files.write(studies / TABLE, HEADS, lines)
-    heads = HEADS[:-1]  # the configuration only tells lines apart
-    page = table(heads, [[(line | {"study": link(line)})[head] for head in heads] for line in ranked(lines)])
+    names = sorted(path.parent.name for path in studies.glob(f"*/{results.RUNS}"))
+    rows = [row for name in names for row in study_rows(name, studies / name)]
+    csv_files.write(studies / TABLE, HEADS, rows)
+    heads = HEADS[:-1]  # the configuration only tells rows apart
+    page = table(heads, [[(row | {"study": link(row)})[head] for head in heads] for row in ranked(rows)])
     files.write(studies / PAGE, f"# Leaderboard\n\n{_TEXT}\n\n{page}\n")
 
 
-def ranked(lines: Iterable[dict[str, str]]) -> list[dict[str, str]]:
-    """Return each configuration once, with the most seeds, by robot and task, and then by return."""
-    once: dict[str, dict[str, str]] = {}
-    for line in lines:
-        known = once.get(line["configuration"])
-        if known is None or int(line["seeds"]) > int(known["seeds"]):
-            once[line["configuration"]] = line
-    return sorted(once.values(), key=lambda line: (line["robot, task"], -float(line["return"])))
-
-
-def link(line: Mapping[str, str], folder: str = "") -> str:
-    """Return the link from a page to the report of a line, or to its entry; `folder` is the way to the studies."""
-    study = line["study"]
-    return f"[entry]({folder}{study})" if study.startswith(f"{ENTRIES}/") else f"[{study}]({folder}{study}/{PAGE})"
-
-
-def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> Path:
-    """Add checked entries to the leaderboard; entries of the same name, robot and task are replaced.
+def study_rows(name: str, published: Path) -> list[dict[str, str]]:
+    """Return the rows of a study, one for each kind of run in a place: cells by `HEADS`.
 
     Args:
-        source: file of the entries, which is copied.
-        name: of the algorithm.
-        entries: of the file.
-        studies: folder of the leaderboard.
-
-    Returns:
-        The page.
+        name: of the study.
+        published: folder of its tables.
 
     Raises:
-        ValueError: a name of other characters than letters, digits, `_`, `-` and `.`.
+        ValueError: an unknown study, or a damaged table.
+        OSError: a table cannot be read.
     """
-    checked_name(name)
-    folder = files.folder(studies / ENTRIES)
-    lines: dict[str, dict[str, str]] = {}
-    for entry in entries:
-        copied = folder / f"{entry.setup.body.name}-{entry.setup.kind.name}-{name}.json"
-        files.write(copied, source.read_text(encoding="utf-8"))
-        totals = np.array([episode.total for episode in entry.episodes])
-        score = float(anchors.anchors(entry.setup).score(totals.mean()))
-        figures = {key: np.mean([each.progress[key] for each in entry.episodes]) for key in entry.episodes[0].progress}
-        figure = next(iter(figures))
-        lines[copied.name] = dict.fromkeys(HEADS, "-") | {
-            "robot, task": str(entry.setup),
-            "algorithm": name,
-            "seeds": "1",
-            "return": f"{totals.mean():.1f}",
-            "score": f"{score:z.2f}" if np.isfinite(score) else "-",
-            "metric": f"{figure} {figures[figure]:.3f}",
-            STYLE[0]: f"{figures['gait_compliance']:.3f}" if "gait_compliance" in figures else "-",
-            "notes": "-" if entry.training_seeds is not None else provenance.UNKNOWN,
-            "study": f"{ENTRIES}/{copied.name}",
-            "command of seed 0": _command(entry),
-            "configuration": copied.name,
+    groups = results.grouped(results.results(catalog.study(name).runs, published))
+    demonstrators = results.demonstrators(published)
+    rows = []
+    for _, _, seeds in report.by_kind(groups):
+        run, values = seeds[0].run, results.scores(seeds)
+        phase_updates = getattr(run.configuration.hyperparameters, "phase_updates", 0)
+        metric = next(iter(seeds[0].progress))
+        cells = {
+            "robot, task": run.place,
+            "algorithm": run.kind,
+            "phases, updates": f"{phase_updates:,}" if phase_updates else "-",
+            "prior data, episodes": f"{run.prior.preset}, {run.prior.episodes:,}" if run.prior else "-",
+            "seeds": str(len(seeds)),
+            "return": f"{values.mean():.1f}",
+            "score": report.score_text(values, run.place, demonstrators),
+            "IQM [95 %]": report.iqm_text(values),
+            "metric": f"{metric} {np.mean([np.mean(each.progress[metric]) for each in seeds]):.3f}",
+            **{head: report.style_text(name_of_metric, seeds) for head, name_of_metric in STYLE.items()},
+            "steps": f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}",
+            "CPU min": f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}",
+            "notes": results.notes(seeds),
+            "study": name,
+            "command of seed 0": f"`{run.configuration.command}`",
+            "configuration": _hash_without_seed(run),
         }
-    others = [line for line in csv_files.read(studies / TABLE, HEADS) if line["configuration"] not in lines]
-    _write(studies, [*others, *lines.values()])
-    return studies / PAGE
+        rows.append(cells)
+    return rows
 
 
-def checked_name(name: str) -> str:
-    """Return the name of a learner.
-
-    Raises:
-        ValueError: it has other characters than letters, digits, `_`, `-` and `.`.
-    """
-    if not _NAME.fullmatch(name):
-        raise ValueError(f"--name={name}: expected letters, digits, _, - and .")
-    return name
+def _hash_without_seed(run: Run) -> str:
+    """Return a hash of a run's configuration without its seed: runs that differ in nothing else have the same."""
+    fields = {name: value for name, value in run.configuration.to_dict().items() if name != "seed"}
+    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def table(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in (heads, ["---"] * len(heads), *lines))
+def ranked(rows: Iterable[dict[str, str]]) -> list[dict[str, str]]:
+    """Return each configuration once, with the most seeds, by robot and task, and then by return."""
+    once: dict[str, dict[str, str]] = {}
+    for row in rows:
+        known = once.get(row["configuration"])
+        if known is None or int(row["seeds"]) > int(known["seeds"]):
+            once[row["configuration"]] = row
+    return sorted(once.values(), key=lambda row: (row["robot, task"], -float(row["return"])))
 
 
-def _command(entry: Entry) -> str:
-    setup = entry.setup
-    settings = [f"--set={name}={json.dumps(value)}" for name, value in setup.task_kwargs.items()]
-    words = ["arc-suite evaluate", f"--robot={setup.body.name}", f"--task={setup.task}", f"--policy={entry.policy}"]
-    settings += [f"--preset={entry.preset}"] * (entry.preset is not None)
-    return f"`{' '.join([*words, *settings])}`"
+def link(row: Mapping[str, str], studies: str = "") -> str:
+    """Return the link from a page to the report of a row; `studies` is the way to the folder of all studies."""
+    return f"[{row['study']}]({studies}{row['study']}/{report.REPORT})"

@@ -1,97 +1,65 @@
-"""The leaderboard takes entries of others after playing them again, and own studies."""
+"""The leaderboard is made of all committed studies."""
 
-import json
+import pathlib
+import shutil
 
-import programs
 import pytest
+from published_tables import constant, publish
+from refusals import refused
 
-from arc_suite.learning.studies import leaderboard
+from arc_suite.learning.studies import results
+from arc_suite.learning.studies.tables import Study, run
+from studies import catalog, leaderboard, reports
 
-
-@pytest.fixture(scope="module")
-def entry(tmp_path_factory):
-    """A file that `arc-suite evaluate --json` wrote: episodes of some thirty steps."""
-    path = tmp_path_factory.mktemp("entry") / "entry.json"
-    programs.passed(programs.arc_suite("evaluate", "--robot=tick", "--policy=random", f"--json={path}"))
-    return path
-
-
-def enter(folder, entry, *arguments):
-    return programs.arc_suite("enter", entry, *arguments, cwd=folder)
+COMMITTED = pathlib.Path(__file__).parents[3] / "studies"
+NAMES = sorted(path.parent.name for path in COMMITTED.glob(f"*/{results.RUNS}"))
 
 
-def test_an_entry_is_played_again_and_added(entry, tmp_path):
-    for name in ("noise", "noise", "more"):  # the second replaces the first
-        out = programs.passed(enter(tmp_path, entry, f"--name={name}"))
-    mean = json.loads(entry.read_text())["robots"]["tick"]["return"]["mean"]
-    assert out == f"tick, walk: more, return {mean:.1f}, all episodes equal\nwrote studies/README.md\n"
-    rows = [line for line in (tmp_path / "studies" / "README.md").read_text().splitlines() if line.startswith("| tick")]
-    assert [row.split(" | ")[1] for row in rows] == ["noise", "more"]
-    assert f" | {mean:.1f} | " in rows[0] and "[entry](entries/tick-walk-noise.json)" in rows[0]
-    assert (tmp_path / "studies" / "entries" / "tick-walk-noise.json").read_text() == entry.read_text()
+def test_the_leaderboard_holds_each_configuration_once(tmp_path, monkeypatch):
+    """The row with more seeds; phases tell two configurations of one algorithm apart."""
+    phases = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
+    few, many = (run("tick", "sac", 1_000_000),), tuple(run("tick", "sac", 1_000_000, seed) for seed in range(2))
+    other = (
+        *many,
+        run("tick", "speq", 1_000_000),
+        run("tick", "speq", 1_000_000, hyperparameters=phases, label="speq-short"),
+    )
+    for name, runs in (("a", few), ("b", other)):
+        for each in runs:
+            publish(tmp_path / name, each, constant(100.0, 200.0))
+        monkeypatch.setitem(catalog.STUDIES, name, Study(name, runs))
+    leaderboard.write(tmp_path)
+    page = (tmp_path / "README.md").read_text()
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| tick")]
+    assert sorted((row[1], row[2], row[4], row[15]) for row in rows) == [
+        ("sac", "-", "2", "[b](b/README.md)"),
+        ("speq", "75,000", "1", "[b](b/README.md)"),
+        ("speq-short", "7,500", "1", "[b](b/README.md)"),
+    ]
+    assert all("204.5" in row for row in rows), "the mean of the latest returns, one seed or two"
 
 
-def test_rows_of_studies_stay(entry, tmp_path):
-    cells = dict.fromkeys(leaderboard.HEADS, "-")
-    cells |= {"robot, task": "tick, walk", "algorithm": "own", "seeds": "1", "return": "99.0"}
-    for study in ("mine", "others", "mine"):  # the third replaces the first
-        leaderboard.write(tmp_path / "studies", study, [cells | {"study": study, "configuration": study}])
-    programs.passed(enter(tmp_path, entry, "--name=noise"))
-    page = (tmp_path / "studies" / "README.md").read_text()
-    assert page.count("| tick, walk | own | ") == 2 and "| [mine](mine/README.md) |" in page
-    assert page.index("| tick, walk | own | ") < page.index("| tick, walk | noise | ")  # the higher return first
+def test_a_folder_of_no_study_is_refused(tmp_path):
+    publish(tmp_path / "shrt", run("tick", "sac", 1_000_000), constant(100.0))
+    with refused("unknown study 'shrt'; did you mean 'short'? (there are: paper, ", begins=True):
+        leaderboard.write(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["shrt"]
 
 
-def _changed(report, *keys, value):
-    for key in keys[:-1]:
-        report = report[key]
-    report[keys[-1]] = value
+def test_the_committed_leaderboard_is_made_of_committed_tables(tmp_path):
+    for name in NAMES:
+        shutil.copytree(COMMITTED / name, tmp_path / name)
+    leaderboard.write(tmp_path)
+    for name in (leaderboard.PAGE, leaderboard.TABLE):
+        assert (tmp_path / name).read_text() == (COMMITTED / name).read_text(), name
 
 
-@pytest.mark.parametrize(
-    ("keys", "value", "message"),
-    [
-        (("versions", "mujoco"), "3.0.0", "versions: the file says "),
-        (("policy_sha256",), "00", 'policy_sha256: the file says "00", and here it is null'),
-        (("robots", "tick", "preset"), ["medium"], "unknown preset "),
-        (("policy",), "os:system", "policy 'os:system': expected --policy with its file, got none"),
-        (("seed",), 5, "expected episodes from seed 0, got 5"),
-        (("robots", "tick", "provenance", "task_sha256"), "00", 'task_sha256: the file says "00", and here it is '),
-        (("robots", "tick", "provenance", "body_sha256"), "00", 'body_sha256: the file says "00", and here it is '),
-        (("robots", "tick", "provenance", "task"), "nowhere:stroll", "task 'nowhere:stroll': files import nothing; "),
-        (("robots", "tick", "provenance"), [], "no entry: provenance: expected a mapping of names to values, got []"),
-        (("robots", "tick", "episodes"), [], "expected 100 episodes of tick, got 0; evaluate without --episodes\n"),
-        (("policy",), "mine:make", 'policy: the file says "mine:make", and here it is "random"\n'),
-        (("robots", "tick", "episodes", 3, "total"), 3999.0, "returns of tick: the file says ["),
-        (("robots",), {}, "expected robots, got none"),
-    ],
-)
-def test_what_differs_is_one_line_and_enters_nothing(entry, tmp_path, keys, value, message):
-    report = json.loads(entry.read_text())
-    _changed(report, *keys, value=value)
-    (tmp_path / "entry.json").write_text(json.dumps(report))
-    done = enter(tmp_path, "entry.json", "--name=noise", *["--policy=random"][: value == "mine:make"])
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith(f"arc-suite enter: entry.json: {message}") and done.stderr.count("\n") == 1
-    assert not (tmp_path / "studies").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((), "expected a file that arc-suite evaluate --json wrote; see --help"),
-        (("none.json",), "cannot read none.json: no such file or directory"),
-        (("text.json",), "text.json: no entry: "),
-        (("list.json",), "list.json: no entry: entry: expected a mapping of names to values, got []"),
-    ],
-)
-def test_what_is_no_entry_is_one_line(tmp_path, arguments, message):
-    (tmp_path / "text.json").write_text("text")
-    (tmp_path / "list.json").write_text("[]")
-    done = programs.arc_suite("enter", *arguments, cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (1, "") and done.stderr.startswith(f"arc-suite enter: {message}")
-
-
-def test_a_name_is_no_path(entry, tmp_path):
-    done = enter(tmp_path, entry, "--name=../a|b")
-    assert done.stderr == "arc-suite enter: --name=../a|b: expected letters, digits, _, - and .\n"
+@pytest.mark.long
+def test_committed_reports_are_made_of_committed_tables(tmp_path):
+    """Nobody has changed a number."""
+    shutil.copytree(COMMITTED, tmp_path / "studies")
+    assert NAMES
+    for name in NAMES:
+        reports.write(name, catalog.study(name), tmp_path / "studies" / name)
+    for path in (f"{name}/README.md" for name in NAMES):
+        assert (tmp_path / "studies" / path).read_text() == (COMMITTED / path).read_text(), path
