@@ -20,7 +20,7 @@ from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING
 from arc_suite.learning.studies.results import RunResult
 from arc_suite.learning.studies.text_tables import table
-from arc_suite.policies import named, network, zips
+from arc_suite.policies import named, network, other_libraries
 
 SCORES = "scores.csv"
 CLIP = (-0.5, 1.2)  # of the score of a run
@@ -29,7 +29,7 @@ STYLE, STYLE_HEADS = ("gait_compliance", "heading_error"), ("gait compliance", "
 NOT_RUN = "not run"
 _LEARNER = re.compile(r"[\w.-]+")  # names of learners
 MAKE = "make"  # function of a module that makes a policy
-ENDINGS = (zips.EXTENSION, network.EXTENSION, named.MODULE)
+ENDINGS = (*other_libraries.READERS, network.EXTENSION, named.MODULE)
 # Robot, task and seed by the names that policies of a folder can have.
 NAMES = {
     f"{robot}-{task}-{seed}{ending}": (robot, task, seed)
