@@ -4,10 +4,10 @@ A score is (return - standing still) / (demonstrator - standing still), each bod
 standing still, 1 the demonstrator. A demonstrator that hardly walks makes any score large, so speeds are shown, too.
 Each body plays 400 control steps.
 
-`walk` is the share of bodies that walk, by the rule of arc-suite survey, `speed` the policy's mean share of the target
-speed, and `tracking`, in tasks with a command, a share of the demonstrators'. Families: random and varied, 50 bodies of
-seeds that no run trains with; the four robots with motors sized anew; 20 mutants of them; and 10 random bodies a
-quarter, and ten times, as large.
+`walk` is the share of bodies that walk: no fall, 0.7 of the target speed, the torso off the ground. `speed` is the
+policy's mean share of the target speed, and `tracking`, in tasks with a command, a share of the demonstrators'.
+Families: random and varied, 50 bodies of seeds that no run trains with; the four robots with motors sized anew; 20
+mutants of them; and 10 random bodies a quarter, and ten times, as large.
 
   arc-suite transfer --policy runs/varied.0-127-walk-dagger_bodies-0
   arc-suite transfer --policy universal --task steer --families varied,robots -o bodies.csv
