@@ -3,12 +3,12 @@
 A name is that of a file, or `FILE+FURTHER` with a further file that belongs to it, such as `ppo.zip+stats.pkl`.
 """
 
-import importlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol, cast
 
+from arc_suite import registry
 from arc_suite.envs.setup import Setup
 from arc_suite.policies.network import Network
 from arc_suite.policies.protocol import Policy
@@ -73,7 +73,7 @@ class PolicyFile(NamedTuple):
     @property
     def reader(self) -> Reader:
         """The module that reads it."""
-        return cast(Reader, importlib.import_module(READERS[self.extension]))
+        return cast(Reader, registry.resolve(READERS[self.extension]))
 
     def setup(self) -> Setup | None:
         """Return the setup that it was trained in; see `Reader.setup`."""
