@@ -169,7 +169,7 @@ def _noise(body: Body, deviation: float, num_envs: int) -> Policy:
 
 
 def is_file(name: str) -> bool:
-    """Return whether a policy's name is that of a folder of a run or of checkpoints that is there, or of a zip."""
+    """Return whether a name is that of a folder of a run or of checkpoints, or of a file of another library."""
     if name in POLICIES:
         return False
     if other_libraries.find(name):
