@@ -226,10 +226,10 @@ check-agents: MARKS := not long and not release
 check-agents-release: MARKS := long or release
 
 check-bodies: RUN = $(PYTEST) $(PARALLEL) tests/envs/test_bodies.py tests/models/test_families.py && \
-	$(VENV)/bin/arc-suite survey --family varied --count 120
+	$(PYTHON) tools/survey.py --family varied --count 120
 check-robots: RUN = $(PYTHON) tests/robots_of_others/zoo.py out/robots && \
 	$(PYTHON) tests/robots_of_others/check.py out/robots
-check-survey: RUN = $(VENV)/bin/arc-suite survey --count 500
+check-survey: RUN = $(PYTHON) tools/survey.py --count 500
 check-following: RUN = $(PYTHON) tests/following.py
 check-directing: RUN = $(PYTHON) tests/directing.py
 check-leaps: RUN = $(PYTHON) tests/leaps.py

@@ -175,7 +175,7 @@ def _copy_studies() -> None:
 
 
 TABLES = (*run_folder.TABLES, "style", "final")
-RUN, STUDY = "tick-walk-tiny_studies.CLIMB-0", "first-steps"
+RUN, STUDY = "tick-walk-tiny_studies.CLIMB-0", "samples-sac"
 _USES_OF_RUNS = (_resume_run, _publish, _act_by_run)
 KINDS = {
     "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,)),

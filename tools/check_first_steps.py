@@ -1,7 +1,7 @@
 """Makes a newcomer's five first successes in an empty folder, by what the pages say alone.
 
     python tools/check_first_steps.py
-    python tools/check_first_steps.py --short --only "offline data and an entry"
+    python tools/check_first_steps.py --short --only "offline data"
 
 A success is some sections of pages, whose commands and code run in order, and commands of `make` that pages name. Later
 successes find what earlier ones left, such as runs. `pip` lines are left to the environment, which has the extras of
@@ -24,14 +24,14 @@ from arc_suite.cli import program
 
 # By name: a page and the heading of a section, or a command of `make` on a page.
 SUCCESSES = {
-    "train and compare": (("README", "Use"), ("first_steps", "A creature learns to walk"), ("study", "Enter a result")),
+    "train and compare": (("README", "Use"), ("first_steps", "A creature learns to walk")),
     "pixels and a task": (("environments", "Pixels and depth"), ("adding_a_task", "Adding a task")),
     "eight legs, Blender, play": (
         *(("clips", "Animation clips"), ("engines", "Clips in Blender, Godot and three.js")),
         *(("engines", "FBX, BVH and Blender"), ("play", "make web"), ("play", "Play")),
     ),
     "site and notebooks": (("reference", "make docs"), ("first_steps", "A notebook")),
-    "offline data and an entry": (("datasets", "Datasets"), ("datasets", "Datasets of agents")),
+    "offline data": (("datasets", "Datasets"), ("datasets", "Datasets of agents")),
 }
 ELSEWHERE = ("pip install", "python learn.py", "python play.py")  # the last two are of docs/clients.md
 

@@ -19,7 +19,6 @@ SHORTER = {
     "evaluate": "--episodes=1",
     "collect": "--episodes=1",
     "style": "--episodes=1",
-    "survey": "--count=2",
     "transfer": "--families=varied",
 }
 
@@ -68,6 +67,6 @@ def commands(text: str) -> list[str]:
 
 
 def shortened(command: str) -> str:
-    """Return a command that does less of the same; an entry of the leaderboard keeps its 100 episodes."""
+    """Return a command that does less of the same."""
     _, program, *_ = *command.split(), "", ""
-    return command if "entry.json" in command else f"{command} {SHORTER.get(program, '')}".strip()
+    return f"{command} {SHORTER.get(program, '')}".strip()

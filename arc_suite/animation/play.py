@@ -26,7 +26,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import GRAVITY
-from arc_suite.policies import zips
+from arc_suite.policies import other_libraries
 from arc_suite.policies.network import Network
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
@@ -173,7 +173,7 @@ def _leaps(law: Directed) -> dict[str, Any]:
 
 def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
     made = policies.policy(name, body, task=steer if name == universal.NAME else None)
-    if zips.parts(name):
+    if other_libraries.find(name):
         made = policies.trained(name)
     if isinstance(made, Universal):  # acts in the task that it was trained in
         made = universal.for_body(made.network, Setup.of(body, made.network.setup.task))

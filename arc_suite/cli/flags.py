@@ -11,7 +11,7 @@ from arc_suite import checks, policies, registry
 from arc_suite.bodies import generator, shaping
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
-from arc_suite.policies import zips
+from arc_suite.policies import other_libraries, zips
 from arc_suite.robots import ROBOTS, palettes, spec_files
 from arc_suite.robots.spec import PALETTES, Body
 from arc_suite.tasks import TASKS
@@ -57,14 +57,9 @@ def define_task(default: str = "walk") -> None:
     )
 
 
-def define_policy(text: str = policies.HELP, default: str | None = "cpg") -> None:
-    """Define --policy and --vecnormalize, for programs that take any policy.
-
-    Args:
-        text: help of --policy.
-        default: of --policy.
-    """
-    flags.DEFINE_string("policy", default, text)
+def define_policy(text: str = policies.HELP) -> None:
+    """Define --policy, with this help, and --vecnormalize, for programs that take any policy."""
+    flags.DEFINE_string("policy", "cpg", text)
     define_vecnormalize()
 
 
@@ -91,10 +86,11 @@ def policy_name(name: str) -> str:
     """
     if FLAGS.vecnormalize is None:
         return name
-    if zips.parts(name) is None:
+    policy_file = other_libraries.find(name)
+    if policy_file is None or policy_file.extension != zips.EXTENSION:
         given = f"--vecnormalize={checks.quoted(FLAGS.vecnormalize)}"
         raise ValueError(f"{given}: goes with a zip of stable-baselines3, got {checks.shown(name)}")
-    return zips.named(name, FLAGS.vecnormalize)
+    return other_libraries.with_further_file(name, FLAGS.vecnormalize)
 
 
 def made_body() -> Body | None:

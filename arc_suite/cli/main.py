@@ -5,7 +5,7 @@ import sys
 
 from arc_suite import checks, versions
 from arc_suite.cli import program
-from arc_suite.cli.programs import PROGRAMS, usage
+from arc_suite.cli.programs import FORMER, PROGRAMS, usage
 
 
 def main(*given: str) -> None:
@@ -32,5 +32,7 @@ def _answer(argument: str) -> None:
         print(program.VERSION)
     elif argument in ("--help", "-h"):
         print(usage())
+    elif argument in FORMER:
+        raise ValueError(f"{argument} is no program any more; {FORMER[argument]}")
     else:
         checks.name(argument, PROGRAMS, "program")

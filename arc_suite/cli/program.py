@@ -18,12 +18,10 @@ from absl import flags
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import checks, files, policies, registry
+from arc_suite import checks, policies, registry
 from arc_suite.cli.help_text import help_text
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
-
-_MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 TERMINATED = 143  # exit status of a program that SIGTERM has ended, as shells count it
 
@@ -88,7 +86,7 @@ def termination() -> Iterator[Callable[[], bool]]:
 def run(main: Callable[..., int | None], name: str | None = None, arguments: Sequence[str] | None = None) -> NoReturn:
     """Parse arguments into absl's flags, call `main` and exit the process, with errors as `guard` shows them.
 
-    `--help` prints the docstring of the module of `main`, and the flags of that module and of this package.
+    `--help` prints the docstring of the module of `main`, and the flags of that module and of packages `cli`.
 
     Args:
         main: reads `absl.flags.FLAGS`; takes what is no flag, each with a default, and returns an exit
@@ -112,24 +110,6 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
         return main(*rest)
 
     guard(work, name or Path(script).name)
-
-
-def marked_page(flag: str, path: str) -> Callable[[str], None]:
-    """Return a function that writes a table into a page, between the lines <!-- table --> and <!-- end -->.
-
-    Raises:
-        ValueError: the page has no such lines.
-        OSError: it cannot be read.
-    """
-    with files.reading(path):
-        page = Path(path).read_text(encoding="utf-8")
-    if not _MARKS.search(page):
-        raise ValueError(f"--{flag}={path}: expected the lines <!-- table --> and <!-- end -->, got none")
-
-    def write(table: str) -> None:
-        files.write(path, _MARKS.sub(lambda match: f"\n{table}\n\n", page))
-
-    return write
 
 
 def guard(work: Callable[[], int | None], name: str) -> NoReturn:
@@ -202,9 +182,9 @@ def _meant(argument: str) -> str:
 
 
 def _flags(module: ModuleType) -> Iterator[flags.Flag]:
-    """Yield the flags of a program and of this package."""
+    """Yield the flags of a program, of this package, and of a program of the suite that it is made from."""
     for name, defined in flags.FLAGS.flags_by_module_dict().items():
-        if name in (module.__name__, sys.argv[0]) or name.startswith(f"{__package__}."):
+        if name in (module.__name__, sys.argv[0]) or "cli" in name.split("."):
             yield from defined
 
 

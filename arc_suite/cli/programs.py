@@ -16,16 +16,20 @@ PROGRAMS = {
     "evaluate": "arc_suite.cli",
     "style": "arc_suite.animation.cli",
     "collect": "arc_suite.cli",
-    "tune_cpg": "arc_suite.learning.cli",
     "train": "arc_suite.learning.cli",
     "study": "arc_suite.learning.cli",
     "benchmark": "arc_suite.learning.cli",
-    "enter": "arc_suite.learning.cli",
     "export": "arc_suite.learning.cli",
-    "survey": "arc_suite.learning.cli",
     "transfer": "arc_suite.learning.cli",
     "design": "arc_suite.animation.cli",
     "doctor": "arc_suite.cli",
+}
+
+# Names of former programs: what to run in place of each.
+FORMER = {
+    "survey": "a clone has python tools/survey.py",
+    "tune_cpg": "a clone has python tools/tune_cpg.py",
+    "enter": "the leaderboard is made of committed studies, by python tools/study.py NAME --report in a clone",
 }
 
 _USAGE = """\

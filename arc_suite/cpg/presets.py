@@ -108,7 +108,7 @@ def _tuples(value):
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
-# What `arc-suite tune_cpg` found: `tuned`, and the steering and torques that `refined` adds to it.
+# What tools/tune_cpg.py found: `tuned`, and the steering and torques that `refined` adds to it.
 _SEARCHED = json.loads(Path(__file__).with_name("searched.json").read_text(encoding="utf-8"), object_hook=_plain)
 for _robot, _found in _SEARCHED.items():
     _tuned = Preset(**_found["tuned"])

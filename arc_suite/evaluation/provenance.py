@@ -7,7 +7,7 @@ from typing import Any
 from arc_suite import policies, seed_ranges
 from arc_suite.envs.setup import Setup
 
-FIELDS = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "model_sha256")
+_FIELDS = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "model_sha256")
 UNKNOWN = "training data unknown"
 
 
@@ -15,7 +15,7 @@ def of_setup(setup: Setup) -> dict[str, Any]:
     """Return, JSON-able, what a setup's results depend on: names, settings, and hashes of body, model and task."""
     settings = repr(setup.definition.settings)
     known = setup.provenance() | {"task_sha256": hashlib.sha256(settings.encode()).hexdigest()}
-    return {name: known[name] for name in FIELDS}
+    return {name: known[name] for name in _FIELDS}
 
 
 def policy_sha256(policy: str) -> str | None:

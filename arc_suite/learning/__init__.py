@@ -1,4 +1,4 @@
-"""Learning: learners, studies and the benchmark, tuning, transfer between bodies; nothing of the core imports it."""
+"""Learning: learners, studies and the benchmark, transfer between bodies; nothing of the core imports it."""
 
 import contextlib
 import tempfile

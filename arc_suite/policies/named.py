@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, files, registry, seed_ranges, versions
+from arc_suite import checks, files, registry, seed_ranges
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import network, zips
+from arc_suite.policies import network, other_libraries
 from arc_suite.policies.network import PACKAGED, Network
+from arc_suite.policies.other_libraries import PolicyFile
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
@@ -168,10 +169,10 @@ def _noise(body: Body, deviation: float, num_envs: int) -> Policy:
 
 
 def is_file(name: str) -> bool:
-    """Return whether a policy's name is that of a folder of a run or of checkpoints that is there, or of a zip."""
+    """Return whether a name is that of a folder of a run or of checkpoints, or of a file of another library."""
     if name in POLICIES:
         return False
-    if zips.parts(name):
+    if other_libraries.find(name):
         return True
     try:
         return (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
@@ -182,7 +183,7 @@ def is_file(name: str) -> bool:
 def function_file(name: str) -> Path | None:
     """Return the file of the function that a policy's name gives; None for other names, and where no file is."""
     module, colon, _ = name.rpartition(":")
-    if not colon or name in POLICIES or zips.parts(name):
+    if not colon or name in POLICIES or other_libraries.find(name):
         return None
     if module.endswith(MODULE):
         return Path(module)
@@ -200,11 +201,11 @@ def digest(name: str) -> str:
     imports or reads is not among them.
 
     Raises:
-        ValueError: as `zips.statistics`.
+        ValueError: a damaged file of another library, or one without a file that belongs to it.
         OSError: a file cannot be read.
     """
-    if zipped := zips.parts(name):
-        held = filter(None, (zipped[0], zips.statistics(*zipped)))
+    if policy_file := other_libraries.find(name):
+        held = policy_file.policy_files()
     elif (code := function_file(name)) is not None:
         held = [code]
     else:
@@ -227,8 +228,8 @@ def setup_of(name) -> Setup | None:
         return name.setup if isinstance(name, Network) else None
     if not (isinstance(name, os.PathLike) or _is_path(name)):
         return None
-    if zipped := zips.parts(name):
-        return zips.setup(zipped[0])
+    if policy_file := other_libraries.find(name):
+        return policy_file.setup()
     path = Path(name)
     if not path.exists():
         return None
@@ -250,7 +251,7 @@ def training_seeds(name) -> seed_ranges.Ranges | None:
     name = os.fspath(name)
     if name in POLICIES:
         return () if name in _UNTRAINED else (seed_ranges.LEARNING,)
-    if zips.parts(name) or not _is_path(name):
+    if other_libraries.find(name) or not _is_path(name):
         return None
     found = [network.load(path).training_seeds for path in _policy_files(Path(name))]
     return None if None in found else tuple(dict.fromkeys(itertools.chain.from_iterable(found)))
@@ -268,14 +269,14 @@ def trained(name: str | os.PathLike) -> Network:
         ValueError: a damaged file, a zip that does not hold its setup, or a network of other layers.
         OSError: a file cannot be read.
     """
-    if (zipped := zips.parts(name)) is None:
+    if (policy_file := other_libraries.find(name)) is None:
         made = network.load(name)
         if made.setup.several:
             raise ValueError(f"policy {name}: expected one of one body, or --robot; got one of {made.setup.robot}")
         return made
-    if (setup := zips.setup(zipped[0])) is None:
-        raise ValueError(f"policy {zipped[0]}: {_UNKNOWN}")
-    return _saved(*zipped).network(setup)
+    if (setup := policy_file.setup()) is None:
+        raise ValueError(f"policy {policy_file.path}: {policy_file.reader.NO_SETUP}")
+    return policy_file.load().network(setup)
 
 
 def _is_path(name: str) -> bool:
@@ -283,8 +284,8 @@ def _is_path(name: str) -> bool:
 
 
 def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
-    if zipped := zips.parts(path):
-        return _from_zip(*zipped, body, task)
+    if policy_file := other_libraries.find(path):
+        return _from_other_library(policy_file, body, task)
     made = network.load(path)
     if made.setup.several:
         return registry.resolve(_MANY_BODIES).Universal(made, task or prepared(body, "walk")[0])
@@ -293,24 +294,15 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
     return made
 
 
-def _from_zip(path: Path, statistics: Path | None, body: Body, task: Task | None) -> Policy:
-    setup = zips.setup(path)
+def _from_other_library(policy_file: PolicyFile, body: Body, task: Task | None) -> Policy:
+    path, setup = policy_file.path, policy_file.setup()
     if setup is None:
-        warnings.warn(f"policy {path}: {_UNKNOWN}", stacklevel=5)
+        warnings.warn(f"policy {path}: {policy_file.reader.NO_SETUP}", stacklevel=5)
     else:
         _check(path, setup, body, task)
-    made = _saved(path, statistics)
-    _check_joints(path, made.joints, body)
-    return made
-
-
-_UNKNOWN = "does not hold the robot and task that it was trained for; train in arc_suite.envs.sb3.VecEnv"
-
-
-def _saved(path: Path, statistics: Path | None):
-    with versions.needing(f"policy {path}: zips need stable-baselines3", "sb3"):
-        from arc_suite.policies import sb3_file
-    return sb3_file.Saved(path, zips.statistics(path, statistics))
+    loaded = policy_file.load()
+    _check_joints(path, loaded.joints, body)
+    return loaded
 
 
 def _check(path: Path, setup: Setup, body: Body, task: Task | None) -> None:

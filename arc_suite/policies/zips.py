@@ -1,33 +1,22 @@
 """Zips of stable-baselines3 and the statistics of `VecNormalize` that belong to them. No pickle is read here.
 
 A name is `ppo.zip`, or `ppo.zip+stats.pkl` with a file of statistics. A zip that was trained in
-`arc_suite.envs.sb3.VecEnv` also holds the setup that it was trained in.
+`arc_suite.envs.sb3.VecEnv` also holds the setup that it was trained in. The functions are those of
+`other_libraries.Reader`.
 """
 
 import json
-import os
 import re
 import zipfile
 from pathlib import Path
 from typing import Any
 
-from arc_suite import checks, registry
+from arc_suite import checks, registry, versions
 from arc_suite.envs.setup import ATTRIBUTE, Setup
+from arc_suite.policies.other_libraries import Loaded
 
 EXTENSION = ".zip"
-
-
-def named(path: str, statistics: str) -> str:
-    """Return the name of a zip that acts with the statistics of a file."""
-    return f"{path}+{statistics}"
-
-
-def parts(name: str | os.PathLike) -> tuple[Path, Path | None] | None:
-    """Return the zip and the statistics that a policy's name gives; None for a name of another kind."""
-    first, plus, second = os.fspath(name).partition(f"{EXTENSION}+")
-    if plus and second:
-        return Path(first + EXTENSION), Path(second)
-    return (Path(name), None) if first.endswith(EXTENSION) else None
+NO_SETUP = "does not hold the robot and task that it was trained for; train in arc_suite.envs.sb3.VecEnv"
 
 
 def content(path: Path) -> dict[str, Any]:
@@ -61,6 +50,32 @@ def setup(path: Path) -> Setup | None:
         return Setup.from_dict(known)
     except (ValueError, registry.NotImported) as error:
         raise ValueError(f"policy {path}: {error}") from None
+
+
+def policy_files(path: Path, further: Path | None) -> list[Path]:
+    """Return a zip and the file of the statistics with which it acts, if there are any.
+
+    Raises:
+        ValueError, OSError: as `statistics`.
+    """
+    found = statistics(path, further)
+    return [path] if found is None else [path, found]
+
+
+def load(path: Path, further: Path | None) -> Loaded:
+    """Return the policy of a zip. The pickles that it holds run code.
+
+    Args:
+        path: of the zip.
+        further: file of its statistics; None for those next to it, if there are any.
+
+    Raises:
+        ValueError: stable-baselines3 is not installed, or as `statistics` and `sb3_file.Saved`.
+        OSError: a file cannot be read.
+    """
+    with versions.needing(f"policy {path}: zips need stable-baselines3", "sb3"):
+        from arc_suite.policies import sb3_file
+    return sb3_file.Saved(path, statistics(path, further))
 
 
 def statistics(path: Path, given: Path | None = None) -> Path | None:

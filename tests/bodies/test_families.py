@@ -192,5 +192,3 @@ def test_programs_take_bodies_of_families():
     done = programs.arc_suite("evaluate", "--robot=varied:3-4", "--episodes=1", "--set=time_limit=1")
     assert (done.returncode, done.stderr) == (0, "")
     assert "varied_3, medium" in done.stdout and "varied_4, medium" in done.stdout
-    done = programs.arc_suite("survey", "--family=varied", "--legs=6")
-    assert done.stderr == "arc-suite survey: --legs=6: goes with the family random, not with varied\n"

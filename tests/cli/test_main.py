@@ -14,7 +14,7 @@ import pytest
 import arc_suite
 from arc_suite.cli import main
 from arc_suite.cli.help_text import GROUPS
-from arc_suite.cli.programs import summary
+from arc_suite.cli.programs import FORMER, summary
 from arc_suite.policies import POLICIES
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -27,7 +27,6 @@ WRITING = (
     "animate",
     "play",
     "style",
-    "tune_cpg",
     "train",
     "export",
     "transfer",
@@ -44,7 +43,7 @@ def test_help_lists_the_programs(arguments):
     lines = programs.passed(run(*arguments)).splitlines()
     assert lines[0] == "arc-suite PROGRAM [flags]"
     assert [line.split()[0] for line in lines if line.startswith("  ")] == list(main.PROGRAMS)
-    assert "  survey       Let random bodies walk and count those that do." in lines
+    assert "  study        Make the runs of a study, or write its report." in lines
     assert max(map(len, lines)) <= 100
 
 
@@ -62,10 +61,17 @@ def test_version():
     assert programs.passed(run("--version")) == VERSION
 
 
-@pytest.mark.parametrize(("argument", "near"), [("rendr", "render"), ("surveys", "survey"), ("stile", "style")])
+@pytest.mark.parametrize(("argument", "near"), [("rendr", "render"), ("studys", "study"), ("stile", "style")])
 def test_an_unknown_program_is_one_line_with_the_nearest(argument, near):
     line = f"arc-suite: unknown program {argument!r}; did you mean {near!r}? (there are: {', '.join(main.PROGRAMS)})\n"
     programs.refused(run(argument, "--robot=queen"), line)
+
+
+@pytest.mark.parametrize("name", FORMER)
+def test_a_former_program_says_what_to_run_instead(name):
+    programs.refused(run(name, "--help"), f"arc-suite: {name} is no program any more; {FORMER[name]}\n")
+    (tool,) = re.findall(r"python (tools/\w+\.py)", FORMER[name])
+    assert name not in main.PROGRAMS and (ROOT / tool).is_file()
 
 
 def test_only_the_program_that_runs_is_imported():
@@ -119,7 +125,7 @@ def test_modules_of_the_current_folder_come_last(tmp_path):
         ("matplotlib", "animate", "style --output=pictures", "pictures need matplotlib"),
         ("imageio_ffmpeg", "video", "render --steps=1 --output=a.mp4", "MP4 needs imageio-ffmpeg"),
         ("viser", "animate", "studio --robot=tick", "the studio needs viser"),
-        ("submitit", "learn", "study paper --submit=2", "--submit needs submitit"),
+        ("submitit", "learn", "study top-ppo --submit=2", "--submit needs submitit"),
         ("jax", "learn", "train", "training needs JAX"),
     ],
 )
@@ -150,14 +156,13 @@ def test_help_of_a_program(program):
 
 
 def test_help_says_what_each_policy_is():
-    text = " ".join(help_of("enter").split("--policy=TEXT")[1].split())
+    text = " ".join(help_of("evaluate").split("--policy=TEXT")[1].split())
     assert [name for name in POLICIES if not re.search(rf"\b{name}, \w+ ", text)] == []
-    assert "any other Body. [default: that which the entry names]" in text
 
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    taking = ("check", "import", "export", "study", "enter", "benchmark")  # an argument
+    taking = ("check", "import", "export", "study", "benchmark")  # an argument
     done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
     programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; see --help\n")
 

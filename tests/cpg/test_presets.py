@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from preset_search import Evaluator
 from returns import RETURNS
 from tiers import never, tiers
 
@@ -12,7 +13,6 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.tuning import Evaluator
 from arc_suite.robots import ROBOTS
 
 

@@ -41,12 +41,12 @@ def test_a_block_that_is_saved_is_not_run():
 
 
 def test_the_task_of_the_first_steps(tmp_path):
-    module, commands = STEPS["A task and an entry in the leaderboard"].blocks
+    module, commands = STEPS["A task of your own"].blocks
     (tmp_path / module.file).write_text(module.text)
     (evaluate,) = re.findall("^arc-suite (evaluate .*)$", commands.text, re.MULTILINE)
     short = ["--policy=zero", "--episodes=1", "--set=time_limit=1"]
     programs.passed(programs.arc_suite(*evaluate.split(), *short, cwd=tmp_path))
-    assert '"task": "ice:ice"' in (tmp_path / "entry.json").read_text()
+    assert '"task": "ice:ice"' in (tmp_path / "ice.json").read_text()
 
 
 @pytest.mark.slow

@@ -42,12 +42,12 @@ NOT_HERE = {
     r"train|study|benchmark|export": "learners need JAX: make check-first-steps, make check-agents",
     r"view|studio|doctor": "they wait for people; their tests run them",
     r"play|\S+ .*\.html": "pages need the viewer that Node builds: make check-play",
-    r"\S+ .*(go2|ppo\.zip|\.json|entry|theirs|RUN|ID\b)": "a file of the reader",
+    r"\S+ .*(go2|ppo\.zip|\.json|theirs|RUN|ID\b)": "a file of the reader",
     r"\S+ .*runs/(?!tick-walk-ppo-0)": "a run of a learner",
     r"\S+ .*(--checkpoint|--quality|--verify)": "what another command left",
     r"\S+ .*(crouching|ice|ramps)": "a module that the page's own test saves",
     r"render (?!.* (-o|--output) )": "without a file to write",
-    r"design|tune_cpg": "a search of minutes; one that is too short breaks its constraints",
+    r"design": "a search of minutes; one that is too short breaks its constraints",
 }
 EVERY = [
     command

@@ -1,9 +1,9 @@
 """The journal of a search."""
 
 import pytest
+from preset_search import Generation
 
 from arc_suite.journal import Journal
-from arc_suite.learning.tuning import Generation
 
 SETTINGS = {"robot": "bastion", "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
 GENERATIONS = [Generation([1.0, 2.0], 2.0, 0.0, [0.5, 0.25]), Generation([1.5, 3.0], 3.0, 0.5, [1.0, 1.0])]

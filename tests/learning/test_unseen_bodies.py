@@ -37,6 +37,14 @@ def test_families_hold_bodies_that_nobody_trains_with():
     assert ratio == pytest.approx(40.0)
 
 
+def test_a_robot_that_is_registered_joins_no_family(monkeypatch):
+    """Tables of episodes stay those of the same bodies."""
+    places = [(name, index) for name in ("robots", "mutants") for index in (0, 3, 4, 5)]
+    before = [transfer.FAMILIES[name][0](index) for name, index in places]
+    monkeypatch.setitem(ROBOTS, "newcomer", generator.random_body(3).replace(name="newcomer"))
+    assert [transfer.FAMILIES[name][0](index) for name, index in places] == before
+
+
 def seen(body):
     """What a network sees of a body, in units of its size."""
     description = tokens.described(Setup.of(body).definition)

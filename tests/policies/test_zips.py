@@ -1,8 +1,12 @@
 """What a zip of stable-baselines3 tells without its pickles: its setup, and which statistics belong to it."""
 
+import hashlib
 import importlib.util
 import json
+import sys
+import types
 import zipfile
+from pathlib import Path
 
 import pytest
 from refusals import refused
@@ -10,7 +14,8 @@ from refusals import refused
 import arc_suite
 from arc_suite import policies
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import zips
+from arc_suite.policies import other_libraries, zips
+from arc_suite.policies.other_libraries import find, with_further_file
 
 ON_POLICY = {"rollout_buffer_class": {}, "_last_obs": {}}
 
@@ -23,9 +28,34 @@ def write(path, **data):
 
 
 def test_names():
-    assert zips.parts("a/ppo.zip") == (zips.Path("a/ppo.zip"), None)
-    assert zips.parts(zips.named("ppo.zip", "b/stats.pkl")) == (zips.Path("ppo.zip"), zips.Path("b/stats.pkl"))
-    assert zips.parts("cpg") is zips.parts("policy.npz") is zips.parts("my.zip:make") is None
+    assert find("a/ppo.zip") == (Path("a/ppo.zip"), None, ".zip")
+    assert find(with_further_file("ppo.zip", "b/stats.pkl")) == (Path("ppo.zip"), Path("b/stats.pkl"), ".zip")
+    assert find("cpg") is find("policy.npz") is find("my.zip:make") is find("ppo.zip+") is None
+
+
+def test_a_library_is_read_by_the_module_of_its_extension(tmp_path, monkeypatch):
+    """Without a word of it elsewhere: setup, hash, checks and policy come from that module."""
+    setup, loaded = Setup.of("tick"), types.SimpleNamespace(joints=18)
+    reader = types.ModuleType("reader_of_text")
+    reader.NO_SETUP = "says nothing of its robot"
+    reader.setup = lambda path: setup if path.read_text() == "tick" else None
+    reader.policy_files = lambda path, further: [path]
+    reader.load = lambda path, further: loaded
+    monkeypatch.setitem(sys.modules, reader.__name__, reader)
+    monkeypatch.setitem(other_libraries.READERS, ".text", reader.__name__)
+    path = tmp_path / "agent.text"
+    path.write_text("tick")
+    assert policies.is_file(str(path)) and policies.setup_of(str(path)) == setup
+    assert policies.policy(path, "tick") is loaded
+    assert policies.digest(str(path)) == hashlib.sha256(b"tick").hexdigest()
+    assert policies.training_seeds(path) is None
+    with refused(f"policy {path}: made for tick, and not for queen"):
+        policies.policy(path, "queen")
+    path.write_text("nobody")
+    with pytest.warns(UserWarning, match=f"^policy {path}: says nothing of its robot$"):
+        policies.policy(path, "tick")
+    with refused(f"policy {path}: says nothing of its robot"):
+        policies.trained(path)
 
 
 def test_the_setup(tmp_path):

@@ -20,13 +20,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent))
+sys.path[:0] = [str(pathlib.Path(__file__).parent), str(pathlib.Path(__file__).parents[2] / "tools")]
 
 import reference  # noqa: E402
 import zoo  # noqa: E402
+from studies.pages import table_writer  # noqa: E402
 
 from arc_suite import rotations  # noqa: E402
-from arc_suite.cli import program  # noqa: E402
 from arc_suite.cpg import Demonstrator  # noqa: E402
 from arc_suite.envs.setup import Setup  # noqa: E402
 from arc_suite.evaluation import protocol, walking  # noqa: E402
@@ -187,7 +187,7 @@ def main(folder: str, *names: str) -> int:
     """Try all files, or those that are named; print, write and judge the table."""
     place, write = pathlib.Path(folder), None
     if "--page" in names:
-        write, names = program.marked_page("page", names[-1]), ()
+        write, names = table_writer(pathlib.Path(names[-1])), ()
     chosen = [robot for robot in zoo.ROBOTS if not names or robot.name in names]
     rows = []
     with multiprocessing.get_context("spawn").Pool() as pool:

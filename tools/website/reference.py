@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 from arc_suite.cli.programs import PROGRAMS, summary
-from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies.text_tables import table
 from website import markdown, returns, settings
 
 # Modules that users import, by title of their page.

@@ -7,11 +7,12 @@ from pathlib import Path
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.evaluation.published import DEMONSTRATORS, FINALS
-from arc_suite.learning.studies import csv_files, leaderboard
-from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies import csv_files
+from arc_suite.learning.studies.text_tables import table
 from arc_suite.policies.network import PACKAGED
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
+from studies import leaderboard
 
 ROOT = Path(__file__).parents[2]
 _LEARNER_HEADS = ("robot, task", "algorithm", "seeds", "return", "score", "IQM [95 %]", "metric", "steps", "study")

@@ -4,7 +4,7 @@ import importlib
 import math
 
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies.text_tables import table
 from website import markdown, observations, players, returns
 
 

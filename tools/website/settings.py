@@ -5,7 +5,7 @@ from typing import Any
 
 from arc_suite.arenas import ARENAS, terrain
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies.text_tables import table
 from arc_suite.robots import ROBOTS, gaits
 from arc_suite.tasks import modifiers, parameters, walk
 from arc_suite.tasks.command import Schedule

@@ -6,7 +6,7 @@ import re
 import arc_suite
 from arc_suite.cpg.selection import suited_presets
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies.text_tables import table
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS, ground
 from arc_suite.tasks.command_task import CommandTask

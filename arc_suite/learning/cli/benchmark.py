@@ -10,7 +10,6 @@ command resumes. Policies of other libraries are files ROBOT-TASK-SEED in a fold
   arc-suite benchmark top --algorithm ppo --seeds 2 --jobs 8
   arc-suite benchmark samples --algorithm sac --seeds 1 --places tick-walk,leaper-walk
   arc-suite benchmark samples --policies my_zips --name my_sac
-  arc-suite benchmark --page docs/benchmark.md
 """
 
 from pathlib import Path
@@ -18,8 +17,8 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks
-from arc_suite.cli.program import marked_page, progress, resumable
-from arc_suite.learning.studies import benchmark, leaderboard, publication, report, results, runner, tables
+from arc_suite.cli.program import progress, resumable
+from arc_suite.learning.studies import benchmark, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.simulation.cores import usable_cores
 
@@ -32,19 +31,16 @@ flags.DEFINE_string("policies", None, "Folder of policies to score in place of r
 flags.DEFINE_string("name", None, "Of these policies in the table. [default: the name of the folder]")
 flags.DEFINE_string("runs", "runs", "Folder of the runs.")
 flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
-flags.DEFINE_string("page", None, "Page to write the table into, between the lines <!-- table --> and <!-- end -->.")
 
 
 def main(division: str | None = None) -> int:
-    """Run a division, and print or write the table; the exit status is 0 if no run has failed."""
+    """Run a division, and print the table; the exit status is 0 if no run has failed."""
     places = [checks.name(each, ["-".join(each) for each in PLACES], "place") for each in FLAGS.places]
-    write = FLAGS.page and marked_page("page", FLAGS.page)
     status = 0
     if division is not None:
         checks.name(division, DIVISIONS, "division")
         status = scored(division) if FLAGS.policies else learned(division, places)
-    table = benchmark.text(Path(FLAGS.results))
-    (write or print)(table)
+    print(benchmark.text(Path(FLAGS.results)))
     return status
 
 
@@ -76,7 +72,7 @@ def scored(division: str) -> int:
         OSError: a file cannot be read.
     """
     policies = Path(FLAGS.policies)
-    name = leaderboard.checked_name(FLAGS.name or policies.resolve().name)
+    name = benchmark.checked_name(FLAGS.name or policies.resolve().name)
     scores = benchmark.of_policies(policies, progress)
     benchmark.write(Path(FLAGS.results), division, name, scores)
     return 0

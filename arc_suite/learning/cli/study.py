@@ -2,15 +2,18 @@
 
 A study is a table of runs: robots, tasks, algorithms, seeds, steps. Each run is a process of one thread. Finished
 runs are skipped, and the others resume. Configurations, episodes, times and style of all runs become two tables, which
-are small enough to be committed, and the report is made from these tables alone.
+are small enough to be committed, and the report is made from these tables alone. A name is module:attribute, a Study on
+Python's path or in the current folder, or <division>-<algorithm> of the benchmark.
 
-  arc-suite study first-steps
-  arc-suite study first-steps --report
-  arc-suite study paper --jobs 8 --shard 3/16
-  arc-suite study paper --submit 16 --hours 24
   arc-suite study my_studies:MINE
+  arc-suite study my_studies:MINE --report
+  arc-suite study my_studies:MINE --jobs 8 --shard 3/16
+  arc-suite study my_studies:MINE --submit 16 --hours 24
+  arc-suite study top-ppo
 """
 
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from absl import flags
@@ -36,8 +39,28 @@ flags.DEFINE_string("results", None, "Folder of the tables and the report. [defa
 def main(name: str | None = None) -> int:
     """Make the runs, or write the report; the exit status is 0 if all runs are finished."""
     if name is None:
-        raise ValueError(f"expected a study: {', '.join(tables.STUDIES)}, or module:attribute; see --help")
-    study = tables.study(name)
+        raise ValueError("expected a study: module:attribute, or <division>-<algorithm>; see --help")
+    command = (sys.executable, "-m", "arc_suite", "study", name)
+    return make_or_report(name, tables.study(name), command, report.write)
+
+
+def make_or_report(
+    name: str,
+    study: tables.Study,
+    command: Sequence[str],
+    write_report: Callable[[str, tables.Study, Path], Path],
+) -> int:
+    """Make the runs of a study or write its report, as the flags say, and return the exit status.
+
+    Args:
+        name: of the study.
+        study: its title and runs.
+        command: that does the same on a machine of a cluster.
+        write_report: takes the name, the study and the folder of its tables; returns the file of the report.
+
+    Raises:
+        ValueError: flags that do not fit each other or the study.
+    """
     part, parts = shard(FLAGS.shard)
     runs = study.runs[part::parts]
     if not runs:
@@ -46,31 +69,31 @@ def main(name: str | None = None) -> int:
     results = Path(FLAGS.results or Path("studies", tables.folder_name(name)))
     if FLAGS.report:
         publication.publish(study.runs, folder, results)
-        print(report.write(name, study, results))
+        print(write_report(name, study, results))
         return 0
     if FLAGS.jobs is not None and FLAGS.submit is not None:
         raise ValueError("--jobs, --submit: this machine, or a cluster; give one of them")
     if FLAGS.submit is not None:
         if parts > 1:
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
-        return submit(name, min(FLAGS.submit, len(runs)), folder, results)
+        return submit(command, min(FLAGS.submit, len(runs)), folder, results)
     with resumable(folder):
         status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
     publication.publish(study.runs, folder, results)
     return status
 
 
-def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
-    """Submit the study to a cluster in so many jobs, and print them.
+def submit(command: Sequence[str], jobs: int, folder: Path, results: Path) -> int:
+    """Submit a command that makes a study to a cluster in so many jobs, and print them.
 
     Raises:
         ValueError: submitit is not installed.
     """
     with versions.needing("--submit needs submitit", "learn"):
         from arc_suite.learning.studies import cluster
-    arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
+    command = (*command, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
     parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
-    for job in cluster.submit(arguments, jobs, FLAGS.hours, folder / "jobs", **parameters):
+    for job in cluster.submit(command, jobs, FLAGS.hours, folder / "jobs", **parameters):
         print(f"submitted {job.job_id}")
     return 0
 

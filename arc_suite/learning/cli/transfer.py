@@ -4,16 +4,13 @@ A score is (return - standing still) / (demonstrator - standing still), each bod
 standing still, 1 the demonstrator. A demonstrator that hardly walks makes any score large, so speeds are shown, too.
 Each body plays 400 control steps.
 
-`walk` is the share of bodies that walk, by the rule of arc-suite survey, `speed` the policy's mean share of the target
-speed, and `tracking`, in tasks with a command, a share of the demonstrators'. Families: random and varied, 50 bodies of
-seeds that no run trains with; the four robots with motors sized anew; 20 mutants of them; and 10 random bodies a
-quarter, and ten times, as large.
+`walk` is the share of bodies that walk: no fall, 0.7 of the target speed, the torso off the ground. `speed` is the
+policy's mean share of the target speed, and `tracking`, in tasks with a command, a share of the demonstrators'.
+Families: random and varied, 50 bodies of seeds that no run trains with; the four robots with motors sized anew; 20
+mutants of them; and 10 random bodies a quarter, and ten times, as large.
 
   arc-suite transfer --policy runs/varied.0-127-walk-dagger_bodies-0
   arc-suite transfer --policy universal --task steer --families varied,robots -o bodies.csv
-  arc-suite transfer --page docs/any_body.md
-
-With --page nothing is played: the episodes in studies/bodies.csv become the table of a page.
 """
 
 from pathlib import Path
@@ -23,7 +20,6 @@ from absl import flags
 from arc_suite import checks, policies
 from arc_suite.bodies import universal
 from arc_suite.cli.flags import completed, define_task, task
-from arc_suite.cli.program import marked_page
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.learning.studies import bodies
@@ -35,15 +31,9 @@ flags.DEFINE_list("families", list(transfer.FAMILIES), "Families to play with.")
 flags.DEFINE_string("output", None, "Table to add every episode to, CSV; those of before are replaced.", short_name="o")
 flags.DEFINE_string("name", None, "Of the policy in this table. [default: the stem of its path]")
 
-flags.DEFINE_string("page", None, "Page to write a table into, between the lines <!-- table --> and <!-- end -->.")
-flags.DEFINE_string("results", "studies/bodies.csv", "Table of episodes for --page.")
-
 
 def main() -> None:
-    """Play, print the table and write the episodes; or write a page."""
-    if FLAGS.page:
-        marked_page("page", FLAGS.page)(bodies.text(Path(FLAGS.results)))
-        return
+    """Play, print the table and write the episodes."""
     name, settings = completed(policies.setup_of(FLAGS.policy), *task())
     for family in FLAGS.families:
         checks.name(family, transfer.FAMILIES, "family")

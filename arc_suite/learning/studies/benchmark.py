@@ -6,6 +6,7 @@ studies/scores.csv holds a row for each run, by `write`. The table of all learne
 import difflib
 import itertools
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -17,17 +18,18 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, provenance
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING
-from arc_suite.learning.studies.leaderboard import table
 from arc_suite.learning.studies.results import RunResult
-from arc_suite.policies import named, network, zips
+from arc_suite.learning.studies.text_tables import table
+from arc_suite.policies import named, network, other_libraries
 
 SCORES = "scores.csv"
 CLIP = (-0.5, 1.2)  # of the score of a run
 HALF = 0.5  # score up to which minutes of the processor are counted
 STYLE, STYLE_HEADS = ("gait_compliance", "heading_error"), ("gait compliance", "heading error, rad")
 NOT_RUN = "not run"
+_LEARNER = re.compile(r"[\w.-]+")  # names of learners
 MAKE = "make"  # function of a module that makes a policy
-ENDINGS = (zips.EXTENSION, network.EXTENSION, named.MODULE)
+ENDINGS = (*other_libraries.READERS, network.EXTENSION, named.MODULE)
 # Robot, task and seed by the names that policies of a folder can have.
 NAMES = {
     f"{robot}-{task}-{seed}{ending}": (robot, task, seed)
@@ -144,6 +146,17 @@ def _of_policy(path: Path, setup: Setup, seed: int) -> RunScore:
     result = np.mean([*(track.rewards.sum() for track in tracks), *(each.total for each in others)])
     notes = "" if known else provenance.UNKNOWN
     return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup), notes)
+
+
+def checked_name(name: str) -> str:
+    """Return the name of a learner.
+
+    Raises:
+        ValueError: it has other characters than letters, digits, `_`, `-` and `.`.
+    """
+    if not _LEARNER.fullmatch(name):
+        raise ValueError(f"--name={name}: expected letters, digits, _, - and .")
+    return name
 
 
 def write(studies: Path, division: str, learner: str, scores: Iterable[RunScore]) -> None:

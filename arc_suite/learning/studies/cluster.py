@@ -1,7 +1,6 @@
 """Submits studies to a SLURM cluster with submitit, one job for each share of the runs."""
 
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,10 +12,10 @@ class Share(NamedTuple):
     """A job: makes a share of a study; after a timeout or preemption it is queued again and resumes.
 
     Attributes:
-        arguments: of `arc-suite`.
+        command: that makes it.
     """
 
-    arguments: tuple[str, ...]
+    command: tuple[str, ...]
 
     def __call__(self) -> None:
         """Make the runs.
@@ -24,7 +23,7 @@ class Share(NamedTuple):
         Raises:
             subprocess.CalledProcessError: a run has failed.
         """
-        subprocess.run([sys.executable, "-m", "arc_suite", *self.arguments], check=True)
+        subprocess.run(self.command, check=True)
 
     def checkpoint(self) -> submitit.helpers.DelayedSubmission:
         """Return the job that is queued in place of an interrupted one: the same, as it resumes from its folders."""
@@ -32,12 +31,12 @@ class Share(NamedTuple):
 
 
 def submit(
-    arguments: Sequence[str], shares: int, hours: float, logs: Path, cluster: str | None = None, **parameters
+    command: Sequence[str], shares: int, hours: float, logs: Path, cluster: str | None = None, **parameters
 ) -> list[submitit.Job]:
     """Submit an array of jobs.
 
     Args:
-        arguments: of `arc-suite` that make the study; each job adds its share.
+        command: that makes the study; each job adds its share.
         shares: number of jobs, of one core each.
         hours: time limit of a job, which is queued again.
         logs: folder of the jobs' output.
@@ -47,5 +46,5 @@ def submit(
     executor = submitit.AutoExecutor(logs, cluster=cluster)
     executor.update_parameters(timeout_min=round(60 * hours), cpus_per_task=1, name="arc-suite", **parameters)
     with executor.batch():
-        jobs = [executor.submit(Share((*arguments, f"--shard={i}/{shares}", "--jobs=1"))) for i in range(shares)]
+        jobs = [executor.submit(Share((*command, f"--shard={i}/{shares}", "--jobs=1"))) for i in range(shares)]
     return jobs

@@ -1,7 +1,5 @@
 """Reports of studies: Markdown and curves, of published tables alone."""
 
-import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -9,21 +7,23 @@ import numpy as np
 
 from arc_suite import evaluation, files
 from arc_suite.evaluation import anchors, published
-from arc_suite.learning.studies import claims, leaderboard, results
-from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies import results
 from arc_suite.learning.studies.results import Groups, RunResult
-from arc_suite.learning.studies.tables import Run, Study
+from arc_suite.learning.studies.tables import Study
+from arc_suite.learning.studies.text_tables import table
 
 REPORT, CURVES = "README.md", "curves.png"
+Sections = Mapping[str, Sequence[str]]  # paragraphs of each section of a report, by its title
 
 
-def write(name: str, study: Study, published: Path) -> Path:
-    """Write the report of a study into the folder of its tables, and the leaderboard one folder above.
+def write(name: str, study: Study, published: Path, further: Sections | None = None) -> Path:
+    """Write the report of a study into the folder of its tables.
 
     Args:
         name: of the study.
         study: its title and runs.
         published: folder of its tables.
+        further: sections that follow the report's own; None for none.
 
     Returns:
         The file of the report.
@@ -43,12 +43,11 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups, demonstrators)],
         **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
         "Style": [_STYLE, _style(groups)],
-        **({"Claims of the paper": [claims.TEXT, claims.checked(found)]} if any(map(claims.is_papers, found)) else {}),
+        **(further or {}),
     }
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
     files.write(published / REPORT, _page(sections))
-    leaderboard.write(published.parent, published.name, _rows(published.name, groups, demonstrators))
     return published / REPORT
 
 
@@ -76,7 +75,7 @@ _STYLE = (
 )
 
 
-def _page(sections: Mapping[str, Sequence[str]]) -> str:
+def _page(sections: Sections) -> str:
     text = "\n\n".join("\n\n".join([f"## {title}", *body]) for title, body in sections.items())
     return text[1:] + "\n"  # the first heading is that of the page
 
@@ -110,8 +109,8 @@ def _curves(groups: Groups, demonstrators):
     return plots.study(drawn, lines, finals)
 
 
-def _kinds(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:
-    """Yield place, kind and results of each kind of run."""
+def by_kind(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:
+    """Yield the place, the kind and the results of each kind of run."""
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
             yield place, kind, seeds
@@ -126,15 +125,22 @@ def _mean(values: np.ndarray) -> str:
     return f"{values.mean():.1f}" + (f" +- {values.std():.1f}" if len(values) > 1 else "")
 
 
-def _iqm(values: np.ndarray) -> str:
+def iqm_text(values: np.ndarray) -> str:
+    """Return the interquartile mean of returns (seeds,) with its interval as text; a dash for a single seed."""
     if len(values) == 1:
         return "-"
     middle, (low, high) = evaluation.iqm_and_interval([values])
     return f"{middle:.1f} [{low:.1f}, {high:.1f}]"
 
 
-def _score(values: np.ndarray, place: str, demonstrators) -> str:
-    """The score of mean returns, a dash without anchors."""
+def score_text(values: np.ndarray, place: str, demonstrators) -> str:
+    """Return the score of the mean of returns in a place as text; a dash without anchors.
+
+    Args:
+        values: returns.
+        place: see `Run.place`.
+        demonstrators: of the study; see `results.demonstrators`.
+    """
     found = anchors.of_returns(demonstrators[place]).score(values.mean()) if place in demonstrators else np.nan
     return f"{found:z.2f}" if np.isfinite(found) else "-"
 
@@ -142,7 +148,7 @@ def _score(values: np.ndarray, place: str, demonstrators) -> str:
 def _paper(result: RunResult, steps: int) -> str:
     """The paper's return after as many steps; a dash where its curves have none."""
     run = result.run.configuration
-    found = published.at(run.setup.body.name, run.algorithm, steps) if claims.is_papers(result) else None
+    found = published.at(run.setup.body.name, run.algorithm, steps) if results.is_in_paper(result) else None
     return "-" if found is None else f"{found:.0f}"
 
 
@@ -151,13 +157,13 @@ def _finals(groups: Groups, demonstrators) -> str:
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
             steps, values = min(each.steps[-1] for each in seeds), results.scores(seeds)
-            score = _score(values, place, demonstrators)
-            cells = (place, kind, f"{steps:,}", str(len(seeds)), _mean(values), score, _iqm(values))
+            score = score_text(values, place, demonstrators)
+            cells = (place, kind, f"{steps:,}", str(len(seeds)), _mean(values), score, iqm_text(values))
             lines.append((*cells, _paper(seeds[0], steps), results.notes(seeds)))
         expert = evaluation.expert_return(seeds[0].run.configuration.setup)
         for name, totals in demonstrators.get(place, {}).items():
             own = f"{expert:.0f}" if name == "medium" and expert else "-"
-            score = _score(totals, place, demonstrators)
+            score = score_text(totals, place, demonstrators)
             note = "".join(results.few_episodes(totals)) or "-"
             lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own, note))
     heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]")
@@ -166,7 +172,7 @@ def _finals(groups: Groups, demonstrators) -> str:
 
 def _efficiency(groups: Groups, demonstrators) -> str:
     lines = []
-    for place, kind, seeds in _kinds(groups):
+    for place, kind, seeds in by_kind(groups):
         half, cells = anchors.of_returns(demonstrators[place]).at(0.5) if place in demonstrators else np.inf, []
         for threshold in (half, 3500.0):
             steps, seconds = results.until(seeds, threshold)
@@ -179,7 +185,7 @@ def _efficiency(groups: Groups, demonstrators) -> str:
 
 def _phases(groups: Groups) -> str:
     lines = []
-    for place, kind, seeds in _kinds(groups):
+    for place, kind, seeds in by_kind(groups):
         updates = np.concatenate([each.phases for each in seeds])
         if len(updates):
             numbers = (len(updates), updates.mean(), updates.min(), updates.max())
@@ -188,47 +194,12 @@ def _phases(groups: Groups) -> str:
 
 
 def _style(groups: Groups) -> str:
-    names = list(dict.fromkeys(name for _, _, seeds in _kinds(groups) for name in seeds[0].style))
-    lines = [(place, kind, *(_size(name, seeds) for name in names)) for place, kind, seeds in _kinds(groups)]
+    names = list(dict.fromkeys(name for _, _, seeds in by_kind(groups) for name in seeds[0].style))
+    lines = [(place, kind, *(style_text(name, seeds) for name in names)) for place, kind, seeds in by_kind(groups)]
     return table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
 
 
-def _size(name: str, seeds: Sequence[RunResult]) -> str:
+def style_text(name: str, seeds: Sequence[RunResult]) -> str:
+    """Return the mean size of a metric of style over seeds as text; a dash where none has it."""
     size = np.mean([results.size(each.style.get(name, np.empty(0))) for each in seeds])
     return "-" if np.isnan(size) else f"{size:.3f}"
-
-
-def _rows(name: str, groups: Groups, demonstrators) -> list[dict[str, str]]:
-    """Return the rows of a study in the leaderboard, by `leaderboard.HEADS`."""
-    rows = []
-    for _, _, seeds in _kinds(groups):
-        run, values = seeds[0].run, results.scores(seeds)
-        length = getattr(run.configuration.hyperparameters, "phase_updates", 0)
-        own = next(iter(seeds[0].progress))
-        style = [_size(metric, seeds) for metric in ("gait_compliance", "heading_error", "torso_pitch")]
-        cells = {
-            "robot, task": run.place,
-            "algorithm": run.kind,
-            "phases, updates": f"{length:,}" if length else "-",
-            "prior data, episodes": f"{run.prior.preset}, {run.prior.episodes:,}" if run.prior else "-",
-            "seeds": str(len(seeds)),
-            "return": f"{values.mean():.1f}",
-            "score": _score(values, run.place, demonstrators),
-            "IQM [95 %]": _iqm(values),
-            "metric": f"{own} {np.mean([np.mean(each.progress[own]) for each in seeds]):.3f}",
-            **dict(zip(leaderboard.STYLE, style, strict=True)),
-            "steps": f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}",
-            "CPU min": f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}",
-            "notes": results.notes(seeds),
-            "study": name,
-            "command of seed 0": f"`{run.configuration.command}`",
-            "configuration": _identity(run),
-        }
-        rows.append(cells)
-    return rows
-
-
-def _identity(run: Run) -> str:
-    """A hash of the configuration without its seed: runs that differ in nothing else have the same."""
-    fields = {name: value for name, value in run.configuration.to_dict().items() if name != "seed"}
-    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()[:12]

@@ -9,6 +9,7 @@ import numpy as np
 
 from arc_suite import checks, evaluation
 from arc_suite.evaluation import anchors, provenance
+from arc_suite.evaluation.published import CURVES
 from arc_suite.learning.agents.configuration import CONFIGURATION, PROVENANCE, TRAINING_SEEDS
 from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
@@ -128,6 +129,13 @@ def grouped(found: Sequence[RunResult]) -> Groups:
     for each in found:
         groups.setdefault(each.run.place, {}).setdefault(each.run.kind, []).append(each)
     return groups
+
+
+def is_in_paper(result: RunResult) -> bool:
+    """Return whether the paper's curves have a run."""
+    setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
+    plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
+    return plain and algorithm in CURVES.get(setup.body.name, {})
 
 
 def few_episodes(returns: np.ndarray) -> tuple[str, ...]:

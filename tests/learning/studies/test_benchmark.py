@@ -196,21 +196,14 @@ def run(*arguments, cwd):
         (["top", "--policies=."], ".: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none"),
         (["top", "--policies=.", "--name=a/b"], "--name=a/b: expected letters, digits, _, - and ."),
         (["top", "--policies=none"], "cannot read none: no such file or directory"),
-        (["--page=none.md"], "cannot read none.md: no such file or directory"),
-        (["--page=plain.md"], "--page=plain.md: expected the lines <!-- table --> and <!-- end -->, got none"),
-        (["--page=page.md"], "studies: no scores of the benchmark; run a division, or name another folder by "),
         ([], "studies: no scores of the benchmark; run a division, or name another folder by --results"),
     ],
 )
 def test_errors_are_one_line(tmp_path, arguments, line):
-    """A page keeps its table."""
-    pages = {"page.md": "<!-- table -->\nrows\n<!-- end -->\n", "plain.md": "text"}
-    for name, text in pages.items():
-        (tmp_path / name).write_text(text)
     done = run(*arguments, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (1, "") and done.stderr.count("\n") == 1, done.stderr
     assert done.stderr.startswith(f"arc-suite benchmark: {line}")
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == pages
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -261,16 +254,14 @@ def test_policies_of_others_are_scored(tmp_path):
     (tmp_path / "theirs").mkdir()
     (tmp_path / "theirs" / "tick-walk-1.npz").write_bytes((PACKAGED / "tick-walk.npz").read_bytes())
     (tmp_path / "theirs" / "notes.txt").write_text("")
-    (tmp_path / "page.md").write_text("# Mine\n\n<!-- table -->\n<!-- end -->\n")
-    done = run("samples", "--policies=theirs", "--page=page.md", cwd=tmp_path)
+    done = run("samples", "--policies=theirs", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     (found,) = benchmark.read(tmp_path / "studies")["samples", "theirs"]
     assert (found.robot, found.task, found.seed) == ("tick", "walk", 1)
     assert found.score == pytest.approx(scale().score(found.result)) and found.score > 0.9
     assert np.isnan(found.minutes) and found.gait_compliance > 0.95 and found.heading_error < 0.2
-    page = (tmp_path / "page.md").read_text()
-    assert page == f"# Mine\n\n<!-- table -->\n\n{benchmark.text(tmp_path / 'studies')}\n\n<!-- end -->\n"
-    assert row(page, "theirs")[4:6] == ["tick walk 1.01", "-"]  # the lowest place, and minutes that nobody knows
+    assert done.stdout == f"{benchmark.text(tmp_path / 'studies')}\n"
+    assert row(done.stdout, "theirs")[4:6] == ["tick walk 1.01", "-"]  # the lowest place, and minutes that nobody knows
 
 
 SHORT = """
@@ -315,9 +306,3 @@ def test_committed_scores_are_those_of_committed_results(name):
     expected = benchmark.of_results(results.results(tables.study(name).runs, COMMITTED / name))
     for one, other in zip(benchmark.read(COMMITTED)[tuple(name.split("-", 1))], expected, strict=True):
         assert one[:3] == other[:3] and one[3:] == pytest.approx(other[3:], nan_ok=True)
-
-
-def test_the_page_holds_the_table_of_committed_scores():
-    assert (
-        f"<!-- table -->\n\n{benchmark.text(COMMITTED)}\n\n<!-- end -->" in (ROOT / "docs" / "benchmark.md").read_text()
-    )

@@ -25,7 +25,7 @@ from arc_suite.bodies import generator
 from arc_suite.envs.dm import load
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.training import train
-from arc_suite.learning.studies import csv_files, publication, results, runner, tables
+from arc_suite.learning.studies import csv_files, publication, results, runner
 from arc_suite.learning.studies.publication import METRICS
 from arc_suite.learning.studies.tables import Prior, run
 
@@ -214,14 +214,6 @@ def test_a_run_is_judged_without_its_settings_of_training(tmp_path):
         assert evaluation.run(environment, policy, 57).total == found.finals[57], "the first ten are the curve's"
 
 
-def test_the_page_counts_runs():
-    rows = re.findall(r"^\| `([a-z-]+)` \| (\d+) \| (\d+) \|", (ROOT / "docs" / "study.md").read_text(), re.MULTILINE)
-    assert {name for name, *_ in rows} == tables.STUDIES.keys()
-    for name, runs, committed in rows:
-        assert len(tables.study(name).runs) == int(runs), name
-        assert len(csv_files.read(ROOT / "studies" / name / results.RUNS)) == int(committed), name
-
-
 def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
     body = dataclasses.replace(generator.generate(4, 2), name="creature")
     monkeypatch.setitem(sys.modules, "others", types.ModuleType("others"))
@@ -252,12 +244,16 @@ def test_columns_stay_in_the_order_of_each_task():
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ([], "expected a study: paper, exact-tick, short, "),
-        (["papr"], "unknown study 'papr'; did you mean 'paper'? (there are: "),
-        (["paper", "--shard=4/4"], "--shard=4/4: expected i/n with i from 0 to n - 1, such as 0/4"),
-        (["first-steps", "--shard=0/2", "--submit=3"], "--shard=0/2: --submit makes shares of its own; leave one of "),
-        (["first-steps", "--jobs=2", "--submit=3"], "--jobs, --submit: this machine, or a cluster; give one of them"),
-        (["first-steps", "--shard=6/7"], "--shard=6/7: no run, as the study has 6"),
+        ([], "expected a study: module:attribute, or <division>-<algorithm>; see --help"),
+        (
+            ["paper"],
+            "study 'paper': expected module:attribute, a Study on Python's path, or <division>-<algorithm> of ",
+        ),
+        (["top-pppo"], "unknown algorithm 'pppo'; did you mean 'ppo'?"),
+        (["top-ppo", "--shard=4/4"], "--shard=4/4: expected i/n with i from 0 to n - 1, such as 0/4"),
+        (["top-ppo", "--shard=0/2", "--submit=3"], "--shard=0/2: --submit makes shares of its own; leave one of "),
+        (["top-ppo", "--jobs=2", "--submit=3"], "--jobs, --submit: this machine, or a cluster; give one of them"),
+        (["top-ppo", "--shard=30/31"], "--shard=30/31: no run, as the study has 30"),
         (["arc_suite:load"], "study 'arc_suite:load': expected a Study, got function"),
         (
             ["tiny_studies:TWIC"],
@@ -286,13 +282,12 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
 
     commands = []
     monkeypatch.setattr(cluster.subprocess, "run", lambda command, check: commands.append(command))
-    jobs = cluster.submit(("study", "first-steps"), 3, 2.0, tmp_path / "jobs", cluster="debug")
+    study = ("arc-suite", "study", "top-ppo")
+    jobs = cluster.submit(study, 3, 2.0, tmp_path / "jobs", cluster="debug")
     for job in jobs:
         job.result()
-    assert [command[1:] for command in commands] == [
-        ["-m", "arc_suite", "study", "first-steps", f"--shard={part}/3", "--jobs=1"] for part in range(3)
-    ]
-    share = cluster.Share(("study", "first-steps"))
+    assert commands == [(*study, f"--shard={part}/3", "--jobs=1") for part in range(3)]
+    share = cluster.Share(study)
     assert share.checkpoint().function == share
 
 

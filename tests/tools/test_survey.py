@@ -1,4 +1,4 @@
-"""`arc-suite survey` lets random bodies walk and tells those that do from those that do not."""
+"""tools/survey.py lets random bodies walk and tells those that do from those that do not."""
 
 import re
 
@@ -6,13 +6,14 @@ import programs
 import pytest
 
 from arc_suite.registry import FAMILIES
+from arc_suite.tasks import TASKS
 
 BODIES = ("--first=40", "--legs=6", "--links=3", "--seconds=12")
 IN_PHASE = ("--set=duty_factor=0.6", "--set=phase_offsets=0.0")
 
 
 def survey(*arguments):
-    return programs.arc_suite("survey", "--processes=1", *arguments)
+    return programs.tool("survey", "--processes=1", *arguments)
 
 
 def test_bodies_walk():
@@ -42,8 +43,10 @@ def test_legs_in_phase_fail_and_their_bodies_are_named():
 
 
 @pytest.mark.parametrize(
-    ("argument", "message"),
+    ("arguments", "message"),
     [
+        ("--task=steer2", f"unknown task 'steer2'; did you mean 'steer'? (there are: {', '.join(TASKS)})"),
+        ("--legs=6 --family=varied", "--legs=6: goes with the family random, not with varied"),
         ("--count=0", "flag --count=0: expected an integer in the range [1, 100000]"),
         ("--picture=missing/a.png", "cannot write missing/a.png: no such file or directory"),
         ("--picture=a.txt", "unknown extension '.txt' (there are: .png)"),
@@ -51,8 +54,8 @@ def test_legs_in_phase_fail_and_their_bodies_are_named():
         ("--family=vared", f"unknown family 'vared'; did you mean 'varied'? (there are: {', '.join(FAMILIES)})"),
     ],
 )
-def test_bad_arguments_are_one_line(argument, message):
-    programs.refused(survey(argument), f"arc-suite survey: {message}\n")
+def test_bad_arguments_are_one_line(arguments, message):
+    programs.refused(survey(*arguments.split()), f"survey.py: {message}\n")
 
 
 @pytest.mark.slow

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from preset_search import Evaluator, Search
 
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.tuning import Evaluator, Search
 
 SETTINGS = {"setup": Setup.of("bastion"), "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
 

@@ -1,4 +1,4 @@
-"""A picture of a search's course. Needs matplotlib (extra `learn`)."""
+"""A picture of a search's course. Needs matplotlib (extra `dev`)."""
 
 from collections.abc import Sequence
 
@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from arc_suite.learning.tuning.evaluator import STYLE
-from arc_suite.learning.tuning.search import Generation
+from preset_search.evaluator import STYLE
+from preset_search.search import Generation
 
 # Okabe and Ito's colors, which color-blind readers can tell apart.
 _BLUE, _GREEN, _GRAY = "#0072B2", "#009E73", "#8C8C8C"

@@ -2,14 +2,13 @@
 
 import math
 import pathlib
-import re
 
-import programs
 import pytest
 
 from arc_suite.learning import transfer
-from arc_suite.learning.studies import bodies
+from arc_suite.learning.studies.bodies import write
 from arc_suite.learning.transfer import Comparison, Judged
+from studies import bodies
 
 ROOT = pathlib.Path(__file__).parents[3]
 STUDY = ROOT / "studies" / "bodies.csv"
@@ -24,8 +23,8 @@ def test_episodes_are_read_as_they_were_written(tmp_path):
     played = {"robots": [compared(15.0, 0.4), compared(20.0, 0.6)], "small": [compared(10.0, 0.2)]}
     path = tmp_path / "bodies.csv"
     for each in ({"small": []}, {"robots": [compared(1.0, 0.1)]}, played):  # the latest replaces the others
-        bodies.write(path, "one", "steer", each)
-    bodies.write(path, "two", "steer", played)
+        write(path, "one", "steer", each)
+    write(path, "two", "steer", played)
     assert bodies.read(path) == {("one", "steer"): played, ("two", "steer"): played}
     table = bodies.text(path).splitlines()
     assert table[0].split(" | ")[1:3] == ["task", "random"]
@@ -33,24 +32,11 @@ def test_episodes_are_read_as_they_were_written(tmp_path):
         "| one | steer | not run | not run | 0.75, tracking 0.62 | not run | not run | not run | 0.00, tracking 0.25 |"
         " not run |"
     )
-    bodies.write(path, "one", "walk", {"robots": [compared(15.0)]})
+    write(path, "one", "walk", {"robots": [compared(15.0)]})
     assert "| one | walk | not run | not run | 100%, 0.50 (0.50), speed 0.90 | not run |" in bodies.text(path)
     path.write_text("family,body\n")
     with pytest.raises(ValueError, match=r"bodies\.csv: expected lines of policy, task, family, "):
         bodies.text(path)
-
-
-def test_the_page_holds_the_committed_table(tmp_path):
-    page = (ROOT / "docs" / "any_body.md").read_text()
-    assert f"<!-- table -->\n\n{bodies.text(STUDY)}\n\n<!-- end -->" in page
-    copy = tmp_path / "page.md"
-    copy.write_text(re.sub(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", "", page, flags=re.DOTALL))
-    done = programs.arc_suite("transfer", f"--page={copy}", f"--results={STUDY}")
-    programs.passed(done)
-    assert copy.read_text() == page
-    done = programs.arc_suite("transfer", f"--page={copy}", f"--results={tmp_path / 'none.csv'}")
-    programs.refused(done, f"arc-suite transfer: {tmp_path / 'none.csv'}: holds no episodes; add some by -o, or ")
-    assert copy.read_text() == page
 
 
 def test_what_ships_is_in_the_table_and_is_good():

@@ -15,8 +15,8 @@ from arc_suite import seed_ranges
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.tuning.evaluator import STYLE, Evaluator, PresetScore
-from arc_suite.learning.tuning.space import SPACES, rounded
+from preset_search.evaluator import STYLE, Evaluator, PresetScore
+from preset_search.space import SPACES, rounded
 
 SPREAD = 0.5  # of the first generation, in scales of the parameters
 HARD = 8  # starts that candidates are tried in
@@ -70,7 +70,7 @@ class Search:
             ImportError: no package `cma`.
             ValueError: a task without the terms of style.
         """
-        import cma  # of the extra "tune"
+        import cma  # of the extra `dev`
 
         tuning, kind = PRESETS[setup.body.name], SPACES[space]
         self._medium = tuning["medium"]

@@ -4,9 +4,9 @@ Every seed is a body. A body walks if it does not fall, its torso touches the gr
 the time, and it reaches 0.7 of the target speed, which is the task's target velocity or its command.
 The summary says how many reach 0.9 of it.
 
-  arc-suite survey --first 0 --count 500
-  arc-suite survey --family varied --count 500
-  arc-suite survey --first 7000 --count 100 --legs 4 --picture failures.png
+  python tools/survey.py --first 0 --count 500
+  python tools/survey.py --family varied --count 500
+  python tools/survey.py --first 7000 --count 100 --legs 4 --picture failures.png
 """
 
 import contextlib
@@ -14,15 +14,15 @@ import contextlib
 import imageio.v3 as imageio
 import numpy as np
 from absl import flags
+from surveys import walks
 
 from arc_suite import checks, files, registry
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
+from arc_suite.cli import program
 from arc_suite.cli.flags import MOST, define_task, task
-from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
-from arc_suite.learning import survey
 from arc_suite.registry import FAMILIES
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
@@ -43,11 +43,11 @@ flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [d
 flags.DEFINE_string("picture", None, "File to write a picture of up to twelve failures to.")
 
 
-def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
+def picture(outcomes: list[walks.Outcome]) -> np.ndarray:
     """Return the ends of up to twelve walks, each with its seed and failures: (height, width, 3) uint8."""
     views = []
     for outcome in outcomes[:12]:
-        environment, _ = survey.play(outcome.case)
+        environment, _ = walks.play(outcome.case)
         caption = ", ".join((f"seed {outcome.case.seed}: {outcome.legs} x {outcome.links}", *outcome.failures))
         view = environment.physics.render(300, 400, "portrait", quality="still")
         views.append(films.captioned(view, caption))
@@ -81,12 +81,16 @@ def main() -> None:
         first = Setup.of(member(seeds[0]), name, settings)
         _ = first.definition  # finds out before all bodies are made, and processes, whether the settings fit
         protocol.check_ends(first.task_kwargs["time_limit"])
-        cases = [survey.Case(Setup.of(member(seed), name, settings), seed) for seed in seeds]
-        outcomes = list(survey.survey(cases, FLAGS.processes, progress))
-        print(survey.table(outcomes))
-        print(survey.summary(outcomes))
+        cases = [walks.Case(Setup.of(member(seed), name, settings), seed) for seed in seeds]
+        outcomes = list(walks.survey(cases, FLAGS.processes, program.progress))
+        print(walks.table(outcomes))
+        print(walks.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]
         for seed, outcome in ((each.case.seed, each) for each in failed):
             print(f"seed {seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}")
         if path:
             imageio.imwrite(path, picture(failed or outcomes))
+
+
+if __name__ == "__main__":
+    program.run(main)

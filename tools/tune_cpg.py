@@ -4,26 +4,26 @@ It must walk no worse than `medium` does. The search is CMA-ES on the vector env
 at any moment, the same command goes on. At the end the best parameters are compared with the existing presets
 over many resets, and printed as a row for the table of presets.
 
-  arc-suite tune_cpg --robot queen --output out/tune/queen
-  arc-suite tune_cpg --robot queen --space torques --output out/tune/queen-torques
+  python tools/tune_cpg.py --robot queen --output out/tune/queen
+  python tools/tune_cpg.py --robot queen --space torques --output out/tune/queen-torques
 """
 
 import contextlib
 import pathlib
 
 from absl import flags
+from preset_search import Evaluator, Generation, Search
+from preset_search.evaluator import STYLE
+from preset_search.search import HARD
+from preset_search.space import SPACES
 
 from arc_suite import checks, evaluation, files, versions
+from arc_suite.cli import program
 from arc_suite.cli.flags import MOST, define_task, task
-from arc_suite.cli.program import progress, resumable, say
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.journal import Journal
-from arc_suite.learning.tuning import Evaluator, Generation, Search
-from arc_suite.learning.tuning.evaluator import STYLE
-from arc_suite.learning.tuning.search import HARD
-from arc_suite.learning.tuning.space import SPACES
 from arc_suite.tasks.contract import STEPS
 
 FLAGS = flags.FLAGS
@@ -64,8 +64,8 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
             course.step(generation.fitness)
         done = len(journal.generations)
         wanted = given("generations")
-        say(f"{folder}: {wanted} generations")
-        with progress(total=max(wanted, done), initial=done, desc=setup.name, unit="generation") as bar:
+        program.say(f"{folder}: {wanted} generations")
+        with program.progress(total=max(wanted, done), initial=done, desc=setup.name, unit="generation") as bar:
             for _ in range(done, wanted):
                 journal.append(course.step())
                 bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}", refresh=False)
@@ -99,13 +99,12 @@ def main() -> None:
     checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:
         raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
-    with versions.needing("a search needs cma and matplotlib", "learn"):
+    with versions.needing("a search needs cma and matplotlib", "dev"):
         import cma  # noqa: F401
-
-        from arc_suite.learning.tuning import plots
+        from preset_search import plots
     folder = files.folder(FLAGS.output)
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
-        with resumable(folder):
+        with program.resumable(folder):
             course, journal = search(setup, folder)
         preset = course.result()
         plots.course(setup.name, course.reward, journal.generations, STEPS).savefig(picture)
@@ -122,3 +121,7 @@ def main() -> None:
     print(f"\n{preset}")
     if broken := violations(metrics):
         raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")
+
+
+if __name__ == "__main__":
+    program.run(main)

@@ -1,4 +1,4 @@
-"""A robustness survey: the demonstrators of random bodies walk, and each walk is assessed."""
+"""The walks of a survey: they are played in several processes, assessed and counted."""
 
 import collections
 import functools

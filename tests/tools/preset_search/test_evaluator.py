@@ -5,12 +5,12 @@ import gymnasium
 import mujoco
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
+from preset_search import Evaluator
 from refusals import refused
 
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.tuning import Evaluator
 
 
 def test_evaluator_plays_the_episodes_of_ordinary_environments():

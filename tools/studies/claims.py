@@ -10,9 +10,9 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation.published import CURVES as PAPER
 from arc_suite.evaluation.published import STEPS, at
 from arc_suite.learning.agents.algorithms import ALGORITHMS
-from arc_suite.learning.studies import results
-from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies import report, results
 from arc_suite.learning.studies.results import RunResult
+from arc_suite.learning.studies.text_tables import table
 
 ONLINE = ("sac", "speq", "sope_eo")
 WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
@@ -78,15 +78,20 @@ CLAIMS = (
     Claim("SOPE looks best: the most gait compliance", _most("sope"), _style("gait_compliance")),
 )
 
-TEXT = (
+_TEXT = (
     "Margin of each claim, in its own unit: it holds above zero. The paper's margin is from its returns after as many "
     "steps, if they decide the claim. Ours are from finished runs alone."
 )
 
 
+def sections(found: Sequence[RunResult]) -> report.Sections:
+    """Return the section of the claims for a report; none without a run that the paper's curves have."""
+    return {"Claims of the paper": [_TEXT, checked(found)]} if any(map(results.is_in_paper, found)) else {}
+
+
 def checked(found: Sequence[RunResult]) -> str:
     """Return a table of the margins of all claims in Markdown."""
-    own = [each for each in found if is_papers(each) and each.steps[-1] >= each.run.configuration.steps]
+    own = [each for each in found if results.is_in_paper(each) and each.steps[-1] >= each.run.configuration.steps]
     steps = min((each.run.configuration.steps for each in own), default=STEPS[-1])
     lines = []
 
@@ -117,7 +122,7 @@ def next_to_the_papers(studies: Iterable[Sequence[RunResult]], steps: int) -> st
     cells: dict[tuple[str, str], str] = {}
     for found in studies:
         own: dict[tuple[str, str], list[RunResult]] = {}
-        for each in filter(is_papers, found):
+        for each in filter(results.is_in_paper, found):
             own.setdefault((each.run.configuration.algorithm, each.run.configuration.setup.body.name), []).append(each)
         cells = {key: _after(runs, steps) for key, runs in own.items()} | cells
     robots = tuple(PAPER)
@@ -137,13 +142,6 @@ def _after(runs: Sequence[RunResult], steps: int) -> str:
     published = ALGORITHMS[run.algorithm].hyperparameters
     notes = [f"at {last:,}"] * (last < steps) + ["short phases"] * (run.hyperparameters != published)
     return f"{mean:.0f}" + f" ({', '.join(notes)})" * bool(notes)
-
-
-def is_papers(result: RunResult) -> bool:
-    """Return whether the paper's curves have a run."""
-    setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
-    plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
-    return plain and algorithm in PAPER.get(setup.body.name, {})
 
 
 def _leads(margins: Mapping[str, float]) -> str:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from preset_search import Space
+from preset_search.space import HARMONICS, SPACES, Torques, rounded
 
 from arc_suite.cpg.prescribed import feedforward, pattern
 from arc_suite.cpg.presets import PRESETS
-from arc_suite.learning.tuning import Space
-from arc_suite.learning.tuning.space import HARMONICS, SPACES, Torques, rounded
 from arc_suite.robots import ROBOTS
 
 

@@ -1,4 +1,4 @@
-"""`arc-suite tune_cpg` searches, goes on when it was broken off, and judges what it found."""
+"""tools/tune_cpg.py searches, goes on when it was broken off, and judges what it found."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ QUICK = ("--robot=bastion", "--steps=20", "--starts=8", "--resets=2")
 
 
 def command(*arguments):
-    return [sys.executable, "-m", "arc_suite", "tune_cpg", *QUICK, *map(str, arguments)]
+    return [sys.executable, programs.TOOLS / "tune_cpg.py", *QUICK, *map(str, arguments)]
 
 
 def tune(*arguments):
@@ -35,7 +35,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     found, medium = result["metrics"]["found"], result["metrics"]["medium"]
     worse = [cost for cost in ("posture", "smoothness", "tilt") if found[cost] > medium[cost]]
     assert done.returncode == (1 if worse or found["falls"] else 0)
-    broken = "arc-suite tune_cpg: the result breaks its constraints: "
+    broken = "tune_cpg.py: the result breaks its constraints: "
     assert [cost for cost in worse if cost not in done.stderr.partition(broken)[2]] == []
     assert (result["robot"], result["generations"], result["resets"]) == ("bastion", 4, 2)
     assert found["return"]["mean"] > medium["return"]["mean"]
@@ -53,6 +53,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--task=wlak"], "unknown task 'wlak'; did you mean 'walk'? (there are: "),
         (["--generations=0"], "flag --generations=0: expected an integer in the range [1, 100000]"),
         (["--resets=100000000000000000000"], "flag --resets=100000000000000000000: "),
         (["--steps=1001"], "flag --steps=1001: "),
@@ -62,7 +63,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     ],
 )
 def test_bad_input_is_one_line(arguments, message):
-    programs.refused(programs.arc_suite("tune_cpg", *QUICK, *arguments), f"arc-suite tune_cpg: {message}")
+    programs.refused(programs.tool("tune_cpg", *QUICK, *arguments), f"tune_cpg.py: {message}")
 
 
 @pytest.mark.release
@@ -72,5 +73,5 @@ def test_another_search_in_the_folder_is_refused(tmp_path):
     assert sorted(before) == ["course.png", "journal.jsonl", "result.json"]
     message = "of a search with seed 0, not 7; delete it or write to another folder"
     done = tune("--generations=2", "--seed=7", f"--output={tmp_path}")
-    programs.refused(done, f"arc-suite tune_cpg: {tmp_path}/journal.jsonl: {message}\n")
+    programs.refused(done, f"tune_cpg.py: {tmp_path}/journal.jsonl: {message}\n")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

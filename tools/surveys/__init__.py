@@ -1,0 +1,1 @@
+"""Surveys: random bodies walk by their demonstrators, and each walk is assessed."""
