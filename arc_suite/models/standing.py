@@ -1,24 +1,15 @@
 """The standing pose of a body, all joints at zero; proportions, motors and gait derive from it."""
 
 import functools
-import math
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite.models import source
-from arc_suite.robots.spec import Ballast, Body
+from arc_suite.models import builder, direct, source
+from arc_suite.robots.spec import Body
 
 GRAVITY = 9.81  # m/s^2
-
-GEOMS = {
-    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
-    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
-    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
-    "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-    "box": mujoco.mjtGeom.mjGEOM_BOX,
-}
 
 
 class Standing(NamedTuple):
@@ -130,26 +121,7 @@ def compiled(body: Body) -> mujoco.MjModel:
     """
     if body.source:
         return source.bare(body)
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    torso = spec.worldbody.add_body(name="torso", pos=(0.0, 0.0, body.torso.standing_height))
-    torso.add_freejoint()
-    for solid in (*body.torso.solids, *body.ballast):
-        weight = {"mass": solid.mass} if isinstance(solid, Ballast) else {"density": body.density}
-        turn = [math.radians(angle) for angle in solid.euler_deg]
-        torso.add_geom(type=GEOMS[solid.shape], size=solid.size, pos=solid.position, euler=turn, **weight)
-    for leg in body.legs:
-        parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
-        for link in leg.links:
-            parent = parent.add_body(name=leg.full_name(link), pos=pos, euler=(0.0, 0.0, yaw))
-            if link.joint:
-                parent.add_joint(name=leg.full_name(link.joint), axis=link.joint.axis)
-            ends = (0.0, 0.0, 0.0, *link.end)
-            parent.add_geom(type=GEOMS["capsule"], fromto=ends, size=(link.radius,), density=body.density)
-            pos, yaw = link.end, 0.0
-        foot = parent.add_body(name=leg.full_name(leg.foot), pos=pos)
-        foot.add_geom(type=GEOMS["sphere"], size=(leg.foot.radius,), density=body.density)
-    return spec.compile()
+    return direct.write(builder.parts(body)).compile()
 
 
 def foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
