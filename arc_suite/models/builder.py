@@ -125,16 +125,16 @@ def parts(body: Body, simulation: Simulation | None = None) -> list[Element]:
 
 def _leg(leg: Leg, geom: dict[str, Any], simulation: Simulation | None) -> list[Element]:
     listed = []
+    joint_names = iter(leg.joint_names)
+    *link_names, foot = leg.part_names
     parent, pos, yaw = "torso", leg.mount, math.radians(leg.yaw_deg)
-    for link in leg.links:
-        name = leg.full_name(link)
+    for name, link in zip(link_names, leg.links, strict=True):
         listed.append(Element("body", parent, {"name": name, "pos": pos, "euler": (0.0, 0.0, yaw)}))
         if link.joint:
-            listed.append(_joint(name, leg.full_name(link.joint), link.joint, simulation))
+            listed.append(_joint(name, next(joint_names), link.joint, simulation))
         capsule = {"name": name, "type": "capsule", "fromto": (0.0, 0.0, 0.0, *link.end), "size": (link.radius,)}
         listed.append(Element("geom", name, {**capsule, **geom}))
         parent, pos, yaw = name, link.end, 0.0
-    foot = leg.full_name(leg.foot)
     listed.append(Element("body", parent, {"name": foot, "pos": pos}))
     listed.append(Element("geom", foot, {"name": foot, "type": "sphere", "size": (leg.foot.radius,), **geom}))
     return listed
@@ -164,8 +164,9 @@ def _shape(solid: Solid) -> dict[str, Any]:
 def _joint(part: str, name: str, joint: Joint, simulation: Simulation | None) -> Element:
     attributes: dict[str, Any] = {"name": name, "type": "hinge", "axis": joint.axis}
     if simulation:
+        low, high = joint.range_deg
         attributes["limited"] = True
-        attributes["range"] = [math.radians(angle) for angle in joint.range_deg]
+        attributes["range"] = (math.radians(low), math.radians(high))
         attributes["armature"] = joint.armature
         attributes["damping"] = joint.damping
         attributes["solreflimit"] = (simulation.contact_time, 1.0)
