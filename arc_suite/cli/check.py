@@ -20,7 +20,7 @@ from absl import flags
 from arc_suite import registry
 from arc_suite.cli.flags import ROBOT_HELP, define_task, task
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import conformance, first_walk
+from arc_suite.evaluation import conformance, cures
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body
 
@@ -51,12 +51,12 @@ def _check_body(spec: str) -> int:
 
 
 def _check_walk(spec: str, body: Body) -> int:
-    tried = first_walk.walk(body)
+    tried = cures.walk(body)
     if tried.quality == 2:
         print(f"{spec}: {_said(tried)}")
         return 0
-    cure = first_walk.left_out(body, tried.quality)
-    advice, given = "", first_walk.given_fields(body)
+    cure = cures.left_out(body, tried.quality)
+    advice, given = "", cures.given_fields(body)
     if cure is not None:
         advice = f": leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
     elif given:
@@ -66,7 +66,7 @@ def _check_walk(spec: str, body: Body) -> int:
     return 1
 
 
-def _said(tried: first_walk.FirstWalk) -> str:
+def _said(tried: cures.FirstWalk) -> str:
     speed = f"{tried.speed:.2f} m/s ({tried.share:.2f} of the target {tried.target:.2f})"
     return f"walks {tried.length} control steps at {speed}"
 
