@@ -202,7 +202,7 @@ def test_a_weak_body_reaches_about_the_speed_that_is_told(gear, joint):
     body = with_gear(gear, (joint,), ALL)
     told = [flaw.text for flaw in flaws(body)]
     walked = cures.walk(body)
-    reached = 0.0 if walked.fell else walked.share
+    reached = 0.0 if walked.verdict.fell else walked.verdict.speed
     if told:
         assert float(told[0].removeprefix("weak: reaches about ").split()[0]) == pytest.approx(reached, abs=0.25)
     assert bool(told) == (reached < 0.7)
