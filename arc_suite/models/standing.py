@@ -1,6 +1,7 @@
 """The standing pose of a body, all joints at zero; proportions, motors and gait derive from it."""
 
 import functools
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import mujoco
@@ -54,13 +55,32 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
         angles: (joints,) rad, in place of zero for all of them; the torso stays where it is.
         feet: (legs,) whether each foot carries; None for all of them.
     """
+    (pose,) = mechanics(body, [(angles, feet)])
+    return pose
+
+
+def mechanics(body: Body, poses: Iterable[tuple[np.ndarray | None, np.ndarray | None]]) -> Iterator[Standing]:
+    """Yield the mechanics of poses, for which MuJoCo's data are made once: that takes longer than a pose.
+
+    Args:
+        body: the spec.
+        poses: angles and feet of each; see `posed`.
+    """
     model = compiled(body)
     places = _places(body)
     data = mujoco.MjData(model)
-    data.qpos[:] = stood(model)
-    if angles is not None:
-        data.qpos[places.angles] += angles
-    mujoco.mj_forward(model, data)
+    for angles, feet in poses:
+        data.qpos[:] = stood(model)
+        if angles is not None:
+            data.qpos[places.angles] += angles
+        mujoco.mj_forward(model, data)
+        yield _measure(body, model, data, places, feet)
+
+
+def _measure(
+    body: Body, model: mujoco.MjModel, data: mujoco.MjData, places: "_Places", feet: np.ndarray | None
+) -> Standing:
+    """Return the mechanics of the pose in which the data are."""
     origin = data.xpos[1]
     soles, jacobians = [], []
     for leg, foot, dofs in zip(body.legs, places.feet, places.dofs_by_leg, strict=True):

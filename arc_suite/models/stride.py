@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from arc_suite.models.kinematics import damped_changes
-from arc_suite.models.standing import GRAVITY, posed, standing
+from arc_suite.models.standing import GRAVITY, mechanics, standing
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body, Leg
 
@@ -92,7 +92,7 @@ def loads(body: Body) -> np.ndarray:
 
     The feet that stand carry it, and every leg hangs at its hip.
     """
-    return np.max([abs(posed(body, angles, feet).loads) for angles, feet in poses(body)], axis=0)
+    return np.max([abs(pose.loads) for pose in mechanics(body, poses(body))], axis=0)
 
 
 def accelerations(body: Body) -> np.ndarray:

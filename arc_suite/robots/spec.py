@@ -167,7 +167,11 @@ class _Spec:
     """Base of all specs: checks every field, then conditions on several fields."""
 
     def __post_init__(self):
-        for field in dataclasses.fields(self):
+        self._check_fields(dataclasses.fields(self))
+        self._check_whole()
+
+    def _check_fields(self, fields: Iterable[dataclasses.Field]) -> None:
+        for field in fields:
             value = getattr(self, field.name)
             if value is None and field.metadata["optional"]:
                 continue
@@ -176,7 +180,6 @@ class _Spec:
             except SpecError as error:
                 raise SpecError(error.reason, field.name, self._label()) from None
             object.__setattr__(self, field.name, value)
-        self._check_whole()
 
     def _check_whole(self) -> None:
         """Check conditions on several fields; subclasses with such conditions override this."""
@@ -191,7 +194,15 @@ class _Spec:
 
     def replace(self, **changes):
         """Return a copy with some fields changed, checked like any other."""
-        return dataclasses.replace(self, **changes)
+        fields = {field.name: field for field in dataclasses.fields(self)}
+        if not changes.keys() <= fields.keys():
+            return dataclasses.replace(self, **changes)  # raises the error of an unknown field
+        copy = object.__new__(type(self))
+        for name in fields:
+            object.__setattr__(copy, name, changes[name] if name in changes else getattr(self, name))
+        copy._check_fields([fields[name] for name in changes])  # the others were checked before
+        copy._check_whole()
+        return copy
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
