@@ -1,4 +1,8 @@
-"""The loop that plays an episode in one environment: every return, track, recording, film and live view takes it."""
+"""The loop that plays an episode in one environment: every return, track, recording, film and live view takes it.
+
+Loops over batches are others: `evaluation.episodes_in_batch` stops environments that have ended, `data.rollouts` starts
+their next seeds, and learners never stop.
+"""
 
 from collections.abc import Callable, Iterator
 
