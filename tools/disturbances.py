@@ -13,7 +13,7 @@ import itertools
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, policies, registry, rotations
+from arc_suite import checks, evaluation, policies, registry, rotations
 from arc_suite.cli import program
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.vector import VectorEnv
@@ -54,23 +54,21 @@ def episodes(task: str, body, settings: dict, policy: str, preset: str, command=
     rows = VectorEnv(body, task, count, autoreset_mode="Disabled", max_episode_steps=FLAGS.steps, task_kwargs=settings)
     acting = policies.policy(policy, body, preset, count, task=rows.task.definition)
     seeds = range(FLAGS.seed, FLAGS.seed + count)
-    with contextlib.closing(rows):
-        observations, _ = rows.reset(seed=FLAGS.seed)
-        acting.reset(range(count), seeds)
-        if command is not None:
+    places = []  # (7,) of all torsos, after the reset and every step
+
+    def watch(playing, terminated):
+        if not places and command is not None:
             rows.command("command", command)
-        first, totals, rewards = rows.batch.data.qpos[:, :7].copy(), np.zeros(count), np.zeros(count)
-        figures, over = {}, np.zeros(count, bool)
-        while not over.all():
-            actions = acting.act(rows.task.split(observations), rewards)
-            observations, rewards, terminated, truncated, info = rows.step(actions)
-            totals += rewards
-            for name in (name for name in info if name.startswith("progress_")):
-                figures[name] = np.where(info[f"_{name}"], info[name], figures.get(name, 0.0))
-            over |= terminated | truncated
-        way = rotations.headed(rows.batch.data.qpos[:, :2] - first[:, :2], rotations.yaw(first[:, 3:]))
-        asked = rows.task.definition.parameters.target_velocity * rows.task.scene.control_timestep * FLAGS.steps
-    return {"return": totals, "distance": way[:, 0] / asked} | figures
+        places.append(rows.batch.data.qpos[:, :7].copy())
+
+    with contextlib.closing(rows):
+        played = evaluation.episodes_in_batch(rows, acting, seeds, watch)
+    first, last = places[0], places[-1]
+    way = rotations.headed(last[:, :2] - first[:, :2], rotations.yaw(first[:, 3:]))
+    asked = rows.task.definition.parameters.target_velocity * rows.task.scene.control_timestep * FLAGS.steps
+    totals = np.array([episode.total for episode in played])
+    figures = {name: np.array([episode.progress[name] for episode in played]) for name in played[0].progress}
+    return {"return": totals, "distance": way[:, 0] / asked, **figures}
 
 
 def line(first: str, cells) -> str:
@@ -87,7 +85,7 @@ def main() -> None:
         print(line(name, FLAGS.presets), line("---", ["---"] * len(FLAGS.presets)), sep="\n")
         for settings in program.progress(modifiers(body), desc=name, leave=False):
             played = [episodes("steer", body, settings, "cpg", preset, AHEAD) for preset in FLAGS.presets]
-            cells = [f"{p['distance'].mean():.2f} ({p['progress_fell'].mean():.0%})" for p in played]
+            cells = [f"{p['distance'].mean():.2f} ({p['fell'].mean():.0%})" for p in played]
             words = ", ".join(f"{key} {value}" for key, value in settings.items()) or "none"
             print(line(words, cells), flush=True)
         print()

@@ -7,6 +7,7 @@ import numpy as np
 
 from arc_suite.animation import direction
 from arc_suite.markers import Marker
+from arc_suite.simulation.episode_loop import play_episode
 
 LONGEST = 0.5  # s of simulated time between two pictures; a slower machine shows slow motion
 _ENDS = ("start", "end")  # of a debug marker
@@ -42,7 +43,9 @@ class Episodes:
 
     def restart(self) -> None:
         """Start the next episode, with the command that a person has set."""
-        self.timestep, self.earned, self.steps = self.environment.reset(), 0.0, 0
+        self._episode = play_episode(self.environment, self._act)
+        self.timestep = next(self._episode)
+        self.earned, self.steps = 0.0, 0
         self._command()
         self._before, self._markers = self._qpos(), 2 * (self._asked(),)
 
@@ -74,7 +77,7 @@ class Episodes:
             return
         self._before = self._qpos()
         self.environment.physics.data.xfrc_applied[:] = forces
-        self.timestep = self.environment.step(self._act(self.timestep))
+        self.timestep = next(self._episode)
         self.earned += self.timestep.reward
         self.steps += 1
         self._markers = self._markers[1], self._asked()

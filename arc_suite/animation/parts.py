@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 
 from arc_suite import models, rotations
-from arc_suite.models.standing import GEOMS, stood
+from arc_suite.models.direct import GEOMS
+from arc_suite.models.standing import stood
 from arc_suite.robots.spec import Body, Link
 
 # Kinds of shapes by MuJoCo's number.

@@ -7,6 +7,8 @@ from dm_control import mjcf
 
 from arc_suite.arenas.arena import Arena
 
+PLANE = {"name": "floor", "type": "plane", "size": (0.0, 0.0, 1.0), "conaffinity": 1}
+
 
 @dataclasses.dataclass(frozen=True)
 class Flat(Arena):
@@ -16,7 +18,7 @@ class Flat(Arena):
 
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
         """Add the plane `floor`."""
-        root.worldbody.add("geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, **contact)
+        root.worldbody.add("geom", **PLANE, **contact)
 
     def height(self, x, y):
         """Return 0 for every point."""

@@ -217,6 +217,10 @@ class BodiesEnv(KnownAttributes, Together):
         poses = np.array(self._of_each(lambda group: group.batch.data.qpos[:, :7]))
         return np.column_stack([poses[:, :2], rotations.yaw(poses[:, 3:7])])
 
+    def quaternions(self) -> np.ndarray:
+        """Return the orientations (num_envs, 4) of the torsos in the world."""
+        return np.array(self._of_each(lambda group: group.batch.data.qpos[:, 3:7]))
+
     def resampled(self) -> np.ndarray:
         """Return in which environments (num_envs,) the latest step began another command; see `VectorEnv.resampled`."""
         return np.array(self._of_each(lambda group: group.resampled()))

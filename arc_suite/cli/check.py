@@ -6,8 +6,8 @@
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
 nothing up, none that can step. With --walk the demonstrator walks it for 100 control steps. Where it falls,
-or stays below 0.7 of the target speed, the line names the fields to leave out, which are then sized to suit
-the body.
+drags its torso, or stays below 0.7 of the target speed, the line names the fields to leave out, which are
+then sized to suit the body.
 
 A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
 the line names the terms, metrics and blocks that differ.
@@ -20,7 +20,7 @@ from absl import flags
 from arc_suite import registry
 from arc_suite.cli.flags import ROBOT_HELP, define_task, task
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import conformance, first_walk
+from arc_suite.evaluation import conformance, cures
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body
 
@@ -28,6 +28,9 @@ FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_bool("walk", False, "Let the demonstrator walk a body, whatever its flaws are, if any walk is possible.")
 flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}.")
+
+
+_FLAWS = {"touch": "drags its torso", "slow": "is slow"}  # by the names of failures, except falls
 
 
 def main(spec: str | None = None) -> int:
@@ -51,23 +54,26 @@ def _check_body(spec: str) -> int:
 
 
 def _check_walk(spec: str, body: Body) -> int:
-    tried = first_walk.walk(body)
+    tried = cures.walk(body)
     if tried.quality == 2:
         print(f"{spec}: {_said(tried)}")
         return 0
-    cure = first_walk.left_out(body, tried.quality)
-    advice, given = "", first_walk.given_fields(body)
+    cure = cures.left_out(body, tried.quality)
+    advice, given = "", cures.given_fields(body)
     if cure is not None:
         advice = f": leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
     elif given:
         advice = f": leaving out {', '.join(given)} of its joints does not help"
-    flaw = f"falls after {tried.length} control steps" if tried.fell else f"is slow: {_said(tried)}"
+    if tried.verdict.fell:
+        flaw = f"falls after {tried.length} control steps"
+    else:
+        flaw = f"{' and '.join(_FLAWS[failure] for failure in tried.verdict.failures)}: {_said(tried)}"
     print(f"{spec}: {body.name} {flaw}{advice}")
     return 1
 
 
-def _said(tried: first_walk.FirstWalk) -> str:
-    speed = f"{tried.speed:.2f} m/s ({tried.share:.2f} of the target {tried.target:.2f})"
+def _said(tried: cures.FirstWalk) -> str:
+    speed = f"{tried.speed:.2f} m/s ({tried.verdict.speed:.2f} of the target {tried.target:.2f})"
     return f"walks {tried.length} control steps at {speed}"
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
-from arc_suite.models.kinematics import flows, rises, weights
+from arc_suite.models.kinematics import damped_changes, flows, rises, weights
 from arc_suite.models.sizing import sized
 from arc_suite.models.standing import posed
 from arc_suite.models.stride import lifted, swung
@@ -128,7 +128,7 @@ def _sweep(leg: _Leg, path, level: float):
     weighted = weights(path, _ACROSS, level) @ leg.jacobian
     damping = np.diag(_damping(leg))
     turned = weighted.swapaxes(-1, -2)
-    angles = numpy.linalg.solve(turned @ weighted + damping, turned[..., :1] * length[..., None])[..., 0]
+    angles = damped_changes(weighted, turned[..., :1] * length[..., None], damping)[..., 0]
     moved = (weighted @ angles[..., None])[..., 0]
     angles = angles * (moved[:, :1] * length / numpy.maximum((moved**2).sum(axis=-1, keepdims=True), 1e-12))
     angles = angles * numpy.minimum(1.0, (leg.room / numpy.maximum(abs(angles), 1e-12)).min(axis=-1, keepdims=True))

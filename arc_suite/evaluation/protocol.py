@@ -10,6 +10,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.envs.together import Together
 from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
+from arc_suite.simulation.episode_loop import play_episode
 
 EPISODES = 100  # of a final policy, from seed 0
 CURVE_EPISODES = 10  # of a point of a learning curve: the paper's Section 6, Experimental Setting
@@ -79,18 +80,27 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
     """
     if max_steps is None:
         check_ends(environment.task.definition.step_limit)
-    act, length = alone(policy, seed), 0
-    timestep = environment.reset(seed)
-    yield timestep
-    while not timestep.last() and length != max_steps:
-        timestep = environment.step(act(timestep))
-        length += 1
-        yield timestep
+    yield from play_episode(environment, alone(policy, seed), seed, max_steps)
 
 
-def run(environment, policy: Policy, seed: int, max_steps: int | None = None) -> EpisodeResult:
-    """Play one episode and return its results; for the arguments see `rollout`."""
-    rewards = [timestep.reward for timestep in rollout(environment, policy, seed, max_steps) if not timestep.first()]
+def run(
+    environment, policy: Policy, seed: int, max_steps: int | None = None, watchers: Iterable[Callable] = ()
+) -> EpisodeResult:
+    """Play one episode and return its results.
+
+    Args:
+        environment: as of `rollout`, like `policy`, `seed` and `max_steps`.
+        policy: see `rollout`.
+        seed: see `rollout`.
+        max_steps: see `rollout`.
+        watchers: called with every `TimeStep`, also that of the reset, while the environment stands there.
+    """
+    rewards = []
+    for timestep in rollout(environment, policy, seed, max_steps):
+        if not timestep.first():
+            rewards.append(timestep.reward)
+        for watch in watchers:
+            watch(timestep)
     progress = {name: float(value) for name, value in environment.task.progress.items()}
     return EpisodeResult(float(sum(rewards)), len(rewards), progress)
 

@@ -9,6 +9,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.importing import tree
 from arc_suite.importing.tree import Robot
+from arc_suite.models.kinematics import least_changes
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots.spec import SpecError
 
@@ -346,8 +347,7 @@ def _bent(robot: Robot, zero: np.ndarray, chain: tuple[int, ...], end: tuple, si
         jacobian = np.zeros((3, model.nv))
         mujoco.mj_jac(model, data, jacobian, None, reached, body)
         moved = jacobian[:, dofs]
-        damped = moved @ moved.T + (_DAMPING * length) ** 2 * np.eye(3)
-        step = moved.T @ np.linalg.solve(damped, goal - reached)
+        step = least_changes(moved, (goal - reached)[:, None], _DAMPING * float(length))
         qpos[places] += step.clip(-_LARGEST_STEP, _LARGEST_STEP)
     missed = np.linalg.norm((goal - reached)[[0, 2]]) > _MISS * length
     return None if missed else robot.clipped(qpos)

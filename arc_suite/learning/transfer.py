@@ -6,7 +6,6 @@ still, 0, to the body's own demonstrator, 1.
 """
 
 import contextlib
-import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
@@ -170,24 +169,31 @@ def _gain(played: list[Comparison]) -> float:
 
 def _episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
     """Play an episode in every environment, from the seed of its index, and judge the walks."""
-    count = environment.num_envs
-    touching, fell = np.zeros(count), np.zeros(count, bool)
-    places, targets = [], []  # of every control step
+    places, targets, touching, fallen = [], [], [], []  # at the start, and after every control step
 
     def watch(playing, terminated):
         own = zip(environment.tasks, environment.own_observations(), strict=True)
         blocks = [task.split(vector) for task, vector in own]
         places.append(environment.places())
         targets.append([walking.target(*each) for each in zip(environment.tasks, blocks, places[-1], strict=True)])
-        touching[playing] += [each["contact_forces"][:6].any() for each in itertools.compress(blocks, playing)]
-        fell[terminated] = True
+        # A batch has no list of its contacts; the observed forces on the torso are those of the ground.
+        touching.append(playing & [block["contact_forces"][:6].any() for block in blocks])
+        fallen.append(playing & walking.has_fallen(terminated, environment.quaternions()))
 
-    played, found = protocol.episodes_in_batch(environment, policy, range(count), watch), []
-    moved, wanted = np.diff(np.array(places)[..., :2], axis=0), np.array(targets)
+    played = protocol.episodes_in_batch(environment, policy, range(environment.num_envs), watch)
+    moved = np.diff(np.array(places)[..., :2], axis=0)
+    targets, touching, fallen = map(np.array, (targets, touching, fallen))
+    episodes = []
     for index, episode in enumerate(played):
-        lasted = slice(episode.length), index
-        speed, _ = walking.shares(wanted[lasted], moved[lasted], STEPS)
-        ending = "fall" if fell[index] else "time"
-        failures = walking.failures(speed, touching[index] / episode.length, ending)
-        found.append(Judged(episode.total, not failures, speed, episode.progress.get("tracking", math.nan)))
-    return found
+        fell = fallen[:, index].any()
+        length = fallen[:, index].argmax() if fell else episode.length
+        verdict = walking.assess(
+            targets[:length, index],
+            moved[:length, index],
+            touching[: length + 1, index],
+            STEPS,
+            walking.FALL if fell else walking.TIME,
+        )
+        tracking = episode.progress.get("tracking", math.nan)
+        episodes.append(Judged(episode.total, verdict.walks, verdict.speed, tracking))
+    return episodes

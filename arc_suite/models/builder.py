@@ -1,6 +1,7 @@
-"""From a `Body` to one PyMJCF root element: dynamics alone, without visuals."""
+"""From a `Body` to the elements of its model, and to one PyMJCF root element: dynamics alone, without visuals."""
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from dm_control import mjcf
@@ -8,8 +9,9 @@ from dm_control import mjcf
 from arc_suite.models.outline import outline, torso_box
 from arc_suite.robots.spec import Body, Joint, Leg, Simulation, Solid
 
-SOLVER_ITERATIONS = 200
+WORLD, ACTUATOR, SENSOR = "worldbody", "actuator", "sensor"  # sections of a model
 
+_HIDDEN = 4  # group of sites
 _TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
 
 # Cameras that ride along: azimuth from straight ahead and elevation, rad.
@@ -20,13 +22,31 @@ _FIELD, _DOWN = 70.0, math.radians(15.0)  # of the eye: field of view, degrees, 
 _FOVY = 30.0  # degrees, as MJCF wants it whatever the compiler's angle
 _ASPECT, _MARGIN = 4.0 / 3.0, 1.3  # of the picture; room for legs that swing
 
+FLAGS = {
+    "filterparent": "enable",
+    "island": "disable",  # a single creature is one island: finding it only costs time
+}
+
+
+class Element(NamedTuple):
+    """An element of a model, in the words of MJCF; angles are in radians.
+
+    Attributes:
+        tag: its kind.
+        parent: name of the rigid part, or of the section, that holds it.
+        attributes: by name.
+    """
+
+    tag: str
+    parent: str
+    attributes: dict[str, Any]
+
 
 def build(body: Body) -> mjcf.RootElement:
     """Assemble the body in an empty world: no floor, no decorations.
 
-    Every element is named: bodies, geoms and sites after the part, joints and motors
-    `<leg>_<joint>`. The legs are written into the one root, since PyMJCF's `attach` would add a
-    body for each and so change the observation.
+    The legs are written into the one root, since PyMJCF's `attach` would add a body for each and so change the
+    observation.
 
     Args:
         body: the spec, with nothing left to be sized.
@@ -34,34 +54,90 @@ def build(body: Body) -> mjcf.RootElement:
     Returns:
         The model, in radians, with the torso as a free body at its standing height.
     """
-    # Robot geoms meet only the floor (conaffinity 1), never one another.
-    touches_floor = {"contype": 1, "conaffinity": 0, "density": body.density, **contact(body.simulation)}
     root = mjcf.RootElement(model=body.name)
     root.compiler.angle = "radian"
-    root.option.timestep = body.simulation.timestep
-    root.option.integrator = "implicitfast"
-    root.option.solver = "Newton"
-    root.option.iterations = SOLVER_ITERATIONS
-    root.option.flag.filterparent = "enable"
-    root.option.flag.island = "disable"  # a single creature is one island: finding it only costs time
+    root.option.set_attributes(**options(body))
+    root.option.flag.set_attributes(**FLAGS)
+    parents = {WORLD: root.worldbody, ACTUATOR: root.actuator, SENSOR: root.sensor}
+    for tag, parent, attributes in elements(body):
+        element = parents[parent].add(tag, **attributes)
+        if tag == "body":
+            parents[attributes["name"]] = element
+    return root
 
-    torso = root.worldbody.add("body", name="torso", pos=(0.0, 0.0, body.torso.standing_height))
-    torso.add("freejoint", name="root")
-    for solid in body.torso.solids:
-        _add_solid(torso, solid, **touches_floor)
-    for ballast in body.ballast:
-        _add_solid(torso, ballast, mass=ballast.mass, **_TOUCHES_NOTHING)
-    for leg in body.legs:
-        _add_leg(root, torso, leg, touches_floor, body.simulation)
-    for name, camera in cameras(body).items():
-        torso.add("camera", name=name, mode="trackcom", **camera)
-    torso.add("camera", name=EYE, mode="fixed", **eye(body))
 
+def options(body: Body) -> dict[str, Any]:
+    """Return the options of a body's simulation."""
+    return {
+        "timestep": body.simulation.timestep,
+        "integrator": "implicitfast",
+        "solver": "Newton",
+        "iterations": 200,
+    }
+
+
+def elements(body: Body) -> list[Element]:
+    """Return all elements of a body in an empty world, parents first.
+
+    Every element is named: bodies, geoms and sites after the part, joints and motors `<leg>_<joint>`.
+
+    Args:
+        body: the spec, with nothing left to be sized.
+    """
+    listed = parts(body, body.simulation)
+    for name, joint in zip(body.joint_names, body.joints, strict=True):
+        listed.append(_motor(name, joint))
+    for name, view in cameras(body).items():
+        listed.append(Element("camera", "torso", {"name": name, "mode": "trackcom", **view}))
+    listed.append(Element("camera", "torso", {"name": EYE, "mode": "fixed", **eye(body)}))
+    listed.append(_site("torso", 0.01))
+    for name, leg in zip(body.foot_names, body.legs, strict=True):
+        listed.append(_site(name, leg.foot.radius))
     # The accelerometer is what makes every mj_step fill cfrc_ext, which the task observes: MuJoCo
     # computes contact forces on bodies only where a sensor needs them.
-    site = torso.add("site", name="torso", size=(0.01,), group=4)
-    root.sensor.add("accelerometer", name="torso_acceleration", site=site)
-    return root
+    listed.append(Element("accelerometer", SENSOR, {"name": "torso_acceleration", "site": "torso"}))
+    return listed
+
+
+def parts(body: Body, simulation: Simulation | None = None) -> list[Element]:
+    """Return the rigid parts of a body with their joints and shapes, parents first.
+
+    Args:
+        body: the spec.
+        simulation: its constants; None leaves out contacts, and the limits and dynamics of joints.
+    """
+    geom = {"density": body.density}
+    if simulation:
+        # Robot geoms meet only the floor (conaffinity 1), never one another.
+        geom |= {"contype": 1, "conaffinity": 0, **contact(simulation)}
+    listed = [
+        Element("body", WORLD, {"name": "torso", "pos": (0.0, 0.0, body.torso.standing_height)}),
+        Element("freejoint", "torso", {"name": "root"}),
+    ]
+    for solid in body.torso.solids:
+        listed.append(Element("geom", "torso", {**_shape(solid), **geom}))
+    for ballast in body.ballast:
+        listed.append(Element("geom", "torso", {**_shape(ballast), "mass": ballast.mass, **_TOUCHES_NOTHING}))
+    for leg in body.legs:
+        listed += _leg(leg, geom, simulation)
+    return listed
+
+
+def _leg(leg: Leg, geom: dict[str, Any], simulation: Simulation | None) -> list[Element]:
+    listed = []
+    joint_names = iter(leg.joint_names)
+    *link_names, foot = leg.part_names
+    parent, pos, yaw = "torso", leg.mount, math.radians(leg.yaw_deg)
+    for name, link in zip(link_names, leg.links, strict=True):
+        listed.append(Element("body", parent, {"name": name, "pos": pos, "euler": (0.0, 0.0, yaw)}))
+        if link.joint:
+            listed.append(_joint(name, next(joint_names), link.joint, simulation))
+        capsule = {"name": name, "type": "capsule", "fromto": (0.0, 0.0, 0.0, *link.end), "size": (link.radius,)}
+        listed.append(Element("geom", name, {**capsule, **geom}))
+        parent, pos, yaw = name, link.end, 0.0
+    listed.append(Element("body", parent, {"name": foot, "pos": pos}))
+    listed.append(Element("geom", foot, {"name": foot, "type": "sphere", "size": (leg.foot.radius,), **geom}))
+    return listed
 
 
 def contact(simulation: Simulation) -> dict:
@@ -75,53 +151,35 @@ def contact(simulation: Simulation) -> dict:
     }
 
 
-def _add_solid(torso, solid: Solid, **attributes) -> None:
-    torso.add(
-        "geom",
-        name=solid.name,
-        type=solid.shape,
-        size=solid.size,
-        pos=solid.position,
-        euler=[math.radians(angle) for angle in solid.euler_deg],
-        **attributes,
-    )
+def _shape(solid: Solid) -> dict[str, Any]:
+    return {
+        "name": solid.name,
+        "type": solid.shape,
+        "size": solid.size,
+        "pos": solid.position,
+        "euler": [math.radians(angle) for angle in solid.euler_deg],
+    }
 
 
-def _add_leg(root, torso, leg: Leg, geom, simulation: Simulation) -> None:
-    parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
-    for link in leg.links:
-        name = leg.full_name(link)
-        parent = parent.add("body", name=name, pos=pos, euler=(0.0, 0.0, yaw))
-        if link.joint:
-            _add_joint(root, parent, leg, link.joint, simulation)
-        parent.add("geom", name=name, type="capsule", fromto=(0.0, 0.0, 0.0, *link.end), size=(link.radius,), **geom)
-        pos, yaw = link.end, 0.0
-    name = leg.full_name(leg.foot)
-    foot = parent.add("body", name=name, pos=pos)
-    foot.add("geom", name=name, type="sphere", size=(leg.foot.radius,), **geom)
-    foot.add("site", name=name, size=(leg.foot.radius,), group=4)
+def _joint(part: str, name: str, joint: Joint, simulation: Simulation | None) -> Element:
+    attributes: dict[str, Any] = {"name": name, "type": "hinge", "axis": joint.axis}
+    if simulation:
+        low, high = joint.range_deg
+        attributes["limited"] = True
+        attributes["range"] = (math.radians(low), math.radians(high))
+        attributes["armature"] = joint.armature
+        attributes["damping"] = joint.damping
+        attributes["solreflimit"] = (simulation.contact_time, 1.0)
+    return Element("joint", part, attributes)
 
 
-def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> None:
-    element = link.add(
-        "joint",
-        name=leg.full_name(joint),
-        type="hinge",
-        axis=joint.axis,
-        limited=True,
-        range=[math.radians(angle) for angle in joint.range_deg],
-        armature=joint.armature,
-        damping=joint.damping,
-        solreflimit=(simulation.contact_time, 1.0),
-    )
-    root.actuator.add(
-        "motor",
-        name=leg.full_name(joint),
-        joint=element,
-        gear=(joint.motor.gear,),
-        ctrllimited=True,
-        ctrlrange=(-1.0, 1.0),
-    )
+def _motor(name: str, joint: Joint) -> Element:
+    control = {"ctrllimited": True, "ctrlrange": (-1.0, 1.0)}
+    return Element("motor", ACTUATOR, {"name": name, "joint": name, "gear": (joint.motor.gear,), **control})
+
+
+def _site(part: str, radius: float) -> Element:
+    return Element("site", part, {"name": part, "size": (radius,), "group": _HIDDEN})
 
 
 def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:

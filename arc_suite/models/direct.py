@@ -1,17 +1,28 @@
-"""The model of a body on flat ground by MuJoCo's own `MjSpec`: the bits of `assemble`, without PyMJCF and its text.
+"""The model of a body by MuJoCo's own `MjSpec`: the bits of `builder.build`, without PyMJCF and its text."""
 
-`builder` defines the model, and this module follows it. A test holds the two equal, byte for byte.
-"""
-
-import math
+from collections.abc import Iterable
+from typing import Any
 
 import mujoco
 
+from arc_suite.arenas.flat import PLANE
 from arc_suite.models import builder
-from arc_suite.models.standing import GEOMS
-from arc_suite.robots.spec import Ballast, Body, Joint, Leg, Simulation
+from arc_suite.models.builder import Element
+from arc_suite.robots.spec import Body
 
-_TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
+GEOMS = {
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+}
+_GEOMS = {**GEOMS, "plane": mujoco.mjtGeom.mjGEOM_PLANE}
+_JOINTS = {"hinge": mujoco.mjtJoint.mjJNT_HINGE}
+_CAMERA_MODES = {"fixed": mujoco.mjtCamLight.mjCAMLIGHT_FIXED, "trackcom": mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM}
+_INTEGRATORS = {"implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST}
+_SOLVERS = {"Newton": mujoco.mjtSolver.mjSOL_NEWTON}
+_FLAGS = {"filterparent": mujoco.mjtDisableBit.mjDSBL_FILTERPARENT, "island": mujoco.mjtDisableBit.mjDSBL_ISLAND}
 
 
 def on_flat_ground(body: Body) -> mujoco.MjSpec:
@@ -20,64 +31,79 @@ def on_flat_ground(body: Body) -> mujoco.MjSpec:
     Args:
         body: without a source, and with nothing left to be sized.
     """
-    contact = builder.contact(body.simulation)
-    contact["friction"] = list(contact["friction"])
-    touches_floor = {"contype": 1, "conaffinity": 0, "density": body.density, **contact}
-    spec = mujoco.MjSpec()
+    floor = Element("geom", builder.WORLD, {**PLANE, **builder.contact(body.simulation)})
+    spec = write([*builder.elements(body), floor])
     spec.modelname = body.name
-    spec.compiler.degree = False
-    spec.option.timestep = body.simulation.timestep
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    spec.option.iterations = builder.SOLVER_ITERATIONS
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
-    torso = spec.worldbody.add_body(name="torso", pos=(0.0, 0.0, body.torso.standing_height))
-    torso.add_freejoint(name="root")
-    for solid in (*body.torso.solids, *body.ballast):
-        own = {"mass": solid.mass, **_TOUCHES_NOTHING} if isinstance(solid, Ballast) else touches_floor
-        shape = {"type": GEOMS[solid.shape], "size": _size(solid.size)}
-        turn = [math.radians(angle) for angle in solid.euler_deg]
-        torso.add_geom(name=solid.name, **shape, pos=solid.position, euler=turn, **own)
-    for leg in body.legs:
-        _add_leg(spec, torso, leg, touches_floor, body.simulation)
-    for name, camera in builder.cameras(body).items():
-        torso.add_camera(name=name, mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM, **camera)
-    torso.add_camera(name=builder.EYE, mode=mujoco.mjtCamLight.mjCAMLIGHT_FIXED, **builder.eye(body))
-    torso.add_site(name="torso", group=4).size[0] = 0.01
-    acceleration = {"type": mujoco.mjtSensor.mjSENS_ACCELEROMETER, "objtype": mujoco.mjtObj.mjOBJ_SITE}
-    spec.add_sensor(name="torso_acceleration", objname="torso", **acceleration)
-    plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": (0.0, 0.0, 1.0)}
-    spec.worldbody.add_geom(name="floor", conaffinity=1, **plane, **contact)
+    options = builder.options(body)
+    spec.option.timestep = options["timestep"]
+    spec.option.integrator = _INTEGRATORS[options["integrator"]]
+    spec.option.solver = _SOLVERS[options["solver"]]
+    spec.option.iterations = options["iterations"]
+    for name, choice in builder.FLAGS.items():
+        if choice == "disable":
+            spec.option.disableflags |= _FLAGS[name]
     return spec
 
 
-def _size(lengths) -> tuple[float, ...]:
-    return (*lengths, *(0.0,) * (3 - len(lengths)))
+def write(elements: Iterable[Element]) -> mujoco.MjSpec:
+    """Return a spec of elements.
+
+    Args:
+        elements: parents first.
+    """
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    parents = {builder.WORLD: spec.worldbody, builder.ACTUATOR: spec, builder.SENSOR: spec}
+    for tag, parent, attributes in elements:
+        element = _ADD[tag](parents[parent], **attributes)
+        if tag == "body":
+            parents[attributes["name"]] = element
+    return spec
 
 
-def _add_leg(spec: mujoco.MjSpec, torso, leg: Leg, geom: dict, simulation: Simulation) -> None:
-    parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
-    for link in leg.links:
-        name = leg.full_name(link)
-        parent = parent.add_body(name=name, pos=pos, euler=(0.0, 0.0, yaw))
-        if link.joint:
-            _add_joint(spec, parent, leg, link.joint, simulation)
-        capsule = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "size": _size((link.radius,))}
-        parent.add_geom(name=name, fromto=(0.0, 0.0, 0.0, *link.end), **capsule, **geom)
-        pos, yaw = link.end, 0.0
-    name, radius = leg.full_name(leg.foot), leg.foot.radius
-    foot = parent.add_body(name=name, pos=pos)
-    foot.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=_size((radius,)), **geom)
-    foot.add_site(name=name, group=4).size[0] = radius
+def _add_joint(part: mujoco.MjsBody, name: str, type: str, axis, limited: bool = False, **dynamics: Any) -> None:
+    joint = part.add_joint(name=name, type=_JOINTS[type], axis=axis)
+    if limited:
+        joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        joint.range = dynamics["range"]
+        joint.armature = dynamics["armature"]
+        joint.damping[0] = dynamics["damping"]  # the linear term of a polynomial
+        joint.solref_limit = dynamics["solreflimit"]
 
 
-def _add_joint(spec: mujoco.MjSpec, link, leg: Leg, joint: Joint, simulation: Simulation) -> None:
-    name = leg.full_name(joint)
-    added = link.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis)
-    added.limited, added.range = mujoco.mjtLimited.mjLIMITED_TRUE, [math.radians(angle) for angle in joint.range_deg]
-    added.armature, added.damping[0] = joint.armature, joint.damping
-    added.solref_limit = (simulation.contact_time, 1.0)
-    motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+def _add_geom(part: mujoco.MjsBody, type: str, size, **attributes: Any) -> None:
+    part.add_geom(type=_GEOMS[type], size=(*size, 0.0, 0.0)[:3], **attributes)
+
+
+def _add_site(part: mujoco.MjsBody, size, **attributes: Any) -> None:
+    site = part.add_site(**attributes)
+    site.size[0] = size[0]
+
+
+def _add_camera(part: mujoco.MjsBody, mode: str, **attributes: Any) -> None:
+    part.add_camera(mode=_CAMERA_MODES[mode], **attributes)
+
+
+def _add_motor(spec: mujoco.MjSpec, name: str, joint: str, gear, ctrllimited: bool, ctrlrange) -> None:
+    motor = spec.add_actuator(name=name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     motor.set_to_motor()
-    motor.gear[0] = joint.motor.gear
-    motor.ctrllimited, motor.ctrlrange = mujoco.mjtLimited.mjLIMITED_TRUE, (-1.0, 1.0)
+    motor.gear[0] = gear[0]
+    motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE if ctrllimited else mujoco.mjtLimited.mjLIMITED_FALSE
+    motor.ctrlrange = ctrlrange
+
+
+def _add_accelerometer(spec: mujoco.MjSpec, name: str, site: str) -> None:
+    sensor = mujoco.mjtSensor.mjSENS_ACCELEROMETER
+    spec.add_sensor(name=name, type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
+
+
+_ADD = {
+    "body": mujoco.MjsBody.add_body,
+    "freejoint": mujoco.MjsBody.add_freejoint,
+    "joint": _add_joint,
+    "geom": _add_geom,
+    "site": _add_site,
+    "camera": _add_camera,
+    "motor": _add_motor,
+    "accelerometer": _add_accelerometer,
+}

@@ -100,10 +100,10 @@ class Legs(NamedTuple):
         for _ in range(steps):
             place, jacobian = self.soles(angles)
             missing, weighed = weights @ (goals - place)[..., None], weights @ jacobian
-            change = _least(weighed, missing, damping)
+            change = least_changes(weighed, missing, damping)
             # Joints at their bounds must not hold the others up.
             bound = (angles <= self.low) & (change < 0.0) | (angles >= self.high) & (change > 0.0)
-            change = _least(numpy.where(bound[..., None, :], 0.0, weighed), missing, damping)
+            change = least_changes(numpy.where(bound[..., None, :], 0.0, weighed), missing, damping)
             angles = (angles + change).clip(self.low, self.high)
         return angles
 
@@ -119,10 +119,38 @@ class Legs(NamedTuple):
         return self.reached(0.5 * (self.low + self.high), places, weights, damping, _SETTLING)
 
 
-def _least(jacobian, missing, damping: float) -> np.ndarray:
-    """The least changes of angles (..., n), with damping, that make up for what is missing (..., 3, 1)."""
-    across, numpy = jacobian.swapaxes(-1, -2), jacobian.__array_namespace__()
-    return (across @ numpy.linalg.solve(jacobian @ across + damping**2 * np.eye(3), missing))[..., 0]
+def least_changes(jacobian, missing, damping: float) -> np.ndarray:
+    """Return the changes of joints, by damped least squares, that move a point: J^T (J J^T + d^2 I)^-1 e.
+
+    Args:
+        jacobian: (..., 3, n) of the point, m/rad.
+        missing: (..., 3, 1) displacement of the point, m.
+        damping: m.
+
+    Returns:
+        (..., n) rad.
+    """
+    xp = jacobian.__array_namespace__()
+    transposed = jacobian.swapaxes(-1, -2)
+    square = jacobian @ transposed + damping**2 * np.eye(3)
+    return (transposed @ xp.linalg.solve(square, missing))[..., 0]
+
+
+def damped_changes(jacobian, pull, damping):
+    """Return the changes of joints by least squares in which each joint has a damping: (J^T J + D)^-1 J^T e.
+
+    With the same damping of all joints they are those of `least_changes`, up to rounding.
+
+    Args:
+        jacobian: (..., m, n) m/rad.
+        pull: J^T e, (..., n, 1); of one point (n,) alone.
+        damping: D, (n, n) m^2, a diagonal matrix.
+
+    Returns:
+        As `pull`, rad.
+    """
+    xp = jacobian.__array_namespace__()
+    return xp.linalg.solve(jacobian.swapaxes(-1, -2) @ jacobian + damping, pull)
 
 
 def _rotations(axes, angles) -> np.ndarray:

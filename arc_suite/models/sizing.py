@@ -117,11 +117,14 @@ def loads(body: Body) -> np.ndarray:
 
 
 def _sized_leg(leg: Leg, agility: float, inertias: np.ndarray, loads: np.ndarray, frequency: float) -> Leg:
-    sized_joints = iter(
-        _sized_joint(joint, agility, float(inertia), float(load), frequency)
-        for joint, inertia, load in zip(leg.joints, inertias, loads, strict=True)
-    )
-    return leg.replace(links=tuple(link.joint and link.replace(joint=next(sized_joints)) or link for link in leg.links))
+    numbers = zip(inertias.tolist(), loads.tolist(), strict=True)
+    links = []
+    for link in leg.links:
+        if link.joint:
+            inertia, load = next(numbers)
+            link = link.replace(joint=_sized_joint(link.joint, agility, inertia, load, frequency))
+        links.append(link)
+    return leg.replace(links=tuple(links))
 
 
 def _sized_joint(joint: Joint, agility: float, inertia: float, load: float, frequency: float) -> Joint:

@@ -1,24 +1,16 @@
 """The standing pose of a body, all joints at zero; proportions, motors and gait derive from it."""
 
 import functools
-import math
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite.models import source
-from arc_suite.robots.spec import Ballast, Body
+from arc_suite.models import builder, direct, source
+from arc_suite.robots.spec import Body
 
 GRAVITY = 9.81  # m/s^2
-
-GEOMS = {
-    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
-    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
-    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
-    "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-    "box": mujoco.mjtGeom.mjGEOM_BOX,
-}
 
 
 class Standing(NamedTuple):
@@ -63,39 +55,58 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
         angles: (joints,) rad, in place of zero for all of them; the torso stays where it is.
         feet: (legs,) whether each foot carries; None for all of them.
     """
+    (pose,) = mechanics(body, [(angles, feet)])
+    return pose
+
+
+def mechanics(body: Body, poses: Iterable[tuple[np.ndarray | None, np.ndarray | None]]) -> Iterator[Standing]:
+    """Yield the mechanics of poses, for which MuJoCo's data are made once: that takes longer than a pose.
+
+    Args:
+        body: the spec.
+        poses: angles and feet of each; see `posed`.
+    """
     model = compiled(body)
+    places = _places(body)
     data = mujoco.MjData(model)
-    data.qpos[:] = stood(model)
-    turned, dofs = _addresses(model, body)
-    if angles is not None:
-        data.qpos[turned] += angles
-    mujoco.mj_forward(model, data)
+    for angles, feet in poses:
+        data.qpos[:] = stood(model)
+        if angles is not None:
+            data.qpos[places.angles] += angles
+        mujoco.mj_forward(model, data)
+        yield _measure(body, model, data, places, feet)
+
+
+def _measure(
+    body: Body, model: mujoco.MjModel, data: mujoco.MjData, places: "_Places", feet: np.ndarray | None
+) -> Standing:
+    """Return the mechanics of the pose in which the data are."""
     origin = data.xpos[1]
-    soles, jacobians, first = [], [], 0
-    for leg, name in zip(body.legs, body.foot_names, strict=True):
-        sole = data.body(name).xpos - (0.0, 0.0, leg.foot.radius)
+    soles, jacobians = [], []
+    for leg, foot, dofs in zip(body.legs, places.feet, places.dofs_by_leg, strict=True):
+        sole = data.xpos[foot] - (0.0, 0.0, leg.foot.radius)
         jacobian = np.empty((3, model.nv))
-        mujoco.mj_jac(model, data, jacobian, None, sole, model.body(name).id)
+        mujoco.mj_jac(model, data, jacobian, None, sole, foot)
         soles.append(sole - origin)
-        jacobians.append(jacobian[:, _span(dofs[first : first + len(leg.joints)])])
-        first += len(leg.joints)
+        jacobians.append(jacobian[:, dofs])
     soles = np.array(soles)
     center = data.subtree_com[1] - origin
     mass = float(model.body_mass.sum())
     matrix = np.empty((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
-    loads, carrying = np.zeros(len(soles)), np.ones(len(soles), bool) if feet is None else feet
+    loads = np.zeros(len(soles))
+    carrying = np.ones(len(soles), bool) if feet is None else feet
     if carrying.any():
         loads[carrying] = foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - center[:2])
-    held = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
+    torques_of_feet = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
     return Standing(
         height=body.torso.standing_height,
         mass=mass,
         center=center,
         soles=soles,
         jacobians=tuple(jacobians),
-        inertias=np.diag(matrix)[dofs],
-        loads=(data.qfrc_bias - data.qfrc_passive)[dofs] - held,
+        inertias=np.diag(matrix)[places.dofs],
+        loads=(data.qfrc_bias - data.qfrc_passive)[places.dofs] - torques_of_feet,
     )
 
 
@@ -104,16 +115,34 @@ def stood(model: mujoco.MjModel) -> np.ndarray:
     return model.key_qpos[0].copy() if model.nkey else model.qpos0.copy()
 
 
-def _span(indices: np.ndarray) -> slice | np.ndarray:
-    """Return indices as a slice where they are adjacent: matrix products round by how an array lies in memory."""
-    adjacent = slice(int(indices[0]), int(indices[-1]) + 1)
-    return adjacent if adjacent.stop - adjacent.start == len(indices) else indices
+class _Places(NamedTuple):
+    """Where the joints and feet of a body are in its compiled model.
+
+    Attributes:
+        angles: (joints,) indices into qpos.
+        dofs: (joints,) indices into qvel.
+        dofs_by_leg: the same of each leg; a slice where they are adjacent, as matrix products round by how an array
+            lies in memory.
+        feet: (legs,) indices of rigid parts.
+    """
+
+    angles: np.ndarray
+    dofs: np.ndarray
+    dofs_by_leg: tuple[slice | np.ndarray, ...]
+    feet: tuple[int, ...]
 
 
-def _addresses(model: mujoco.MjModel, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the angles and velocities of a body's joints lie in qpos and qvel, (joints,) each."""
+@functools.lru_cache(maxsize=256)
+def _places(body: Body) -> _Places:
+    model = compiled(body)
     joints = [model.joint(name) for name in body.joint_names]
-    return np.array([joint.qposadr[0] for joint in joints]), np.array([joint.dofadr[0] for joint in joints])
+    dofs = np.array([joint.dofadr[0] for joint in joints])
+    dofs_by_leg = []
+    for indices in by_leg(body, dofs):
+        adjacent = slice(int(indices[0]), int(indices[-1]) + 1)
+        dofs_by_leg.append(adjacent if adjacent.stop - adjacent.start == len(indices) else indices)
+    feet = tuple([model.body(name).id for name in body.foot_names])
+    return _Places(np.array([joint.qposadr[0] for joint in joints]), dofs, tuple(dofs_by_leg), feet)
 
 
 def by_leg(body: Body, values: np.ndarray) -> list[np.ndarray]:
@@ -130,26 +159,7 @@ def compiled(body: Body) -> mujoco.MjModel:
     """
     if body.source:
         return source.bare(body)
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    torso = spec.worldbody.add_body(name="torso", pos=(0.0, 0.0, body.torso.standing_height))
-    torso.add_freejoint()
-    for solid in (*body.torso.solids, *body.ballast):
-        weight = {"mass": solid.mass} if isinstance(solid, Ballast) else {"density": body.density}
-        turn = [math.radians(angle) for angle in solid.euler_deg]
-        torso.add_geom(type=GEOMS[solid.shape], size=solid.size, pos=solid.position, euler=turn, **weight)
-    for leg in body.legs:
-        parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
-        for link in leg.links:
-            parent = parent.add_body(name=leg.full_name(link), pos=pos, euler=(0.0, 0.0, yaw))
-            if link.joint:
-                parent.add_joint(name=leg.full_name(link.joint), axis=link.joint.axis)
-            ends = (0.0, 0.0, 0.0, *link.end)
-            parent.add_geom(type=GEOMS["capsule"], fromto=ends, size=(link.radius,), density=body.density)
-            pos, yaw = link.end, 0.0
-        foot = parent.add_body(name=leg.full_name(leg.foot), pos=pos)
-        foot.add_geom(type=GEOMS["sphere"], size=(leg.foot.radius,), density=body.density)
-    return spec.compile()
+    return direct.write(builder.parts(body)).compile()
 
 
 def foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:

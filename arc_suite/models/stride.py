@@ -10,7 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from arc_suite.models.standing import GRAVITY, posed, standing
+from arc_suite.models.kinematics import damped_changes
+from arc_suite.models.standing import GRAVITY, mechanics, standing
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body, Leg
 
@@ -91,7 +92,7 @@ def loads(body: Body) -> np.ndarray:
 
     The feet that stand carry it, and every leg hangs at its hip.
     """
-    return np.max([abs(posed(body, angles, feet).loads) for angles, feet in poses(body)], axis=0)
+    return np.max([abs(pose.loads) for pose in mechanics(body, poses(body))], axis=0)
 
 
 def accelerations(body: Body) -> np.ndarray:
@@ -153,8 +154,7 @@ def _towards(jacobian, displacement, weights, below, above) -> np.ndarray:
     wanted = np.array(weights) * displacement
     weighted = np.diag(weights) @ jacobian
     damping = _DAMPING * abs(jacobian).max() or 1.0  # of a leg that nothing moves
-    square = weighted.T @ weighted + damping**2 * np.eye(jacobian.shape[1])
-    angles = np.linalg.solve(square, weighted.T @ wanted)
+    angles = damped_changes(weighted, weighted.T @ wanted, damping**2 * np.eye(jacobian.shape[1]))
     moved = weighted @ angles
     angles *= moved @ wanted / max(moved @ moved, 1e-12 * (wanted @ wanted))
     room = np.where(angles > 0.0, above, below)

@@ -15,7 +15,10 @@ the standard library.
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
 import math
+import operator
 import re
 from collections.abc import Iterable
 from typing import Any, NoReturn
@@ -71,7 +74,7 @@ def _check_number(value: Any, low: float, high: float) -> float:
 def _check_vector(value: Any, size: int, low: float, high: float) -> tuple[float, ...]:
     if not isinstance(value, (tuple, list)) or len(value) != size:
         raise SpecError(f"expected {size} numbers, got {_shown(value)}")
-    return tuple(_check_number(number, low, high) for number in value)
+    return tuple(map(functools.partial(_check_number, low=low, high=high), value))
 
 
 def _check_lengths(value: Any) -> tuple[float, ...]:
@@ -104,7 +107,7 @@ def _check_items(value: Any, kind: type, low: int, high: int) -> tuple:
         raise SpecError(f"expected a sequence of {kind.__name__}s, got {_shown(value)}")
     if not low <= len(value) <= high:
         raise SpecError(f"expected {low} to {high} {kind.__name__}s, got {len(value)}")
-    return tuple(_check_instance(item, kind) for item in value)
+    return tuple(map(functools.partial(_check_instance, kind=kind), value))
 
 
 def _check_text(value: Any, low: int, high: int) -> str:
@@ -133,11 +136,7 @@ def _shown(value: Any) -> str:
 
 def _field(check, *args, default=dataclasses.MISSING, optional=False):
     """Return a dataclass field whose value passes through `check(value, *args)`; None may pass if optional."""
-
-    def checked(value):
-        return None if optional and value is None else check(value, *args)
-
-    metadata = {"check": checked}
+    metadata = {"check": check, "args": args, "optional": optional}
     if check in (_check_instance, _check_items):
         metadata["kind"] = args[0]
         metadata["many"] = check is _check_items
@@ -168,13 +167,19 @@ class _Spec:
     """Base of all specs: checks every field, then conditions on several fields."""
 
     def __post_init__(self):
-        for field in dataclasses.fields(self):
+        self._check_fields(dataclasses.fields(self))
+        self._check_whole()
+
+    def _check_fields(self, fields: Iterable[dataclasses.Field]) -> None:
+        for field in fields:
+            value = getattr(self, field.name)
+            if value is None and field.metadata["optional"]:
+                continue
             try:
-                value = field.metadata["check"](getattr(self, field.name))
+                value = field.metadata["check"](value, *field.metadata["args"])
             except SpecError as error:
                 raise SpecError(error.reason, field.name, self._label()) from None
             object.__setattr__(self, field.name, value)
-        self._check_whole()
 
     def _check_whole(self) -> None:
         """Check conditions on several fields; subclasses with such conditions override this."""
@@ -189,7 +194,15 @@ class _Spec:
 
     def replace(self, **changes):
         """Return a copy with some fields changed, checked like any other."""
-        return dataclasses.replace(self, **changes)
+        fields = {field.name: field for field in dataclasses.fields(self)}
+        if not changes.keys() <= fields.keys():
+            return dataclasses.replace(self, **changes)  # raises the error of an unknown field
+        copy = object.__new__(type(self))
+        for name in fields:
+            object.__setattr__(copy, name, changes[name] if name in changes else getattr(self, name))
+        copy._check_fields([fields[name] for name in changes])  # the others were checked before
+        copy._check_whole()
+        return copy
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -317,22 +330,27 @@ class Leg(_Spec):
         if not self.joints:
             self._fail("links", "expected at least one link with a joint")
 
-    @property
+    @functools.cached_property
     def joints(self) -> tuple[Joint, ...]:
         """Return the joints, from the torso outwards."""
-        return tuple(link.joint for link in self.links if link.joint)
+        return tuple([link.joint for link in self.links if link.joint])
+
+    @functools.cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the names of the joints in the model, from the torso outwards."""
+        return tuple(map(self.full_name, self.joints))
 
     @property
     def side(self) -> str:
         """Return 'left' or 'right', the side of the foot; 'left' on the midline."""
         return "right" if self.foot_position[1] < -1e-9 else "left"  # rounding must not tell sides
 
-    @property
+    @functools.cached_property
     def foot_position(self) -> Vector:
         """Return the position of the foot in the torso's frame with all joints at zero."""
         return self.points[-1]
 
-    @property
+    @functools.cached_property
     def points(self) -> tuple[Vector, ...]:
         """Return the origin of every link, and last of the foot, in the torso's frame with all joints at zero."""
         cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
@@ -342,12 +360,12 @@ class Leg(_Spec):
             points.append((x + (cos * a - sin * b), y + (sin * a + cos * b), z + c))
         return tuple(points)
 
-    @property
+    @functools.cached_property
     def parts(self) -> tuple[Link | Foot, ...]:
         """Return the rigid parts, from the torso outwards."""
         return (*self.links, self.foot)
 
-    @property
+    @functools.cached_property
     def part_names(self) -> tuple[str, ...]:
         """Return the names of the parts' bodies in the model, from the torso outwards."""
         return tuple(map(self.full_name, self.parts))
@@ -551,9 +569,10 @@ class Body(_Spec):
     def _check_inertia(self):
         """Refuse moving parts whose inertia is too small for MuJoCo; that of a ball is 8/15 pi density radius^5."""
         least = (_LEAST_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2
-        parts = [("torso", solid.name, min(solid.size)) for solid in self.torso.solids]
-        parts += [("legs", leg.full_name(part), part.radius) for leg in self.legs for part in leg.parts]
-        field, name, size = min(parts, key=lambda part: part[2])
+        sizes = [("torso", solid.name, min(solid.size)) for solid in self.torso.solids]
+        for leg in self.legs:
+            sizes += [("legs", name, part.radius) for name, part in zip(leg.part_names, leg.parts, strict=True)]
+        field, name, size = min(sizes, key=operator.itemgetter(2))
         if size < least:
             denser = float(f"{1.1 * self.density * (least / size) ** 5:.2g}")
             fits = f" (density {denser:g} fits)" if denser <= _DENSEST else ""
@@ -562,31 +581,31 @@ class Body(_Spec):
                 field, f"{name}: expected {what} from {least:.2g} at density {self.density:g}, got {size:g}{fits}"
             )
 
-    @property
+    @functools.cached_property
     def joints(self) -> tuple[Joint, ...]:
         """Return the joints in the order of the action."""
-        return tuple(joint for leg in self.legs for joint in leg.joints)
+        return tuple(itertools.chain.from_iterable([leg.joints for leg in self.legs]))
 
-    @property
+    @functools.cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Return the names of the joints, and of their motors, in the order of the action."""
-        return tuple(leg.full_name(joint) for leg in self.legs for joint in leg.joints)
+        return tuple(itertools.chain.from_iterable([leg.joint_names for leg in self.legs]))
 
-    @property
+    @functools.cached_property
     def part_names(self) -> tuple[str, ...]:
         """Return the names of the rigid bodies in the order of the contact forces, the torso first."""
-        return ("torso", *(name for leg in self.legs for name in leg.part_names))
+        return ("torso", *itertools.chain.from_iterable([leg.part_names for leg in self.legs]))
 
-    @property
+    @functools.cached_property
     def foot_names(self) -> tuple[str, ...]:
         """Return the names of the feet's bodies, in the order of the legs."""
-        return tuple(leg.full_name(leg.foot) for leg in self.legs)
+        return tuple([leg.part_names[-1] for leg in self.legs])
 
-    @property
+    @functools.cached_property
     def ranks(self) -> tuple[int, ...]:
         """Return for each leg how many legs of its side stand in front of it: 0 is the front leg."""
-        feet = [(leg.side, leg.foot_position[0]) for leg in self.legs]  # once: both follow the chain of links
-        return tuple(sum(other == side and ahead > x for other, ahead in feet) for side, x in feet)
+        feet = [(leg.side, leg.foot_position[0]) for leg in self.legs]
+        return tuple([sum([other == side and ahead > x for other, ahead in feet]) for side, x in feet])
 
     def mirrored(self) -> Body:
         """Return the body across the x-z plane; every part keeps its name and place in the order."""

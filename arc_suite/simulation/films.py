@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from arc_suite import versions
 from arc_suite.models.builder import EYE
+from arc_suite.simulation.episode_loop import play_episode
 
 _ROUNDING = 1e-6  # control steps
 _SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
@@ -45,8 +46,9 @@ class Footage:
         self.earned = 0.0
         self.steps = 0
         self.advance = 0.0
-        self._environment, self._policy = environment, policy
-        self._time_step = environment.reset()
+        self._environment = environment
+        self._episode = play_episode(environment, policy)
+        self._time_step = next(self._episode)
         self._before = self._state()
         self._camera, self._size, self._quality = camera, size, None if camera == EYE else quality
 
@@ -71,7 +73,7 @@ class Footage:
         if self.ended:
             return
         before, self._before = self.phase, self._state()
-        self._time_step = self._environment.step(self._policy(self._time_step))
+        self._time_step = next(self._episode)
         self.advance = (self.phase - before) % 1.0
         self.earned += self._time_step.reward
         self.steps += 1

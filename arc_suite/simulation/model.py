@@ -172,9 +172,9 @@ def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel, all_geoms: bool = 
     touches = np.triu((touches | touches.T) & (body[:, None] != body))
     if not all_geoms:
         touches &= large[:, None] | large
-    for pair in np.argwhere(touches):
-        first, second = (model.geom(index).name for index in pair)
-        spec.add_pair(geomname1=first, geomname2=second, **_contact(model, *pair))
+    for first, second in np.argwhere(touches):
+        names = {"geomname1": model.geom(first).name, "geomname2": model.geom(second).name}
+        spec.add_pair(**names, **_contact(model, first, second))
     for geom in spec.geoms:
         if all_geoms or geom.type in _LARGE:
             geom.contype = geom.conaffinity = 0

@@ -152,6 +152,16 @@ def test_a_weak_body_is_told_and_walked_all_the_same(path):
     assert walked.startswith(f"{path}: spider is slow: walks 100 control steps at ")
 
 
+def test_a_body_that_drags_its_torso_is_told(path):
+    spec = json.loads(spec_files.body_to_json(spec_files.load_body("spider")))
+    (chassis,) = spec["torso"]["solids"]
+    chassis["size"][2] = 1.01 * 0.25  # of the standing height
+    path.write_text(json.dumps(spec))
+    done = check("--walk", path)
+    assert done.returncode == 1
+    assert done.stdout.splitlines()[1].startswith(f"{path}: spider drags its torso: walks 100 control steps at ")
+
+
 def test_imported_robots_walk_for_20_seconds_and_get_no_advice(path):
     robot = imports.FILES / "go2_like.xml"
     done = check("--walk", robot)

@@ -54,6 +54,21 @@ def test_policies_get_named_environments_and_the_reward_of_the_step_before():
     assert episode.total == sum(step.reward for step in steps[1:])
 
 
+def test_watchers_see_every_step_in_the_environment():
+    environment = arc_suite.load("tick", "walk", {"time_limit": 0.5})
+    seen = []
+
+    def watch(timestep):
+        seen.append((timestep.reward, environment.physics.data.time))
+
+    plain = evaluation.run(environment, Demonstrator("tick"), seed=4)
+    episode = evaluation.run(environment, Demonstrator("tick"), seed=4, watchers=[watch, watch])
+    assert episode == plain
+    assert len(seen) == 2 * (1 + episode.length) and seen[0::2] == seen[1::2]
+    assert seen[0][0] is None and sum(reward for reward, _ in seen[2::2]) == episode.total
+    assert np.diff([time for _, time in seen[0::2]]) == pytest.approx(environment.control_timestep())
+
+
 def test_returns_of_the_papers_demonstrators():
     for robot, returns in RETURNS.items():
         assert evaluation.expert_return(Setup.of(robot)) == returns.paper

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from refusals import refused
 
+import arc_suite
+from arc_suite import evaluation
+from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import walking
 
@@ -55,3 +58,45 @@ def test_shares_are_those_of_the_target_path():
 )
 def test_failures(motion, reasons):
     assert walking.failures(*motion) == reasons
+
+
+def test_a_tilted_or_terminated_body_has_fallen():
+    tilts = np.radians([0.0, 59.0, 61.0, 180.0])
+    quaternions = np.stack([np.cos(tilts / 2.0), np.sin(tilts / 2.0), 0.0 * tilts, 0.0 * tilts], axis=-1)
+    assert walking.has_fallen(np.zeros(4, bool), quaternions).tolist() == [False, False, True, True]
+    assert walking.has_fallen(True, quaternions[0])
+
+
+def test_a_demonstrator_is_seen_to_walk():
+    environment = arc_suite.load("tick", "walk", {"time_limit": 6.0})
+    watcher = walking.WalkWatcher(environment)
+    episode = evaluation.run(environment, Demonstrator(environment), 0, watchers=[watcher])
+    verdict = watcher.verdict(episode.length)
+    assert verdict.walks and not verdict.fell and verdict.touching == 0.0
+    assert (watcher.ending, watcher.length) == (walking.TIME, 120)
+    target = environment.task.definition.target_velocity
+    assert verdict.speed * target == pytest.approx(episode.progress["speed"], rel=0.01)
+    assert watcher.verdict(2 * episode.length).failures == ("slow",), "as if it had rested as long"
+
+
+def test_steps_after_a_fall_do_not_count():
+    environment = arc_suite.load("tick", "walk", {"time_limit": 4.0, "healthy_range": (0.0, 1.0)})
+    watcher, data = walking.WalkWatcher(environment), environment.physics.data
+
+    def capsize(timestep):
+        if watcher.length == 20:
+            data.qpos[2:7] = (0.5 * data.qpos[2], 0.0, 1.0, 0.0, 0.0)  # onto its back
+
+    steps = evaluation.run(environment, Demonstrator(environment), 0, watchers=[watcher, capsize]).length
+    verdict = watcher.verdict(steps)
+    assert (watcher.ending, watcher.length, steps) == (walking.FALL, 21, 80)
+    assert verdict.fell and verdict.failures == ("fall", "slow")
+
+
+def test_a_divergence_ends_a_walk():
+    environment = arc_suite.load("tick", "walk")
+    watcher = walking.WalkWatcher(environment)
+    for timestep in evaluation.rollout(environment, Demonstrator(environment), 0, max_steps=8):
+        watcher(timestep)
+    watcher.note_divergence()
+    assert watcher.length == 9 and watcher.verdict(100).failures == ("divergence", "slow")

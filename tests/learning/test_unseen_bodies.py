@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from networks import of_many_bodies as drawn
 
+from arc_suite import evaluation
 from arc_suite.bodies import families, generator, tokens
+from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation.walking import WalkWatcher
 from arc_suite.learning import transfer
 from arc_suite.learning.transfer import Comparison, Judged
 from arc_suite.robots import ROBOTS
@@ -75,6 +78,22 @@ def test_demonstrators_walk_and_drawn_weights_do_not(monkeypatch):
     assert small.demonstrator.total > small.zero.total > 0.0
     for one, other in ((small.demonstrator, large.demonstrator), (small.zero, large.zero)):
         assert one.total == pytest.approx(other.total, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_walk_in_a_batch_is_judged_as_one_alone(monkeypatch):
+    """Up to the rounding of observations in a batch."""
+    monkeypatch.setattr(transfer, "STEPS", 120)
+    body = transfer.FAMILIES["robots"][0](2)
+    (played,) = transfer.compare(drawn(), [body], "walk")
+    environment = Setup.of(body).load()
+    watcher = WalkWatcher(environment)
+    evaluation.run(
+        environment, Demonstrator(environment, suited_preset(environment.task.definition)), 0, 120, [watcher]
+    )
+    verdict = watcher.verdict(120)
+    assert played.demonstrator.speed == pytest.approx(verdict.speed, rel=0.01)
+    assert played.demonstrator.walked == verdict.walks
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.bodies import generator
-from arc_suite.models.kinematics import Legs
+from arc_suite.models.kinematics import Legs, damped_changes, least_changes
 from arc_suite.models.standing import posed
 from arc_suite.robots import ROBOTS
 
@@ -42,3 +42,24 @@ def test_what_is_out_of_reach_stays_within_bounds(body):
     weights = np.tile(np.eye(3), (len(goals), 1, 1))
     found = legs.reached(middle, goals, weights, 0.02, 20)
     assert np.isfinite(found).all() and ((found >= legs.low) & (found <= legs.high)).all()
+
+
+def test_damped_least_squares_have_two_forms_and_the_least_error():
+    random = np.random.RandomState(2)
+    jacobian, missing, damping = random.normal(size=(4, 3, 5)), random.normal(size=(4, 3, 1)), 0.3
+    changes = least_changes(jacobian, missing, damping)
+    pull = jacobian.swapaxes(-1, -2) @ missing
+    assert_allclose(changes, damped_changes(jacobian, pull, damping**2 * np.eye(5))[..., 0], atol=1e-12)
+
+    def error(angles):
+        left = missing[..., 0] - (jacobian @ angles[..., None])[..., 0]
+        return (left**2).sum(axis=-1) + damping**2 * (angles**2).sum(axis=-1)
+
+    for other in changes + 0.01 * random.normal(size=(20, *changes.shape)):
+        assert (error(other) > error(changes)).all()
+
+
+def test_a_joint_with_more_damping_changes_less():
+    jacobian = np.ones((3, 2))
+    first, second = damped_changes(jacobian, jacobian.T @ np.ones(3), np.diag((0.1, 10.0)))
+    assert first == pytest.approx(100.0 * second)

@@ -9,7 +9,7 @@ import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
 from arc_suite.cpg import Demonstrator
-from arc_suite.evaluation import first_walk
+from arc_suite.evaluation import cures
 from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS
@@ -201,8 +201,8 @@ def test_the_body_stands_on_motors_of_the_gear_that_fits_and_sinks_on_those_that
 def test_a_weak_body_reaches_about_the_speed_that_is_told(gear, joint):
     body = with_gear(gear, (joint,), ALL)
     told = [flaw.text for flaw in flaws(body)]
-    walked = first_walk.walk(body)
-    reached = 0.0 if walked.fell else walked.share
+    walked = cures.walk(body)
+    reached = 0.0 if walked.verdict.fell else walked.verdict.speed
     if told:
         assert float(told[0].removeprefix("weak: reaches about ").split()[0]) == pytest.approx(reached, abs=0.25)
     assert bool(told) == (reached < 0.7)

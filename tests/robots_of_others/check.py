@@ -26,7 +26,6 @@ import reference  # noqa: E402
 import zoo  # noqa: E402
 from studies.pages import table_writer  # noqa: E402
 
-from arc_suite import rotations  # noqa: E402
 from arc_suite.cpg import Demonstrator  # noqa: E402
 from arc_suite.envs.setup import Setup  # noqa: E402
 from arc_suite.evaluation import protocol, walking  # noqa: E402
@@ -137,21 +136,16 @@ def _tried(body: Body, task: str, preset: str, seed: int) -> tuple[float, bool, 
     names = body.joint_names
     model, data = environment.physics.model.ptr, environment.physics.data.ptr
     motors = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in names]
-    targets, places, limited, fell = [], [], [], False
+    limited, watcher = [], walking.WalkWatcher(environment)
     for timestep in protocol.rollout(environment, Demonstrator(environment, preset), seed, steps):
         if timestep.first() and "command" in environment.task.definition.commands:
             environment.command("command", (1.0, 0.0, 0.0))
-        place = np.array((*data.qpos[:2], rotations.yaw(data.qpos[3:7])))
-        places.append(place)
-        targets.append(walking.target(environment.task.definition, timestep.observation, place))
+        watcher(timestep)
         limited.append((abs(data.actuator_force[motors]) >= 0.999 * limits).mean())
-        ended = timestep.last() and timestep.discount == 0.0
-        if ended or rotations.upright(data.qpos[3:7]) < walking.MOST_TILT_COSINE:
-            fell = True
+        if watcher.ending != walking.TIME:
             break
-    moved = np.diff(np.array(places)[:, :2], axis=0)
-    speed, _ = walking.shares(np.array(targets[:-1]), moved, steps) if len(moved) else (0.0, 0.0)
-    return speed, fell, float(np.mean(limited[1:] or [0.0]))
+    verdict = watcher.verdict(steps)
+    return verdict.speed, verdict.fell, float(np.mean(limited[1:]))
 
 
 HEADER = ["robot", "group", "legs", "same bits"]

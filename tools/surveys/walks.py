@@ -10,10 +10,10 @@ import numpy as np
 from dm_control.rl import control
 from tqdm import tqdm
 
-from arc_suite import rotations
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol, walking
+from arc_suite.simulation.episode_loop import play_episode
 
 NEAR_TARGET = 0.9  # of the target speed: bodies that reach it are counted, too
 
@@ -58,69 +58,34 @@ class Outcome(NamedTuple):
         return len(self.case.setup.body.legs[0].joints)
 
 
-class Trajectory(NamedTuple):
-    """The torso in a walk that lasted n control steps.
-
-    Attributes:
-        steps: of the whole walk.
-        places: (n + 1, 3) x and y, m, and yaw, rad.
-        targets: (n, 2) target displacements, m.
-        touching: (n + 1,) whether the torso touches the ground.
-        ending: "time" at the time limit, else "fall" or "divergence".
-    """
-
-    steps: float
-    places: np.ndarray
-    targets: np.ndarray
-    touching: np.ndarray
-    ending: str
-
-
-def play(case: Case) -> tuple[control.Environment, Trajectory]:
+def play(case: Case) -> tuple[control.Environment, walking.Verdict]:
     """Play the walk of one body by the demonstrator that suits the task.
 
     Returns:
-        The environment as the walk left it, and the walk.
+        The environment as the walk left it, and what the walk came to.
 
     Raises:
         ValueError: a task without a target velocity or command.
     """
     environment = case.setup.load(case.seed)
-    task, data = environment.task.definition, environment.physics.data.ptr
+    task = environment.task.definition
     demonstrator = Demonstrator(environment, suited_preset(task))
-    shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in case.setup.body.torso.solids]
-    step, ending = environment.reset(), "time"
-    places, targets, touching = [_place(data)], [], [False]
+    watcher = walking.WalkWatcher(environment)
     try:
-        while not step.last() and ending == "time":
-            targets.append(walking.target(task, step.observation, places[-1]))
-            step = environment.step(demonstrator(step))
-            places.append(_place(data))
-            touching.append(bool(np.isin(data.contact.geom, shapes).any()))
-            if step.discount == 0.0 or rotations.upright(data.qpos[3:7]) < walking.MOST_TILT_COSINE:
-                ending = "fall"
+        for timestep in play_episode(environment, demonstrator):
+            watcher(timestep)
+            if watcher.ending != walking.TIME:
+                break
     except control.PhysicsError:
-        ending = "divergence"
-        places.append(places[-1])
-    return environment, Trajectory(task.step_limit, *map(np.array, (places, targets, touching)), ending)
-
-
-def _place(data) -> np.ndarray:
-    return np.array((*data.qpos[:2], rotations.yaw(data.qpos[3:7])))
-
-
-def assess(case: Case, trajectory: Trajectory) -> Outcome:
-    """Return whether a trajectory is a walk, and if not, why; see `walking.failures`."""
-    moved, touching = np.diff(trajectory.places[:, :2], axis=0), float(trajectory.touching.mean())
-    speed, drift = walking.shares(trajectory.targets, moved, trajectory.steps)
-    return Outcome(case, speed, abs(drift), touching, walking.failures(speed, touching, trajectory.ending))
+        watcher.note_divergence()
+    return environment, watcher.verdict(task.step_limit)
 
 
 def run(case: Case) -> Outcome:
     """Play the walk of one body and assess it."""
-    environment, trajectory = play(case)
+    environment, verdict = play(case)
     environment.close()
-    return assess(case, trajectory)
+    return Outcome(case, verdict.speed, abs(verdict.drift), verdict.touching, verdict.failures)
 
 
 def survey(cases: Sequence[Case], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:

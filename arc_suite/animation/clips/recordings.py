@@ -9,6 +9,7 @@ from mujoco import rollout
 
 from arc_suite.envs.dm import Environment
 from arc_suite.policies import Policy, alone
+from arc_suite.simulation.episode_loop import play_episode
 from arc_suite.tasks.readings import pose
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -57,22 +58,23 @@ def record(
     Raises:
         ValueError: the episode ends before.
     """
-    act, commands = alone(policy), dict(commands)
+    commands = dict(commands)
     model, data = environment.physics.model.ptr, environment.physics.data.ptr
-    timestep, controls = environment.reset(), []
-    for name, value in held.items():
-        environment.command(name, value)
-    for count in range(settle + steps):
+    controls = []
+    for count, timestep in enumerate(play_episode(environment, alone(policy), max_steps=settle + steps)):
+        if timestep.last():
+            raise ValueError(f"the episode ends after {count} control steps, {settle + steps} are needed")
+        if timestep.first():
+            for name, value in held.items():
+                environment.command(name, value)
+        else:
+            controls.append(data.ctrl.copy())
         if count in commands:
             environment.command("command", commands[count])
         if count == settle:
             state = np.empty(mujoco.mj_stateSize(model, _STATE))
             mujoco.mj_getState(model, data, state, _STATE)
             start, warmstart = data.qpos.copy(), data.qacc_warmstart.copy()
-        timestep = environment.step(act(timestep))
-        if timestep.last():
-            raise ValueError(f"the episode ends after {count + 1} control steps, {settle + steps} are needed")
-        controls.append(data.ctrl.copy())
     scene = environment.task.definition.scene
     controls = np.repeat(controls[settle:], scene.substeps, axis=0)
     states, _ = rollout.rollout(model, mujoco.MjData(model), state, controls[None], initial_warmstart=warmstart)

@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, evaluation, policies, registry, rotations
+from arc_suite import checks, evaluation, policies, registry
 from arc_suite.animation.design.genes import Budget
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation.walking import MOST_TILT_COSINE
+from arc_suite.evaluation import walking
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import GRAVITY
-from arc_suite.models.stride import LEAST_SHARE
 from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import energy
@@ -164,7 +163,7 @@ def excluded(goal: Goal, budget: Budget, walk: WalkMeans) -> str:
         return "fell"
     if walk.power > budget.power:
         return f"power: {walk.power:.3g} W/kg"
-    if goal.metric == "cost_of_transport" and walk.achieved < LEAST_SHARE:
+    if goal.metric == "cost_of_transport" and walking.is_slow(walk.achieved):
         return f"slow: {walk.achieved:.2f} of the command"
     return "" if math.isfinite(goal.value(walk)) else "no finite metric"
 
@@ -200,12 +199,13 @@ def _episode(environment, policy, seed: int, steps: int) -> WalkMeans:
     for timestep in evaluation.rollout(environment, policy, seed, steps):
         if timestep.first():
             start, length, spent = data.qpos[0], 0, energy.begin(spent, data.qpos[7:])
+            fell = False
         else:
             length, spent = length + 1, energy.after(spent, torques, data.ctrl, data.qpos[7:])
+            fell |= walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
     progress, way = environment.task.progress, data.qpos[0] - start
     tracking = progress.get("tracking", math.nan) * length / steps
     target = task.parameters.target_velocity * seconds
     achieved = way / target if "distance" in progress or math.isnan(tracking) else tracking
-    fell = timestep.discount == 0.0 or rotations.upright(data.qpos[3:7]) < MOST_TILT_COSINE
     power = spent.total * GRAVITY / (length * task.scene.control_timestep)
     return WalkMeans(way / seconds, achieved, tracking, progress.get("cost_of_transport", math.nan), power, fell)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
-from arc_suite.models.stride import LEAST_SHARE
+from arc_suite.evaluation.walking import Verdict, WalkWatcher
 from arc_suite.robots.spec import Body, Link
 
 _STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
@@ -19,25 +19,23 @@ class FirstWalk(NamedTuple):
 
     Attributes:
         length: control steps until a fall or divergence, or of the whole walk.
-        fell: whether the walk ended in one.
-        speed: m/s forward.
+        verdict: what it came to.
         target: m/s that the task wants.
     """
 
     length: int
-    fell: bool
-    speed: float
+    verdict: Verdict
     target: float
 
     @property
-    def share(self) -> float:
-        """The speed as a share of the target."""
-        return self.speed / self.target
+    def speed(self) -> float:
+        """The speed forward, m/s."""
+        return self.verdict.speed * self.target
 
     @property
     def quality(self) -> int:
-        """2 for a walk at `LEAST_SHARE` of the target or more, 1 for a slower one, 0 for a fall."""
-        return 0 if self.fell else 1 + (self.share >= LEAST_SHARE)
+        """2 for what counts as walking, 1 for what is too slow or drags the torso, 0 for a fall."""
+        return 0 if self.verdict.fell else 1 + self.verdict.walks
 
 
 def walk(body: Body) -> FirstWalk:
@@ -47,12 +45,11 @@ def walk(body: Body) -> FirstWalk:
         ValueError: a body that cannot walk whatever the demonstrator does.
     """
     environment = Setup.of(body, "walk", {"on_divergence": "terminate"}).load()
-    steps, target = (
-        _STEPS_OF_IMPORTED if body.source else _STEPS,
-        environment.task.definition.parameters.target_velocity,
-    )
-    episode = protocol.run(environment, Demonstrator(environment, "medium"), 0, steps)
-    return FirstWalk(episode.length, episode.length < steps, episode.progress["speed"], target)
+    steps = _STEPS_OF_IMPORTED if body.source else _STEPS
+    watcher = WalkWatcher(environment)
+    protocol.run(environment, Demonstrator(environment, "medium"), 0, steps, [watcher])
+    target = environment.task.definition.parameters.target_velocity
+    return FirstWalk(watcher.length, watcher.verdict(steps), target)
 
 
 def given_fields(body: Body) -> list[str]:
@@ -76,7 +73,7 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
         better |= {names: each for names, each in walks.items() if each.quality > quality}
         if any(each.quality == 2 for each in better.values()):  # larger sets are no better
             break
-    return max(better.items(), key=lambda item: (item[1].quality, -len(item[0]), item[1].share), default=None)
+    return max(better.items(), key=lambda item: (item[1].quality, -len(item[0]), item[1].speed), default=None)
 
 
 def _leaving_out(body: Body, names: tuple[str, ...]) -> Body:
