@@ -13,7 +13,7 @@ from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESE
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.steering import Steered, SteeringParameters
 from arc_suite.cpg.stepping import Directed, directed
-from arc_suite.cpg.stride import StrideLaw
+from arc_suite.cpg.stride_law import StrideLaw
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
