@@ -28,7 +28,10 @@ _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "t
 FLAGS = flags.FLAGS
 define_walk(task="steer")
 flags.DEFINE_list(
-    "clips", list(export.DEFAULT), f"Which, with commas between them: {', '.join(export.CLIPS)}; or {export.ALL}."
+    "clips",
+    list(export.DEFAULT),
+    f"Which, with commas between them: {', '.join(export.CLIPS)}; module:name of one that another package has; or "
+    f"{export.ALL}.",
 )
 flags.DEFINE_float("fps", export.FPS, "Frames a second.", 1.0, 1000.0)
 flags.DEFINE_string("rig", "skin", f"{' or '.join(export.RIGS)}: bones and one mesh, or rigid parts.")
