@@ -250,7 +250,7 @@ def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
     Raises:
         ValueError: an unknown name, or one that the suite has and another package registers.
     """
-    entry = _find(name, collections.ChainMap(ADDITIONS[kind], suite), kind)
+    entry = _find(name, collections.ChainMap(ADDITIONS[kind], dict(suite)), kind)
     if bare(name) in suite and bare(name) in ADDITIONS[kind]:
         module = MODULES.get((kind, bare(name))) or "__main__"
         raise ValueError(f"{kind} {bare(name)!r}: the suite has one of this name, and {module} registers another")
