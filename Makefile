@@ -184,7 +184,7 @@ check-web: RUN = $(PYTEST) tests/animation/test_pages.py && \
 	NODE_PATH=$(CURDIR)/.node-web/node_modules .node-web/node_modules/.bin/esbuild tests/engines/loader.js --bundle \
 		--outfile=$(ENGINES)/loader.js --log-level=warning && \
 	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
-check-play: RUN = $(PYTEST) tests/animation/test_play.py tests/animation/test_play_page.py
+check-play: RUN = $(PYTEST) tests/animation/test_play_pages.py tests/animation/test_play_in_browser.py
 check-studio: VENV := .venv-studio
 check-studio: EXTRAS := dev,animate
 check-studio: RUN = $(PYTEST) tests/animation/studio

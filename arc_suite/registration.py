@@ -1,4 +1,4 @@
-"""Robots, families of bodies and tasks of other packages, and Gymnasium's ids for all there are."""
+"""Parts of other packages: robots, tasks, laws, learners and others; and Gymnasium's ids for all robots and tasks."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -7,12 +7,13 @@ import gymnasium
 
 from arc_suite import checks, registry
 from arc_suite.arenas import ARENAS
+from arc_suite.cpg.law import Law
 from arc_suite.cpg.presets import PRESETS
-from arc_suite.cpg.selection import law
+from arc_suite.cpg.selection import LAWS, SUITE_PRESETS, law
 from arc_suite.envs.prepare import prepared
 from arc_suite.models.visuals import VISUALS
 from arc_suite.models.visuals.spec import Visuals
-from arc_suite.registry import BODIES_ENV, FAMILIES, MODULES
+from arc_suite.registry import ADDITIONS, BODIES_ENV, FAMILIES, MODULES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
@@ -20,6 +21,8 @@ from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
 
 BODIES = "bodies"  # in place of a robot in ids of environments of different bodies
+
+_TABLES: dict[str, dict[str, Any]] = {"task": TASKS, "arena": ARENAS, "family": FAMILIES, **ADDITIONS}
 
 
 def register(
@@ -32,11 +35,16 @@ def register(
     tasks: Iterable[type[Task]] = (),
     arenas: Mapping[str, Any] | None = None,
     families: Mapping[str, Callable[[int], Body]] | None = None,
+    laws: Mapping[str, type[Law]] | None = None,
+    networks: Mapping[str, Any] | None = None,
+    algorithms: Mapping[str, Any] | None = None,
+    clips: Mapping[str, Any] | None = None,
+    programs: Mapping[str, str] | None = None,
 ) -> None:
-    """Add a robot, tasks, arenas, families or all of them to the suite: every task then exists for every robot.
+    """Add a robot, or parts of other kinds, to the suite: every task then exists for every robot.
 
     Call it where a module is imported. `load` and Gymnasium's ids then name the robot as they name
-    Queen.
+    Queen. Callers name a part of any kind as `name`, or as `module:name`, which imports the module.
 
     Args:
         module: whose import makes this call, `__name__` there; processes that do not share this
@@ -53,54 +61,100 @@ def register(
         families: functions by name, from a seed to a body, always the same for the same seed; see
             `bodies.families.sound`. `name:seed` then stands for the body wherever a domain does, and comes before
             a module of that name.
+        laws: classes of demonstrators' laws by name; see `cpg.law.Law`. Presets of their class have the law,
+            and `name` stands for the class's own `preset` on every body.
+        networks: functions by name that make an architecture for a task, for `--hp network=`; see
+            `learning.agents.architectures.of`.
+        algorithms: values by name of `learning.agents.algorithms.Algorithm`.
+        clips: values by name of `animation.clips.catalog`, such as `Acted`.
+        programs: modules by name, as texts, that `arc-suite` runs: each has a docstring and a function `main`.
+
+    A network, an algorithm or a clip may be a text `module:attribute` that says where it is: it is imported when it is
+    used. It is checked then, too.
 
     Raises:
-        ValueError: a name that is taken, a task that lacks methods, or parameters or a preset that do not fit the
-            body; nothing has been registered.
+        ValueError: a name that is taken, a task or a law that lacks methods, or parameters or a preset that do not fit
+            the body; nothing has been registered.
     """
     module = None if module == "__main__" else module
-    new_tasks: dict[str, Any] = {_task_name(task): task for task in tasks}
-    new_arenas = dict(arenas or {})
-    new_families = {_family_name(name): make for name, make in (families or {}).items()}
-    added: list[tuple[str, dict, dict]]
-    added = [("task", TASKS, new_tasks), ("arena", ARENAS, new_arenas), ("family", FAMILIES, new_families)]
-    for kind, table, new in added:
-        for name, value in new.items():
-            if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:
-                raise ValueError(f"{kind} {checks.shown(name)} is already registered; choose another name")
+    parts = {
+        "task": {_task_name(task): task for task in tasks},
+        "arena": arenas,
+        "family": families,
+        "law": laws,
+        "network": networks,
+        "algorithm": algorithms,
+        "clip": clips,
+        "program": programs,
+    }
+    parts = {kind: dict(additions) for kind, additions in parts.items() if additions}
+    for kind, additions in parts.items():
+        _check_names(kind, additions, module)
+    for name, path in parts.get("program", {}).items():
+        _check_program(name, path)
+    law_by_preset = {_preset_class(name, added): added for name, added in parts.get("law", {}).items()}
     if body is None:
         if (parameters, presets, visuals) != (None, None, None):
             raise ValueError("parameters, presets and visuals belong to a body, and none is given")
-        if not (new_tasks or new_arenas or new_families):
-            raise ValueError("nothing to register: give a body, tasks, arenas or families")
+        if not parts:
+            kinds = "a body, tasks, arenas, families, laws, networks, algorithms, clips or programs"
+            raise ValueError(f"nothing to register: give {kinds}")
     else:
-        _register_body(body, parameters or {}, presets, visuals)
+        _register_body(body, parameters or {}, presets, visuals, {**LAWS, **law_by_preset})
         MODULES["robot", body.name] = module
-    for kind, table, new in added:
-        table.update(new)
-        MODULES.update({(kind, name): module for name in new})
+    LAWS.update(law_by_preset)
+    for kind, additions in parts.items():
+        _TABLES[kind].update(additions)
+        MODULES.update({(kind, name): module for name in additions})
     register_ids()
 
 
-def _family_name(name) -> str:
-    if not (isinstance(name, str) and name.isidentifier()):
-        raise ValueError(f"family {checks.shown(name)}: expected a name of letters, digits and underscores")
-    return name
+def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) -> None:
+    """Raise ValueError for a name that nobody can write, or that something else has."""
+    table = _TABLES[kind]
+    for name, value in additions.items():
+        if not (isinstance(name, str) and name.isidentifier()):
+            raise ValueError(f"{kind} {checks.shown(name)}: expected a name of letters, digits and underscores")
+        is_again = table.get(name) is value or (module is not None and MODULES.get((kind, name)) == module)
+        if name in table and not is_again:
+            raise ValueError(f"{kind} {checks.shown(name)} is already registered; choose another name")
+
+
+def _check_program(name: str, path) -> None:
+    if not isinstance(path, str):
+        raise ValueError(f"program {name!r}: expected the name of a module, got {checks.shown(path)}")
+
+
+def _preset_class(name: str, law) -> type:
+    """Return the class of the presets that a law of another package has.
+
+    Raises:
+        ValueError: it is no law, or the name or the class are those of another law.
+    """
+    attributes = {attribute for base in getattr(law, "__mro__", ()) for attribute in vars(base)}
+    if missing := [part for part in ("preset", "reads", "initial", "__call__") if part not in attributes]:
+        raise ValueError(f"law {name!r}: has no {' and no '.join(missing)}, which arc_suite.cpg.law.Law requires")
+    if not {"posture", "velocities"} <= set(law.reads):
+        raise ValueError(f"law {name!r}: reads: expected posture, velocities and others, got {checks.shown(law.reads)}")
+    if name in SUITE_PRESETS:
+        raise ValueError(f"law {name!r}: the suite has presets of this name; choose another name")
+    preset_class = type(law.preset)
+    if LAWS.get(preset_class, law) is not law:
+        raise ValueError(f"law {name!r}: presets of {preset_class.__name__} are those of {LAWS[preset_class].__name__}")
+    return preset_class
 
 
 def _task_name(task) -> str:
     name = getattr(task, "name", None)
     if not (isinstance(task, type) and issubclass(task, Task)):
         raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {checks.shown(task)}")
-    if not (isinstance(name, str) and name.isidentifier()):
-        raise ValueError(f"task {checks.shown(name)}: expected a name of letters, digits and underscores")
     if missing := sorted(task.__abstractmethods__):
         lacks = " and no ".join(missing)
         raise ValueError(f"task {checks.shown(name)}: has no {lacks}, which arc_suite.tasks.Task requires")
     return name
 
 
-def _register_body(body, parameters, presets, visuals) -> None:
+def _register_body(body, parameters, presets, visuals, laws) -> None:
     if not isinstance(body, Body):
         raise ValueError(f"body: expected a spec.Body, got {checks.shown(body)}")
     if body.name == BODIES:
@@ -110,7 +164,7 @@ def _register_body(body, parameters, presets, visuals) -> None:
     for task, given in parameters.items():
         _check_parameters(body, checks.name(task, TASKS, "task of parameters"), given)
     if presets is not None:
-        _check_presets(body, parameters.get("walk", {}), presets)
+        _check_presets(body, parameters.get("walk", {}), presets, laws)
     ROBOTS[body.name] = body
     tables: list[tuple[dict, Any]] = [(PARAMETERS.setdefault(task, {}), given) for task, given in parameters.items()]
     for table, value in (*tables, (PRESETS, presets), (VISUALS, visuals)):
@@ -125,11 +179,11 @@ def _check_parameters(body: Body, task: str, given: Mapping[str, Any]) -> None:
     TASKS[task].settings_for(body, given)
 
 
-def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, Any]) -> None:
+def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, Any], laws: Mapping[type, Any]) -> None:
     task, _ = prepared(body, "walk", walk)
     for name, preset in presets.items():
         try:
-            law(task, preset)
+            law(task, preset, laws)
         except ValueError as error:
             raise ValueError(f"preset {checks.shown(name)}: {error}") from None
 

@@ -1,5 +1,9 @@
-"""Tables of names: robots, families of bodies, tasks and arenas, including those of other packages."""
+"""Tables of names: robots, families of bodies, tasks and arenas, including those of other packages.
 
+Of what only demonstrators, wings and the command `arc-suite` know, the tables here hold what other packages add.
+"""
+
+import collections
 import importlib
 import itertools
 import os
@@ -30,6 +34,10 @@ READERS = {".xml": "arc_suite.importing:body_of", ".urdf": "arc_suite.importing:
 
 # The vector environment of different bodies.
 BODIES_ENV = "arc_suite.bodies:BodiesEnv"
+
+# What other packages register, or where it is, by kind and name. What uses it has a table of the suite's own, and
+# checks values when it uses them; see `find`.
+ADDITIONS: dict[str, dict[str, Any]] = {"law": {}, "network": {}, "algorithm": {}, "clip": {}, "program": {}}
 
 MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
@@ -108,11 +116,18 @@ def stored(robot: str) -> str:
         NotImported: the module of a name has not been imported yet.
     """
     for part in [] if robot.startswith("{") else robot.split(","):
-        family, _, seeds = part.rpartition(":")
-        if not family or _is_path(part):
+        if not part.rpartition(":")[0] or _is_path(part):
             checks.name(part, (*ROBOTS, *EXAMPLES), "robot", words()[-len(FAMILIES) :])
-        imported("robot", family if _SEEDS.fullmatch(seeds) else part)
+    for name in names_in(robot):
+        imported("robot", name)
     return robot
+
+
+def names_in(robot: str) -> list[str]:
+    """Return the names of robots and families, without seeds, in a text that names bodies."""
+    parts = [] if robot.startswith("{") else robot.split(",")
+    families = [part.rpartition(":") for part in parts]
+    return [family if _SEEDS.fullmatch(seeds) else f"{family}{colon}{seeds}" for family, colon, seeds in families]
 
 
 def family_of(name: str) -> Callable[[int], Body]:
@@ -206,6 +221,47 @@ def arena_maker(name: str) -> Callable[[Body], Arena]:
     return _find(name, ARENAS, "arena")
 
 
+def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
+    """Return what a name of a kind in `ADDITIONS` stands for.
+
+    Args:
+        kind: such as "algorithm".
+        name: see `find_entry`.
+        suite: the suite's own values, or where they are, by name.
+
+    Raises:
+        ValueError: as `find_entry`, or a value that cannot be imported.
+    """
+    entry = find_entry(kind, name, suite)
+    try:
+        return resolve(entry)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ValueError(f"{kind} {bare(name)!r}: cannot import {entry}: {checks.quoted(error)}") from None
+
+
+def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
+    """Return the value of a name of a kind in `ADDITIONS`, or the text `module:attribute` that says where it is.
+
+    Args:
+        kind: such as "algorithm".
+        name: of the suite, or of another package as `name` or `module:name`, whose module is imported.
+        suite: the suite's own entries by name.
+
+    Raises:
+        ValueError: an unknown name, or one that the suite has and another package registers.
+    """
+    entry = _find(name, collections.ChainMap(ADDITIONS[kind], dict(suite)), kind)
+    if bare(name) in suite and bare(name) in ADDITIONS[kind]:
+        module = MODULES.get((kind, bare(name))) or "__main__"
+        raise ValueError(f"{kind} {bare(name)!r}: the suite has one of this name, and {module} registers another")
+    return entry
+
+
+def bare(name: str) -> str:
+    """Return the name in `module:name`, or the name itself."""
+    return name.rpartition(":")[2]
+
+
 def imported(kind: str, name: str) -> str:
     """Return a name that a file gives, `name` or `module:name`, if looking it up imports nothing new.
 
@@ -231,18 +287,31 @@ def env_id(domain_name: str, task: type[Task]) -> str:
     return f"arc_suite/{domain_name}-{task.name}-v{task.version}"
 
 
+def import_module(module: str, subject: str) -> None:
+    """Import a module that a caller names.
+
+    Args:
+        module: its name.
+        subject: with which an error begins.
+
+    Raises:
+        ValueError: it cannot be imported.
+    """
+    try:
+        importlib.import_module(module)
+    except ImportError as error:
+        cause = f"cannot import {module[:80]}: {checks.quoted(error)}"
+        remedy = f"; start in the folder of {module[:80]}.py, or put it on Python's path"
+        raise ValueError(f"{subject}: {cause}{remedy if error.name == module else ''}") from None
+
+
 def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
     if isinstance(name, str) and ":" in name:
         module, _, name = name.rpartition(":")
         if not all(part.isidentifier() for part in module.split(".")):
             given = checks.shown(f"{module}:{name}")
             raise ValueError(f"{kind} {given}: expected module:name, with a module that can be imported")
-        try:
-            importlib.import_module(module)
-        except ImportError as error:
-            cause = f"cannot import {module[:80]}: {checks.quoted(error)}"
-            start = f"; start in the folder of {module[:80]}.py, or put it on Python's path"
-            raise ValueError(f"{kind} {name[:80]!r}: {cause}{start if error.name == module else ''}") from None
+        import_module(module, f"{kind} {name[:80]!r}")
         if name not in table:
             hint = checks.hint(name, [own for own in table if MODULES.get((kind, own)) == module])
             raise ValueError(f"{kind} {name[:80]!r}: {module} registers no such {kind} by arc_suite.register{hint}")

@@ -134,7 +134,7 @@ def _design() -> None:
 
 
 def _run() -> tables.Run:
-    return tables.run("tick", "tiny_studies:CLIMB", 40, task_kwargs={"time_limit": 0.2}, evaluate_every=20)
+    return tables.run("tick", "tiny_studies:climb", 40, task_kwargs={"time_limit": 0.2}, evaluate_every=20)
 
 
 def _begin_run() -> None:
@@ -175,7 +175,7 @@ def _copy_studies() -> None:
 
 
 TABLES = (*run_folder.TABLES, "style", "final")
-RUN, STUDY = "tick-walk-tiny_studies.CLIMB-0", "samples-sac"
+RUN, STUDY = "tick-walk-tiny_studies.climb-0", "samples-sac"
 _USES_OF_RUNS = (_resume_run, _publish, _act_by_run)
 KINDS = {
     "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,)),

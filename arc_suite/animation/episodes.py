@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
-from arc_suite.animation import direction
+from arc_suite.animation import player_controls
 from arc_suite.markers import Marker
 from arc_suite.simulation.episode_loop import play_episode
 
@@ -59,7 +59,7 @@ class Episodes:
         """Set pose and gait, or leave them to the task; one that has no such commands ignores it.
 
         Args:
-            pose: see `direction.commands`, as `gait` and `tempo`.
+            pose: see `player_controls.commands`, as `gait` and `tempo`.
             gait: its name.
             tempo: multiple of its frequency.
         """
@@ -103,7 +103,7 @@ class Episodes:
 
     def _command(self) -> None:
         task = self.environment.task.definition
-        for name, value in direction.commands(task, self.desired, self._pose, *self._gait).items():
+        for name, value in player_controls.commands(task, self.desired, self._pose, *self._gait).items():
             self.environment.command(name, value)
 
     def _asked(self) -> list[Marker]:

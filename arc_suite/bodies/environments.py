@@ -14,9 +14,9 @@ from arc_suite import checks, registry, rotations
 from arc_suite.bodies import tokens
 from arc_suite.bodies.groups import Group, Member, Place, grouped, scatter
 from arc_suite.bodies.tokens import Description, Tokens
+from arc_suite.envs.base_vector import MOST_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
-from arc_suite.envs.together import MOST_ENVS, Together
 from arc_suite.tasks.contract import CURRICULUM
 
 
@@ -52,7 +52,7 @@ class BodiesTask(NamedTuple):
         return tokens.split(observation)
 
 
-class BodiesEnv(KnownAttributes, Together):
+class BodiesEnv(KnownAttributes, BaseVectorEnv):
     """Environments of different bodies, `gymnasium.make_vec("arc_suite/bodies-<task>-v0", num_envs=n, bodies=...)`.
 
     Observations are legs (num_envs, 12, 12), torso (num_envs, 12) and command (num_envs, 6), float32 without

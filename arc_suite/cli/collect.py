@@ -18,10 +18,11 @@ import pathlib
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, policies, seed_ranges
+from arc_suite import policies, seed_ranges
 from arc_suite.cli.flags import MOST, define_body, define_policy, define_task, made_body, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
+from arc_suite.cpg.selection import check_preset_name
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
@@ -80,7 +81,7 @@ def main() -> None:
     if FLAGS.id is not None and len(asked) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(asked)}")
     for name in FLAGS.preset or ():
-        checks.name(name, policies.preset_names(), "preset")
+        check_preset_name(name)
     policy, label = chosen()
     for setup in asked.values():
         presets = FLAGS.preset if FLAGS.policy == "cpg" else ()

@@ -2,10 +2,11 @@
 
 import importlib
 import sys
+from types import ModuleType
 
-from arc_suite import checks, versions
+from arc_suite import checks, registry, versions
 from arc_suite.cli import program
-from arc_suite.cli.programs import FORMER, PROGRAMS, usage
+from arc_suite.cli.programs import FORMER, PROGRAMS, installed, usage
 
 
 def main(*given: str) -> None:
@@ -24,15 +25,25 @@ def main(*given: str) -> None:
         except versions.MissingExtra as error:
             sys.exit(f"arc-suite {first}: {error}")
         program.run(module.main, f"arc-suite {first}", others)
-    program.guard(lambda: _answer(first), "arc-suite")
+    if first in ("--help", "-h", "--version"):
+        program.guard(lambda: print(program.VERSION if first == "--version" else usage()), "arc-suite")
+    module = _program_of_another_package(first)
+    program.run(module.main, f"arc-suite {first}", others)
 
 
-def _answer(argument: str) -> None:
-    if argument == "--version":
-        print(program.VERSION)
-    elif argument in ("--help", "-h"):
-        print(usage())
-    elif argument in FORMER:
-        raise ValueError(f"{argument} is no program any more; {FORMER[argument]}")
-    else:
-        checks.name(argument, PROGRAMS, "program")
+def _program_of_another_package(name: str) -> ModuleType:
+    """Return the module of a program by `module:name`, or by the name of an entry point; exit where there is none."""
+    try:
+        points = installed()
+        if name in FORMER:
+            raise ValueError(f"{name} is no program any more; {FORMER[name]}")
+        if name in points:
+            name = f"{points[name].value}:{name}"
+        elif ":" not in name:
+            checks.name(name, [*PROGRAMS, *points], "program")
+        module = registry.find("program", name, PROGRAMS)
+        if not callable(getattr(module, "main", None)) or not module.__doc__:
+            raise ValueError(f"program {name!r}: expected a module with a docstring and a function main")
+    except ValueError as error:
+        sys.exit(f"arc-suite: {error}")
+    return module

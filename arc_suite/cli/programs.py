@@ -1,7 +1,11 @@
 """The programs of `arc-suite`, and its help; the standard library alone is imported here."""
 
 import ast
+from importlib import metadata
 from pathlib import Path
+
+# Entry points of installed packages: the name of a program, and the module whose import registers it.
+GROUP = "arc_suite.programs"
 
 # The package of each program: the core's own, and those of the wings, which nothing else of the core names.
 PROGRAMS = {
@@ -37,13 +41,21 @@ arc-suite PROGRAM [flags]
 
 {programs}
 
-arc-suite PROGRAM --help shows the flags of a program, arc-suite --version the version."""
+arc-suite PROGRAM --help shows the flags of a program, arc-suite --version the version.
+arc-suite MODULE:NAME runs a program that another package registers."""
 
 
 def usage() -> str:
-    """Return the help of `arc-suite`."""
-    width = max(map(len, PROGRAMS))
-    return _USAGE.format(programs="\n".join(f"  {name:<{width}}  {summary(name)}" for name in PROGRAMS))
+    """Return the help of `arc-suite`; no program is imported for it."""
+    summaries = {name: summary(name) for name in PROGRAMS}
+    summaries |= {name: f"of the package {point.dist.name}" for name, point in installed().items()}
+    width = max(map(len, summaries))
+    return _USAGE.format(programs="\n".join(f"  {name:<{width}}  {text}" for name, text in summaries.items()))
+
+
+def installed() -> dict[str, metadata.EntryPoint]:
+    """Return the entry points of programs of installed packages by name, without those that have a program's name."""
+    return {point.name: point for point in metadata.entry_points(group=GROUP) if point.name not in PROGRAMS}
 
 
 def summary(name: str) -> str:

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, registry
+from arc_suite import registry
 from arc_suite.cpg.law import checked, restarted
 from arc_suite.cpg.prescribed import Preset
-from arc_suite.cpg.selection import law, presets_of
+from arc_suite.cpg.selection import law, preset_of
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepared
 from arc_suite.models.soundness import hopeless
@@ -46,18 +46,17 @@ class Demonstrator:
             preset: a name: slow, medium or fast, which every body has; for the four robots also tuned, which
                 earns most of what the paper's law can earn in walk, and refined, which earns most of all;
                 steered or surefooted, which follow a command; sighted and leaping, which need a height scan;
-                for leaper balanced; planned, for the task navigate. Or parameters of a law: a `Preset`,
-                `SteeringParameters`, ...; a number is a target speed as a share of sqrt(g h), h being the
-                standing height, negative for backwards.
+                for leaper balanced; planned, for the task navigate; `module:name` of a law of another package. Or
+                parameters of a law: a `Preset`, `SteeringParameters`, ...; a number is a target speed as a share of
+                sqrt(g h), h being the standing height, negative for backwards.
 
         Raises:
             ValueError: an unknown name, a value out of range, a preset that does not fit, or a body that
                 cannot walk by any preset, as its feet hang far above the floor.
         """
         body, task = _resolved(task)
-        presets = presets_of(body)
         if isinstance(preset, str) or preset is None:
-            preset = presets[checks.name(preset, presets, "preset")]
+            preset = preset_of(body, preset)
         # Presets of the published law were found for a body as it is.
         if not isinstance(preset, Preset) and (found := hopeless(body)):
             raise ValueError(f"{body.name} cannot walk: {found[0].text}")

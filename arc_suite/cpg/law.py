@@ -4,15 +4,48 @@ A leg's hip sweeps linearly, back in stance and forth in swing; its other joints
 bell to their center. A PD loop turns the distance to these targets into torques. Beyond the paper,
 a preset may add feedforward torques: harmonics of the leg's phase, and steering by yaw.
 
-A law of a demonstrator is a pure function `(state, observation) -> (state, actions)`. Its attribute
-`reads` names the blocks of the observation that it needs, float64 arrays (environments, size). Its
-state is a NamedTuple of arrays with a leading axis of environments, as `initial(count)` returns it.
+A law of a demonstrator is a pure function `(state, observation) -> (state, actions)`; see `Law`.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+
+
+class Law(Protocol):
+    """A law of a demonstrator: a pure function of arrays with a leading axis of environments.
+
+    Attributes:
+        preset: parameters that suit any body, an instance of a class of their own, where the law has a name; see
+            `arc_suite.register`.
+        reads: names of the blocks of the observation that it needs, `posture` and `velocities` among them.
+    """
+
+    preset: ClassVar[Any]
+    reads: tuple[str, ...]
+
+    def __init__(self, task, preset):
+        """Fit the law to a task.
+
+        Args:
+            task: of the contract; `task.scene.body` is the body, `cpg.gait.gait_of(task)` the gait.
+            preset: parameters, such as `preset` of the class.
+
+        Raises:
+            ValueError: the parameters do not fit.
+        """
+
+    def initial(self, count: int) -> Any:
+        """Return the state at the start of episodes: a NamedTuple of arrays (environments, ...)."""
+
+    def __call__(self, state, observation: Mapping[str, np.ndarray]) -> tuple:
+        """Return the next state and the actions (environments, joints) in [-1, 1].
+
+        Args:
+            state: before.
+            observation: blocks by name, (environments, size) each, float64.
+        """
 
 
 class Pattern(NamedTuple):

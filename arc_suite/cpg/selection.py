@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import Any
 
-from arc_suite import robots
+from arc_suite import checks, registry, robots
 from arc_suite.cpg.balancing import Balanced, BalancingParameters
 from arc_suite.cpg.leaping import Leaping, LeapingParameters
 from arc_suite.cpg.planner import Planned, PlanningParameters
@@ -13,12 +13,12 @@ from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESE
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.steering import Steered, SteeringParameters
 from arc_suite.cpg.stepping import Directed, directed
-from arc_suite.cpg.stride import StrideLaw
+from arc_suite.cpg.stride_law import StrideLaw
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
-# By kind of preset.
-LAWS = {
+# By class of preset; `registration.register` adds those of other packages.
+LAWS: dict[type, Any] = {
     Preset: PrescribedLaw,
     float: StrideLaw,
     SteeringParameters: Steered,
@@ -35,32 +35,75 @@ _MOST_UNSTEADY = 5  # legs with which a body steps for its balance
 _AHEAD = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
 
 
-def law(task: Task, preset: Any):
+def law(task: Task, preset: Any, laws: Mapping[type, Any] = LAWS):
     """Return the law of a preset, fitted to a task; see `cpg.law`.
 
+    Args:
+        task: to act in.
+        preset: parameters of the law.
+        laws: by class of preset.
+
     Raises:
-        ValueError: the preset is of no kind of `LAWS`, or does not fit.
+        ValueError: the preset is of no class that has a law, or does not fit.
     """
-    kind = _kind(preset)
+    kind = law_class(preset, laws)
     return (_DIRECTED.get(kind, kind) if directed(task) else kind)(task, preset)
 
 
-def _kind(preset: Any):
+def law_class(preset: Any, laws: Mapping[type, Any] = LAWS) -> Any:
+    """Return the class of the law that a preset has parameters of.
+
+    Raises:
+        ValueError: the preset is of no class that has a law.
+    """
     kind = float if isinstance(preset, Real) else type(preset)
-    if kind not in LAWS:
-        kinds = ", ".join(each.__name__ for each in LAWS)
+    if kind not in laws:
+        kinds = ", ".join(each.__name__ for each in laws)
         raise ValueError(f"preset: expected one of {kinds}, got {kind.__name__}")
-    return LAWS[kind]
+    return laws[kind]
+
+
+def preset_of(body: Body, name: str) -> Any:
+    """Return a body's preset of a name.
+
+    Args:
+        body: whose preset of the name comes first.
+        name: see `presets_of`; or `module:name` of a law of another package, whose module is imported.
+
+    Raises:
+        ValueError: an unknown name, or a body of a robot's name that has other joints.
+    """
+    if isinstance(name, str) and ":" in name:
+        name = check_preset_name(name)
+    presets = presets_of(body)
+    return presets[checks.name(name, presets, "preset")]
+
+
+def check_preset_name(name: str) -> str:
+    """Return the name of a preset of any body, without the module of a law of another package, which is imported.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    if isinstance(name, str) and ":" in name:
+        registry.find("law", name, {})
+        return registry.bare(name)
+    return checks.name(name, preset_names(), "preset")
 
 
 def presets_of(body: Body) -> Mapping[str, Any]:
-    """Return a body's presets by name: its own, and the defaults of others.
+    """Return a body's presets by name: its own, the defaults of others, and those of laws of other packages.
 
     Raises:
         ValueError: a body of a robot's name that has other joints.
     """
     own = robots.parameters(PRESETS, body, "presets") or {}
-    return own | {name: preset for name, preset in _defaults(body).items() if name not in own}
+    defaults = {**_defaults(body), **_presets_of_added_laws()}
+    return own | {name: preset for name, preset in defaults.items() if name not in own}
+
+
+def _presets_of_added_laws() -> dict[str, Any]:
+    return {name: law.preset for name, law in registry.ADDITIONS["law"].items()}
 
 
 def _defaults(body: Body) -> Mapping[str, Any]:
@@ -70,8 +113,12 @@ def _defaults(body: Body) -> Mapping[str, Any]:
 
 
 def preset_names() -> tuple[str, ...]:
-    """Return the names of the presets of all robots, those of other packages included."""
-    return tuple(dict.fromkeys(name for presets in (*PRESETS.values(), DEFAULTS) for name in presets))
+    """Return the names of the presets of all robots and laws, those of other packages included."""
+    tables = (*PRESETS.values(), DEFAULTS, _presets_of_added_laws())
+    return tuple(dict.fromkeys(name for presets in tables for name in presets))
+
+
+SUITE_PRESETS = frozenset(preset_names())  # before other packages add any
 
 
 def suited_presets(task: Task) -> tuple[str, ...]:
@@ -85,7 +132,7 @@ def suited_presets(task: Task) -> tuple[str, ...]:
     """
     presets = presets_of(task.scene.body)
     names = dict.fromkeys((*task.demonstrators, "steered", *(() if task.parameters is None else _AHEAD)))
-    return tuple(n for n in names if n in presets and set(_kind(presets[n]).reads) <= task.blocks.keys())
+    return tuple(n for n in names if n in presets and set(law_class(presets[n]).reads) <= task.blocks.keys())
 
 
 def suited_preset(task: Task) -> str:

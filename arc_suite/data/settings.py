@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arc_suite import policies, seed_ranges
+from arc_suite import policies, registry, seed_ranges
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -19,8 +19,8 @@ class DatasetSettings(NamedTuple):
     Attributes:
         setup: body, task and settings of the task.
         policy: a name, or `module:attribute`; see `policies.policy`.
-        presets: of the demonstrator; the episode with seed s has number s modulo their count. Empty for other
-            policies.
+        presets: of the demonstrator, names or `module:name`; the episode with seed s has number s modulo their count.
+            Empty for other policies.
         noise: standard deviation of the normal noise on actions, which are clipped after it.
         seed: seed of the first episode, of `seed_ranges.COLLECTING`.
         steps: control steps after which an episode is truncated.
@@ -68,7 +68,7 @@ class DatasetSettings(NamedTuple):
         presets = presets_of(self.setup.body) if self.presets else {}
         known = self.setup.provenance() | self._asdict() | {"presets": list(self.presets)}
         del known["setup"]
-        known["presets_sha256"] = [_sha256(repr(presets.get(preset))) for preset in self.presets]
+        known["presets_sha256"] = [_sha256(repr(presets.get(registry.bare(preset)))) for preset in self.presets]
         if policies.is_file(self.policy):
             known["policy_sha256"] = policies.digest(self.policy)
             known["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]

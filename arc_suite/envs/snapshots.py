@@ -12,7 +12,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import with_changes
-from arc_suite.simulation.snapshots import bounded, fitting
+from arc_suite.simulation.state_arrays import bounded, fitting
 from arc_suite.tasks import Task
 
 # Arrays of the driver, with a leading axis for the environments.

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
 from arc_suite.envs import snapshots, stacked, trees
+from arc_suite.envs.base_vector import MOST_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import (
     KnownAttributes,
     LiveCommands,
@@ -23,7 +24,6 @@ from arc_suite.envs.calls import (
 )
 from arc_suite.envs.prepare import checked_changes, checked_limit, prepared
 from arc_suite.envs.task_view import TaskView
-from arc_suite.envs.together import MOST_ENVS, Together
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
@@ -78,7 +78,7 @@ class VectorTask(TaskView, KnownAttributes):
         return self._environment._memory
 
 
-class VectorEnv(KnownAttributes, Together):
+class VectorEnv(KnownAttributes, BaseVectorEnv):
     """Environments of one task, made by `gymnasium.make_vec("arc_suite/<robot>-<task>-v0", num_envs=n, ...)`.
 
     An environment seeded s is bit-equal to `arc_suite.envs.gym.Env` seeded s, from step to step and from episode

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.envs.base_vector import BaseVectorEnv
 from arc_suite.envs.setup import Setup
-from arc_suite.envs.together import Together
 from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
 from arc_suite.simulation.episode_loop import play_episode
@@ -117,7 +117,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 
 
 def episodes_in_batch(
-    environment: Together,
+    environment: BaseVectorEnv,
     policy: Policy,
     seeds: Sequence[int] | None = None,
     watch: Callable[[np.ndarray, np.ndarray], None] | None = None,

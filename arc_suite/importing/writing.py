@@ -15,7 +15,7 @@ from arc_suite.importing.meshes import Mesh
 from arc_suite.importing.naming import Names
 from arc_suite.importing.poses import Leg, Stance
 from arc_suite.importing.tree import HINGE, Robot
-from arc_suite.models.writing import exact
+from arc_suite.models.mjcf_text import exact
 from arc_suite.robots import sources
 
 SITE = {"group": "4"}

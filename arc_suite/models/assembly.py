@@ -7,7 +7,7 @@ import numpy as np
 from dm_control import mjcf
 
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.models import builder, sizing, source, visuals, writing
+from arc_suite.models import builder, mjcf_text, sizing, source, visuals
 from arc_suite.robots.spec import Body
 
 
@@ -20,7 +20,7 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
         decorated: add visuals, which leave the dynamics unchanged but cost about a tenth of the speed.
 
     Returns:
-        The model; `writing.written` makes a text of it.
+        The model; `mjcf_text.written` makes a text of it.
 
     Raises:
         ValueError: an imported body, of which there is a text alone.
@@ -45,7 +45,7 @@ def text(body: Body, arena: Arena | None = FLAT, decorated: bool = False) -> str
         tree = source.tree(sizing.sized(body), arena, decorated)
         ElementTree.indent(tree)
         return ElementTree.tostring(tree, encoding="unicode") + "\n"
-    return writing.written(assemble(body, arena, decorated))
+    return mjcf_text.written(assemble(body, arena, decorated))
 
 
 def parsed(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mujoco.MjSpec:

@@ -14,9 +14,9 @@ from dm_control import mjcf
 
 from arc_suite.arenas import Arena
 from arc_suite.models import builder, visuals
+from arc_suite.models.mjcf_text import exact, written
 from arc_suite.models.outline import CORNERS, outline
 from arc_suite.models.visuals import scene
-from arc_suite.models.writing import exact, written
 from arc_suite.robots.spec import Body, Servo, SpecError
 
 HOME = "home"  # keyframe of the standing pose

@@ -15,7 +15,7 @@ import numpy as np
 
 from arc_suite import checks, files, registry, seed_ranges
 from arc_suite.cpg import Demonstrator, suited_preset
-from arc_suite.cpg.selection import preset_names
+from arc_suite.cpg.selection import check_preset_name, preset_names
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, other_libraries
@@ -83,7 +83,10 @@ HELP = (
     "pickles run code; or module:attribute or file.py:attribute, a function that makes a policy from a robot's name, "
     "or from any other Body."
 )
-PRESET_HELP = f"Of the demonstrator: {', '.join(preset_names())}, or another that the robot has."
+PRESET_HELP = (
+    f"Of the demonstrator: {', '.join(preset_names())}, another that the robot has, or module:name of a law that "
+    "another package has."
+)
 
 
 def policy(
@@ -121,7 +124,7 @@ def policy(
         presets = suited_preset(task or prepared(body, "walk")[0]) if name == "cpg" else ()
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
-        checks.name(preset, preset_names(), "preset")
+        check_preset_name(preset)
     checks.number("noise", noise, 0.0)
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
         turns = network.checkpoint_files(Path(name))

@@ -10,7 +10,7 @@ import numpy as np
 
 from arc_suite.simulation import forks, timers
 from arc_suite.simulation.model import ReadOnly, change, field
-from arc_suite.simulation.snapshots import LASTING, OF_MODEL, checked_snapshot, model_fields
+from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, checked_snapshot, model_fields
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 # Sizes of models that make no difference to `MjData`.

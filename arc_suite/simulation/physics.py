@@ -16,7 +16,7 @@ from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
 from arc_suite.simulation.model import change, compiled, field
-from arc_suite.simulation.snapshots import LASTING, OF_MODEL, checked_snapshot, model_fields
+from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, checked_snapshot, model_fields
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)

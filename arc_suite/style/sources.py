@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, policies
+from arc_suite.cpg.selection import check_preset_name
 from arc_suite.envs.setup import Setup
 from arc_suite.style.files import load
 from arc_suite.style.tracks import Track, record
@@ -48,7 +49,7 @@ def source(name: str, preset: str | None = "medium") -> Source:
         OSError: a file cannot be read.
     """
     if preset is not None:
-        checks.name(preset, policies.preset_names(), "preset")
+        check_preset_name(preset)
     if policies.is_file(name):
         return _played(name, preset)
     if name.endswith(".npz"):

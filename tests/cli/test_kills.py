@@ -21,7 +21,7 @@ COMMANDS = {
     "train": (
         (
             "--robot=tick",
-            "--algorithm=tiny_studies:CLIMB",
+            "--algorithm=tiny_studies:climb",
             "--steps=200",
             "--hp=slice=100",
             "--set=time_limit=0.5",
@@ -34,7 +34,7 @@ COMMANDS = {
         10,
     ),
     "study": (("tiny_studies:PAIR", "--jobs=2"), 10),
-    "benchmark": (("samples", "--algorithm=tiny_studies:CLIMB", "--places=tick-walk", "--seeds=1"), 10),
+    "benchmark": (("samples", "--algorithm=tiny_studies:climb", "--places=tick-walk", "--seeds=1"), 10),
 }
 
 
@@ -102,7 +102,7 @@ def test_sigterm_can_be_asked_for():
 @pytest.mark.skipif(sys.platform == "win32", reason="has no SIGTERM to catch")
 def test_training_that_is_asked_to_end_leaves_a_checkpoint(tmp_path):
     """Clusters send SIGTERM before they take a machine away."""
-    flags = ["--robot=tick", "--algorithm=tiny_studies:CLIMB", "--steps=100000", "--output=run"]
+    flags = ["--robot=tick", "--algorithm=tiny_studies:climb", "--steps=100000", "--output=run"]
     command, environ = [sys.executable, "-m", "arc_suite", "train", *flags], os.environ | {"PYTHONPATH": str(FIXTURES)}
     with subprocess.Popen(
         command, cwd=tmp_path, env=environ, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

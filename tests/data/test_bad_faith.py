@@ -73,6 +73,14 @@ def test_metadata_import_nothing(kept, module, change):
     assert not module.exists()
 
 
+def test_presets_of_a_dataset_import_nothing(kept, module):
+    """They say who acted; reading and replaying need no demonstrator."""
+    about(kept, presets=["strolling:stroll"])
+    for use in READERS.values():
+        use(ID)
+    assert data.open(ID).settings.presets == ("strolling:stroll",) and not module.exists()
+
+
 @pytest.mark.long
 def test_what_the_caller_names_is_imported(module):
     def run(*arguments):

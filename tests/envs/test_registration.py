@@ -2,6 +2,7 @@
 
 import functools
 import re
+from typing import NamedTuple
 
 import gymnasium
 import programs
@@ -12,7 +13,9 @@ from refusals import refused
 import arc_suite
 from arc_suite import registration, registry
 from arc_suite.arenas import ARENAS
+from arc_suite.cpg.law import Clocked
 from arc_suite.cpg.presets import PRESETS
+from arc_suite.cpg.selection import LAWS
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.parameters import PARAMETERS
@@ -211,6 +214,40 @@ class Other(Walk):
     """Another task of a name that is taken."""
 
 
+class Parameters(NamedTuple):
+    """Presets of a law of another package."""
+
+
+class Law(Clocked):
+    """A law of another package."""
+
+    preset = Parameters()
+
+
+class Lacking:
+    """A law without parts."""
+
+    reads, initial = ("posture", "velocities"), None
+
+
+class Blind(Law):
+    """A law that does not see its joints."""
+
+    reads = ("goal",)
+
+
+class Stolen(Law):
+    """A law whose presets are those of another."""
+
+    preset = PRESETS["queen"]["steered"]
+
+
+class Numbered(Law):
+    """A law whose preset is a number."""
+
+    preset = 0.3
+
+
 class Misnamed(Walk):
     """A task whose name no id can have."""
 
@@ -220,7 +257,10 @@ class Misnamed(Walk):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "nothing to register: give a body, tasks, arenas or families"),
+        (
+            {},
+            "nothing to register: give a body, tasks, arenas, families, laws, networks, algorithms, clips or programs",
+        ),
         ({"parameters": {"walk": ROW}}, "parameters, presets and visuals belong to a body, and none is given"),
         ({"body": "other"}, "body: expected a spec.Body, got 'other'"),
         ({"body": TICK.replace(density=7.0)}, "robot 'tick' is already registered"),
@@ -237,10 +277,26 @@ class Misnamed(Walk):
         ({"tasks": (len,)}, "tasks: expected classes by the contract of arc_suite.tasks.Task, got <built-in"),
         (walk(ROW) | {"tasks": (Other,)}, "task 'walk' is already registered"),
         ({"arenas": {"flat": lambda body: None}}, "arena 'flat' is already registered"),
+        ({"arenas": {"a-b": lambda body: None}}, "arena 'a-b': expected a name of letters, digits and underscores"),
+        ({"laws": {"mine": Law, "a b": Law}}, "law 'a b': expected a name of letters, digits and underscores"),
+        ({"laws": {"mine": Law, "steered": Law}}, "law 'steered': the suite has presets of this name; choose another"),
+        (
+            {"laws": {"mine": Lacking}},
+            "law 'mine': has no preset and no __call__, which arc_suite.cpg.law.Law requires",
+        ),
+        ({"laws": {"mine": 3}}, "law 'mine': has no preset and no reads and no initial and no __call__, which "),
+        ({"laws": {"mine": Blind}}, "law 'mine': reads: expected posture, velocities and others, got ('goal',)"),
+        ({"laws": {"mine": Stolen}}, "law 'mine': presets of SteeringParameters are those of Steered"),
+        ({"laws": {"mine": Numbered}}, "law 'mine': presets of float are those of StrideLaw"),
+        ({"laws": {"mine": Law}} | walk(WITHOUT_BANDS), "parameters of walk: other has no healthy_range and no veloc"),
+        ({"laws": {"mine": Law}} | presets(mine=3.0), "preset 'mine': froude: expected a number from -1 to 1, got 3.0"),
+        ({"programs": {"mine": len}}, "program 'mine': expected the name of a module, got <built-in function len>"),
+        ({"clips": {"mine": "a:b"}, "algorithms": {3: "a:b"}}, "algorithm 3: expected a name of letters, digits and "),
+        ({"networks": {"mine": "a:b"}, "tasks": (Other,)}, "task 'walk' is already registered"),
     ],
 )
 def test_mistakes_are_one_line_and_register_nothing(arguments, message):
-    tables = (ROBOTS, PARAMETERS["walk"], PRESETS, TASKS, ARENAS)
+    tables = (ROBOTS, PARAMETERS["walk"], PRESETS, TASKS, ARENAS, LAWS, registry.MODULES, *registry.ADDITIONS.values())
     before = [dict(table) for table in tables]
     with refused(message, begins=True):
         arc_suite.register(**arguments)

@@ -54,7 +54,7 @@ class Tracker(types.ModuleType):
 def test_a_tracker_has_what_the_tables_have(name, monkeypatch, tmp_path):
     tracker = Tracker(name)
     monkeypatch.setitem(sys.modules, name, tracker)
-    arguments = ["--algorithm=tiny_studies:CLIMB", "--steps=20", f"--output={tmp_path}"]
+    arguments = ["--algorithm=tiny_studies:climb", "--steps=20", f"--output={tmp_path}"]
     monkeypatch.setattr(sys, "argv", [f"{name}_run.py", *arguments])
     runpy.run_path(str(SCRIPTS / f"{name}_run.py"), run_name="__main__")
     (last,) = (line for line in tracker.logged if "return" in line)

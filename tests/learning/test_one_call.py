@@ -15,7 +15,7 @@ from tqdm import tqdm
 from arc_suite import evaluation, learning, policies
 from arc_suite.learning.agents import run_folder
 
-RUN = {"robot": "tick", "algorithm": "tiny_studies:CLIMB", "task_kwargs": {"time_limit": 0.2}, "evaluate_every": 20}
+RUN = {"robot": "tick", "algorithm": "tiny_studies:climb", "task_kwargs": {"time_limit": 0.2}, "evaluate_every": 20}
 train = functools.partial(learning.train, **RUN, progress=functools.partial(tqdm, disable=True))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import arc_suite
 from arc_suite import policies, registry, style
-from arc_suite.animation import pages, play
+from arc_suite.animation import pages, play_pages
 from arc_suite.robots import ROBOTS
 from website import markdown
 
@@ -27,7 +27,7 @@ def write(folder: Path) -> None:
         ValueError: the scripts have not been built.
     """
     for name, bodies in {GAME: ROBOTS.values(), GALLERY: map(registry.body_of, CREATURES)}.items():
-        page = play.page([play.creature(body) for body in bodies])
+        page = play_pages.page([play_pages.creature(body) for body in bodies])
         (folder / name).write_text(page, encoding="utf-8")
     for robot, name in films().items():
         environment = arc_suite.load(robot, "walk", {"random": 0})

@@ -19,7 +19,7 @@ import math
 from absl import flags
 
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import writing
+from arc_suite.animation.clips import clip_files
 from arc_suite.cli.flags import define_walk, only_setup, policy_name
 from arc_suite.cli.program import progress
 
@@ -28,7 +28,10 @@ _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "t
 FLAGS = flags.FLAGS
 define_walk(task="steer")
 flags.DEFINE_list(
-    "clips", list(export.DEFAULT), f"Which, with commas between them: {', '.join(export.CLIPS)}; or {export.ALL}."
+    "clips",
+    list(export.DEFAULT),
+    f"Which, with commas between them: {', '.join(export.CLIPS)}; module:name of one that another package has; or "
+    f"{export.ALL}.",
 )
 flags.DEFINE_float("fps", export.FPS, "Frames a second.", 1.0, 1000.0)
 flags.DEFINE_string("rig", "skin", f"{' or '.join(export.RIGS)}: bones and one mesh, or rigid parts.")
@@ -38,18 +41,21 @@ flags.DEFINE_string(
 flags.DEFINE_bool("straight", False, "Loops that do not turn go exactly where they are to, and do not veer.")
 flags.DEFINE_bool("plant", False, "Feet in stance stay where they are, by inverse kinematics, and do not slide.")
 flags.DEFINE_integer(
-    "triangles", None, "At most so many, for creatures far away: 3000 fits most bodies.", *writing.BOUNDS["triangles"]
+    "triangles",
+    None,
+    "At most so many, for creatures far away: 3000 fits most bodies.",
+    *clip_files.BOUNDS["triangles"],
 )
 flags.DEFINE_bool("uv", False, "Faces have places in a texture, to be painted.")
 flags.DEFINE_bool("reduce", False, "Leave out keys that lines between others replace within 0.1 degrees.")
-flags.DEFINE_integer("size", writing.SIZE, "Of films: width and height, in pixels.", *writing.BOUNDS["size"])
+flags.DEFINE_integer("size", clip_files.SIZE, "Of films: width and height, in pixels.", *clip_files.BOUNDS["size"])
 flags.DEFINE_bool("transparent", False, "Of films and sheets, .webp or .png: the body alone.")
 flags.DEFINE_bool("turntable", False, "Of films: the body turns once while its clip is repeated.")
 flags.DEFINE_integer(
     "directions",
-    writing.DIRECTIONS,
+    clip_files.DIRECTIONS,
     "Of sheets: rows; the first goes to the right, the next to its left.",
-    *writing.BOUNDS["directions"],
+    *clip_files.BOUNDS["directions"],
 )
 flags.DEFINE_string("output", None, "File to write, .glb, .mp4, .gif, .webp or .png. Required.", short_name="o")
 
@@ -59,7 +65,7 @@ def main() -> None:
     setup = only_setup()
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
-    clips = writing.animate(
+    clips = clip_files.animate(
         setup.body,
         FLAGS.output,
         FLAGS.clips,
@@ -68,11 +74,11 @@ def main() -> None:
         policy=policy_name(FLAGS.policy),
         **{name: FLAGS[name].value for name in ("preset", "fps", "straight", "plant")},
         progress=progress,
-        **{name: FLAGS[name].value for name in writing.OPTIONS if FLAGS[name].present},
+        **{name: FLAGS[name].value for name in clip_files.OPTIONS if FLAGS[name].present},
     )
     if FLAGS.output.lower().endswith(".glb"):
         print_table(clips)
-        print(f"wrote {FLAGS.output} and {writing.metrics_file(FLAGS.output)}")
+        print(f"wrote {FLAGS.output} and {clip_files.metrics_file(FLAGS.output)}")
     else:
         print(f"wrote {FLAGS.output}")
 

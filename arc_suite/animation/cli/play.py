@@ -15,7 +15,7 @@ such as steer, is given the keys' command; one of walk keeps walking, and left a
 from absl import flags
 
 from arc_suite import checks, files
-from arc_suite.animation import play
+from arc_suite.animation import play_pages
 from arc_suite.cli.flags import bodies, define_body, define_policy, define_preset, own_bodies, policy_name, trained
 from arc_suite.cli.program import progress
 
@@ -34,6 +34,6 @@ def main() -> None:
     named = bodies()  # first: this imports the modules that flags name
     walkers = progress(own_bodies(trained(), named).values(), "fitting", leave=False)
     with files.writing(FLAGS.output) as temporary:
-        page = play.page([play.creature(body, policy_name(FLAGS.policy), FLAGS.preset) for body in walkers])
+        page = play_pages.page([play_pages.creature(body, policy_name(FLAGS.policy), FLAGS.preset) for body in walkers])
         temporary.write_text(page, encoding="utf-8")
     print(f"wrote {FLAGS.output}, {len(page.encode()) / 1e6:.1f} MB")

@@ -20,6 +20,7 @@ from arc_suite import versions
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import OWN, Sketch, cured, sources
 from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name
+from arc_suite.cpg.selection import check_preset_name
 
 FLAGS = flags.FLAGS
 define_walk()
@@ -37,6 +38,8 @@ def main() -> None:
 def _sketch() -> Sketch:
     """Return what the flags say."""
     setup = only_setup()
+    if FLAGS.preset is not None:
+        check_preset_name(FLAGS.preset)
     settings = setup.task_kwargs
     ground, kicks = settings.pop("arena", "flat"), settings.pop("kicks", 0.0)
     player = {"policy": policy_name(FLAGS.policy), "preset": FLAGS.preset or OWN}

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.catalog import ADDITIVE, CLIPS, WalkLoop
+from arc_suite.animation.clips.catalog import Difference, WalkLoop, clip_of, is_additive
 from arc_suite.animation.clips.foot_contacts import sole_heights
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
@@ -20,7 +20,7 @@ def bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[st
 
     Args:
         body: the spec.
-        name: of the additive clip, of `catalog.ADDITIVE`.
+        name: of the additive clip.
         motion: of each clip, by name, with frames of one rate.
         loops: whether each of them loops.
         idle: first pose of the idle clip, which engines subtract.
@@ -28,7 +28,7 @@ def bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[st
     return [
         base
         for base in motion
-        if loops[base] and base not in ADDITIVE and _depth(body, name, base, motion, idle) <= _DEEPEST
+        if loops[base] and not is_additive(base) and _depth(body, name, base, motion, idle) <= _DEEPEST
     ]
 
 
@@ -44,7 +44,7 @@ def _depth(body: Body, name: str, base: str, motion: Mapping[str, Motion], idle:
     """Return how deep a sole is below the ground, standing heights."""
     clip, under = motion[name], motion[base]
     frames, around = np.arange(len(clip.joints)), len(under.joints) - 1
-    if name == "limp" and isinstance(CLIPS[base], WalkLoop):  # in step
+    if isinstance(clip_of(name), Difference) and isinstance(clip_of(base), WalkLoop):  # in step
         starts = np.round(frames * around / frames[-1]).astype(int)[None]
     else:
         starts = frames + np.arange(_STARTS)[:, None] * around // _STARTS

@@ -3,8 +3,9 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
+from arc_suite import registry
 from arc_suite.animation.clips import acting, gestures
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
@@ -54,12 +55,14 @@ class Acted(NamedTuple):
         ends: those at which it has the first pose of idle: 0 and -1.
         loops: whether it is a loop.
         steps: whether feet step in it.
+        additive: whether it is added to other clips, as its difference from the first pose of idle.
     """
 
     play: Callable[[Body, Pose], Motion]
     ends: tuple[int, ...]
     loops: bool = False
     steps: bool = False
+    additive: bool = False
 
 
 class Difference(NamedTuple):
@@ -84,8 +87,10 @@ class Showcase(NamedTuple):
     preset: str
 
 
+Kind = WalkLoop | Passage | Turn | Acted | Difference | Showcase
+
 WALK = WalkLoop((1.0, 0.0, 0.0))
-CLIPS: dict[str, WalkLoop | Passage | Turn | Acted | Difference | Showcase] = {
+CLIPS: dict[str, Kind] = {
     "walk": WALK,
     "slow": WalkLoop((0.6, 0.0, 0.0)),
     "fast": WalkLoop((1.25, 0.0, 0.0)),
@@ -112,7 +117,10 @@ CLIPS: dict[str, WalkLoop | Passage | Turn | Acted | Difference | Showcase] = {
     "look_down": Acted(functools.partial(gestures.turned, number="pitch", sign=1.0), (0, -1)),
     "limp_walk": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "limp": Difference("limp_walk", "walk"),
-    **{f"hit_{side}": Acted(functools.partial(gestures.hit, side=side), (0, -1)) for side in gestures.HITS},
+    **{
+        f"hit_{side}": Acted(functools.partial(gestures.hit, side=side), (0, -1), additive=True)
+        for side in gestures.HITS
+    },
     "attack": Acted(gestures.strike, (0, -1), steps=True),
     "rise": Acted(acting.rise, (-1,)),
     "jump": Acted(acting.jump, (0, -1)),
@@ -122,19 +130,43 @@ CLIPS: dict[str, WalkLoop | Passage | Turn | Acted | Difference | Showcase] = {
     "refined": Showcase("refined"),
 }
 DEFAULT = ("walk", "slow", "fast", "turn_left", "turn_right", "start", "stop", "idle")
-ADDITIVE = ("limp", *(f"hit_{side}" for side in gestures.HITS))  # to the first pose of idle
 PACES = {"slow": (0.0, 1.0 / 1.1), "fast": (1.1, math.inf), "run": (1.4, math.inf)}  # speeds, of that of the walk
 ALL = "all"  # in place of all names
 REST = "rest"  # the recording of a stop, of rest and of a start
+
+
+def names() -> list[str]:
+    """Return the names of all clips, those of other packages included."""
+    return [*CLIPS, *registry.ADDITIONS["clip"]]
+
+
+def clip_of(name: str) -> Kind:
+    """Return the clip of a name, or of `module:name`, which another package registers.
+
+    Raises:
+        ValueError: an unknown name, or no clip.
+    """
+    clip = registry.find("clip", name, CLIPS)
+    if not isinstance(clip, Kind):
+        kinds = ", ".join(kind.__name__ for kind in get_args(Kind))
+        raise ValueError(f"clip {registry.bare(name)!r}: expected one of {kinds}, got {type(clip).__name__}")
+    return clip
+
+
+def is_additive(name: str) -> bool:
+    """Return whether a clip is added to others, as its difference from the first pose of idle."""
+    clip = clip_of(name)
+    return isinstance(clip, Difference) or (isinstance(clip, Acted) and clip.additive)
 
 
 def sources(names: Sequence[str]) -> dict[str, list[str]]:
     """Return the names of the recordings that clips are made of, each with the clips that cannot be made without it."""
     found: dict[str, list[str]] = {}
     for name in names:
-        match CLIPS[name]:
-            case Difference() as spec:
-                needs = spec.loop, REST
+        clip = clip_of(name)
+        match clip:
+            case Difference():
+                needs = clip.loop, REST
             case Turn():
                 needs = name, REST
             case WalkLoop() | Showcase():
@@ -143,6 +175,8 @@ def sources(names: Sequence[str]) -> dict[str, list[str]]:
                 needs = (REST,)
         for source in needs:
             found.setdefault(source, []).append(name)
-        if isinstance(CLIPS[name], Passage | Difference) or name in PACES:
+        if isinstance(clip, Difference):
+            found.setdefault(clip.base, [])
+        if isinstance(clip, Passage) or name in PACES:
             found.setdefault("walk", [])
     return found

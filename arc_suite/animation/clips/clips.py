@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import checks
-from arc_suite.animation.clips import additive, planting
-from arc_suite.animation.clips.catalog import ADDITIVE, CLIPS
+from arc_suite import checks, registry
+from arc_suite.animation.clips import additive, catalog, planting
 from arc_suite.animation.clips.drafts import Draft, drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
 from arc_suite.animation.clips.recorder import Recorder
@@ -25,7 +24,7 @@ class Clip(NamedTuple):
     """A named motion, sampled at the frames of a clip.
 
     Attributes:
-        name: of `CLIPS`.
+        name: see `catalog.clip_of`, without a module.
         motion: a sample for each frame, both ends included.
         loops: whether the last pose is the first one.
         cycles: of the gait.
@@ -67,7 +66,7 @@ def clips(
 ) -> list[Clip]:
     """Make clips of a body, all of them by one policy, except the showcases of presets.
 
-    The policy walks under the commands of `CLIPS` where the task has a command; in another task there is the clip walk
+    The policy walks under the commands of clips where the task has a command; in another task there is the clip walk
     alone. A cycle of the gait is a whole number of control steps, unless the setup sets `gait_frequency`.
 
     Loops begin where the gait schedules the touchdown of the first foot, and hold the same number of cycles: the least
@@ -80,7 +79,7 @@ def clips(
 
     Args:
         setup: body and task.
-        names: of `CLIPS`.
+        names: see `catalog.clip_of`.
         policy: see `policies.policy`.
         preset: of the policy; None for `steered` on level ground with a command, elsewhere for the one that suits the
             task and the body.
@@ -97,9 +96,10 @@ def clips(
     """
     checks.number("fps", fps, 1.0, 1000.0)
     if not names:
-        raise ValueError(f"clips: expected one or more of {', '.join(CLIPS)}, got none")
+        raise ValueError(f"clips: expected one or more of {', '.join(catalog.names())}, got none")
     for name in names:
-        checks.name(name, CLIPS, "clip")
+        catalog.clip_of(name)
+    names = [registry.bare(name) for name in names]
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
     if policy == "cpg" and preset is None and "command" in setup.definition.blocks and not setup.kind.own_arena:
@@ -115,7 +115,7 @@ def clips(
     framed = {name: _framed(name, setup.body, made[name], fps) for name in names if name not in left_out}
     motions = {name: clip.motion for name, clip in framed.items()}
     loops = {name: clip.loops for name, clip in framed.items()}
-    for name in framed.keys() & set(ADDITIVE):
+    for name in filter(catalog.is_additive, framed):
         over = additive.bases(setup.body, name, motions, loops, made["idle"].start)
         framed[name] = framed[name]._replace(additive_over=tuple(over))
     return list(framed.values())

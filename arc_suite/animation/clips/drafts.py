@@ -9,7 +9,6 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips import loops, planting, root_motion
 from arc_suite.animation.clips.catalog import (
-    CLIPS,
     PACES,
     REST,
     WALK,
@@ -19,6 +18,7 @@ from arc_suite.animation.clips.catalog import (
     Showcase,
     Turn,
     WalkLoop,
+    clip_of,
     sources,
 )
 from arc_suite.animation.clips.foot_contacts import LEAST_RISE, TOUCH_DOWN, FootContact, foot_contacts, sole_heights
@@ -89,7 +89,7 @@ def drafts(
 
     Args:
         recorder: of the body.
-        names: of `catalog.CLIPS`.
+        names: see `catalog.clip_of`, without modules.
         progress: wraps the recordings.
         left_out: takes the reasons why clips cannot be made, by name.
         straight: whether loops that do not turn go exactly where their commands say.
@@ -113,7 +113,7 @@ def drafts(
         turns = {name: each for name, each in recorded.items() if isinstance(each, Turned)}
         found |= _connected(body, transition, turns, names, walk, found.get("walk") if plant else None, left_out)
     for name in names:
-        if isinstance(spec := CLIPS[name], Difference) and name not in left_out:
+        if isinstance(spec := clip_of(name), Difference) and name not in left_out:
             if {spec.loop, spec.base, "idle"} <= found.keys():
                 found[name] = _difference(found[spec.loop], found[spec.base], found["idle"].start)
             else:
@@ -135,12 +135,14 @@ def _recordings(recorder: Recorder, names, progress, left_out) -> dict[str, Reco
 def _recording(recorder: Recorder, source: str) -> Recorded | Transition | Turned:
     if source == REST:
         return recorder.transition(WALK.command)
-    if isinstance(turn := CLIPS[source], Turn):
-        return recorder.turn(math.radians(turn.angle))
-    spec = cast(WalkLoop | Showcase, CLIPS[source])  # `sources` names no others
-    if isinstance(spec, Showcase):
-        return recorder.showcase(spec.preset)
-    return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(*spec)
+    match clip_of(source):
+        case Turn() as turn:
+            return recorder.turn(math.radians(turn.angle))
+        case Showcase() as showcase:
+            return recorder.showcase(showcase.preset)
+        case WalkLoop() as loop:
+            return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(*loop)
+    raise ValueError(f"{source} is no loop that is recorded")  # of a difference of another package
 
 
 def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: float, left_out) -> dict[str, Draft]:
@@ -162,7 +164,7 @@ def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: flo
 
 def _straight(name: str, motion: Motion) -> Motion:
     """Return a loop that goes where its command says, unless that is a turn."""
-    spec = CLIPS[name]
+    spec = clip_of(name)
     forward, left, turning = spec.command if isinstance(spec, WalkLoop) else (1.0, 0.0, 0.0)
     return motion if turning else loops.straightened(motion, math.atan2(left, forward))
 
@@ -175,7 +177,7 @@ def _first_touchdown(body: Body, draft: Draft) -> int:
 
 def _unfit(name: str, draft: Draft, units: np.ndarray | None, walk: Draft | None) -> str:
     """Return why a loop is not what its name says: it does not follow its command, or is as fast as the walk; or ""."""
-    if units is not None and isinstance(spec := CLIPS[name], WalkLoop):
+    if units is not None and isinstance(spec := clip_of(name), WalkLoop):
         command = np.array(spec.command)
         share = command @ (draft.motion.twist / units) / (command @ command)
         if share < _FOLLOWS:
@@ -209,11 +211,11 @@ def _connected(
         left_out: takes the reasons why clips cannot be made.
     """
     rest = root_motion.standing(transition.recorded.recording, transition.start, 1).pose(0)
-    idle = _played(body, cast(Acted, CLIPS["idle"]), rest).grounded(body)
+    idle = _played(body, cast(Acted, clip_of("idle")), rest).grounded(body)
     found = {"idle": idle}
     for name in names:
         try:
-            match CLIPS[name]:
+            match clip_of(name):
                 case Acted() as spec if name != "idle":
                     found[name] = _acted(body, spec, rest, idle.start)
                 case Turn() as spec if name in turns:
@@ -228,8 +230,15 @@ def _connected(
 
 
 def _played(body: Body, spec: Acted, rest: Pose) -> Draft:
-    """Return a motion from the pose at rest."""
-    return Draft(spec.play(body, rest), loops=spec.loops, stands=not spec.steps)
+    """Return a motion from the pose at rest.
+
+    Raises:
+        ValueError: the clip plays no motion, as one of another package may.
+    """
+    motion = spec.play(body, rest)
+    if not isinstance(motion, Motion):
+        raise ValueError(f"expected a Motion of its play, got {type(motion).__name__}")
+    return Draft(motion, loops=spec.loops, stands=not spec.steps)
 
 
 def _acted(body: Body, spec: Acted, rest: Pose, idle: Pose) -> Draft:

@@ -65,6 +65,22 @@ def held(pose: Pose, samples: int, step: float) -> Motion:
     return Motion(step, np.zeros((samples + 1, 3)), positions, quaternions, joints, np.zeros(3))
 
 
+def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration: float) -> Motion:
+    """Return a torso that moves over standing feet, as far as the legs can follow.
+
+    Args:
+        body: the spec.
+        rest: pose from which it moves.
+        tracks: by a number of the pose, see `posture.NAMES`: pairs of a time, sqrt(h / g), and a value, standing
+            heights or rad.
+        duration: sqrt(h / g).
+
+    Raises:
+        ValueError: the legs leave no room for it.
+    """
+    return _followed(body, rest, _poses(_times(body, duration), tracks), "move so")
+
+
 def idle(body: Body, rest: Pose) -> Motion:
     """Return a standing body as a loop that begins with the pose at rest: two breaths, and weight that shifts.
 

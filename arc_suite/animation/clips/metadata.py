@@ -4,7 +4,7 @@ import collections
 from collections.abc import Sequence
 from typing import Any
 
-from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
+from arc_suite.animation.clips.catalog import WalkLoop, clip_of
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
 from arc_suite.robots.spec import Body
@@ -74,7 +74,7 @@ def _spaces(clips: Sequence[Clip], moving: Sequence[bool]) -> dict[str, Any]:
     for name, (axes, zero) in _SPACES.items():
         points = []
         for clip in clips:
-            spec = CLIPS[clip.name]
+            spec = clip_of(clip.name)
             walks = isinstance(spec, WalkLoop) and spec.failing is None and spec.command[zero] == 0.0
             if walks or clip.name == "idle":
                 figures = metadata(clip)

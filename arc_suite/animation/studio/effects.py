@@ -1,6 +1,6 @@
 """Which widgets change nothing of a creature: the page does not show them."""
 
-from arc_suite.animation import direction
+from arc_suite.animation import player_controls
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.sketch import LEGS, RANDOM
@@ -18,7 +18,7 @@ def idle_fields(creature: Creature, command: Command) -> frozenset[str]:
         command: of now.
     """
     sketch, setup, task = creature.sketch, creature.setup, creature.environment.task.definition
-    field, by_hand, directs = sketches.field(sketch), command.by_hand, direction.directs(task)
+    field, by_hand, directs = sketches.field(sketch), command.by_hand, player_controls.directs(task)
     rules = (
         (("legs", "links", "layout"), sketch.source != LEGS),
         (("seed",), sketch.source != RANDOM),

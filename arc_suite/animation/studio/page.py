@@ -17,7 +17,7 @@ import numpy as np
 import viser
 
 from arc_suite import checks
-from arc_suite.animation import direction
+from arc_suite.animation import player_controls
 from arc_suite.animation.studio import layout, saving, texts
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.charts import Charts
@@ -225,10 +225,10 @@ class Page:
         """Offer the poses and gaits of a body, if they are by command in its task."""
         task, widgets = creature.environment.task.definition, self._widgets
         self._fixed = frozenset()
-        if not direction.directs(task):
+        if not player_controls.directs(task):
             return
-        widgets["gait_now"].options = list(direction.named(task))
-        rooms = dict(zip(POSE, direction.room(creature.setup.body), strict=True))
+        widgets["gait_now"].options = list(player_controls.named(task))
+        rooms = dict(zip(POSE, player_controls.room(creature.setup.body), strict=True))
         self._fixed = frozenset(name for name, (low, high) in rooms.items() if low >= high)
         for name in rooms.keys() - self._fixed:
             widgets[name].min, widgets[name].max = map(float, rooms[name])
@@ -345,7 +345,9 @@ class Page:
 
     def _stand(self) -> None:
         """Ask for the pose at rest and the body's own gait, at its own frequency."""
-        self._edit(lambda state: state.having(gait_now=direction.OWN, tempo=1.0, **dict.fromkeys(POSE, 0.0)), "upright")
+        self._edit(
+            lambda state: state.having(gait_now=player_controls.OWN, tempo=1.0, **dict.fromkeys(POSE, 0.0)), "upright"
+        )
         self._render()
 
     def _press(self, name: str, change: float, event: viser.CommandEvent) -> None:

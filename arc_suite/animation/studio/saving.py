@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import models, style, versions
 from arc_suite.animation import clips as export
-from arc_suite.animation import pages, play
+from arc_suite.animation import pages, play_pages
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import Creature, load, policy
 from arc_suite.animation.studio.sketch import Sketch
@@ -87,13 +87,13 @@ def page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
 
 
 def playable(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
-    """Return a page in which keys walk the creature about; see `export.play`.
+    """Return a page in which keys walk the creature about; see `play_pages`.
 
     Raises:
         ValueError: the scripts of pages have not been built, or the policy does not run in a page.
     """
     sketch = creature.sketch
-    return play.page([play.creature(creature.setup.body, sketch.policy, sketches.preset(sketch))]).encode()
+    return play_pages.page([play_pages.creature(creature.setup.body, sketch.policy, sketches.preset(sketch))]).encode()
 
 
 def image(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:

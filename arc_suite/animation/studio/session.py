@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite.animation import direction
+from arc_suite.animation import player_controls
 from arc_suite.animation.episodes import LONGEST, Episodes
 from arc_suite.animation.studio.creature import Creature, opened
 from arc_suite.animation.studio.history import History
@@ -79,7 +79,7 @@ class Session:
         self.pace = 1.0
         self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
         self.pose: np.ndarray | None = np.zeros(6)
-        self.gait: tuple[str | None, float] = direction.OWN, 1.0
+        self.gait: tuple[str | None, float] = player_controls.OWN, 1.0
         self.kept: Walker | None = None
         self._replace(opened(sketch))
 
@@ -137,7 +137,7 @@ class Session:
     def commands(self) -> dict[str, Any]:
         """What visitors have set of the commands of the creature's task, by name."""
         task = self.creature.environment.task.definition
-        return direction.commands(task, self.desired, self.pose, *self.gait)
+        return player_controls.commands(task, self.desired, self.pose, *self.gait)
 
     def kick(self, angle: float) -> None:
         """Kick the torso in a direction of the world, rad, from any thread."""

@@ -153,8 +153,13 @@ def setup(sketch: Sketch) -> Setup:
 
 
 def preset(sketch: Sketch) -> str | None:
-    """Return the demonstrator's preset; None for the one that suits the task and the body."""
-    return _given(sketch.preset)
+    """Return the demonstrator's preset; None for the one that suits the task and the body.
+
+    Raises:
+        NotImported: the preset's module has not been imported yet: a visitor of the page imports nothing.
+    """
+    given = _given(sketch.preset)
+    return given and registry.imported("law", given)
 
 
 def file_name(made: Body) -> str:

@@ -5,7 +5,7 @@ import functools
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from arc_suite import checks, versions
+from arc_suite import checks, registry, versions
 from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.hyperparameters import UNSEEN, BehaviorCloning, DAgger, ProximalPolicy, SoftActorCritic
@@ -198,14 +198,12 @@ ALGORITHMS = {
 
 
 def algorithm(name: str) -> Algorithm:
-    """Return the algorithm of a name, or of `module:attribute`, an `Algorithm` on Python's path.
+    """Return the algorithm of a name, or of `module:name`, which another package registers.
 
     Raises:
         ValueError: there is none.
     """
-    if isinstance(name, str) and ":" in name:
-        found = checks.imported(name, "algorithm")
-        if not isinstance(found, Algorithm):
-            raise ValueError(f"algorithm {checks.shown(name)}: expected an Algorithm, got {type(found).__name__}")
-        return found
-    return ALGORITHMS[checks.name(name, ALGORITHMS, "algorithm")]
+    definition = registry.find("algorithm", name, ALGORITHMS)
+    if not isinstance(definition, Algorithm):
+        raise ValueError(f"algorithm {checks.shown(name)}: expected an Algorithm, got {type(definition).__name__}")
+    return definition

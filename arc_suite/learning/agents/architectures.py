@@ -1,17 +1,21 @@
 """Architectures of networks: what maps vectors of observations to actions and to values.
 
 An architecture is a value with the methods of `Perceptron`: how networks view observations, and how they give actions
-(..., joints) and values (...). Learners draw its parameters, normalize what it views and apply it.
+(..., joints) and values (...). Learners draw its parameters, normalize what it views and apply it. JAX compiles for
+each value: equal ones must compute the same.
 """
 
+import dataclasses
 from collections.abc import Iterable
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 
+from arc_suite import registry
 from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import networks
+from arc_suite.learning.agents.hyperparameters import NETWORKS
 from arc_suite.learning.agents.leg_networks import AnyLegs, Legs
 from arc_suite.learning.agents.networks import ACTIVATION
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
@@ -20,7 +24,8 @@ from arc_suite.policies.tracing import perceptron, traced
 from arc_suite.tasks import Task
 
 
-class Perceptron(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Perceptron:
     """Multilayer perceptrons of two hidden layers, for one body.
 
     Normalized numbers of a block are scaled, so that the variances of every block have the same sum. Otherwise 150
@@ -45,8 +50,14 @@ class Perceptron(NamedTuple):
     inputs = property(lambda self: self.size + sum(self.privileged))
 
     @classmethod
-    def of(cls, task: Task, critic_blocks: Iterable[str] = ()) -> Self:
-        """Return the architecture for a task, given names of privileged blocks for networks of values."""
+    def of(cls, task: Task, critic_blocks: Iterable[str] = (), symmetric: bool = False) -> Self:
+        """Return the architecture for a task.
+
+        Args:
+            task: whose observations networks see.
+            critic_blocks: names of privileged blocks for networks of values.
+            symmetric: makes no difference: mirrored transitions teach both sides.
+        """
         privileged = tuple(task.privileged_blocks[name].size for name in critic_blocks)
         return cls(tuple(task.sizes.values()), len(task.scene.body.joint_names), privileged)
 
@@ -103,6 +114,13 @@ class Perceptron(NamedTuple):
 Architecture = Perceptron | Legs | AnyLegs
 
 
+# What learners use of an architecture.
+_ATTRIBUTES = (
+    *("symmetric", "size", "own", "inputs", "viewed", "seen", "normalize"),
+    *("drawn", "drawn_values", "actions", "values", "exported", "imported"),
+)
+
+
 def of(
     task: Task, network: str = "perceptron", critic_blocks: Iterable[str] = (), symmetric: bool = True
 ) -> Perceptron | Legs:
@@ -110,13 +128,17 @@ def of(
 
     Args:
         task: whose observations networks see.
-        network: "perceptron", or "legs".
+        network: "perceptron", "legs", or that of another package. Its function takes the other arguments.
         critic_blocks: names of privileged blocks for networks of values.
         symmetric: whether legs on the left and on the right share their network, if the task is symmetric.
+
+    Raises:
+        ValueError: an unknown network, or a function that returns no architecture.
     """
-    if network == "legs":
-        return Legs.of(task, critic_blocks, symmetric)
-    return Perceptron.of(task, critic_blocks)
+    architecture = registry.find("network", network, NETWORKS)(task, critic_blocks, symmetric)
+    if missing := [name for name in _ATTRIBUTES if not hasattr(architecture, name)]:
+        raise ValueError(f"network {network!r}: has no {' and no '.join(missing)}, which architectures have")
+    return architecture
 
 
 def of_environment(environment: VectorEnv | BodiesEnv, *options, **more) -> Architecture:

@@ -4,13 +4,13 @@ import dataclasses
 import json
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from arc_suite import checks, evaluation, files, versions
+from arc_suite import checks, evaluation, files, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.hyperparameters import UNSEEN
@@ -27,6 +27,8 @@ CONFIGURATION = ("robot", "task", "task_kwargs", *_OWN)
 # records of earlier versions.
 PRIOR_SHA256, TRAINING_SEEDS = "prior_sha256", "training_seeds"
 OF_DATA = (PRIOR_SHA256, TRAINING_SEEDS)
+# Hyperparameters that hold names which other packages may have registered, and their kinds.
+_NAMES_IN_HYPERPARAMETERS = {"network": "network", "preset": "law"}
 PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", LEG_VIEWS, *OF_DATA, "versions")
 
 
@@ -36,7 +38,7 @@ class Configuration:
 
     Attributes:
         setup: body, or bodies, task and settings.
-        algorithm: name, or `module:attribute`; see `algorithms.algorithm`.
+        algorithm: name, or `module:name`; see `algorithms.algorithm`.
         hyperparameters: of the algorithm, a frozen dataclass.
         seed: of all random numbers.
         steps: environment steps.
@@ -100,7 +102,9 @@ class Configuration:
         training = checks.mapping("training", training)
         _check_training(setup, definition, training)
         text = checks.json_text("training", dict(training))
-        return cls(setup, algorithm, definition.hyperparameters, seed, steps, evaluate_every, prior, text)
+        algorithm = registry.importable("algorithm", registry.bare(algorithm))
+        hyperparameters = _with_modules(definition.hyperparameters)
+        return cls(setup, algorithm, hyperparameters, seed, steps, evaluate_every, prior, text)
 
     @property
     def training(self) -> dict[str, Any]:
@@ -184,12 +188,13 @@ class Configuration:
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """Return the configuration of a file; modules that it names are imported.
+        """Return the configuration of a file; no module that it names is imported.
 
         Args:
             fields: those of `to_dict` or `record`; all but `robot` have defaults.
 
         Raises:
+            NotImported: the module of a name has not been imported yet.
             ValueError: an unknown field, or a value that does not fit.
             OSError: the file of a body cannot be read.
         """
@@ -197,9 +202,16 @@ class Configuration:
             checks.name(name, (*CONFIGURATION, *PROVENANCE), "field of a configuration")
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
-        checks.mapping("hyperparameters", fields.get("hyperparameters"))
+        for kind, name in _registered_names(fields):
+            registry.imported(kind, name)
         setup = Setup.of(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
         return cls.of(setup, **{name: fields[name] for name in _OWN if name in fields})
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Modules that register what it names, for processes that read it from a file."""
+        names = [name for _, name in _registered_names(self.to_dict())]
+        return tuple(dict.fromkeys(name.rpartition(":")[0] for name in names if ":" in name))
 
     def record(self) -> dict[str, Any]:
         """Return, JSON-able, `to_dict` with hashes and versions of all that computes.
@@ -218,6 +230,34 @@ class Configuration:
             return {}
         seen = [*self.policy_setup.definition.blocks, *getattr(self.hyperparameters, "critic_blocks", ())]
         return {LEG_VIEWS: leg_views.VERSION} if set(seen) - set(leg_views.TURNED_BEFORE) else {}
+
+
+def _registered_names(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield kind and name of all that other packages may have registered, in the fields of a configuration.
+
+    Raises:
+        ValueError: hyperparameters or settings that are no mappings.
+    """
+    hyperparameters = checks.mapping("hyperparameters", fields.get("hyperparameters"))
+    names = [("robot", name) for name in _names_of_bodies(fields.get("robot"))]
+    names += [("task", fields.get("task")), ("algorithm", fields.get("algorithm"))]
+    names += [("arena", checks.mapping(key, fields.get(key)).get("arena")) for key in ("task_kwargs", "training")]
+    names += [(kind, hyperparameters.get(field)) for field, kind in _NAMES_IN_HYPERPARAMETERS.items()]
+    yield from ((kind, name) for kind, name in names if isinstance(name, str))
+
+
+def _names_of_bodies(robot) -> list[str]:
+    return registry.names_in(robot) if isinstance(robot, str) else []
+
+
+def _with_modules(hyperparameters):
+    """Return hyperparameters whose names of other packages have their modules, as other processes look them up."""
+    changes = {}
+    for field, kind in _NAMES_IN_HYPERPARAMETERS.items():
+        name = getattr(hyperparameters, field, None)
+        if isinstance(name, str) and registry.bare(name) in registry.ADDITIONS[kind]:
+            changes[field] = registry.importable(kind, registry.bare(name))
+    return dataclasses.replace(hyperparameters, **changes)
 
 
 def network_of(start: str | os.PathLike) -> dict[str, Any]:
@@ -252,6 +292,7 @@ def read(path: Path) -> Configuration:
     """Return the configuration in a JSON file, such as `config.json` of a run's folder.
 
     Raises:
+        NotImported: the module of a name has not been imported yet.
         ValueError: no configuration.
         OSError: the file cannot be read.
     """
@@ -259,5 +300,7 @@ def read(path: Path) -> Configuration:
         with files.reading(path):
             found = files.read_json(path)
         return Configuration.from_dict(checks.mapping("configuration", found))
+    except registry.NotImported as error:
+        raise registry.NotImported(f"{path}: {error}") from None
     except ValueError as error:
         raise ValueError(f"{path}: {checks.quoted(error)}") from None

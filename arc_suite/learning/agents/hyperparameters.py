@@ -3,12 +3,16 @@
 import dataclasses
 from collections.abc import Mapping
 
-from arc_suite import checks
+from arc_suite import checks, registry
 
 _POSITIVE = (1e-6, 1e3)
 # Contact forces are 114 to 150 numbers, without which learners that act are better: docs/algorithms.md.
 UNSEEN = ("contact_forces",)
-NETWORKS = ("perceptron", "legs")
+# Functions that make an architecture for a task, see `architectures.of`; or where they are, as those need JAX.
+NETWORKS = {
+    "perceptron": "arc_suite.learning.agents.architectures:Perceptron.of",
+    "legs": "arc_suite.learning.agents.leg_networks:Legs.of",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,7 +103,7 @@ class SoftActorCritic:
                 f"it is above 1, got {checks.shown(self.utd_ratio)}"
             )
         checks.name(self.critics, ("squared", "categorical"), "critics")
-        checks.name(self.network, NETWORKS, "network")
+        checks.name(self.network, NETWORKS, "network of soft actor-critic")
         if self.dropout and (self.critics == "categorical" or self.network == "legs"):
             kind = "categorical critics" if self.critics == "categorical" else "a network of legs"
             raise ValueError(f"dropout: expected 0 with {kind}, got {self.dropout}")
@@ -184,8 +188,8 @@ class ProximalPolicy:
             implementations of `arc_suite.envs.worlds.mjx`, where all of learning stays on JAX's device.
         num_envs: environments.
         horizon: control steps of each environment between updates.
-        network: what acts and values: "perceptron", two layers that see all of an observation; or "legs", which
-            all legs share, see `leg_networks`.
+        network: what acts and values: "perceptron", two layers that see all of an observation; "legs", which
+            all legs share, see `leg_networks`; or `module:name` of one that another package has.
         symmetry_augmentation: whether left and right are alike, for symmetric bodies: a perceptron learns from a
             mirrored copy of each transition, legs share one network.
         epochs: passes over the transitions of a horizon.
@@ -240,7 +244,7 @@ class ProximalPolicy:
         ranges = {"value_warm_up": (0,), "gae_lambda": (0.0, 1.0), "normalize_until": (0.0, 1.0)}
         _check(self, ranges | dict.fromkeys(names, _POSITIVE))
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
-        checks.name(self.network, NETWORKS, "network")
+        registry.find_entry("network", self.network, NETWORKS)
         mirrored = self.symmetry_augmentation and self.network == "perceptron"
         if self.minibatch > self.num_envs * self.horizon * (2 if mirrored else 1):
             raise ValueError(f"minibatch: expected at most the transitions of a horizon, got {self.minibatch}")

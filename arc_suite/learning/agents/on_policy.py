@@ -155,6 +155,9 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
     except ValueError as error:
         raise ValueError(f"{hp.start}: expected {error}, {hp.network}") from None
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
-    if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
+    expected = [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]
+    if len(shapes) != len(expected):
+        raise ValueError(f"{hp.start}: expected the {len(expected)} arrays of a {hp.network}, got {len(shapes)}")
+    if shapes != expected:
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
     return normalize, policy

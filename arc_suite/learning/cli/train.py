@@ -67,7 +67,7 @@ define_task()
 flags.DEFINE_string(
     "algorithm",
     "ppo",
-    f"One of {', '.join(algorithms.ALGORITHMS)}, or module:attribute, an Algorithm on Python's path.",
+    f"One of {', '.join(algorithms.ALGORITHMS)}, or module:name of one that another package has.",
 )
 flags.DEFINE_multi_string(
     "train_set", [], "Setting of the task in training alone, name=value, in place of that of --set."
@@ -90,6 +90,11 @@ flags.DEFINE_string(
     None,
     "Train as config.json of another run's folder says. It stands for the flags of body, policy and task, and for "
     "--seed, --steps and --evaluate_every.",
+)
+flags.DEFINE_list(
+    "modules",
+    [],
+    "Modules, with commas between them, that register what --config names: files themselves import nothing.",
 )
 flags.DEFINE_float(
     "minutes",
@@ -226,11 +231,16 @@ def configured() -> list[Configuration]:
         ValueError: a flag that does not fit.
         OSError: a file that cannot be read.
     """
+    for module in FLAGS.modules:
+        registry.import_module(module, "--modules")
     if FLAGS.config is not None:
         for name in (*_OF_THE_RUN, "evaluate_every"):
             if FLAGS[name].present:
                 raise ValueError(f"--{name}: expected none with --config, which has the whole configuration")
-        return [configuration.read(Path(FLAGS.config))]
+        try:
+            return [configuration.read(Path(FLAGS.config))]
+        except registry.NotImported as error:
+            raise ValueError(f"{error}, by --modules") from None
     hyperparameters = named_values("hp", FLAGS.hp)
     run = FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior, named_values("train_set", FLAGS.train_set)
     several = registry.names_several(FLAGS.robot) and made_body() is None

@@ -66,4 +66,5 @@ def _command(run: Run, output: Path) -> list[str]:
     if not run_folder.is_begun(output):
         with files.writing_json(config) as file:
             file.update(run.configuration.to_dict())
-    return ["train", f"--config={config}", f"--output={output}"]
+    modules = ",".join(run.configuration.modules)
+    return ["train", f"--config={config}", f"--output={output}", *([f"--modules={modules}"] if modules else [])]

@@ -67,7 +67,7 @@ def test_a_page_plays_the_walk_under_the_command(creature, monkeypatch):
 
 def test_a_page_to_play_in_has_the_body_and_its_law(creature, monkeypatch):
     made = []
-    monkeypatch.setattr(saving.play, "page", lambda given: made.extend(given) or "<html>")
+    monkeypatch.setattr(saving.play_pages, "page", lambda given: made.extend(given) or "<html>")
     assert content(creature, "Page to play in") == b"<html>"
     (walker,) = made
     assert walker["name"] == "tick_shaped" and walker["policy"]["kind"] == "law"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from arc_suite import style
-from arc_suite.animation import direction
+from arc_suite.animation import player_controls
 from arc_suite.animation.episodes import Episodes
 from arc_suite.animation.studio import session as sessions
 from arc_suite.animation.studio import texts
@@ -83,7 +83,7 @@ def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
         session.direct((-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple", 1.3)
         observed = lambda name: session.episodes.timestep.observation[name]  # noqa: E731
         shown.until(lambda: observed("gait")[-2] == pytest.approx(0.75))
-        low = direction.room(session.creature.setup.body)[0, 0]
+        low = player_controls.room(session.creature.setup.body)[0, 0]
         shown.until(lambda: observed("pose")[0] == pytest.approx(low))
         assert session.commands["pose"] == pytest.approx([low, 0.0, 0.0, 0.0, 0.0, 0.0])
         session.ask(Sketch(legs=4, links=3))  # whose legs do not ripple

@@ -172,6 +172,10 @@ def test_legs_that_overlap_are_moved_apart():
         (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),
         (Sketch(source=FILE, file="{}"), "name: missing; a Body needs it"),
         (Sketch(task="walk", preset="balanced"), "unknown preset 'balanced'"),
+        (
+            Sketch(task="walk", preset="antigravity:x"),
+            "law 'antigravity:x': files import nothing; import 'antigravity'",
+        ),
         (Sketch(preset="sighted"), "observation: expected a block scan, as the task rough has"),
         (Sketch(policy="ppo"), "policy ppo: none for walker_8x3-directed"),
     ],

@@ -45,7 +45,7 @@ def test_a_run_keeps_the_policy_of_each_evaluation(run):
     agents = checkpoints.agents(run / "checkpoints")
     assert [agent.steps for agent in agents] == [100, 200, 300]
     for agent in agents:
-        assert (agent.algorithm, agent.seed) == ("tiny_studies:CLIMB", 0)
+        assert (agent.algorithm, agent.seed) == ("tiny_studies:climb", 0)
         assert agent.mean_return == table["return"][table["step"] == agent.steps].mean()
         assert checkpoints.agents(checkpoints.at(run, agent.steps)) == [agent]
     assert (run / "checkpoints/300/policy.npz").read_bytes() == (run / "policy.npz").read_bytes()
@@ -76,7 +76,7 @@ def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
     """Its id and metadata name its policy, and it replays bit-exactly."""
     programs.passed(collected(flag))
     (dataset_id,) = data.ids.existing()
-    assert f"/tiny_studies_CLIMB-0-{label}-set" in dataset_id
+    assert f"/tiny_studies_climb-0-{label}-set" in dataset_id
     dataset = data.open(dataset_id)
     agents = dataset.metadata["arc_suite"]["agents"]
     assert [agent["steps"] for agent in agents] == steps
@@ -94,7 +94,7 @@ def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
 def test_random_is_a_quality_too(collected):
     programs.passed(collected("--quality=random"))
     (dataset_id,) = data.ids.existing()
-    assert "/tiny_studies_CLIMB-0-random-set" in dataset_id
+    assert "/tiny_studies_climb-0-random-set" in dataset_id
     assert data.open(dataset_id).settings.policy == "random"
 
 

@@ -92,8 +92,12 @@ def test_ppo_takes_no_whole_number_for_a_share(changes):
     ("name", "line"),
     [
         ("sop", r"^unknown algorithm 'sop'; did you mean 'sope'\? \(there are: sac, "),
-        ("nowhere:NAME", r"^algorithm 'nowhere:NAME': No module named 'nowhere'$"),
-        ("json:loads", r"^algorithm 'json:loads': expected an Algorithm, got function$"),
+        (
+            "nowhere:search",
+            r"^algorithm 'search': cannot import nowhere: No module named 'nowhere'; start in the fol",
+        ),
+        ("json:loads", r"^algorithm 'loads': json registers no such algorithm by arc_suite.register$"),
+        ("json:ppo", r"^algorithm 'json:ppo': ppo is the suite's own, expected without a module$"),
     ],
 )
 def test_unknown_algorithms(name, line):

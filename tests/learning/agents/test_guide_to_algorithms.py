@@ -46,4 +46,4 @@ def test_a_new_learner(run, tmp_path):
 @pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="of the extra learn: make check-agents")
 def test_new_hyperparameters(run, tmp_path):
     out = run(TRAIN_PATIENT, "--steps=50", "--hp=hidden=8", "--hp=batch=4", "--set", "time_limit=2")
-    assert out.startswith("runs/patient: finished, return ")
+    assert "\nruns/patient: finished, return " in out

@@ -40,9 +40,22 @@ def run(*arguments, cwd):
     [
         (["--algorithm=sopee"], "arc-suite train: unknown algorithm 'sopee'; did you mean 'sope'? (there are: sac, "),
         (
-            ["--algorithm=my_algorithms:PATIEN"],
-            "arc-suite train: algorithm 'my_algorithms:PATIEN': module 'my_algorithms' has no attribute 'PATIEN'; "
-            "did you mean 'PATIENT'?\n",
+            ["--algorithm=my_algorithms:patien"],
+            "arc-suite train: algorithm 'patien': my_algorithms registers no such algorithm by arc_suite.register; "
+            "did you mean 'patient'?\n",
+        ),
+        (
+            ["--algorithm=my_algorithms:patient"],
+            "arc-suite train: algorithm 'my_algorithms:patient': expected an Algorithm, got int\n",
+        ),
+        (
+            ["--hp=network=my_algorithms:depp"],
+            "arc-suite train: network 'depp': my_algorithms registers no such network by arc_suite.register; "
+            "did you mean 'deep'?\n",
+        ),
+        (
+            ["--algorithm=sac", "--hp=network=my_algorithms:deep"],
+            "arc-suite train: unknown network of soft actor-critic 'my_algorithms:deep' (there are: perceptron, legs)",
         ),
         (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
         (["--robot=tock"], f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? {WORDS}\n"),
@@ -64,7 +77,8 @@ def run(*arguments, cwd):
     ],
 )
 def test_errors_are_one_line(flags, line, tmp_path):
-    (tmp_path / "my_algorithms.py").write_text("PATIENT = None")
+    parts = 'module=__name__, algorithms={"patient": 3}, networks={"deep": "a:b"}'
+    (tmp_path / "my_algorithms.py").write_text(f"import arc_suite\narc_suite.register({parts})\n")
     (tmp_path / "policy.npz").write_bytes(b"PK\x80")
     programs.refused(run("train", *flags, cwd=tmp_path), line)
     assert not list(tmp_path.rglob("*.csv"))
@@ -101,7 +115,7 @@ def test_export_of_what_is_no_run(tmp_path, arguments, message):
     programs.refused(run("export", *arguments, cwd=tmp_path), f"arc-suite export: {message}")
 
 
-CLIMB = ["--robot=tick", "--algorithm=tiny_studies:CLIMB", "--set", "time_limit=0.2", "--steps=40"]
+CLIMB = ["--robot=tick", "--algorithm=tiny_studies:climb", "--set", "time_limit=0.2", "--steps=40"]
 CLIMB += ["--evaluate_every=20"]
 REACHED = r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+ \+- \S+, score \S+ \(.*"
 STOPPED = "other: stopped at --minutes=0 of CPU time; more minutes resume it, no evaluation yet\n"
@@ -123,7 +137,7 @@ def test_until_a_score(tmp_path):
 def test_several_seeds(tmp_path):
     """Each is the run that it is alone; one that fails does not stop the others."""
     shutil.copy(ROOT / "tests" / "fixtures" / "tiny_studies.py", tmp_path)
-    name = "tick-walk-tiny_studies.CLIMB"
+    name = "tick-walk-tiny_studies.climb"
     foreign = tmp_path / "runs" / f"{name}-1" / "mine.txt"
     foreign.parent.mkdir(parents=True), foreign.write_text("")
     done = run("train", *CLIMB, "--seed=0,1,2", "--jobs=3", cwd=tmp_path)

@@ -279,7 +279,7 @@ def test_a_track_is_run_and_resumed(tmp_path):
     """A division of 300 steps, by an algorithm that needs no JAX; the second command has nothing left to do."""
     environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests" / "fixtures")])}
     (tmp_path / "short.py").write_text(SHORT)
-    command = [sys.executable, "short.py", "samples", "--algorithm=tiny_studies:CLIMB", "--places=tick-walk"]
+    command = [sys.executable, "short.py", "samples", "--algorithm=tiny_studies:climb", "--places=tick-walk"]
 
     def go():
         done = subprocess.run(
@@ -289,8 +289,8 @@ def test_a_track_is_run_and_resumed(tmp_path):
         return done.stdout
 
     printed = go()
-    (found,) = benchmark.read(tmp_path / "studies")["samples", "tiny_studies.CLIMB"]
-    folder = tmp_path / "studies" / "samples-tiny_studies.CLIMB"
+    (found,) = benchmark.read(tmp_path / "studies")["samples", "tiny_studies.climb"]
+    folder = tmp_path / "studies" / "samples-tiny_studies.climb"
     (row,) = csv_files.read(folder / results.RUNS)
     assert row["steps"] == "300"
     returns = [float(each["return"]) for each in csv_files.read(folder / results.EVALUATIONS) if each["step"] == "300"]

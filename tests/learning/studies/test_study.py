@@ -122,7 +122,7 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     assert runner.make([first], folder, 1) == 0
     assert (folder / first.name / "checkpoint.npz").stat().st_mtime_ns == before
 
-    other = tiny_studies.tiny("tiny_studies:CLIMB", 0, hyperparameters={"spread": 0.3})
+    other = tiny_studies.tiny("tiny_studies:climb", 0, hyperparameters={"spread": 0.3})
     with pytest.raises(ValueError, match=r"of another run, with hyperparameters.spread 0.02, not 0.3; write "):
         runner.is_finished(other, folder / first.name)
 
@@ -195,7 +195,7 @@ def test_prior_data_are_those_of_the_study(tmp_path, monkeypatch):
 @pytest.mark.long
 def test_a_run_is_judged_without_its_settings_of_training(tmp_path):
     own = {"task_kwargs": tiny_studies.SHORT, "training": {"curriculum": True, "level": 3}}
-    each = run("tick", "tiny_studies:CLIMB", 100, task="gaps", evaluate_every=100, **own)
+    each = run("tick", "tiny_studies:climb", 100, task="gaps", evaluate_every=100, **own)
     assert each.place == 'tick, gaps, {"time_limit": 2.0}'
     folder, published = tmp_path / "runs", tmp_path / "results"
     assert train(each.configuration, folder / each.name)

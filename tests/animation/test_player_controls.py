@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arc_suite.animation import direction
+from arc_suite.animation import player_controls
 from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
@@ -15,31 +15,33 @@ BODIES = [*ROBOTS.values(), generator.random_body(4)]
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 def test_torsos_stay_above_the_ground(body):
-    low, high = direction.room(body).T
+    low, high = player_controls.room(body).T
     assert (low <= 0.0).all() and (high >= 0.0).all() and (high > low).any()
     ride, height = posture.rest(body).ride, body.torso.standing_height
     assert (ride + low[0]) * height + torso_box(body)[0][2] > 0.07 * height
     kept = posture.room(body, planted=False)
-    np.testing.assert_allclose(direction.room(body)[1:], kept[1:], atol=1e-9)  # which stays as it was
+    np.testing.assert_allclose(player_controls.room(body)[1:], kept[1:], atol=1e-9)  # which stays as it was
     assert (kept[0, 0] <= low[0] + 1e-9) and kept[0, 1] == pytest.approx(high[0])
 
 
 def test_what_is_set_of_a_task():
     task = Setup.of("tick", "directed").definition
-    asked = direction.commands(task, (1.0, 0.0, 0.0), (-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple")
+    asked = player_controls.commands(task, (1.0, 0.0, 0.0), (-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple")
     assert asked["command"] == (1.0, 0.0, 0.0)
     np.testing.assert_allclose(asked["pose"], (-0.29, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert asked["gait"][-2:] == [0.75, task.parameters.gait_frequency]
-    quick = direction.commands(task, None, None, "ripple", 1.2)["gait"]
+    quick = player_controls.commands(task, None, None, "ripple", 1.2)["gait"]
     assert quick == [*asked["gait"][:-1], 1.2 * task.parameters.gait_frequency]
-    most = direction.room(task.scene.body)[:, 1]
-    np.testing.assert_allclose(direction.commands(task, None, most, None)["pose"], most / 6.0)  # together they are less
-    own = direction.commands(task, None, None, "trot")["gait"]  # which does not fit
-    assert own == direction.commands(task, None, None, direction.OWN)["gait"]
+    most = player_controls.room(task.scene.body)[:, 1]
+    np.testing.assert_allclose(
+        player_controls.commands(task, None, most, None)["pose"], most / 6.0
+    )  # together they are less
+    own = player_controls.commands(task, None, None, "trot")["gait"]  # which does not fit
+    assert own == player_controls.commands(task, None, None, player_controls.OWN)["gait"]
     assert own[-2] == task.parameters.duty_factor
-    assert direction.commands(task, None, None, None) == {"command": None, "pose": None, "gait": None}
+    assert player_controls.commands(task, None, None, None) == {"command": None, "pose": None, "gait": None}
 
 
 @pytest.mark.parametrize(("name", "asked"), [("steer", {"command": None}), ("walk", {}), ("navigate", {})])
 def test_tasks_without_poses(name, asked):
-    assert direction.commands(Setup.of("tick", name).definition, None, np.zeros(6), direction.OWN) == asked
+    assert player_controls.commands(Setup.of("tick", name).definition, None, np.zeros(6), player_controls.OWN) == asked

@@ -10,8 +10,8 @@ from typing import Any
 from tqdm import tqdm
 
 from arc_suite import checks, files, versions
-from arc_suite.animation.clips import filming
-from arc_suite.animation.clips.catalog import ALL, CLIPS, DEFAULT
+from arc_suite.animation.clips import catalog, filming
+from arc_suite.animation.clips.catalog import ALL, DEFAULT
 from arc_suite.animation.clips.clips import FPS, Clip
 from arc_suite.animation.clips.clips import clips as recorded
 from arc_suite.animation.clips.creatures import RIGS, glb
@@ -58,7 +58,7 @@ def animate(
     Args:
         robot, task, task_kwargs: see `arc_suite.load`.
         path: of the file.
-        clips: names of `CLIPS`, one or several, or "all".
+        clips: names of `CLIPS`, or `module:name` of clips of other packages, one or several; or "all".
         policy, preset, fps, straight, plant: see `clips.clips`.
         progress: wraps what takes long, as `tqdm` does.
         options: of a `.glb`, `rig`, `root_motion`, `triangles`, `uv` and `reduce`, see `creatures.glb`; of pictures,
@@ -77,7 +77,7 @@ def animate(
     with contextlib.ExitStack() as stack:
         temporary = stack.enter_context(files.writing(path))
         metrics = stack.enter_context(files.writing_json(metrics_file(path) if extension == ".glb" else None))
-        names = list(CLIPS) if names == [ALL] else names
+        names = catalog.names() if names == [ALL] else names
         made = recorded(setup, names, policy, preset, fps, recording, straight, plant)
         if extension == ".glb":
             metrics |= _write_glb(temporary, setup.body, made, **options)

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import models, policies
-from arc_suite.animation import direction, pages
+from arc_suite.animation import pages, player_controls
 from arc_suite.bodies import universal
 from arc_suite.bodies.universal import Universal
 from arc_suite.cpg import Demonstrator, leaps
@@ -129,7 +129,7 @@ def _task(task: Task, commanded: Task) -> dict[str, Any]:
         "lowest": health.lowest * context.height,
         "lying": health.lying,
         "least_upright": health.least_upright,
-        "direction": _direction(task) if direction.directs(task) else None,
+        "direction": _direction(task) if player_controls.directs(task) else None,
     }
 
 
@@ -141,9 +141,9 @@ def _direction(task: Task) -> dict[str, Any]:
         "step": reference.step,
         "rate": (body.torso.standing_height / GRAVITY) ** 0.5 / reference.step,
         "names": posture.NAMES,
-        "room": direction.room(body),
+        "room": player_controls.room(body),
         "frequency": task.parameters.gait_frequency,
-        "gaits": direction.named(task),
+        "gaits": player_controls.named(task),
     }
 
 

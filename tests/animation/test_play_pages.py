@@ -12,7 +12,7 @@ import programs
 import pytest
 from page_data import data_of
 
-from arc_suite.animation import pages, play
+from arc_suite.animation import pages, play_pages
 from arc_suite.bodies import generator, universal
 from arc_suite.cpg import leaps
 from arc_suite.cpg.presets import PRESETS
@@ -88,7 +88,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
     Under stiff servos the solvers of two versions of MuJoCo take other ways to its tolerance.
     """
     tolerance = 1e-6 if body.source else 1e-9
-    setup, creature = Setup.of(body, "directed", {"time_limit": 1e6}), play.creature(body, "cpg", preset)
+    setup, creature = Setup.of(body, "directed", {"time_limit": 1e6}), play_pages.creature(body, "cpg", preset)
     given = directions(steps, creature)
     start, positions, actions, observations = played(setup, policy("cpg", body, preset, task=setup.definition), given)
     (found,) = nodes.run(script, [{"creature": creature, "ground": "level", "asked": given, **start}])
@@ -130,7 +130,10 @@ def test_walks_of_ten_seconds_are_those_of_python(script, name):
 def test_leaps_follow_the_keyframes_of_python(script, name, speed, plays):
     """Standing still a body jumps, walking it leaps; actions are those of the drive towards Python's targets."""
     body, pressed = ROBOTS[name], 60
-    creature, law = play.creature(body), policy("cpg", body, "steered", task=Setup.of(body, "directed").definition).law
+    creature, law = (
+        play_pages.creature(body),
+        policy("cpg", body, "steered", task=Setup.of(body, "directed").definition).law,
+    )
     legs, pose = Legs.of(law.body), tuple(law.legs.by_joint(law.angles).tolist())
     choice, measure = {"jump": (leaps.JUMPS, "clearance"), "leap": (PRESETS[name]["leaping"].choice, "distance")}[plays]
     leap, _ = leaps.best(body, pose, choice, measure)
@@ -158,7 +161,7 @@ def assert_networks_agree(script, setup, driver, name, tolerance=1e-9):
         commands(16) if setup.definition.commands else [{"command": (0.0, 0.0, 0.0)}] * 16
     )  # else they turn the course
     start, positions, actions, observations = played(setup, driver, given)
-    creature = play.creature(setup.body, name)
+    creature = play_pages.creature(setup.body, name)
     episode = {"creature": creature, "ground": "level", "asked": given, "replayed": actions.tolist(), **start}
     (found,) = nodes.run(script, [episode])
     np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=tolerance)
@@ -214,7 +217,7 @@ def test_a_policy_of_any_body_is_that_of_python(script, tmp_path, task):
 def test_heights_on_bumps_are_those_of_python(script):
     """Contacts with height fields differ between versions of MuJoCo; heights over them do not."""
     arena = Setup.of("tick", "steer", {"arena": "bumps"}).definition.scene.arena
-    creature = play.creature(ROBOTS["tick"])
+    creature = play_pages.creature(ROBOTS["tick"])
     places = np.random.default_rng(0).uniform((-20.0, -5.0), (20.0, 5.0), (40, 2))  # beyond the edges, too
     still = {
         "creature": creature,
@@ -232,11 +235,11 @@ def test_heights_on_bumps_are_those_of_python(script):
 
 @pytest.mark.slow
 @nodes.needs_node
-@pytest.mark.parametrize("ground", play.GROUNDS)
+@pytest.mark.parametrize("ground", play_pages.GROUNDS)
 def test_bodies_walk_from_their_start(script, ground):
     """Ahead as fast as the command says or nearly so, on either ground, and upside down is a fall."""
     body, steps = ROBOTS["tick"], 100
-    creature = play.creature(body)
+    creature = play_pages.creature(body)
     walk = {"qpos": creature["grounds"][ground]["start"], "qvel": [], "desired": [0.0, 0.0, 0.0]}
     walk |= {"creature": creature, "ground": ground, "asked": [upright(creature, [1.0, 0.0, 0.0])] * steps}
     over = walk | {"qpos": [0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, *walk["qpos"][7:]]}
@@ -250,23 +253,23 @@ def test_bodies_walk_from_their_start(script, ground):
 def test_what_a_page_holds_of_a_body(monkeypatch):
     """Names of bodies come from files of others: they are text."""
     monkeypatch.setattr(pages, "built", lambda name: f"built {name}".encode())
-    creature = play.creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
-    page = play.page([creature])
+    creature = play_pages.creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
+    page = play_pages.page([creature])
     assert "<title>&lt;leaper&gt;</title>" in page
     assert data_of(page) == [creature]
-    assert page == play.page([creature])
+    assert page == play_pages.page([creature])
     assert all('integrator="Euler"' in ground["xml"] for ground in creature["grounds"].values())
     assert [creature["parts"][foot["part"]]["name"] for foot in creature["feet"]] == list(ROBOTS["leaper"].foot_names)
     choices = creature["task"]["direction"]
     assert choices["names"] == ["height", "forward", "left", "roll", "pitch", "yaw"] and len(choices["room"]) == 6
     assert list(choices["gaits"]) == ["own", "trot", "pace", "bound", "walk", "wave"]
     assert creature["policy"]["constants"]["leaps"] == {}  # its feet hardly leave the ground: no key
-    assert play.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
+    assert play_pages.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
 
 
 def test_a_page_begins_with_the_licenses(monkeypatch):
     monkeypatch.setattr(pages, "built", lambda name: b"[" + name.encode() + b"]")
-    page = play.page([play.creature(ROBOTS["leaper"])])
+    page = play_pages.page([play_pages.creature(ROBOTS["leaper"])])
     assert page.index('<meta charset="utf-8">') < 200  # where browsers look for it
     order = ["Apache License", "Third-party licenses", "Qhull", "-->", "[play.js]", "<body", 'id="engine"']
     places = [page.index(text) for text in order]
@@ -314,4 +317,4 @@ def test_networks_that_a_page_cannot_run(tmp_path, task, settings, message):
     made = networks.made("tick", task)
     network.save(tmp_path / "policy.npz", made._replace(setup=Setup.of("tick", task, settings)))
     with pytest.raises(ValueError, match=message):
-        play.creature(ROBOTS["tick"], str(tmp_path))
+        play_pages.creature(ROBOTS["tick"], str(tmp_path))

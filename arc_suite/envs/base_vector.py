@@ -15,7 +15,7 @@ _OF_EACH = ("np_random", "np_random_seed", "render", "positions", "resampled")
 _OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
 
 
-class Together(gymnasium.vector.VectorEnv):
+class BaseVectorEnv(gymnasium.vector.VectorEnv):
     """A vector environment that answers for each of its environments."""
 
     def call(self, name: str, *args, **kwargs) -> tuple:

@@ -7,7 +7,7 @@ import nodes
 import pytest
 import tabs
 
-from arc_suite.animation import play
+from arc_suite.animation import play_pages
 from arc_suite.bodies import generator
 from arc_suite.robots import ROBOTS, gaits
 
@@ -22,11 +22,11 @@ pytestmark = [pytest.mark.slow, nodes.needs_viewer]
 def page(tmp_path_factory):
     path = tmp_path_factory.mktemp("play") / "play.html"
     bodies = [
-        play.creature(ROBOTS["tick"]),
-        play.creature(generator.generate(6, 3)),
-        play.creature(ROBOTS["queen"], "ppo"),
+        play_pages.creature(ROBOTS["tick"]),
+        play_pages.creature(generator.generate(6, 3)),
+        play_pages.creature(ROBOTS["queen"], "ppo"),
     ]
-    path.write_text(play.page(bodies), "utf-8")
+    path.write_text(play_pages.page(bodies), "utf-8")
     return path
 
 

@@ -1,0 +1,90 @@
+"""Clips that another package registers: of every kind, checked when they are made."""
+
+import numpy as np
+import pytest
+from refusals import refused
+
+import arc_suite
+from arc_suite import registry
+from arc_suite.animation import clips as export
+from arc_suite.animation.clips import gestures
+from arc_suite.animation.clips.catalog import Acted, Difference, Showcase, Turn, WalkLoop, names
+from arc_suite.envs.setup import Setup
+
+TICK = Setup.of("tick", "steer")
+
+
+@pytest.fixture(autouse=True)
+def table(monkeypatch):
+    """Take back what a test registers."""
+    monkeypatch.setitem(registry.ADDITIONS, "clip", {})
+
+
+@pytest.fixture
+def register(monkeypatch):
+    """Return a function that registers clips of this test."""
+    return lambda **clips: registry.ADDITIONS["clip"].update(clips)
+
+
+def dip(body, rest):
+    """A short motion of the torso over its feet."""
+    return gestures.torso_gesture(body, rest, {"height": ((0.0, 0.0), (2.0, -0.05), (4.0, 0.0))}, 4.0)
+
+
+def test_motions_loops_and_turns_are_made_as_the_suites_are(register):
+    register(dip=Acted(dip, (0, -1)), creep=WalkLoop((0.35, 0.0, 0.0)), around=Turn(90.0), paper=Showcase("medium"))
+    made = {clip.name: clip for clip in export.clips(TICK, ["walk", "dip", "creep", "around", "paper"], fps=30)}
+    assert list(made) == ["walk", "dip", "creep", "around", "paper"]
+    low = made["dip"].motion.positions[:, 2]
+    assert low[0] == pytest.approx(low[-1]) and low.min() < low[0] - 0.02 * TICK.body.torso.standing_height
+    assert made["creep"].motion.twist[0] == pytest.approx(0.35 * made["walk"].motion.twist[0], rel=0.2)
+    assert made["around"].motion.root[-1, 2] == pytest.approx(np.pi / 2.0)
+
+
+@pytest.mark.slow
+def test_differences_are_additive(register):
+    low_walk, low = WalkLoop((1.0, 0.0, 0.0), crouch=0.2), Difference("low_walk", "walk")
+    register(low_walk=low_walk, low=low, nod=Acted(dip, (0, -1), additive=True))
+    made = {clip.name: clip for clip in export.clips(TICK, ["walk", "idle", "low", "nod"], fps=30)}
+    assert made["low"].loops and "walk" in made["low"].additive_over
+    assert made["walk"].additive_over is None and made["nod"].additive_over is not None
+
+
+def test_a_name_may_have_its_module(monkeypatch, register):
+    register(creep=WalkLoop((0.35, 0.0, 0.0)))
+    monkeypatch.setitem(registry.MODULES, ("clip", "creep"), __name__)
+    (creep,) = export.clips(TICK, [f"{__name__}:creep"], fps=30)
+    assert creep.name == "creep" and names()[-1] == "creep"
+    with refused("clips: expected each once, got creep, creep"):
+        export.clips(TICK, ["creep", f"{__name__}:creep"])
+
+
+@pytest.mark.parametrize(
+    ("clip", "message"),
+    [
+        (3, "clip 'mine': expected one of WalkLoop, Passage, Turn, Acted, Difference, Showcase, got int"),
+        ("math:pi", "clip 'mine': expected one of WalkLoop, Passage, Turn, Acted, Difference, Showcase, got float"),
+        ("math:tau_", "clip 'mine': cannot import math:tau_: module 'math' has no attribute 'tau_'"),
+        ("no_such:a", "clip 'mine': cannot import no_such:a: No module named 'no_such'"),
+        (Acted(lambda body, rest: None, (0,)), "tick, clip mine: expected a Motion of its play, got NoneType"),
+        (Difference("idle", "walk"), "tick, clip mine: idle is no loop that is recorded"),
+        (Showcase("prowl"), "tick, clip mine: tick has no preset prowl"),
+    ],
+)
+def test_what_is_no_clip_is_one_line(register, clip, message):
+    register(mine=clip)
+    with refused(message):
+        export.clips(TICK, ["mine"])
+
+
+def test_names_of_the_suite_stay_its_own(register):
+    register(walk=Turn(9.0))
+    with refused("clip 'walk': the suite has one of this name, and __main__ registers another"):
+        export.clips(TICK, ["walk"])
+
+
+def test_a_registered_name_is_taken(monkeypatch):
+    monkeypatch.setattr(registry, "MODULES", dict(registry.MODULES))
+    with refused("clip 'mine' is already registered; choose another name"):
+        for turn in (Turn(9.0), Turn(8.0)):
+            arc_suite.register(clips={"mine": turn})

@@ -1,0 +1,144 @@
+"""The guide to parts of other packages: its code runs, from a folder that is not the suite's."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+import programs
+import pytest
+from interpreters import ROOT, printed
+
+GUIDE = (ROOT / "docs" / "doors.md").read_text()
+SHUFFLING, USING_A_LAW, _, GESTURING, JOINT_COUNTER, MEASURING = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+EVALUATE, COLLECT, _, _, ANIMATE, COUNT, _ = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
+(ENTRY_POINT,) = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Write the guide's files, and return their folder."""
+    files = {"shuffling": SHUFFLING, "gesturing": GESTURING, "joint_counter": JOINT_COUNTER, "measuring": MEASURING}
+    for name, text in files.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder, monkeypatch):
+    """Return a function that runs a command of the guide in that folder, with other flags at the end."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder / "datasets"))
+    return lambda command, *flags: programs.run(*command.split(), *flags, cwd=folder)
+
+
+def test_a_law_moves_any_body(folder):
+    checks = """
+from arc_suite import evaluation
+for body in ("queen", "spider", "varied:3"):
+    environment = arc_suite.load(body, "walk", {"time_limit": 10.0})
+    speeds = [
+        evaluation.run(environment, Demonstrator(environment, preset), seed=0).progress["speed"]
+        for preset in ("shuffling:shuffle", shuffling.Shuffle(reach=0.2))
+    ]
+    assert 0.05 < speeds[0] < speeds[1], (body, speeds)
+"""
+    assert printed(USING_A_LAW + checks, folder=folder) == []
+
+
+def test_programs_take_a_law(run, folder):
+    done = run(EVALUATE, "--episodes=1", "--set=time_limit=1")
+    assert "\nqueen, shuffling:shuffle  " in programs.passed(done)
+    done = run(COLLECT, "--episodes=2", "--steps=20")
+    assert done.stdout.startswith("arc_suite/queen/walk/cpg-shuffling_shuffle-20steps-v0: 2 episodes"), done.stderr
+    done = run(EVALUATE.replace(":shuffle", ":shufle"), "--episodes=1")
+    line = "law 'shufle': shuffling registers no such law by arc_suite.register; did you mean 'shuffle'?\n"
+    programs.refused(done, f"arc-suite evaluate: {line}")
+
+
+def test_a_robot_brings_presets_of_a_law(folder):
+    code = """
+import arc_suite, shuffling
+from arc_suite.cpg.selection import presets_of
+from arc_suite.robots import ROBOTS
+body = ROBOTS["tick"].replace(name="ticker")
+arc_suite.register(body=body, presets={"shuffle": shuffling.Shuffle(reach=0.1)})
+print(presets_of(body)["shuffle"].reach, presets_of(ROBOTS["tick"])["shuffle"].reach)
+law = arc_suite.cpg.Demonstrator("ticker", "shuffling:shuffle").law
+print(type(law).__name__, law.sweep.max() < arc_suite.cpg.Demonstrator("tick", "shuffle").law.sweep.max())
+"""
+    assert printed(code, folder=folder) == ["0.1 0.15", "ShuffleLaw True"]
+
+
+@pytest.mark.slow
+def test_clips_are_animated(run, folder):
+    lines = programs.passed(run(ANIMATE)).splitlines()
+    assert [line.split()[0] for line in lines[1:4]] == ["walk", "creep", "bow"]
+    found = json.loads((folder / "queen.clips.json").read_text())
+    named = found["clips"]
+    assert named["creep_loop"]["forward_speed"] < 0.5 * named["walk_loop"]["forward_speed"]
+
+
+def test_a_program_runs_by_its_module(run):
+    assert programs.passed(run(COUNT)) == "queen has 18 joints\n"
+    text = programs.passed(run(COUNT, "--help"))
+    assert text.startswith("Count the joints of a body.\n\n  arc-suite measuring:count_joints") and "--robot=" in text
+    programs.refused(run(COUNT, "--robot=nobody"), "arc-suite measuring:count_joints: unknown robot 'nobody'")
+
+
+def installed(folder):
+    """Install the guide's program as a package does: metadata with the entry point of the guide."""
+    (group,) = re.findall(r'"(.*)"\]', ENTRY_POINT)
+    (entry,) = re.findall(r"\n(.*)\n", ENTRY_POINT)
+    metadata = folder / "legs_kit-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: legs-kit\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(f"[{group}]\n{entry.replace(chr(34), '')}\n")
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
+
+
+def command(environ, *arguments):
+    """Run `arc-suite` in an interpreter of its own."""
+    done = [sys.executable, "-c", "import arc_suite_command; arc_suite_command.main()", *arguments]
+    return subprocess.run(done, env=environ, capture_output=True, text=True)
+
+
+def test_an_installed_program_has_a_name(folder):
+    environ = installed(folder)
+    assert programs.passed(command(environ, "count_joints", "--robot=tick")) == "tick has 18 joints\n"
+    line = "arc-suite: unknown program 'count_joint'; did you mean 'count_joints'? (there are: build_model, "
+    programs.refused(command(environ, "count_joint"), line)
+
+
+def test_help_lists_an_installed_program_and_imports_nothing(folder):
+    environ = installed(folder)
+    (folder / "measuring.py").write_text("raise SystemExit('imported')\n")
+    lines = programs.passed(command(environ, "--help")).splitlines()
+    assert "  count_joints  of the package legs-kit" in lines
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('{"count_joints": "nowhere"}', "program 'count_joints': cannot import nowhere: No module named 'nowhere'\n"),
+        (
+            '{"count_joints": "json.tool_"}',
+            "program 'count_joints': cannot import json.tool_: module 'json' has no at",
+        ),
+        (
+            '{"count_joints": "json"}',
+            "program 'measuring:count_joints': expected a module with a docstring and a fun",
+        ),
+        ('{"doctor": "joint_counter"}', "program 'count_joints': measuring registers no such program by arc_suite.reg"),
+    ],
+)
+def test_a_program_that_is_none_is_one_line(run, folder, text, line):
+    (folder / "measuring.py").write_text(f"import arc_suite\narc_suite.register(module=__name__, programs={text})\n")
+    programs.refused(run(COUNT), f"arc-suite: {line}")
+
+
+def test_a_program_of_another_package_takes_no_name_of_the_suite(run, folder):
+    (folder / "measuring.py").write_text(MEASURING.replace("count_joints", "doctor"))
+    line = "program 'doctor': the suite has one of this name, and measuring registers another\n"
+    programs.refused(run("arc-suite measuring:doctor"), f"arc-suite: {line}")
+    assert run("arc-suite doctor --version").returncode == 0

@@ -1,0 +1,144 @@
+"""Files that name a module of another package: reading them imports nothing, and one line says what is missing."""
+
+import json
+import sys
+
+import networks
+import numpy as np
+import programs
+import pytest
+
+import arc_suite
+from arc_suite import policies, registry
+from arc_suite.cpg import selection
+from arc_suite.learning.agents import configuration
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.policies import network
+
+# A module whose import leaves a mark, and registers a part of each kind that a run can name.
+STROLLING = '''
+import pathlib
+from typing import NamedTuple
+import arc_suite
+from arc_suite.arenas import FLAT
+from arc_suite.cpg.law import Clocked
+from arc_suite.learning.agents.algorithms import ALGORITHMS
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks.walk import Walk
+
+pathlib.Path(__file__).with_name("imported").touch()
+
+class Preset(NamedTuple):
+    """Parameters of a law."""
+
+class Law(Clocked):
+    """A law that rests."""
+    preset = Preset()
+    def __init__(self, task, preset):
+        super().__init__(lambda steps, quaternion, angles, velocities: 0.0 * angles)
+
+class Stroll(Walk):
+    """The task walk."""
+    name = "stroll"
+
+arc_suite.register(
+    module=__name__,
+    body=ROBOTS["tick"].replace(name="beetle"),
+    tasks=(Stroll,),
+    arenas={"lawn": lambda body: FLAT},
+    families={"crab": lambda seed: ROBOTS["tick"].replace(name=f"crab_{seed}")},
+    laws={"rest": Law},
+    networks={"deep": "no_such_module:Deep.of"},
+    algorithms={"search": ALGORITHMS["ppo"]},
+)
+'''
+# Fields of a configuration that name the module.
+NAMES = {
+    "robot": {"robot": "strolling:beetle"},
+    "family": {"robot": "strolling:crab:3"},
+    "robots": {"robot": "queen,strolling:crab:0-3", "algorithm": "dagger"},
+    "task": {"task": "strolling:stroll"},
+    "arena": {"task_kwargs": {"arena": "strolling:lawn"}},
+    "arena in training": {"training": {"arena": "strolling:lawn"}},
+    "algorithm": {"algorithm": "strolling:search"},
+    "network": {"hyperparameters": {"network": "strolling:deep"}},
+    "preset": {"algorithm": "dagger", "hyperparameters": {"preset": "strolling:rest"}},
+}
+LINE = "files import nothing; import 'strolling' first"
+IN_A_POLICY = {name: NAMES[name] for name in ("robot", "family", "robots", "task", "arena")}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Write the module where it can be imported, and return its folder."""
+    (tmp_path / "strolling.py").write_text(STROLLING)
+    monkeypatch.syspath_prepend(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def without_additions(monkeypatch):
+    """Take back what the import of the module registers."""
+    tables = (*registry.ADDITIONS.values(), registry.MODULES, registry.ROBOTS, registry.TASKS, registry.ARENAS)
+    tables += (registry.FAMILIES, selection.LAWS)
+    before = [dict(table) for table in tables]
+    yield
+    for table, entries in zip(tables, before, strict=True):
+        table.clear()
+        table.update(entries)
+    sys.modules.pop("strolling", None)
+
+
+@pytest.mark.parametrize("change", NAMES.values(), ids=NAMES)
+def test_a_configuration_imports_nothing(folder, change):
+    path = folder / "run.json"
+    path.write_text(json.dumps({"robot": "tick"} | change))
+    with pytest.raises(registry.NotImported, match=rf"^{path}: \w+ 'strolling:\w+': {LINE}$"):
+        configuration.read(path)
+    assert not (folder / "imported").exists()
+
+
+def test_a_configuration_takes_names_of_imported_modules(folder, without_additions):
+    import strolling  # noqa: F401
+
+    for name, change in NAMES.items():
+        run = Configuration.from_dict({"robot": "tick"} | change)
+        again = Configuration.from_dict(json.loads(json.dumps(run.to_dict())))
+        # One body of a family is written down whole.
+        assert again == run and run.modules == (() if name == "family" else ("strolling",))
+
+
+def test_a_configuration_names_modules_as_other_processes_need_them(folder, without_additions):
+    import strolling  # noqa: F401
+
+    run = Configuration.of(arc_suite.Setup.of("beetle", "stroll"), "search", {"network": "deep"})
+    assert run.algorithm == "strolling:search" and run.hyperparameters.network == "strolling:deep"
+    assert run.name == "beetle-stroll-strolling.search-0"
+    assert "--hp=network=strolling:deep" in run.command and "--algorithm=strolling:search" in run.command
+    assert Configuration.of(arc_suite.Setup.of("tick"), "dagger", {"preset": "rest"}).modules == ("strolling",)
+    assert Configuration.of(arc_suite.Setup.of("tick")).modules == ()
+
+
+@pytest.mark.parametrize("change", IN_A_POLICY.values(), ids=IN_A_POLICY)
+def test_a_policy_imports_nothing(folder, change):
+    network.save(folder / "policy.npz", networks.made())
+    with np.load(folder / "policy.npz") as stored:
+        arrays = dict(stored)
+    described = {name: value for name, value in change.items() if name != "algorithm"}
+    arrays["policy"] = np.array(json.dumps(json.loads(str(arrays["policy"])) | described))
+    np.savez(folder / "policy.npz", **arrays)
+    for read in (policies.setup_of, policies.trained, policies.training_seeds):
+        with pytest.raises(ValueError, match=rf"^policy .*policy\.npz: \w+ 'strolling:\w+': {LINE}$"):
+            read(str(folder / "policy.npz"))
+    assert not (folder / "imported").exists()
+
+
+def test_train_names_modules_for_a_configuration(folder):
+    (folder / "run.json").write_text('{"robot": "tick", "algorithm": "strolling:search", "steps": 0}')
+    line = "run.json: algorithm 'strolling:search': files import nothing; import 'strolling' first, by --modules\n"
+    programs.refused(programs.arc_suite("train", "--config=run.json", cwd=folder), f"arc-suite train: {line}")
+    assert not (folder / "imported").exists()
+    done = programs.arc_suite("train", "--config=run.json", "--modules=strolling", cwd=folder)
+    programs.refused(done, "arc-suite train: run.json: steps: expected an integer from 1, got 0\n")
+    done = programs.arc_suite("train", "--modules=stroling", cwd=folder)
+    programs.refused(done, "arc-suite train: --modules: cannot import stroling: No module named 'stroling'; start in ")
