@@ -18,11 +18,20 @@ from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.contract import STEPS
+from arc_suite.tasks.modifiers import MODIFIERS, Modifier
 from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
 
 BODIES = "bodies"  # in place of a robot in ids of environments of different bodies
 
-_TABLES: dict[str, dict[str, Any]] = {"task": TASKS, "arena": ARENAS, "family": FAMILIES, **ADDITIONS}
+_TABLES: dict[str, dict[str, Any]] = {
+    "task": TASKS,
+    "arena": ARENAS,
+    "family": FAMILIES,
+    "modifier": MODIFIERS,
+    **ADDITIONS,
+}
+
+_OF_ALL_TASKS = ("time_limit", "arena", "random", "on_divergence")  # settings that no modifier has
 
 
 def register(
@@ -35,6 +44,7 @@ def register(
     tasks: Iterable[type[Task]] = (),
     arenas: Mapping[str, Any] | None = None,
     families: Mapping[str, Callable[[int], Body]] | None = None,
+    modifiers: Iterable[type[Modifier]] = (),
     laws: Mapping[str, type[Law]] | None = None,
     networks: Mapping[str, Any] | None = None,
     algorithms: Mapping[str, Any] | None = None,
@@ -61,6 +71,8 @@ def register(
         families: functions by name, from a seed to a body, always the same for the same seed; see
             `bodies.families.sound`. `name:seed` then stands for the body wherever a domain does, and comes before
             a module of that name.
+        modifiers: classes of `tasks.modifiers.Modifier`. Their settings become settings of every task; a task has the
+            modifier where one of them is given.
         laws: classes of demonstrators' laws by name; see `cpg.law.Law`. Presets of their class have the law,
             and `name` stands for the class's own `preset` on every body.
         networks: functions by name that make an architecture for a task, for `--hp network=`; see
@@ -81,6 +93,7 @@ def register(
         "task": {_task_name(task): task for task in tasks},
         "arena": arenas,
         "family": families,
+        "modifier": {name: kind for kind in modifiers for name in _modifier_settings(kind)},
         "law": laws,
         "network": networks,
         "algorithm": algorithms,
@@ -97,7 +110,7 @@ def register(
         if (parameters, presets, visuals) != (None, None, None):
             raise ValueError("parameters, presets and visuals belong to a body, and none is given")
         if not parts:
-            kinds = "a body, tasks, arenas, families, laws, networks, algorithms, clips or programs"
+            kinds = "a body, tasks, arenas, families, modifiers, laws, networks, algorithms, clips or programs"
             raise ValueError(f"nothing to register: give {kinds}")
     else:
         _register_body(body, parameters or {}, presets, visuals, {**LAWS, **law_by_preset})
@@ -152,6 +165,23 @@ def _task_name(task) -> str:
         lacks = " and no ".join(missing)
         raise ValueError(f"task {checks.shown(name)}: has no {lacks}, which arc_suite.tasks.Task requires")
     return name
+
+
+def _modifier_settings(kind) -> Mapping[str, Any]:
+    """Return the default values of a modifier's settings by name.
+
+    Raises:
+        ValueError: it is no modifier, has no settings, or one that tasks have.
+    """
+    if not (isinstance(kind, type) and issubclass(kind, Modifier) and issubclass(kind, tuple)):
+        expected = "NamedTuples that inherit from arc_suite.tasks.modifiers.Modifier"
+        raise ValueError(f"modifiers: expected {expected}, got {checks.shown(kind)}")
+    if not kind.defaults:
+        raise ValueError(f"modifier {kind.__name__}: expected settings in its `defaults`, got none")
+    of_tasks = {name for task in TASKS.values() for name in getattr(task, "names", tuple)()}
+    if taken := sorted(kind.defaults.keys() & {*of_tasks, *_OF_ALL_TASKS}):
+        raise ValueError(f"modifier {kind.__name__}: {taken[0]} is a setting of tasks; choose another name")
+    return kind.defaults
 
 
 def _register_body(body, parameters, presets, visuals, laws) -> None:

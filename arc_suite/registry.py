@@ -20,6 +20,7 @@ from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, load_body
 from arc_suite.tasks import TASKS, Task
+from arc_suite.tasks.modifiers import MODIFIERS
 
 # Functions from a seed to a body, by name, or where they are; `registration.register` adds those of other packages.
 FAMILIES: dict[str, Callable[[int], Body] | str] = {
@@ -219,6 +220,31 @@ def arena_maker(name: str) -> Callable[[Body], Arena]:
         ValueError: an unknown name.
     """
     return _find(name, ARENAS, "arena")
+
+
+def modifier_setting(name: str) -> str | None:
+    """Return the setting of a modifier that a name of a setting stands for, `name` or `module:name`.
+
+    None for settings that are no modifier's.
+
+    Raises:
+        ValueError: as of other parts of a module.
+    """
+    if ":" in name:
+        _find(name, MODIFIERS, "modifier")
+        return bare(name)
+    return name if name in MODIFIERS else None
+
+
+def stored_settings(settings: Mapping[str, Any]) -> None:
+    """Check that settings of a task, as a file gives them, import nothing.
+
+    Raises:
+        NotImported: the module of a modifier or of an arena has not been imported yet.
+    """
+    for name in settings:
+        imported("modifier", name)
+    imported("arena", str(settings.get("arena", "flat")))
 
 
 def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:

@@ -11,7 +11,7 @@ from arc_suite import checks, registry
 from arc_suite.models.sizing import simulation
 from arc_suite.models.standing import stood
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks import modified_task, modifiers, parameters
+from arc_suite.tasks import modified_task, parameters
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
@@ -36,7 +36,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     time_limit, arena = settings.pop("time_limit", None), settings.pop("arena", None)
     if arena is not None and kind.own_arena:
         raise ValueError(f"arena: task {kind.name} has a ground of its own, expected none")
-    changes = {**kind.modifiers, **{name: settings.pop(name) for name in modifiers.MODIFIERS if name in settings}}
+    changes = kind.modifiers | _take_modifiers(settings)
     settings = kind.settings_for(body, settings)
     arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
     model = compiled(body, arena)
@@ -53,6 +53,12 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     )
     task = kind(scene, settings, _step_limit(time_limit, step))
     return modified_task.modified(task, changes) if changes else task, model
+
+
+def _take_modifiers(settings: dict[str, Any]) -> dict[str, Any]:
+    """Remove the settings of modifiers from others, and return them by name."""
+    names = {name: registry.modifier_setting(name) for name in settings}
+    return {setting: settings.pop(name) for name, setting in names.items() if setting is not None}
 
 
 # What an environment keeps from its opening on, and what to do instead.
@@ -93,6 +99,7 @@ def with_changes(task: Task, settings: Mapping[str, Any], text: str) -> Task:
         ValueError: as `checked_changes`.
     """
     changes = checks.mapping("settings", json.loads(text))
+    registry.stored_settings(changes)  # a snapshot may have come from a file
     for name in changes.keys() & _KEPT.keys():
         raise ValueError(f"setting {name!r}: environments keep it; {_KEPT[name]}")
     if not changes:

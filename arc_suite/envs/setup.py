@@ -72,7 +72,8 @@ class Setup:
             )
         if several:
             checks.name(settings.get("actions", "position"), ["position"], "actions of different bodies")
-        text = checks.json_text("task_kwargs", dict(settings))
+        named = {registry.importable("modifier", name): value for name, value in settings.items()}
+        text = checks.json_text("task_kwargs", named)
         if isinstance(arena := settings.get("arena"), str):
             registry.arena_maker(arena)
         return cls(domain, registry.importable("task", task.name), text)
@@ -237,7 +238,7 @@ class Setup:
                 raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.shown(fields.get(name))}")
         robot, task, settings = registry.stored(fields["robot"]), fields["task"], fields["task_kwargs"]
         registry.imported("task", task)
-        registry.imported("arena", str(settings.get("arena", "flat")))
+        registry.stored_settings(settings)
         return cls._checked(robot, task, settings)  # draws no body of several
 
     def provenance(self) -> dict[str, Any]:

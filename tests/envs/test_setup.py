@@ -102,6 +102,7 @@ def test_names_and_settings_are_checked_when_it_is_made(arguments, message):
         ({"robot": "strolling:queen"}, "files import nothing; import 'strolling' first"),
         ({"task": "strolling:walk"}, "files import nothing; import 'strolling' first"),
         ({"task_kwargs": {"arena": "strolling:flat"}}, "files import nothing; import 'strolling' first"),
+        ({"task_kwargs": {"strolling:wind": 1.0}}, "files import nothing; import 'strolling' first"),
     ],
 )
 def test_files_import_nothing_and_open_nothing(change, message):

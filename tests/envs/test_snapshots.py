@@ -158,3 +158,16 @@ def test_a_snapshot_of_directed_with_gait_and_pose_in_the_command_is_refused():
     former = arrays | {f"memory/{place}": arrays[f"memory/{index}"] for place, index in enumerate(order)}
     with refused("snapshot: of another task or number of environments: memory: expected", begins=True):
         environments.restore(former)
+
+
+def test_a_snapshot_imports_no_module_that_its_settings_name():
+    environments = envs("shoved", random=1)
+    environments.reset()
+    environments.change_settings({"kicks": 0.5})
+    arrays = environments.snapshot()
+    texts = {name: array for name, array in arrays.items() if array.dtype.kind == "U"}
+    assert texts
+    hostile = arrays | {name: np.array(['{"strolling:wind": 1.0}'] * NUM_ENVS) for name in texts}
+    line = "snapshot: of another task or number of environments: modifier 'strolling:wind': files import nothing;"
+    with refused(line, begins=True):
+        environments.restore(hostile)

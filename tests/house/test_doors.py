@@ -11,7 +11,9 @@ import pytest
 from interpreters import ROOT, printed
 
 GUIDE = (ROOT / "docs" / "doors.md").read_text()
-SHUFFLING, USING_A_LAW, _, GESTURING, JOINT_COUNTER, MEASURING = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+SHUFFLING, USING_A_LAW, GALES, USING_A_MODIFIER, _, GESTURING, JOINT_COUNTER, MEASURING = re.findall(
+    r"```python\n(.*?)```", GUIDE, re.DOTALL
+)
 EVALUATE, COLLECT, _, _, ANIMATE, COUNT, _ = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
 (ENTRY_POINT,) = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
 
@@ -19,7 +21,8 @@ EVALUATE, COLLECT, _, _, ANIMATE, COUNT, _ = re.findall(r"^arc-suite .*$", GUIDE
 @pytest.fixture
 def folder(tmp_path):
     """Write the guide's files, and return their folder."""
-    files = {"shuffling": SHUFFLING, "gesturing": GESTURING, "joint_counter": JOINT_COUNTER, "measuring": MEASURING}
+    files = {"shuffling": SHUFFLING, "gales": GALES, "gesturing": GESTURING}
+    files |= {"joint_counter": JOINT_COUNTER, "measuring": MEASURING}
     for name, text in files.items():
         (tmp_path / f"{name}.py").write_text(text)
     return tmp_path
@@ -68,6 +71,80 @@ law = arc_suite.cpg.Demonstrator("ticker", "shuffling:shuffle").law
 print(type(law).__name__, law.sweep.max() < arc_suite.cpg.Demonstrator("tick", "shuffle").law.sweep.max())
 """
     assert printed(code, folder=folder) == ["0.1 0.15", "ShuffleLaw True"]
+
+
+MODIFIED = """
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import conformance
+setup = Setup.of("tick", "walk", {"wind": 0.2, "kicks": 1.0})
+print(setup.to_dict()["task_kwargs"], conformance.difference(setup, 20))
+wind = environment.task.privileged["wind"]
+import numpy as np
+print(round(float(np.hypot(*wind)), 9), len(environment.task.definition.changes))
+plain = arc_suite.load("queen", "steer", {"kicks": 1.0, "random": 3})
+windy = arc_suite.load("queen", "steer", {"kicks": 1.0, "random": 3, "wind": 0.1})
+one, other = plain.reset(), windy.reset()
+print(all((one.observation[name] == other.observation[name]).all() for name in one.observation))
+other = windy.step(np.zeros(18))
+print((plain.step(np.zeros(18)).observation["velocities"] != other.observation["velocities"]).any())
+symmetry = windy.task.definition.symmetry
+"""
+
+
+def test_a_modifier_blows_on_any_task(folder):
+    """In a batch as alone, among the suite's own; and the stream of seeds gives what it gave without it."""
+    *_, settings, numbers, is_same_start, is_pushed = printed(USING_A_MODIFIER + MODIFIED, folder=folder)
+    assert settings == "{'gales:wind': 0.2, 'kicks': 1.0} None"
+    assert (numbers, is_same_start, is_pushed) == ("0.2 12", "True", "True")
+
+
+def test_programs_take_a_modifier(run):
+    done = run("arc-suite evaluate --robot tick --set gales:wind=0.2", "--episodes=1", "--set=time_limit=1")
+    assert "\ntick, " in programs.passed(done)
+    line = "arc-suite evaluate: wind: expected a number from 0 to 1, got 2"
+    programs.refused(run("arc-suite evaluate --robot tick --set gales:wind=2", "--episodes=1"), line)
+
+
+REFUSED = """
+import arc_suite, numpy as np
+from arc_suite import registration
+from arc_suite.tasks.modifiers import Modifier
+from typing import NamedTuple
+
+def refused(**parts):
+    try:
+        arc_suite.register(**parts)
+    except ValueError as error:
+        print(error)
+
+class Fields(NamedTuple):
+    gravity: float
+
+class Plain(Modifier):
+    defaults = {"gravity": 1.0}
+
+class Empty(Fields, Modifier):
+    pass
+
+class Taken(Fields, Modifier):
+    defaults = {"time_limit": 1.0}
+
+class Again(Fields, Modifier):
+    defaults = {"kicks": 1.0}
+
+refused(modifiers=(Plain,))
+refused(modifiers=(Empty,))
+refused(modifiers=(Taken,))
+refused(modifiers=(Again,))
+"""
+
+
+def test_mistakes_in_a_modifier_are_one_line(folder):
+    plain, empty, taken, again = printed(REFUSED, folder=folder)
+    assert plain.startswith("modifiers: expected NamedTuples that inherit from arc_suite.tasks.modifiers.Modifier, got")
+    assert empty == "modifier Empty: expected settings in its `defaults`, got none"
+    assert taken == "modifier Taken: time_limit is a setting of tasks; choose another name"
+    assert again == "modifier 'kicks' is already registered; choose another name"
 
 
 @pytest.mark.slow

@@ -12,9 +12,12 @@ from arc_suite.bodies import BodiesEnv, tokens
 from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks import privileged
+from arc_suite.tasks import TASKS, privileged
+from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.modifiers import Kicks, Motors, Pushes
 from arc_suite.tasks.modifiers.motors import FAILS_FROM
+from arc_suite.tasks.parts import Joints, Legs, Scalar
+from arc_suite.tasks.suite import Steer
 
 DRAWN = {"friction": (0.5, 1.0), "mass": (0.8, 1.2), "payload": (0.1, 0.3), "center_of_mass": 0.1}
 DRAWN |= {"joint_offset": 0.05, "joint_strength": (0.5, 1.0), "motor_strength": 0.8, "armature": (0.8, 1.2)}
@@ -147,6 +150,37 @@ def test_different_bodies_have_one_padded_layout(mode):
             [each.step(np.zeros(each.action_space.shape))[-1] for each in alone],
         )
     assert (ends > 0) == (mode == "SameStep")
+
+
+class Loaded(Steer):
+    """Steer, with a privileged block of another package: the load of each foot and of each joint."""
+
+    name = "loaded"
+
+    @property
+    def privileged_blocks(self):
+        body = self.scene.body
+        return {**super().privileged_blocks, "load": Block((Legs(body), Scalar(), Joints(body)))}
+
+    def privileged(self, memory, data):
+        body = self.scene.body
+        numbers = np.concatenate([np.full(len(body.legs), 2.0), [3.0], np.full(len(body.joint_names), 4.0)])
+        load = np.broadcast_to(numbers, (*data.qpos.shape[:-1], len(numbers)))
+        return {**super().privileged(memory, data), "load": load}
+
+
+def test_a_block_of_another_package_is_padded_by_its_parts(monkeypatch):
+    """Bodies of four and six legs have one layout."""
+    monkeypatch.setitem(TASKS, "loaded", Loaded)
+    mixed = BodiesEnv("loaded", 2, ["leaper", "queen"], privileged=True)
+    _, info = mixed.reset(seed=0)
+    blocks = privileged.split(tokens.privileged_sizes(mixed.tasks[0]), info["privileged"])
+    assert blocks["load"].shape == (2, 12 + 1 + 48)
+    for load, body in zip(blocks["load"], mixed.bodies, strict=True):
+        legs, joints = len(body.legs), len(body.joint_names)
+        assert_array_equal(load[:12], [2.0] * legs + [0.0] * (12 - legs))
+        assert load[12] == 3.0 and (load[13:] == 4.0).sum() == joints and set(load[13:]) == {0.0, 4.0}
+        assert_array_equal(load[13 : 13 + 4], [4.0] * (joints // legs) + [0.0] * (4 - joints // legs))
 
 
 def test_vector_environments_of_gymnasium_batch_them():

@@ -102,6 +102,16 @@ def test_a_modified_task_has_every_member_of_the_contract_and_of_its_own():
         task.contxet  # noqa: B018
 
 
+def test_methods_of_a_task_are_given_its_own_memory():
+    """Also those that the contract does not know."""
+    environment = arc_suite.load("tick", "steer", {"kicks": 1.0})
+    environment.reset()
+    environment.step(np.zeros(18))
+    task, memory = environment.task.definition, environment.task.memory
+    assert task.judged(memory) == task.task.judged(memory.task) == 1
+    assert task.phase(memory) == task.task.phase(memory.task)
+
+
 def test_a_modified_task_is_copied_and_pickled():
     task = arc_suite.load("tick", "shoved").task.definition
     for again in (copy.deepcopy(task), pickle.loads(pickle.dumps(task))):

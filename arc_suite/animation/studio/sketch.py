@@ -138,7 +138,7 @@ def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
     if sketch.kicks:
         found["kicks"] = sketch.kicks
     found |= given
-    registry.imported("arena", str(found.get("arena", "flat")))  # a visitor of the page imports nothing
+    registry.stored_settings(found)  # a visitor of the page imports nothing
     return found
 
 

@@ -241,7 +241,9 @@ def _registered_names(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     hyperparameters = checks.mapping("hyperparameters", fields.get("hyperparameters"))
     names = [("robot", name) for name in _names_of_bodies(fields.get("robot"))]
     names += [("task", fields.get("task")), ("algorithm", fields.get("algorithm"))]
-    names += [("arena", checks.mapping(key, fields.get(key)).get("arena")) for key in ("task_kwargs", "training")]
+    for key in ("task_kwargs", "training"):
+        settings = checks.mapping(key, fields.get(key))
+        names += [("arena", settings.get("arena")), *(("modifier", name) for name in settings)]
     names += [(kind, hyperparameters.get(field)) for field, kind in _NAMES_IN_HYPERPARAMETERS.items()]
     yield from ((kind, name) for kind, name in names if isinstance(name, str))
 
