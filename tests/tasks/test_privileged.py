@@ -176,11 +176,11 @@ def test_a_block_of_another_package_is_padded_by_its_parts(monkeypatch):
     _, info = mixed.reset(seed=0)
     blocks = privileged.split(tokens.privileged_sizes(mixed.tasks[0]), info["privileged"])
     assert blocks["load"].shape == (2, 12 + 1 + 48)
-    for load, body in zip(blocks["load"], mixed.bodies, strict=True):
+    for numbers, body in zip(blocks["load"], mixed.bodies, strict=True):
         legs, joints = len(body.legs), len(body.joint_names)
-        assert_array_equal(load[:12], [2.0] * legs + [0.0] * (12 - legs))
-        assert load[12] == 3.0 and (load[13:] == 4.0).sum() == joints and set(load[13:]) == {0.0, 4.0}
-        assert_array_equal(load[13 : 13 + 4], [4.0] * (joints // legs) + [0.0] * (4 - joints // legs))
+        assert_array_equal(numbers[:12], [2.0] * legs + [0.0] * (12 - legs))
+        assert numbers[12] == 3.0 and (numbers[13:] == 4.0).sum() == joints and set(numbers[13:]) == {0.0, 4.0}
+        assert_array_equal(numbers[13 : 13 + 4], [4.0] * (joints // legs) + [0.0] * (4 - joints // legs))
 
 
 def test_vector_environments_of_gymnasium_batch_them():
