@@ -49,7 +49,7 @@ ALLOWED = {
     "warm_up": r"value_warm_up$",  # the field's word
     "cloning": r" BehaviorCloning$",  # what bc abbreviates
     # Arena and body of a task; lights and floor of a picture; arguments that wrappers of others hand on.
-    "scene": r"tasks\.|models\.|task_view\.|mjx\.Env\.render",
+    "scene": r"tasks scene$|tasks\.|models\.|task_view\.|mjx\.Env\.render",
 }
 
 
