@@ -8,8 +8,10 @@ import importlib.abc
 import importlib.machinery
 import sys
 
+# Of packages, their modules too.
 MOVED = {
     "arc_suite.envs.bodies": "arc_suite.bodies",
+    "arc_suite.envs.worlds": "arc_suite.learning.worlds",
     "arc_suite.models.families": "arc_suite.bodies.families",
     "arc_suite.models.importing": "arc_suite.importing",
     "arc_suite.policies.universal": "arc_suite.bodies.universal",
@@ -25,11 +27,19 @@ class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
     def find_spec(self, fullname: str, path=None, target=None) -> importlib.machinery.ModuleSpec | None:
         """Return a spec of a former path; None for other names."""
-        return importlib.machinery.ModuleSpec(fullname, self) if fullname in MOVED else None
+        return None if find_path(fullname) is None else importlib.machinery.ModuleSpec(fullname, self)
 
     def exec_module(self, module) -> None:
         """Put the module of today in the place of the empty one that the import system has made."""
-        sys.modules[module.__name__] = importlib.import_module(MOVED[module.__name__])
+        sys.modules[module.__name__] = importlib.import_module(find_path(module.__name__))
+
+
+def find_path(name: str) -> str | None:
+    """Return the path of today of a module, or of a module in a package, that has moved; None for others."""
+    for former, path in MOVED.items():
+        if name == former or name.startswith(f"{former}."):
+            return path + name.removeprefix(former)
+    return None
 
 
 def install_finder() -> None:

@@ -1,4 +1,4 @@
-"""Measures worlds of `arc_suite.envs.worlds.mjx` on this machine's accelerator, and writes tables into docs/gpu.md.
+"""Measures worlds of `arc_suite.learning.worlds.mjx` on this machine's accelerator, and writes tables into docs/gpu.md.
 
 Prints control steps a second, memory and compile time, whole episodes against a processor's, and the minutes in which
 PPO earns what the demonstrator `medium` does. Needs the extras `learn` and `gpu`.
@@ -27,12 +27,11 @@ from arc_suite.cli import program
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.selection import law, presets_of
 from arc_suite.envs.setup import Setup
-from arc_suite.envs.worlds import mjx
 from arc_suite.learning.agents import run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
+from arc_suite.learning.worlds import device, mjx
 from arc_suite.robots import ROBOTS
-from arc_suite.simulation import device
 
 FLAGS = flags.FLAGS
 flags.DEFINE_list("robots", list(ROBOTS), "Whose walks.")

@@ -15,7 +15,7 @@ jax.device_put_replicated = lambda tree, devices: jax.tree.map(lambda leaf: jnp.
 from brax.training.agents.ppo import train as ppo  # noqa: E402
 from mujoco_playground import wrapper  # noqa: E402
 
-from arc_suite.envs.worlds import mjx  # noqa: E402
+from arc_suite.learning.worlds import mjx  # noqa: E402
 
 
 def main():

@@ -44,6 +44,12 @@ def test_step_imports_neither_wing_nor_annex():
     assert interpreters.printed(_STEP) == ["[]"]
 
 
+def test_modules_of_a_former_package_are_aliases():
+    """Not second copies of them."""
+    former, today = "arc_suite.models.importing.naming", "arc_suite.importing.naming"
+    assert importlib.import_module(former) is importlib.import_module(today)
+
+
 @pytest.mark.parametrize("former", moved.MOVED)
 def test_former_paths_are_aliases(former):
     assert importlib.import_module(former) is importlib.import_module(moved.MOVED[former])

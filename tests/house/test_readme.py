@@ -36,8 +36,9 @@ BLOCKS = [
 
 SCHEMATIC = {"arc-suite --help", "arc-suite PROGRAM --help", "arc-suite PROGRAM", "python -m arc_suite PROGRAM"}
 BLENDER = {"python tools/to_fbx.py queen.glb queen.fbx"}  # make check-blender
+OF_ANOTHER_PACKAGE = re.compile(r"arc-suite (measuring:)?count_joints")  # test_doors has the package
 COMMANDS = {text for page in PAGES for text in page_commands.commands(page.read_text())}
-COMMANDS = sorted(COMMANDS - SCHEMATIC - BLENDER)
+COMMANDS = sorted(text for text in COMMANDS - SCHEMATIC - BLENDER if not OF_ANOTHER_PACKAGE.match(text))
 
 
 def _page(name):
@@ -134,4 +135,4 @@ def test_the_map_names_every_room():
     named = set(re.findall(r"\b(\w+)(?:/|\.py)", text)) - {"tools", "build_model", "arc_suite"}
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     layers = next(contract["layers"] for contract in contracts if contract["type"] == "layers")
-    assert named - {"worlds"} == {room for layer in layers for room in layer.split(" | ")}
+    assert named == {room for layer in layers for room in layer.split(" | ")}

@@ -1,4 +1,4 @@
-"""What tests of `arc_suite.envs.worlds.mjx` share: compiled environments, and walks on a processor to compare with."""
+"""What tests of `learning.worlds.mjx` share: compiled environments, and walks on a processor to compare with."""
 
 import functools
 import importlib.util
@@ -26,7 +26,7 @@ def compiled(robot, task="walk", settings=(), impl="jax", worlds=WORLDS):
     """An environment, and its compiled functions of a batch: `start` of seeds and `step`."""
     import jax
 
-    from arc_suite.envs.worlds import mjx
+    from arc_suite.learning.worlds import mjx
 
     env = mjx.load(robot, task, dict(settings), impl, num_starts=16, num_envs=worlds)
     return env, jax.jit(jax.vmap(env.start)), jax.jit(jax.vmap(env.step))

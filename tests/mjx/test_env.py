@@ -1,4 +1,4 @@
-"""`arc_suite.envs.worlds.mjx`: its starts, its interface and its errors."""
+"""`arc_suite.learning.worlds.mjx`: its starts, its interface and its errors."""
 
 import subprocess
 import sys
@@ -14,9 +14,8 @@ import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.envs.worlds import mjx
-from arc_suite.envs.worlds.randomization import randomization_fn
-from arc_suite.simulation import device
+from arc_suite.learning.worlds import device, mjx
+from arc_suite.learning.worlds.randomization import randomization_fn
 from arc_suite.tasks import privileged
 
 ROBOT = "leaper"  # the fastest to compile
@@ -204,8 +203,8 @@ def test_errors_are_one_line(arguments, message):
 @pytest.mark.parametrize(
     ("module", "code", "extra"),
     [
-        ("mujoco.mjx", "from arc_suite.envs.worlds import mjx", "gpu"),
-        ("warp", "from arc_suite.envs.worlds import mjx; mjx.load('leaper', 'walk', impl='warp')", "gpu"),
+        ("mujoco.mjx", "from arc_suite.learning.worlds import mjx", "gpu"),
+        ("warp", "from arc_suite.learning.worlds import mjx; mjx.load('leaper', 'walk', impl='warp')", "gpu"),
     ],
 )
 def test_a_missing_extra_is_one_line(module, code, extra):

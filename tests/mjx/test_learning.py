@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import collecting, critic_blocks, on_policy, worlds
+from arc_suite.learning.agents import collecting, critic_blocks, on_policy, world_rollouts
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.normalizer import Moments
@@ -53,7 +53,7 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     monkeypatch.setattr(command, "LONGEST", 6)
     run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | {"horizon": 12, "simulation": "mjx"})
     hp, context = run.hyperparameters, run.context(pathlib.Path())
-    collector = worlds.Worlds(hp, context)
+    collector = world_rollouts.Worlds(hp, context)
     state = ppo.begin(hp, collector.architecture, np.random.default_rng(0))
     normalize = Moments.none(collector.task.size).normalizer()
     rollout = jax.tree.map(np.asarray, collector.roll_out(state.policy, normalize, 0.01, 0, 0))

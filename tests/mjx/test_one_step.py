@@ -9,8 +9,7 @@ from mujoco import mjx as upstream
 from mujoco.mjx._src import collision_driver
 
 from arc_suite.bodies import generator
-from arc_suite.envs.worlds import mjx
-from arc_suite.simulation import device
+from arc_suite.learning.worlds import device, mjx
 
 CAPSULE = collision_driver.GeomType.PLANE, collision_driver.GeomType.CAPSULE
 BODIES = {name: name for name in ("leaper", "queen", "bastion", "tick")} | {"random": generator.random_body(3)}

@@ -23,7 +23,7 @@ def test_terrain(task, apart):
 
 def test_overflow_is_told(monkeypatch):
     """Tables of two contacts a world: Warp drops the others in the steps that have more, and says so."""
-    from arc_suite.simulation import device
+    from arc_suite.learning.worlds import device
 
     monkeypatch.setattr(device, "table_sizes", lambda model: (2, 64))
     compiled.cache_clear()

@@ -15,8 +15,8 @@ pytest.importorskip("mujoco_playground", reason="make check-mjx")
 
 from mujoco_playground import wrapper
 
-from arc_suite.envs.worlds import mjx
-from arc_suite.envs.worlds.randomization import randomization_fn
+from arc_suite.learning.worlds import mjx
+from arc_suite.learning.worlds.randomization import randomization_fn
 
 ROOT = pathlib.Path(__file__).parents[2]
 LENGTH = 7

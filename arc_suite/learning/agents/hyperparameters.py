@@ -185,7 +185,7 @@ class ProximalPolicy:
     Attributes:
         start: folder of a run, or a policy file, whose policy learning starts from; "" for none.
         simulation: what simulates the environments: "mujoco", on a processor; or "mjx" or "warp", the
-            implementations of `arc_suite.envs.worlds.mjx`, where all of learning stays on JAX's device.
+            implementations of `arc_suite.learning.worlds.mjx`, where all of learning stays on JAX's device.
         num_envs: environments.
         horizon: control steps of each environment between updates.
         network: what acts and values: "perceptron", two layers that see all of an observation; "legs", which

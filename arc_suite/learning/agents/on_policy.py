@@ -107,9 +107,9 @@ def _environments(hp: ProximalPolicy, context: RunContext):
         raise ValueError(f"critic_blocks: expected none with several bodies, got {', '.join(hp.critic_blocks)}")
     if hp.simulation == "mujoco":
         return collecting.Environments(hp, context)
-    from arc_suite.learning.agents import worlds  # needs the extra `gpu`
+    from arc_suite.learning.agents import world_rollouts  # needs the extra `gpu`
 
-    return worlds.Worlds(hp, context)
+    return world_rollouts.Worlds(hp, context)
 
 
 def batch_of(

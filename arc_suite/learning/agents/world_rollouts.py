@@ -1,4 +1,4 @@
-"""Rollouts in the worlds of `arc_suite.envs.worlds.mjx`: simulation, policy and transitions stay on JAX's device."""
+"""Rollouts in the worlds of `learning.worlds.mjx`: simulation, policy and transitions stay on JAX's device."""
 
 import functools
 from collections.abc import Mapping
@@ -7,13 +7,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite.envs.worlds import mjx
 from arc_suite.learning.agents import architectures, critic_blocks, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.collecting import TRANSITIONS, ages, viewed
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
 from arc_suite.learning.agents.normalizer import Normalizer
+from arc_suite.learning.worlds import mjx
 
 _IMPLEMENTATIONS = {"mjx": "jax", "warp": "warp"}
 

@@ -20,9 +20,9 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.envs.prepare import prepared
-from arc_suite.envs.worlds import starts
+from arc_suite.learning.worlds import device, starts
 from arc_suite.robots.spec import Body
-from arc_suite.simulation import device, pictures
+from arc_suite.simulation import pictures
 from arc_suite.tasks import privileged as seen
 from arc_suite.tasks import terms
 from arc_suite.tasks.contract import Inputs
@@ -198,7 +198,7 @@ class Env:
         """
         if scene_option is not None or modify_scene_fns is not None:
             raise ValueError(
-                "render: expected neither scene_option nor modify_scene_fns; see arc_suite.envs.worlds.mjx"
+                "render: expected neither scene_option nor modify_scene_fns; see arc_suite.learning.worlds.mjx"
             )
         states = [trajectory] if isinstance(trajectory, WorldState) else trajectory
         camera = "tracking" if camera is None else camera
