@@ -58,7 +58,9 @@ def leg_views(body: Body, blocks: Mapping[str, Block], symmetry: Symmetry | None
     """
     kinds, is_mirrored = _kinds(body, symmetry)
     pairs = kinds[:, None] == np.unique(kinds)
-    weights, biases, actions = [], [], []
+    weights = []
+    biases = []
+    actions = []
     for leg, pair, mirrored in zip(_viewing_legs(body, kinds), pairs, is_mirrored, strict=True):
         views = [_view_block(name, block, leg) for name, block in blocks.items()]
         weight = diagonal(np.zeros((0, len(pair))), *(view.weights for view in views))
@@ -94,9 +96,11 @@ class _BlockView(NamedTuple):
 def _view_block(name: str, block: Block, leg: ViewingLeg) -> _BlockView:
     if Unframed in block.kinds:
         raise ValueError(f"network legs: block {name!r} has numbers without a frame, expected other parts")
-    weights, biases = [], []
+    weights = []
+    biases = []
     for part in block.parts:
-        features, constants = part.view(leg), part.constants(leg)
+        features = part.view(leg)
+        constants = part.constants(leg)
         weights.append(np.pad(features, ((0, 0), (0, len(constants)))))
         biases += [np.zeros(features.shape[1]), constants]
     weight = diagonal(*weights)
@@ -116,7 +120,8 @@ def _kinds(body: Body, symmetry: Symmetry | None) -> tuple[np.ndarray, np.ndarra
 
 def _viewing_legs(body: Body, kinds: Iterable[int]) -> Iterator[ViewingLeg]:
     """Yield the legs that observations are transformed for."""
-    jacobians, soles = _jacobians(body), standing(body).soles[:, :2]
+    jacobians = _jacobians(body)
+    soles = standing(body).soles[:, :2]
     joints = by_leg(body, np.eye(len(body.joint_names)))
     for kind in kinds:
         turn, signs = _align(jacobians[kind], jacobians[kinds[0]])

@@ -157,8 +157,10 @@ class Modified(Wrapper):
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the other task's start, then what is random in the modifiers; see `modifiers.draws`."""
-        start, scene = self.task.start(random, stream), self.scene
-        episode, fields = draw_episode(scene, random), dict(start.model)
+        scene = self.scene
+        start = self.task.start(random, stream)
+        episode = draw_episode(scene, random)
+        fields = dict(start.model)
         states = tuple(change.draw(episode) for change in self.changes)
         for change, state in zip(self.changes, states, strict=True):
             fields |= change.fields(scene, {**scene.model, **fields}, state)
@@ -176,7 +178,8 @@ class Modified(Wrapper):
         The other task is given, and its reward judges, the torques commanded of the motors when they
         arrive; weak and failing motors give less.
         """
-        elapsed, states = memory.changes.elapsed, list(memory.changes.states)
+        elapsed = memory.changes.elapsed
+        states = list(memory.changes.states)
         for index in self._acting:
             states[index], action = self.changes[index].act(states[index], action, elapsed)
         inner, inputs = self.task.before(memory.task, action)
@@ -187,7 +190,8 @@ class Modified(Wrapper):
 
     def after(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
         """Return the other task's memory, what modifiers measure and observe, and whether the body has fallen."""
-        inner, changes = self.task.after(memory.task, readings), memory.changes
+        inner = self.task.after(memory.task, readings)
+        changes = memory.changes
         terminated, _ = self.task.ended(inner, readings)
         # With the leading axes of the memory, even where the task returns one boolean for all environments.
         changes = changes._replace(terminated=(changes.terminated & False) | terminated)
@@ -195,7 +199,8 @@ class Modified(Wrapper):
 
     def observe(self, memory: ModifiedMemory, readings: Readings) -> dict:
         """Return the other task's blocks as sensors show them and modifiers change them."""
-        elapsed, states = memory.changes.elapsed, memory.changes.states
+        elapsed = memory.changes.elapsed
+        states = memory.changes.states
         observed = self.task.observe(memory.task, self._sense(states, readings))
         for index in self._observing:
             observed = self.changes[index].observe(states[index], observed, elapsed)
@@ -210,12 +215,14 @@ class Modified(Wrapper):
     def _look(self, memory: ModifiedMemory, readings: Readings, is_start: bool) -> ModifiedMemory:
         """Return the memory with what modifiers measure, and what they remember of the observation."""
         if self._measuring:
-            states, seen = list(memory.changes.states), self._sense(memory.changes.states, readings)
+            states = list(memory.changes.states)
+            sensed = self._sense(states, readings)
             for index in self._measuring:
-                states[index] = self.changes[index].measure(states[index], seen)
+                states[index] = self.changes[index].measure(states[index], sensed)
             memory = memory._replace(changes=memory.changes._replace(states=tuple(states)))
         if self._remembering:
-            states, observed = list(memory.changes.states), self.observe(memory, readings)
+            states = list(memory.changes.states)
+            observed = self.observe(memory, readings)
             for index in self._remembering:
                 states[index] = self.changes[index].remember(states[index], observed, is_start)
             memory = memory._replace(changes=memory.changes._replace(states=tuple(states)))
@@ -231,17 +238,18 @@ class Modified(Wrapper):
 
     def privileged(self, memory: ModifiedMemory, data) -> dict:
         """Return the other task's blocks, and those of the modifiers."""
-        blocks, heading = dict(self.task.privileged(memory.task, data)), rotations.yaw(data.qpos[..., 3:7])
+        blocks = dict(self.task.privileged(memory.task, data))
+        heading = rotations.yaw(data.qpos[..., 3:7])
         for change, state in zip(self.changes, memory.changes.states, strict=True):
             blocks |= change.privileged(state, memory.changes.elapsed, heading)
         return blocks
 
     def read_back(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
         """Return the privileged blocks that changed fields of the model decide; see `Modifier.read_back`."""
-        found = dict(self.task.read_back(blocks, fields))
+        changed = dict(self.task.read_back(blocks, fields))
         for change in self.changes:
-            found |= change.read_back(self.scene, blocks, fields)
-        return found
+            changed |= change.read_back(self.scene, blocks, fields)
+        return changed
 
     @property
     def read_back_fields(self) -> tuple[str, ...]:
@@ -256,7 +264,8 @@ class Modified(Wrapper):
 
     def markers(self, memory: ModifiedMemory, readings: Readings) -> list[Marker]:
         """Return the other task's markers, and those of the modifiers."""
-        markers, elapsed = list(self.task.markers(memory.task, readings)), int(memory.changes.elapsed[0])
+        markers = list(self.task.markers(memory.task, readings))
+        elapsed = int(memory.changes.elapsed[0])
         for index in self._calling("markers"):
             state = memory.changes.states[index]
             markers += self.changes[index].markers(self.scene, state, readings, elapsed)
@@ -264,7 +273,8 @@ class Modified(Wrapper):
 
     def failed_legs(self, memory: ModifiedMemory) -> tuple[str, ...]:
         """Return the names of the legs whose motors have failed, of one environment."""
-        legs, elapsed = list(self.task.failed_legs(memory.task)), int(memory.changes.elapsed[0])
+        legs = list(self.task.failed_legs(memory.task))
+        elapsed = int(memory.changes.elapsed[0])
         for change, state in zip(self.changes, memory.changes.states, strict=True):
             legs += change.failed_legs(self.scene, state, elapsed)
         return tuple(legs)

@@ -320,8 +320,10 @@ class RigidParts(Part):
         most = joints + 1
         if len(self._by_leg) > legs or any(len(indices) > most for indices in self._by_leg):
             raise ValueError(f"{self.body.name}: expected at most {legs} legs of at most {joints} links and a foot")
-        rigid_parts = [0, *(1 + most * leg + k for leg, own in enumerate(self._by_leg) for k in range(len(own)))]
-        places = np.add.outer(self._share * np.array(rigid_parts), np.arange(self._share)).ravel()
+        slots = [0]
+        for leg, indices in enumerate(self._by_leg):
+            slots += [1 + most * leg + place for place in range(len(indices))]
+        places = np.add.outer(self._share * np.array(slots), np.arange(self._share)).ravel()
         return Padding(self._share * (1 + most * legs), places)
 
     def places(self, name: str) -> np.ndarray:
@@ -445,10 +447,10 @@ class Rays(Part):
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights of the two rays next to each ray of the leg."""
         steps = round(leg.turn * self.size / (2.0 * math.pi), _DIGITS)
-        whole = math.floor(steps)
-        share = steps - whole
+        whole_steps = math.floor(steps)
+        share = steps - whole_steps
         rays = np.eye(self.size)
-        return (1.0 - share) * np.roll(rays, whole, axis=1) + share * np.roll(rays, whole + 1, axis=1)
+        return (1.0 - share) * np.roll(rays, whole_steps, axis=1) + share * np.roll(rays, whole_steps + 1, axis=1)
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each ray."""
@@ -554,7 +556,8 @@ def rotation(angle: float) -> np.ndarray:
 def diagonal(*matrices: np.ndarray) -> np.ndarray:
     """Return the matrix with these on its diagonal, 0 elsewhere."""
     joined = np.zeros(np.sum([matrix.shape for matrix in matrices], axis=0))
-    row, column = 0, 0
+    row = 0
+    column = 0
     for matrix in matrices:
         joined[row : row + len(matrix), column : column + matrix.shape[1]] = matrix
         row += len(matrix)

@@ -17,7 +17,8 @@ _APART = 0.3  # distance from the torso's solids, which shells exceed, h
 
 def draw_arrow(body: Body, readings: Readings, push) -> Iterator[Marker]:
     """Yield a red arrow against the torso, for a push (2,) in sqrt(g h) or in weights; none for no push."""
-    size, height = math.hypot(*push), body.torso.standing_height
+    size = math.hypot(*push)
+    height = body.torso.standing_height
     if size > 0.0:
         direction = np.array((*push / size, 0.0))
         tip = readings.torso_position - _rim(body) * direction

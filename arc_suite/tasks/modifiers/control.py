@@ -68,10 +68,11 @@ class Control(_ControlFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        gains, actions = cls.check_span("gains", settings), _check_actions(settings["actions"], body)
+        gains = cls.check_span("gains", settings)
+        actions = _check_actions(settings["actions"], body)
         if actions == "torque" and gains != (1.0, 1.0):
-            given = checks.shown(settings["gains"])
-            raise ValueError(f"gains: torques have none, expected actions='position', got {given}")
+            value = checks.shown(settings["gains"])
+            raise ValueError(f"gains: torques have none, expected actions='position', got {value}")
         stiffness, damping = position_gains(sized(body), standing(body).inertias)
         return cls(gains, actions, bool(body.source), stiffness, damping, reaches(body))
 
@@ -104,9 +105,10 @@ class Control(_ControlFields, Modifier):
 
     def torques(self, state: ControlState, action):
         """Return the actions (..., joints) in [-1, 1] of motors that hold joints at the positions of an action."""
-        stiff, damped = state.gains[..., :1], state.gains[..., 1:]
-        pull = stiff * (self.stiffness * (self.reach * action - state.angles))
-        return (pull - damped * (self.damping * state.speeds)).clip(-1.0, 1.0)
+        stiffness_gain = state.gains[..., :1]
+        damping_gain = state.gains[..., 1:]
+        pull = stiffness_gain * (self.stiffness * (self.reach * action - state.angles))
+        return (pull - damping_gain * (self.damping * state.speeds)).clip(-1.0, 1.0)
 
     def positions(self, torques, angles, speeds):
         """Return the action (..., joints) for which motors that hold positions give torques, as far as joints reach.
@@ -138,8 +140,8 @@ class Control(_ControlFields, Modifier):
         if not self.is_of_servos or all(multiple is None for multiple in multiples):
             return {}
         gains = [
-            drawn if multiple is None else multiple.mean()
-            for drawn, multiple in zip(blocks["gains"], multiples, strict=True)
+            gain if multiple is None else multiple.mean()
+            for gain, multiple in zip(blocks["gains"], multiples, strict=True)
         ]
         return {"gains": blocks["gains"].__array_namespace__().stack(gains)}
 

@@ -45,7 +45,8 @@ class Delay(_DelayFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        value, (least, most) = settings["delay"], cls.bounds["delay"]
+        value = settings["delay"]
+        least, most = cls.bounds["delay"]
         low, high = value if isinstance(value, tuple | list) and len(value) == 2 else (value, value)
         low = checks.integer("delay", low, least, most)
         return cls((low, checks.integer("delay", high, low, most)))

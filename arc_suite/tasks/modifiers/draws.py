@@ -12,7 +12,9 @@ import numpy as np
 from arc_suite.tasks import noise
 from arc_suite.tasks.scene import Scene
 
-SCHEDULE, SHORTEST, LONGEST = 25, 40, 121  # kicks or pushes, and control steps from one to the next
+SCHEDULE = 25  # kicks or pushes of a schedule
+SHORTEST = 40  # control steps from one to the next
+LONGEST = 121  # one more than the most control steps from one to the next
 
 _STEP = np.array([2**32 - 1], np.uint32)  # of the noise's generator, to which no episode counts
 

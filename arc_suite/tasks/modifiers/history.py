@@ -54,11 +54,12 @@ class History(_HistoryFields, Modifier):
         """Return the modifier that settings ask for."""
         excluded = check_excluded(settings["exclude_blocks"], blocks)
         count = checks.integer("history", settings["history"], *cls.bounds["history"])
-        kept = select_blocks(blocks, excluded)
-        if count and not kept:
-            there = ", ".join(name for name in blocks if name not in excluded)
-            raise ValueError(f"history: expected blocks that measure joints, as posture and velocities do, got {there}")
-        return cls(count, tuple(kept), sum(block.size for block in kept.values()))
+        joint_blocks = select_blocks(blocks, excluded)
+        if count and not joint_blocks:
+            observed = ", ".join(name for name in blocks if name not in excluded)
+            expected = "expected blocks that measure joints, as posture and velocities do"
+            raise ValueError(f"history: {expected}, got {observed}")
+        return cls(count, tuple(joint_blocks), sum(block.size for block in joint_blocks.values()))
 
     @property
     def is_active(self) -> bool:
@@ -72,7 +73,8 @@ class History(_HistoryFields, Modifier):
 
     def draw(self, episode: Episode) -> HistoryState:
         """Return an empty history."""
-        size, joints = self.size * self.is_active, len(episode.scene.body.joint_names)
+        size = self.size if self.is_active else 0
+        joints = len(episode.scene.body.joint_names)
         return HistoryState(np.zeros(size), np.zeros((self.history, size + joints)))
 
     def act(self, state: HistoryState, action, elapsed) -> tuple[HistoryState, Any]:
@@ -94,7 +96,8 @@ class History(_HistoryFields, Modifier):
         """Return the state with the latest observation; at the start, with a history that repeats it."""
         arrays = [observed[name] for name in self.names]
         xp = arrays[0].__array_namespace__()
-        now, recent = xp.concatenate(arrays, axis=-1), state.recent
+        now = xp.concatenate(arrays, axis=-1)
+        recent = state.recent
         if is_start:
             repeated = xp.broadcast_to(now[..., None, :], (*recent.shape[:-1], self.size))
             recent = xp.concatenate([repeated, 0.0 * recent[..., self.size :]], axis=-1)

@@ -58,7 +58,8 @@ class Masses(_MassesFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        mass, payload = cls.check_span("mass", settings), cls.check_span("payload", settings)
+        mass = cls.check_span("mass", settings)
+        payload = cls.check_span("payload", settings)
         return cls(mass, payload, cls.check_number("center_of_mass", settings))
 
     @property
@@ -68,12 +69,14 @@ class Masses(_MassesFields, Modifier):
 
     def draw(self, episode: Episode) -> MassesState:
         """Return the masses of the episode."""
-        body, keyed = episode.scene.body, episode.keyed
+        body = episode.scene.body
+        keyed = episode.keyed
         low, high = (corner / body.torso.standing_height for corner in torso_box(body))
-        share, place = within(self.payload, keyed.payload), within((low, high), keyed.place)
+        payload_share = within(self.payload, keyed.payload)
+        payload_position = within((low, high), keyed.place)
         return MassesState(
             mass=np.array([within(self.mass, episode.stream.mass)]),
-            payload=np.array([share, *place]),
+            payload=np.array([payload_share, *payload_position]),
             center_of_mass=self.center_of_mass * (2.0 * keyed.center - 1.0),
         )
 
@@ -105,32 +108,40 @@ class Masses(_MassesFields, Modifier):
         """
         if not any(name in fields for name in self.read_back_fields):
             return {}
-        xp, height = blocks["mass"].__array_namespace__(), scene.body.torso.standing_height
-        torso, legs = scene.layout.torso, np.arange(len(scene.model["body_mass"]))[scene.layout.parts][1:]
-        own, place, whole = scene.model["body_mass"][torso], scene.model["body_ipos"][torso], standing(scene.body).mass
-        payload = whole * blocks["payload"][:1]
-        moment = own * (place + height * blocks["center_of_mass"]) + payload * height * blocks["payload"][1:]
-        center, multiple = moment / (own + payload), blocks["mass"]
+        xp = blocks["mass"].__array_namespace__()
+        height = scene.body.torso.standing_height
+        body_mass = standing(scene.body).mass
+        torso = scene.layout.torso
+        legs = np.arange(len(scene.model["body_mass"]))[scene.layout.parts][1:]
+        torso_mass = scene.model["body_mass"][torso]
+        torso_center = scene.model["body_ipos"][torso]
+        multiple = blocks["mass"]
+        payload = body_mass * blocks["payload"][:1]
+        moment = torso_mass * (torso_center + height * blocks["center_of_mass"])
+        center = (moment + payload * height * blocks["payload"][1:]) / (torso_mass + payload)
         if "body_mass" in fields:
             multiple = fields["body_mass"][legs].sum(keepdims=True) / scene.model["body_mass"][legs].sum()
-            payload = fields["body_mass"][[torso]] / multiple - own
-        center = fields["body_ipos"][torso] if "body_ipos" in fields else center
+            payload = fields["body_mass"][[torso]] / multiple - torso_mass
+        if "body_ipos" in fields:
+            center = fields["body_ipos"][torso]
         return {
             "mass": multiple,
-            "payload": xp.concatenate([payload / whole, center / height]),
-            "center_of_mass": (center - place) / height,
+            "payload": xp.concatenate([payload / body_mass, center / height]),
+            "center_of_mass": (center - torso_center) / height,
         }
 
 
 def _change_torso(scene: Scene, state: MassesState, model: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return the masses with a payload on the torso, and its center of mass moved."""
-    part, height = scene.layout.torso, scene.body.torso.standing_height
+    part = scene.layout.torso
+    height = scene.body.torso.standing_height
     fields = {name: model[name].copy() for name in _INERTIA}
     torso = Inertia(*(fields[name][part] for name in _INERTIA))
     torso = torso._replace(center=torso.center + height * state.center_of_mass)
-    share, place = state.payload[0], state.payload[1:]
-    if share > 0.0:
-        torso = torso.with_point(share * state.mass[0] * standing(scene.body).mass, height * place)
+    payload_share = state.payload[0]
+    if payload_share > 0.0:
+        payload = payload_share * state.mass[0] * standing(scene.body).mass
+        torso = torso.with_point(payload, height * state.payload[1:])
     for name, value in zip(_INERTIA, torso, strict=True):
         fields[name][part] = value
     return fields

@@ -93,17 +93,17 @@ class Motors(_MotorsFields, Modifier):
 
     def draw(self, episode: Episode) -> MotorsState:
         """Return strengths, failure and armature of the episode."""
-        body, stream, keyed = episode.scene.body, episode.stream, episode.keyed
+        stream = episode.stream
         motor_strength = np.array([within(self.motor_strength, stream.strength)])
-        joint_strength = within(self.joint_strength, keyed.strengths)
-        owners = _owners(body)
+        joint_strength = within(self.joint_strength, episode.keyed.strengths)
+        owners = _owners(episode.scene.body)
         leg = stream.leg if self.actuator_failure is True else self.actuator_failure
         return MotorsState(
             motor_strength,
             joint_strength,
             strength=motor_strength * joint_strength,
             failing=np.zeros(len(owners), bool) if self.actuator_failure is False else owners == leg,
-            armature=np.array([within(self.armature, keyed.armature)]),
+            armature=np.array([within(self.armature, episode.keyed.armature)]),
         )
 
     def fields(self, scene: Scene, model: Mapping[str, Any], state: MotorsState) -> dict[str, Any]:
@@ -126,7 +126,8 @@ class Motors(_MotorsFields, Modifier):
         ctrl = strength * inputs.ctrl
         if self.actuator_failure is not False:
             works = ~(state.failing & (elapsed >= FAILS_FROM))
-            ctrl, strength = ctrl * works, strength * works
+            ctrl = ctrl * works
+            strength = strength * works
         if self.are_servos:
             ctrl = ctrl.__array_namespace__().concatenate([ctrl, 1.0 - strength], axis=-1)
         return inputs._replace(ctrl=ctrl)
@@ -145,14 +146,16 @@ class Motors(_MotorsFields, Modifier):
         """Return the mean multiple of changed armatures, and strengths times those of changed motors or servos."""
         joints = len(scene.body.joint_names)
         armatures = find_multiples(scene, fields, "dof_armature", scene.layout.joint_velocities)
-        found = {} if armatures is None else {"armature": armatures.mean(keepdims=True)}
-        gears = (("actuator_gear", np.s_[:joints, 0]), ("actuator_gainprm", np.s_[:joints, 0]))
-        places = ((_LIMITS, (_joints(scene), 1)),) if self.are_servos else gears
-        multiples = [find_multiples(scene, fields, name, part) for name, part in places]
+        changed = {} if armatures is None else {"armature": armatures.mean(keepdims=True)}
+        if self.are_servos:
+            strengths = {_LIMITS: (_joints(scene), 1)}
+        else:
+            strengths = dict.fromkeys(("actuator_gear", "actuator_gainprm"), np.s_[:joints, 0])
+        multiples = [find_multiples(scene, fields, name, part) for name, part in strengths.items()]
         multiples = [multiple for multiple in multiples if multiple is not None]
         if multiples:
-            found["strength"] = math.prod(multiples, start=blocks["strength"])
-        return found
+            changed["strength"] = math.prod(multiples, start=blocks["strength"])
+        return changed
 
     def failed_legs(self, scene: Scene, state: MotorsState, elapsed: int) -> tuple[str, ...]:
         """Return the leg whose motors have failed, once they have."""

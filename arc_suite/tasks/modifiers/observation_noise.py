@@ -8,7 +8,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import noise
-from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.blocks import Block, places
 from arc_suite.tasks.modifiers.draws import Episode
 from arc_suite.tasks.modifiers.excluded_blocks import check_excluded
 from arc_suite.tasks.modifiers.modifier import Modifier
@@ -27,7 +27,7 @@ class NoiseState(NamedTuple):
 class _ObservationNoiseFields(NamedTuple):
     observation_noise: Mapping[str, float]
     widths: Mapping[str, np.ndarray]
-    places: Mapping[str, slice]
+    slices: Mapping[str, slice]
     total: int
 
 
@@ -38,7 +38,7 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
         observation_noise: level of uniform noise on what is measured, for all blocks that declare
             `noise`, or by the name of a block.
         widths: half-widths (size,) of the noise of each block that has some, by name.
-        places: where its noise lies among that of all blocks, by name.
+        slices: where its noise lies among that of all blocks, by name.
         total: how many numbers are drawn in a step.
     """
 
@@ -53,12 +53,11 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
         noisy = {name: block for name, block in blocks.items() if block.noise is not None}
         levels = cls._check_levels(settings["observation_noise"], noisy)
         excluded = check_excluded(settings["exclude_blocks"], blocks)
-        widths, places, last = {}, {}, 0
-        for name, block in noisy.items():
-            first, last = last, last + block.size
-            if levels.get(name) and name not in excluded:
-                widths[name], places[name] = levels[name] * block.widths, slice(first, last)
-        return cls(levels, widths, places, max((place.stop for place in places.values()), default=0))
+        numbers = places({name: block.size for name, block in noisy.items()})  # of the noise of all blocks
+        names = [name for name in noisy if levels.get(name) and name not in excluded]
+        widths = {name: levels[name] * noisy[name].widths for name in names}
+        slices = {name: numbers[name] for name in names}
+        return cls(levels, widths, slices, max((numbers[name].stop for name in names), default=0))
 
     @classmethod
     def _check_levels(cls, value, noisy: Mapping[str, Block]) -> dict[str, float]:
@@ -73,12 +72,12 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
     @property
     def is_active(self) -> bool:
         """Whether a block has noise."""
-        return bool(self.places)
+        return bool(self.slices)
 
     @property
     def structure(self) -> Hashable:
         """The names of the blocks that have some."""
-        return tuple(self.places)
+        return tuple(self.slices)
 
     def draw(self, episode: Episode) -> NoiseState:
         """Return the key of the episode."""
@@ -88,5 +87,5 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
         """Return the blocks with the noise of the step."""
         numbers = noise.noise(state.key, elapsed, self.total)
         return observed | {
-            name: observed[name] + width * numbers[..., self.places[name]] for name, width in self.widths.items()
+            name: observed[name] + width * numbers[..., self.slices[name]] for name, width in self.widths.items()
         }

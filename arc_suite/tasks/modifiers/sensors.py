@@ -66,7 +66,8 @@ class Sensors(_SensorsFields, Modifier):
 
     def sense(self, state: SensorsState, readings: Readings) -> Readings:
         """Return the readings with displaced angles."""
-        xp, angles = readings.posture.__array_namespace__(), readings.joint_angles + state.joint_offset
+        xp = readings.posture.__array_namespace__()
+        angles = readings.joint_angles + state.joint_offset
         posture = xp.concatenate([readings.posture[..., :5], angles], axis=-1)
         return readings._replace(posture=posture, joint_angles=angles)
 
