@@ -273,7 +273,8 @@ class Tokens(NamedTuple):
         body = task.scene.body
         numbers = {name: np.arange(part.start, part.stop) for name, part in blocks.places(task.sizes).items()}
         parts = {name: [numbers[name][part] for part in task.blocks[name].places] for name in BLOCKS}
-        (height, orientation, angles), (linear, angular, speeds) = parts["posture"], parts["velocities"]
+        height, orientation, angles = parts["posture"]
+        linear, angular, speeds = parts["velocities"]
         (forces,) = parts["contact_forces"]
         upward = np.zeros(LEGS, int)
         rigid_parts = task.blocks["contact_forces"].parts[0]

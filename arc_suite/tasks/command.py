@@ -8,7 +8,7 @@ torso's frame, m, and its yaw, rad.
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -51,6 +51,7 @@ class Followed(NamedTuple):
     arrived: np.ndarray | bool = False
 
 
+@runtime_checkable
 class WithLive(Protocol):
     """What the memory of a command must have that can be set live, see `Command.live`: a NamedTuple with this field.
 

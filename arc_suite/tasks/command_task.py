@@ -23,7 +23,7 @@ from arc_suite.tasks import blocks, clock, energy, parameters, terms
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.clock import Clock
-from arc_suite.tasks.command import Command, Scheduled
+from arc_suite.tasks.command import Command, Scheduled, WithLive
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.gait_and_pose import GaitAndPose, GaitAndPoseMemory
@@ -296,7 +296,7 @@ class CommandTask(Task):
     def _start_command(self, random: np.random.RandomState, schedule: Scheduled) -> Any:
         command = self.settings.command
         memory = command.start(self.context, random, schedule)
-        if command.live(self.scene.body) and not hasattr(memory, "live"):
+        if command.live(self.scene.body) and not isinstance(memory, WithLive):
             kind = type(command).__name__
             raise ValueError(f"command {kind}: expected a memory with a field 'live', or no live commands, got neither")
         return memory

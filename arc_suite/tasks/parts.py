@@ -385,17 +385,8 @@ class Phase(Part):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Grid(Part):
-    """A number for each point of a grid in the torso's frame (n,), such as heights of the ground.
-
-    A turned grid has points between those of this one, which needs four numbers a feature. So a leg sees the grid as
-    the body does, in the mirror on the right, and the place of its foot in addition.
-
-    Attributes:
-        points: (2, n) forward and left, R.
-        name: of the numbers; two {} stand for the coordinates.
-        unit: of the numbers.
-    """
+class _Points(Part):
+    """A number for each of some points in the torso's frame (n,)."""
 
     points: np.ndarray
     name: str = "{:.2f}, {:.2f}"
@@ -410,39 +401,38 @@ class Grid(Part):
         """Return the map to the points across."""
         return Mirror.moved(_across(self.points))
 
-    def constants(self, leg: ViewingLeg) -> np.ndarray:
-        """Return the place (2,) of the leg's foot."""
-        return leg.foot
-
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each point."""
         yield from ((self.name.format(*point), self.unit) for point in self.points.T)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Rays(Part):
+class Grid(_Points):
+    """A number for each point of a grid in the torso's frame (n,), such as heights of the ground.
+
+    A turned grid has points between those of this one, which needs four numbers a feature. So a leg sees the grid as
+    the body does, in the mirror on the right, and the place of its foot in addition.
+
+    Attributes:
+        points: (2, n) forward and left, R.
+        name: of the numbers; two {} stand for the coordinates.
+        unit: of the numbers.
+    """
+
+    def constants(self, leg: ViewingLeg) -> np.ndarray:
+        """Return the place (2,) of the leg's foot."""
+        return leg.foot
+
+
+class Rays(_Points):
     """A number for each ray around the torso (n,), the first ahead, then evenly to the left.
 
     To a leg, rays turn as planar vectors do. Between two rays, their numbers are interpolated.
 
     Attributes:
-        directions: (2, n) forward and left.
+        points: (2, n) directions, forward and left.
         name: of the numbers; {} stands for the angle in degrees.
         unit: of the numbers.
     """
-
-    directions: np.ndarray
-    name: str = "{:.0f}"
-    unit: str = ""
-
-    @property
-    def size(self) -> int:
-        """How many rays there are."""
-        return self.directions.shape[1]
-
-    def mirror(self, image: Image) -> Mirror:
-        """Return the map to the rays across."""
-        return Mirror.moved(_across(self.directions))
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights of the two rays next to each ray of the leg."""
@@ -454,7 +444,7 @@ class Rays(Part):
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each ray."""
-        degrees = np.degrees(np.arctan2(self.directions[1], self.directions[0])) % 360.0
+        degrees = np.degrees(np.arctan2(self.points[1], self.points[0])) % 360.0
         yield from ((self.name.format(angle), self.unit) for angle in degrees)
 
 
