@@ -15,6 +15,7 @@ from arc_suite.learning.agents import dagger, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
+from arc_suite.tasks.modifiers import Control
 
 SMALL = {"num_envs": 8, "round": 10, "left_out": 2, "updates": 20, "last_updates": 40, "batch": 64, "hidden": 16}
 
@@ -49,7 +50,7 @@ def test_labels_are_positions_where_actions_are(begun):
     one, other = torques.until(80).checkpoint, positions.until(80).checkpoint
     first = other["observations"][0]
     assert_array_equal(first, one["observations"][0])
-    expected = positions.environment.task.definition.positions(
+    expected = positions.environment.task.definition.modifier(Control).positions(
         one["labels"][0].astype(float), first[:, 5:17], first[:, 17 + 6 : 17 + 18]
     )
     assert_allclose(other["labels"][0], expected, atol=1e-4)
