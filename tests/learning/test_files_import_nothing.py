@@ -24,6 +24,7 @@ from arc_suite.arenas import FLAT
 from arc_suite.cpg.law import Clocked
 from arc_suite.learning.agents.algorithms import ALGORITHMS
 from arc_suite.robots import ROBOTS
+from arc_suite.tasks.modifiers import Modifier
 from arc_suite.tasks.walk import Walk
 
 pathlib.Path(__file__).with_name("imported").touch()
@@ -41,8 +42,20 @@ class Stroll(Walk):
     """The task walk."""
     name = "stroll"
 
+class Fields(NamedTuple):
+    """Fields of a modifier."""
+    wind: float
+
+class Wind(Fields, Modifier):
+    """A modifier that changes nothing."""
+    defaults = {"wind": 0.0}
+    @classmethod
+    def of(cls, settings, body, blocks):
+        return cls(settings["wind"])
+
 arc_suite.register(
     module=__name__,
+    modifiers=(Wind,),
     body=ROBOTS["tick"].replace(name="beetle"),
     tasks=(Stroll,),
     arenas={"lawn": lambda body: FLAT},
@@ -60,12 +73,14 @@ NAMES = {
     "task": {"task": "strolling:stroll"},
     "arena": {"task_kwargs": {"arena": "strolling:lawn"}},
     "arena in training": {"training": {"arena": "strolling:lawn"}},
+    "modifier": {"task_kwargs": {"strolling:wind": 1.0}},
+    "modifier in training": {"training": {"strolling:wind": 1.0}},
     "algorithm": {"algorithm": "strolling:search"},
     "network": {"hyperparameters": {"network": "strolling:deep"}},
     "preset": {"algorithm": "dagger", "hyperparameters": {"preset": "strolling:rest"}},
 }
 LINE = "files import nothing; import 'strolling' first"
-IN_A_POLICY = {name: NAMES[name] for name in ("robot", "family", "robots", "task", "arena")}
+IN_A_POLICY = {name: NAMES[name] for name in ("robot", "family", "robots", "task", "arena", "modifier")}
 
 
 @pytest.fixture
@@ -80,7 +95,7 @@ def folder(tmp_path, monkeypatch):
 def without_additions(monkeypatch):
     """Take back what the import of the module registers."""
     tables = (*registry.ADDITIONS.values(), registry.MODULES, registry.ROBOTS, registry.TASKS, registry.ARENAS)
-    tables += (registry.FAMILIES, selection.LAWS)
+    tables += (registry.FAMILIES, registry.MODIFIERS, selection.LAWS)
     before = [dict(table) for table in tables]
     yield
     for table, entries in zip(tables, before, strict=True):
