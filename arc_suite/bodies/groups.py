@@ -30,10 +30,11 @@ class Group(VectorEnv):
     def __init__(self, members: Sequence[Member], task_name: str, **options):
         """Allocate an environment for each member; for the options see `VectorEnv`."""
         self._members = members
+        self._padding = tokens.privileged_padding(members[0].task)  # the same for all, whose layout is one
         super().__init__(None, task_name, len(members), **options)
 
     def _privileged_vectors(self) -> np.ndarray:
-        return tokens.padded_privileged(self._tasks[0], super()._privileged_vectors())
+        return tokens.spread(self._padding, super()._privileged_vectors())
 
     def _prepared(self):
         tasks, models = zip(*self._members, strict=True)

@@ -95,7 +95,16 @@ def privileged_sizes(task: Task) -> dict[str, int]:
 
 def padded_privileged(task: Task, vectors: np.ndarray) -> np.ndarray:
     """Return privileged observations (environments, size) with 12 legs of 4 joints, 0 where there is none."""
-    padding = join_padding([_padding(block) for block in task.privileged_blocks.values()])
+    return spread(privileged_padding(task), vectors)
+
+
+def privileged_padding(task: Task) -> Padding:
+    """Return the places of a task's privileged observation in that of bodies of 12 legs of 4 joints."""
+    return join_padding([_padding(block) for block in task.privileged_blocks.values()])
+
+
+def spread(padding: Padding, vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (environments, numbers of the body) at their places in padded ones, 0 elsewhere."""
     padded_vectors = np.zeros((len(vectors), padding.size), vectors.dtype)
     padded_vectors[:, padding.places] = vectors
     return padded_vectors

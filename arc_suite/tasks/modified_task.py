@@ -228,7 +228,7 @@ class Modified(Wrapper):
             memory = memory._replace(changes=memory.changes._replace(states=tuple(states)))
         return memory
 
-    @property
+    @functools.cached_property
     def privileged_blocks(self) -> Mapping[str, Block]:
         """The other task's, and those of the modifiers."""
         blocks = dict(self.task.privileged_blocks)
