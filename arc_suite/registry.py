@@ -236,7 +236,7 @@ def modifier_setting(name: str) -> str | None:
     return name if name in MODIFIERS else None
 
 
-def stored_settings(settings: Mapping[str, Any]) -> None:
+def check_stored_settings(settings: Mapping[str, Any]) -> None:
     """Check that settings of a task, as a file gives them, import nothing.
 
     Raises:

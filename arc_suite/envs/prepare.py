@@ -99,7 +99,7 @@ def with_changes(task: Task, settings: Mapping[str, Any], text: str) -> Task:
         ValueError: as `checked_changes`.
     """
     changes = checks.mapping("settings", json.loads(text))
-    registry.stored_settings(changes)  # a snapshot may have come from a file
+    registry.check_stored_settings(changes)  # a snapshot may have come from a file
     for name in changes.keys() & _KEPT.keys():
         raise ValueError(f"setting {name!r}: environments keep it; {_KEPT[name]}")
     if not changes:

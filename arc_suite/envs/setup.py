@@ -238,7 +238,7 @@ class Setup:
                 raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.shown(fields.get(name))}")
         robot, task, settings = registry.stored(fields["robot"]), fields["task"], fields["task_kwargs"]
         registry.imported("task", task)
-        registry.stored_settings(settings)
+        registry.check_stored_settings(settings)
         return cls._checked(robot, task, settings)  # draws no body of several
 
     def provenance(self) -> dict[str, Any]:

@@ -54,6 +54,11 @@ class Block(NamedTuple):
         return [slice(end - part.size, end) for part, end in zip(self.parts, ends, strict=True)]
 
     @property
+    def has_frame(self) -> bool:
+        """Whether it is known how all of its numbers transform."""
+        return all(part.has_frame for part in self.parts)
+
+    @property
     def measures_joints(self) -> bool:
         """Whether it holds angles or other numbers of joints, as what a history keeps does."""
         return any(isinstance(part, Joints) for part in self.parts)

@@ -44,7 +44,6 @@ from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block, places
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.parameters import Parameters
-from arc_suite.tasks.parts import Unframed
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.scene import Inputs, Scene, Start
 
@@ -91,7 +90,7 @@ class Observed(ABC):
         """
         image = mirror.image(self.scene.body)
         for name, block in self.blocks.items():
-            if Unframed in block.kinds:
+            if not block.has_frame:
                 raise ValueError(f"task {self.name}: block {name!r} has numbers without a frame, so no mirror image")
         observation = mirrors.joined(block.mirror(image) for block in self.blocks.values())
         return Symmetry(observation, mirrors.joints(image))

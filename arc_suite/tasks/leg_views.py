@@ -17,7 +17,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.mirrors import Mirror, Symmetry
-from arc_suite.tasks.parts import Unframed, ViewingLeg, diagonal, rotation
+from arc_suite.tasks.parts import ViewingLeg, diagonal, rotation
 
 VERSION = 1  # of what legs see; runs without one have turned the blocks `TURNED_BEFORE` alone
 TURNED_BEFORE = ("posture", "velocities", "gait_clock", "command")
@@ -94,7 +94,7 @@ class _BlockView(NamedTuple):
 
 
 def _view_block(name: str, block: Block, leg: ViewingLeg) -> _BlockView:
-    if Unframed in block.kinds:
+    if not block.has_frame:
         raise ValueError(f"network legs: block {name!r} has numbers without a frame, expected other parts")
     weights = []
     biases = []

@@ -59,6 +59,11 @@ class Part(ABC):
     """A part of a block."""
 
     @property
+    def has_frame(self) -> bool:
+        """Whether it is known how its numbers transform."""
+        return True
+
+    @property
     @abstractmethod
     def size(self) -> int:
         """How many numbers it has."""
@@ -118,7 +123,22 @@ class Scalar(Part):
 
 
 @dataclasses.dataclass(frozen=True)
-class Planar(Part):
+class _Components(Part):
+    """Numbers along axes."""
+
+    name: str = ""
+    unit: str = ""
+    axes: tuple[str, ...] = ()
+    axial: bool = False
+
+    def entries(self) -> Iterator[tuple[str, str]]:
+        """Yield the names and units of the components."""
+        for axis in self.axes:
+            yield (f"{self.name}, {axis}" if self.name else axis), self.unit
+
+
+@dataclasses.dataclass(frozen=True)
+class Planar(_Components):
     """A horizontal vector (2,).
 
     Attributes:
@@ -128,10 +148,7 @@ class Planar(Part):
         axial: whether it is an axis of rotation, as roll and pitch are to first order.
     """
 
-    name: str = ""
-    unit: str = ""
     axes: tuple[str, str] = HEADED[:2]
-    axial: bool = False
 
     size = 2
 
@@ -143,13 +160,9 @@ class Planar(Part):
         """Return the rotation by the leg's turn."""
         return rotation(leg.turn)
 
-    def entries(self) -> Iterator[tuple[str, str]]:
-        """Yield the names and units of the components."""
-        yield from ((_joined(self.name, axis), self.unit) for axis in self.axes)
-
 
 @dataclasses.dataclass(frozen=True)
-class Vector(Part):
+class Vector(_Components):
     """A vector (3,) in the world's frame, in that of the heading, or in the torso's.
 
     Attributes:
@@ -159,10 +172,7 @@ class Vector(Part):
         axial: whether it is an axis of rotation, such as an angular velocity or a torque.
     """
 
-    name: str = ""
-    unit: str = ""
     axes: tuple[str, str, str] = HEADED
-    axial: bool = False
 
     size = 3
 
@@ -173,10 +183,6 @@ class Vector(Part):
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the rotation by the leg's turn about the vertical axis."""
         return diagonal(rotation(leg.turn), np.eye(1))
-
-    def entries(self) -> Iterator[tuple[str, str]]:
-        """Yield the names and units of the components."""
-        yield from ((_joined(self.name, axis), self.unit) for axis in self.axes)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -296,6 +302,11 @@ class RigidParts(Part):
     def size(self) -> int:
         """How many numbers there are."""
         return self._share * len(self.body.part_names)
+
+    @property
+    def has_frame(self) -> bool:
+        """Whether it is known how the numbers of its parts transform."""
+        return all(part.has_frame for part in self.parts)
 
     @property
     def _share(self) -> int:
@@ -465,6 +476,11 @@ class Repeated(Part):
         """How many numbers there are."""
         return self.count * sum(part.size for part in self.parts)
 
+    @property
+    def has_frame(self) -> bool:
+        """Whether it is known how the numbers of its parts transform."""
+        return all(part.has_frame for part in self.parts)
+
     def mirror(self, image: Image) -> Mirror:
         """Return the map of each control step."""
         return mirrors.of_each(np.arange(self.count), mirrors.joined([part.mirror(image) for part in self.parts]))
@@ -502,6 +518,8 @@ class Unframed(Part):
     size: int = 1
     name: str = "{}"
     unit: str = ""
+
+    has_frame = False
 
     def mirror(self, image: Image) -> Mirror:
         """Raise a ValueError, as there is no mirror image."""
@@ -559,7 +577,3 @@ def _across(points: np.ndarray) -> np.ndarray:
     """Return for each of the points (2, n) the index of the one across the x axis."""
     reflected = points * ((1.0,), (-1.0,))
     return np.square(points[:, None, :] - reflected[:, :, None]).sum(axis=0).argmin(axis=1)
-
-
-def _joined(name: str, axis: str) -> str:
-    return f"{name}, {axis}" if name else axis

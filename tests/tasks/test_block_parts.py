@@ -174,10 +174,14 @@ def test_the_place_of_the_foot_is_beside_a_grid():
     assert (np.sum(feet * directions, axis=-1) > 0.9 * np.hypot(*directions.T) * np.hypot(*feet.T)).all()
 
 
-def test_numbers_without_a_frame_are_refused_in_one_line():
+@pytest.mark.parametrize(
+    "part", [Unframed(2), Repeated((Planar(), Unframed(2)), 2), RigidParts(STAR, (Unframed(),))], ids=lambda p: type(p)
+)
+def test_numbers_without_a_frame_are_refused_in_one_line(part):
+    """Also within other parts."""
     message = "^network legs: block 'odd' has numbers without a frame, expected other parts$"
     with pytest.raises(ValueError, match=message):
-        leg_views(STAR, {"odd": Block((Unframed(2),))}, None)
+        leg_views(STAR, {"odd": Block((Joints(STAR), part))}, None)
 
 
 def test_a_view_of_many_numbers_is_refused_in_one_line():

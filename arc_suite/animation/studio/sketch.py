@@ -138,7 +138,7 @@ def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
     if sketch.kicks:
         found["kicks"] = sketch.kicks
     found |= given
-    registry.stored_settings(found)  # a visitor of the page imports nothing
+    registry.check_stored_settings(found)  # a visitor of the page imports nothing
     return found
 
 
