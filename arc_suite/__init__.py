@@ -13,7 +13,7 @@ from arc_suite import moved, versions
 from arc_suite.simulation import opengl
 
 moved.install_finder()
-with versions.explained():
+with versions.explain_import_errors():
     opengl.select_backend()  # before anything imports dm_control
 
     from arc_suite import registration, registry

@@ -36,4 +36,4 @@ def read(path: str | os.PathLike, most: int, only: str | None = None) -> dict[st
             with np.load(file, allow_pickle=False) as stored:
                 return {name: stored[name] for name in stored.files if only in (None, name)}
     except _DAMAGES as error:
-        raise ValueError(checks.quoted(error)) from None
+        raise ValueError(checks.quote(error)) from None

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-LARGEST_SEED = 2**32 - 1  # that a RandomState takes
+MAX_SEED = 2**32 - 1  # that a RandomState takes
 _SMALL = 1e-6  # least number that errors name as a bound; a smaller one keeps out 0
 _LONGEST_QUOTE = 300  # characters
 
@@ -33,7 +33,7 @@ def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> st
     if value in valid:
         return value
     valid += near
-    raise ValueError(f"unknown {kind} {shown(value)}{hint(value, valid)} (there are: {', '.join(valid)})")
+    raise ValueError(f"unknown {kind} {preview(value)}{hint(value, valid)} (there are: {', '.join(valid)})")
 
 
 def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
@@ -50,13 +50,13 @@ def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
     """
     given = (value,) if isinstance(value, str) else value
     if not isinstance(given, tuple | list):
-        raise ValueError(f"{what}: expected names of {kind}s, got {shown(value)}")
+        raise ValueError(f"{what}: expected names of {kind}s, got {preview(value)}")
     return tuple(name(each, valid, kind) for each in given)
 
 
 def hint(value, valid: Iterable[str]) -> str:
     """Return how an error goes on that names an unknown value: with a valid one that is near, if there is any."""
-    close = difflib.get_close_matches(shown(value).strip("'"), valid, n=1)
+    close = difflib.get_close_matches(preview(value).strip("'"), valid, n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
@@ -79,7 +79,7 @@ def seed(value) -> int:
     Raises:
         ValueError: it is not an integer from 0 to 2**32 - 1.
     """
-    return integer("seed", value, 0, LARGEST_SEED)
+    return integer("seed", value, 0, MAX_SEED)
 
 
 def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
@@ -100,7 +100,7 @@ def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
         number = low - 1
     if number < low or (high is not None and number > high):
         bounds = f"from {low}" if high is None else f"from {low} to {high}"
-        raise ValueError(f"{what}: expected an integer {bounds}, got {shown(value)}")
+        raise ValueError(f"{what}: expected an integer {bounds}, got {preview(value)}")
     return number
 
 
@@ -122,7 +122,7 @@ def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf
     except OverflowError:  # of a large integer
         found = math.inf
     if not math.isfinite(found) or not low <= found <= high:
-        raise ValueError(f"{what}: expected a {_numbers(low, high)}, got {shown(value)}")
+        raise ValueError(f"{what}: expected a {_numbers(low, high)}, got {preview(value)}")
     return found
 
 
@@ -137,7 +137,7 @@ def boolean(what: str, value: Any) -> bool:
         ValueError: it is neither.
     """
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{what}: expected true or false, got {shown(value)}")
+        raise ValueError(f"{what}: expected true or false, got {preview(value)}")
     return bool(value)
 
 
@@ -159,7 +159,7 @@ def span(what: str, value: Any, low: float, high: float) -> tuple[float, float]:
         return first, number(what, last, first, high)
     except ValueError:
         raise ValueError(
-            f"{what}: expected a {_numbers(low, high)}, or two of them, the lower first, got {shown(value)}"
+            f"{what}: expected a {_numbers(low, high)}, or two of them, the lower first, got {preview(value)}"
         ) from None
 
 
@@ -191,7 +191,7 @@ def array(what: str, value: Any, size: int, low: float = -math.inf, high: float 
         numbers = np.asarray(None)
     fits = numbers.dtype.kind in "if" and numbers.shape in ((), (size,)) and np.isfinite(numbers).all()
     if not (fits and ((low <= numbers) & (numbers <= high)).all()):
-        raise ValueError(f"{what}: expected one {_numbers(low, high)} or {size} of them, got {shown(value)}")
+        raise ValueError(f"{what}: expected one {_numbers(low, high)} or {size} of them, got {preview(value)}")
     return np.broadcast_to(numbers, size).astype(float)
 
 
@@ -204,7 +204,7 @@ def mapping(what: str, value: Any) -> Mapping[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping):
-        raise ValueError(f"{what}: expected a mapping of names to values, got {shown(value)}")
+        raise ValueError(f"{what}: expected a mapping of names to values, got {preview(value)}")
     return value
 
 
@@ -217,23 +217,23 @@ def json_text(what: str, value: Any) -> str:
     try:
         return json.dumps(value, sort_keys=True)
     except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"{what}: expected values that JSON can hold: {quoted(error)}") from None
+        raise ValueError(f"{what}: expected values that JSON can hold: {quote(error)}") from None
 
 
-def quoted(value: Any) -> str:
+def quote(value: Any) -> str:
     """Return the beginning of a foreign text, such as another library's error, without line breaks."""
     return " ".join(str(value).split())[:_LONGEST_QUOTE]
 
 
-def shown(value: Any) -> str:
+def preview(value: Any) -> str:
     """Return how errors write a value of any origin, such as of a file: the beginning of its text, in one line."""
     try:
-        return quoted(repr(value))
+        return quote(repr(value))
     except Exception:  # nested too deeply, or broken
         return f"a {type(value).__name__} that cannot be shown"
 
 
-def imported(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:
+def import_object(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:
     """Return what `module:name` stands for; its module is imported.
 
     Args:
@@ -248,4 +248,4 @@ def imported(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resol
         return resolve(path)
     except (ImportError, ValueError, AttributeError) as error:
         near = hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
-        raise ValueError(f"{kind} {path[:80]!r}: {quoted(error)}{near}") from None
+        raise ValueError(f"{kind} {path[:80]!r}: {quote(error)}{near}") from None

@@ -165,7 +165,7 @@ def _runs(process: int) -> bool:
     return True
 
 
-def delete_unfinished(path: str | os.PathLike) -> None:
+def delete_temporaries(path: str | os.PathLike) -> None:
     """Delete temporary files that killed processes left in `writing` a file; no process may be writing it."""
     target = Path(path)
     for temporary in target.parent.glob(f".{target.stem[:32]}.*{target.suffix}"):
@@ -210,7 +210,7 @@ def lock(file: IO) -> bool:
 
 
 @contextlib.contextmanager
-def locked(path: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
+def hold_lock(path: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
     """Hold a lock against other processes: a file that is there while the lock is held.
 
     Args:

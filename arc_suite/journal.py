@@ -76,6 +76,6 @@ def _generations(path: Path, text: bytes, header: bytes, generation: Callable[..
     except (ValueError, LookupError, TypeError, RecursionError):
         raise ValueError(f"{path}: no journal of a search; {advice}") from None
     for name in differing:
-        there, asked = checks.quoted(found[name]), checks.quoted(wanted[name])
+        there, asked = checks.quote(found[name]), checks.quote(wanted[name])
         raise ValueError(f"{path}: of a search with {name} {there}, not {asked}; {advice}")
     return generations

@@ -10,10 +10,10 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.law import Law
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import LAWS, SUITE_PRESETS, law
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.visuals import VISUALS
 from arc_suite.models.visuals.spec import Visuals
-from arc_suite.registry import ADDITIONS, BODIES_ENV, FAMILIES, MODULES
+from arc_suite.registry import ADDITIONS, BODIES_ENV, FAMILIES, MODULE_OF_NAME
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
@@ -114,11 +114,11 @@ def register(
             raise ValueError(f"nothing to register: give {kinds}")
     else:
         _register_body(body, parameters or {}, presets, visuals, {**LAWS, **law_by_preset})
-        MODULES["robot", body.name] = module
+        MODULE_OF_NAME["robot", body.name] = module
     LAWS.update(law_by_preset)
     for kind, additions in parts.items():
         _TABLES[kind].update(additions)
-        MODULES.update({(kind, name): module for name in additions})
+        MODULE_OF_NAME.update({(kind, name): module for name in additions})
     register_ids()
 
 
@@ -127,15 +127,15 @@ def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) ->
     table = _TABLES[kind]
     for name, value in additions.items():
         if not (isinstance(name, str) and name.isidentifier()):
-            raise ValueError(f"{kind} {checks.shown(name)}: expected a name of letters, digits and underscores")
-        is_again = table.get(name) is value or (module is not None and MODULES.get((kind, name)) == module)
+            raise ValueError(f"{kind} {checks.preview(name)}: expected a name of letters, digits and underscores")
+        is_again = table.get(name) is value or (module is not None and MODULE_OF_NAME.get((kind, name)) == module)
         if name in table and not is_again:
-            raise ValueError(f"{kind} {checks.shown(name)} is already registered; choose another name")
+            raise ValueError(f"{kind} {checks.preview(name)} is already registered; choose another name")
 
 
 def _check_program(name: str, path) -> None:
     if not isinstance(path, str):
-        raise ValueError(f"program {name!r}: expected the name of a module, got {checks.shown(path)}")
+        raise ValueError(f"program {name!r}: expected the name of a module, got {checks.preview(path)}")
 
 
 def _preset_class(name: str, law) -> type:
@@ -148,7 +148,9 @@ def _preset_class(name: str, law) -> type:
     if missing := [part for part in ("preset", "reads", "initial", "__call__") if part not in attributes]:
         raise ValueError(f"law {name!r}: has no {' and no '.join(missing)}, which arc_suite.cpg.law.Law requires")
     if not {"posture", "velocities"} <= set(law.reads):
-        raise ValueError(f"law {name!r}: reads: expected posture, velocities and others, got {checks.shown(law.reads)}")
+        raise ValueError(
+            f"law {name!r}: reads: expected posture, velocities and others, got {checks.preview(law.reads)}"
+        )
     if name in SUITE_PRESETS:
         raise ValueError(f"law {name!r}: the suite has presets of this name; choose another name")
     preset_class = type(law.preset)
@@ -160,10 +162,10 @@ def _preset_class(name: str, law) -> type:
 def _task_name(task) -> str:
     name = getattr(task, "name", None)
     if not (isinstance(task, type) and issubclass(task, Task)):
-        raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {checks.shown(task)}")
+        raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {checks.preview(task)}")
     if missing := sorted(task.__abstractmethods__):
         lacks = " and no ".join(missing)
-        raise ValueError(f"task {checks.shown(name)}: has no {lacks}, which arc_suite.tasks.Task requires")
+        raise ValueError(f"task {checks.preview(name)}: has no {lacks}, which arc_suite.tasks.Task requires")
     return name
 
 
@@ -175,7 +177,7 @@ def _modifier_settings(kind) -> Mapping[str, Any]:
     """
     if not (isinstance(kind, type) and issubclass(kind, Modifier) and issubclass(kind, tuple)):
         expected = "NamedTuples that inherit from arc_suite.tasks.modifiers.Modifier"
-        raise ValueError(f"modifiers: expected {expected}, got {checks.shown(kind)}")
+        raise ValueError(f"modifiers: expected {expected}, got {checks.preview(kind)}")
     if not kind.defaults:
         raise ValueError(f"modifier {kind.__name__}: expected settings in its `defaults`, got none")
     of_tasks = {name for task in TASKS.values() for name in getattr(task, "names", tuple)()}
@@ -186,7 +188,7 @@ def _modifier_settings(kind) -> Mapping[str, Any]:
 
 def _register_body(body, parameters, presets, visuals, laws) -> None:
     if not isinstance(body, Body):
-        raise ValueError(f"body: expected a spec.Body, got {checks.shown(body)}")
+        raise ValueError(f"body: expected a spec.Body, got {checks.preview(body)}")
     if body.name == BODIES:
         raise ValueError(f"robot {BODIES!r}: ids of environments of different bodies have this name; choose another")
     if ROBOTS.get(body.name, body) != body:
@@ -210,12 +212,12 @@ def _check_parameters(body: Body, task: str, given: Mapping[str, Any]) -> None:
 
 
 def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, Any], laws: Mapping[type, Any]) -> None:
-    task, _ = prepared(body, "walk", walk)
+    task, _ = prepare_task(body, "walk", walk)
     for name, preset in presets.items():
         try:
             law(task, preset, laws)
         except ValueError as error:
-            raise ValueError(f"preset {checks.shown(name)}: {error}") from None
+            raise ValueError(f"preset {checks.preview(name)}: {error}") from None
 
 
 def register_ids() -> None:
@@ -233,8 +235,8 @@ def register_ids() -> None:
                 vector_entry_point="arc_suite.envs.vector:VectorEnv",
                 max_episode_steps=STEPS,
                 kwargs={
-                    "domain_name": registry.importable("robot", domain_name),
-                    "task_name": registry.importable("task", task_name),
+                    "domain_name": registry.importable_name("robot", domain_name),
+                    "task_name": registry.importable_name("task", task_name),
                 },
             )
     for task_name, task in TASKS.items():
@@ -243,5 +245,5 @@ def register_ids() -> None:
             gymnasium.register(
                 env_id,
                 vector_entry_point=BODIES_ENV,
-                kwargs={"task_name": registry.importable("task", task_name)},
+                kwargs={"task_name": registry.importable_name("task", task_name)},
             )

@@ -40,9 +40,9 @@ BODIES_ENV = "arc_suite.bodies:BodiesEnv"
 # checks values when it uses them; see `find`.
 ADDITIONS: dict[str, dict[str, Any]] = {"law": {}, "network": {}, "algorithm": {}, "clip": {}, "program": {}}
 
-MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
+MODULE_OF_NAME = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
-MOST_BODIES = 1 << 16  # that one name stands for
+MAX_BODIES = 1 << 16  # that one name stands for
 
 _SEEDS = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")
 _SEVERAL = re.compile(r",|:\d+-\d+$")
@@ -85,7 +85,7 @@ def body_of(robot, near: Iterable[str] = ()) -> Body:
     """
     body, *others = itertools.islice(_bodies(robot, near), 2)
     if others:
-        raise ValueError(f"robot {checks.shown(robot)}: expected one body, got several")
+        raise ValueError(f"robot {checks.preview(robot)}: expected one body, got several")
     return body
 
 
@@ -99,17 +99,17 @@ def bodies_of(robot, near: Iterable[str] = ()) -> tuple[Body, ...]:
     return tuple(_bodies(robot, near))
 
 
-def words() -> list[str]:
+def robot_words() -> list[str]:
     """Return words for bodies: names of robots, and of packaged specs, and a body of each family."""
     return [*ROBOTS, *EXAMPLES, *(f"{family}:7" for family in FAMILIES)]
 
 
-def names_several(robot) -> bool:
+def names_several_bodies(robot) -> bool:
     """Return whether a text names several bodies: `family:first-last`, or names with commas."""
     return isinstance(robot, str) and not (robot.startswith("{") or _is_path(robot)) and bool(_SEVERAL.search(robot))
 
 
-def stored(robot: str) -> str:
+def check_stored_robot(robot: str) -> str:
     """Return what a file names bodies by, if looking it up imports nothing and opens no file but packaged ones.
 
     Raises:
@@ -118,13 +118,13 @@ def stored(robot: str) -> str:
     """
     for part in [] if robot.startswith("{") else robot.split(","):
         if not part.rpartition(":")[0] or _is_path(part):
-            checks.name(part, (*ROBOTS, *EXAMPLES), "robot", words()[-len(FAMILIES) :])
-    for name in names_in(robot):
-        imported("robot", name)
+            checks.name(part, (*ROBOTS, *EXAMPLES), "robot", robot_words()[-len(FAMILIES) :])
+    for name in names_in_robot(robot):
+        refuse_import("robot", name)
     return robot
 
 
-def names_in(robot: str) -> list[str]:
+def names_in_robot(robot: str) -> list[str]:
     """Return the names of robots and families, without seeds, in a text that names bodies."""
     parts = [] if robot.startswith("{") else robot.split(",")
     families = [part.rpartition(":") for part in parts]
@@ -154,7 +154,7 @@ def _bodies(robot, near: Iterable[str]) -> Iterator[Body]:
     elif family in FAMILIES or ":" in family or (family and _SEEDS.fullmatch(seeds)):  # seeds are no name of a robot
         yield from (_member(family, seed) for seed in _range(family, seeds))
     else:
-        yield _find(robot, ROBOTS, "robot", (*words()[len(ROBOTS) :], *near))
+        yield _find(robot, ROBOTS, "robot", (*robot_words()[len(ROBOTS) :], *near))
 
 
 def _read(path: Path) -> Body:
@@ -179,8 +179,8 @@ def _range(family: str, seeds: str) -> range:
             f"robot '{family}:{seeds}': expected {family}:seed or {family}:first-last, such as {family}:0-9"
         )
     first, last = int(found[1]), int(found[2] or found[1])
-    if not first <= last < first + MOST_BODIES:
-        raise ValueError(f"robot '{family}:{seeds}': expected seeds in ascending order, at most {MOST_BODIES}")
+    if not first <= last < first + MAX_BODIES:
+        raise ValueError(f"robot '{family}:{seeds}': expected seeds in ascending order, at most {MAX_BODIES}")
     return range(first, last + 1)
 
 
@@ -189,9 +189,9 @@ def _member(family: str, seed: int) -> Body:
     try:
         body = make(seed)
     except ValueError as error:
-        raise ValueError(f"robot '{family}:{seed}': {checks.quoted(error)}") from None
+        raise ValueError(f"robot '{family}:{seed}': {checks.quote(error)}") from None
     if not isinstance(body, Body):
-        raise ValueError(f"family {family!r}: expected a spec.Body of seed {seed}, got {checks.shown(body)}")
+        raise ValueError(f"family {family!r}: expected a spec.Body of seed {seed}, got {checks.preview(body)}")
     return body
 
 
@@ -232,7 +232,7 @@ def modifier_setting(name: str) -> str | None:
     """
     if ":" in name:
         _find(name, MODIFIERS, "modifier")
-        return bare(name)
+        return bare_name(name)
     return name if name in MODIFIERS else None
 
 
@@ -243,8 +243,8 @@ def check_stored_settings(settings: Mapping[str, Any]) -> None:
         NotImported: the module of a modifier or of an arena has not been imported yet.
     """
     for name in settings:
-        imported("modifier", name)
-    imported("arena", str(settings.get("arena", "flat")))
+        refuse_import("modifier", name)
+    refuse_import("arena", str(settings.get("arena", "flat")))
 
 
 def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
@@ -262,7 +262,7 @@ def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
     try:
         return resolve(entry)
     except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(f"{kind} {bare(name)!r}: cannot import {entry}: {checks.quoted(error)}") from None
+        raise ValueError(f"{kind} {bare_name(name)!r}: cannot import {entry}: {checks.quote(error)}") from None
 
 
 def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
@@ -277,18 +277,18 @@ def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
         ValueError: an unknown name, or one that the suite has and another package registers.
     """
     entry = _find(name, collections.ChainMap(ADDITIONS[kind], dict(suite)), kind)
-    if bare(name) in suite and bare(name) in ADDITIONS[kind]:
-        module = MODULES.get((kind, bare(name))) or "__main__"
-        raise ValueError(f"{kind} {bare(name)!r}: the suite has one of this name, and {module} registers another")
+    if bare_name(name) in suite and bare_name(name) in ADDITIONS[kind]:
+        module = MODULE_OF_NAME.get((kind, bare_name(name))) or "__main__"
+        raise ValueError(f"{kind} {bare_name(name)!r}: the suite has one of this name, and {module} registers another")
     return entry
 
 
-def bare(name: str) -> str:
+def bare_name(name: str) -> str:
     """Return the name in `module:name`, or the name itself."""
     return name.rpartition(":")[2]
 
 
-def imported(kind: str, name: str) -> str:
+def refuse_import(kind: str, name: str) -> str:
     """Return a name that a file gives, `name` or `module:name`, if looking it up imports nothing new.
 
     Files are data: their names are looked up among the registered ones, and only callers choose what to import.
@@ -298,13 +298,13 @@ def imported(kind: str, name: str) -> str:
     """
     module, colon, _ = name.rpartition(":")
     if colon and module not in sys.modules:
-        raise NotImported(f"{kind} {checks.shown(name)}: files import nothing; import {module[:80]!r} first")
+        raise NotImported(f"{kind} {checks.preview(name)}: files import nothing; import {module[:80]!r} first")
     return name
 
 
-def importable(kind: str, name: str) -> str:
+def importable_name(kind: str, name: str) -> str:
     """Return a name as another process can look it up: `module:name` where another package registered it."""
-    module = MODULES.get((kind, name))
+    module = MODULE_OF_NAME.get((kind, name))
     return name if module is None else f"{module}:{name}"
 
 
@@ -326,7 +326,7 @@ def import_module(module: str, subject: str) -> None:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        cause = f"cannot import {module[:80]}: {checks.quoted(error)}"
+        cause = f"cannot import {module[:80]}: {checks.quote(error)}"
         remedy = f"; start in the folder of {module[:80]}.py, or put it on Python's path"
         raise ValueError(f"{subject}: {cause}{remedy if error.name == module else ''}") from None
 
@@ -335,12 +335,12 @@ def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
     if isinstance(name, str) and ":" in name:
         module, _, name = name.rpartition(":")
         if not all(part.isidentifier() for part in module.split(".")):
-            given = checks.shown(f"{module}:{name}")
+            given = checks.preview(f"{module}:{name}")
             raise ValueError(f"{kind} {given}: expected module:name, with a module that can be imported")
         import_module(module, f"{kind} {name[:80]!r}")
         if name not in table:
-            hint = checks.hint(name, [own for own in table if MODULES.get((kind, own)) == module])
+            hint = checks.hint(name, [own for own in table if MODULE_OF_NAME.get((kind, own)) == module])
             raise ValueError(f"{kind} {name[:80]!r}: {module} registers no such {kind} by arc_suite.register{hint}")
-        if (kind, name) not in MODULES:
+        if (kind, name) not in MODULE_OF_NAME:
             raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
     return table[checks.name(name, table, kind, near)]

@@ -3,7 +3,7 @@
 import math
 
 
-def wrapped(angle):
+def wrap_angle(angle):
     """Return angles (...) between -pi and pi, rad."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
@@ -21,7 +21,7 @@ def yaw(quaternion):
     return numpy.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def turned(quaternion, angle):
+def turn_about_z(quaternion, angle):
     """Return orientations (..., 4) turned by an angle (...) about world z, rad."""
     numpy = quaternion.__array_namespace__()
     cosine, sine = numpy.cos(0.5 * angle), numpy.sin(0.5 * angle)
@@ -56,7 +56,7 @@ def matrix(quaternion):
     return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def headed(vectors, heading):
+def to_heading_frame(vectors, heading):
     """Return world vectors (..., 2) in the frame of a heading (...), rad: forward and left."""
     numpy = vectors.__array_namespace__()
     cosine, sine, x, y = numpy.cos(heading), numpy.sin(heading), vectors[..., 0], vectors[..., 1]

@@ -20,7 +20,7 @@ def of_run(seed: int) -> range:
     return range(_OF_ONE * (1 + seed), _OF_ONE * (2 + seed))
 
 
-def common(ranges: Iterable[range], played: range) -> range:
+def common_seeds(ranges: Iterable[range], played: range) -> range:
     """Return the seeds that the first range to have any of those played has in common with them; empty for none."""
     shared = (range(max(each.start, played.start), min(each.stop, played.stop)) for each in ranges)
     return next(filter(None, shared), range(0))

@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 
 # As in setup.cfg. MuJoCo and dm_control move together.
-NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
+REQUIREMENTS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
 
 
-def clone() -> Path | None:
+def clone_folder() -> Path | None:
     """Return the folder of the clone that this package lies in; None for an installed package."""
     folder = Path(__file__).parents[1]
     return folder if (folder / "setup.cfg").exists() else None
@@ -26,12 +26,16 @@ class MissingExtra(ImportError, ValueError):
             error: of the import that failed.
         """
         # Outside a clone nobody knows where the package came from: no index has it.
-        remedy = f"pip install -e '{clone()}[{extra}]'" if clone() else f"install arc_suite with the extra {extra!r}"
+        remedy = (
+            f"pip install -e '{clone_folder()}[{extra}]'"
+            if clone_folder()
+            else f"install arc_suite with the extra {extra!r}"
+        )
         super().__init__(f"{need}: {remedy} ({error})")
 
 
 @contextlib.contextmanager
-def needing(need: str, extra: str):
+def require_extra(need: str, extra: str):
     """Name the extra that is missing where imports in this context fail.
 
     Args:
@@ -47,7 +51,7 @@ def needing(need: str, extra: str):
         raise MissingExtra(need, extra, error) from None
 
 
-def installed(package: str) -> str | None:
+def version_of(package: str) -> str | None:
     """Return the version of an installed package; None for one that is not installed."""
     from importlib import metadata  # slow to import, and seldom needed
 
@@ -57,9 +61,9 @@ def installed(package: str) -> str | None:
         return None
 
 
-def recorded() -> dict[str, str | None]:
+def dependency_versions() -> dict[str, str | None]:
     """Return the versions of what results depend on, by package; None for one that is not installed."""
-    return {name: installed(name) for name in ("arc_suite", "mujoco", "dm_control", "numpy")}
+    return {name: version_of(name) for name in ("arc_suite", "mujoco", "dm_control", "numpy")}
 
 
 def problems() -> list[str]:
@@ -67,8 +71,8 @@ def problems() -> list[str]:
     from packaging.specifiers import SpecifierSet
 
     lines = []
-    for package, needed in NEEDS.items():
-        version = installed(package)
+    for package, needed in REQUIREMENTS.items():
+        version = version_of(package)
         if version is None or not SpecifierSet(needed).contains(version, prereleases=True):
             wrong = f"{package} is {version or 'not installed'} and should be {needed}"
             # From Python 3.13 on a package that dm_control asks for cannot be installed; nothing here uses it.
@@ -78,7 +82,7 @@ def problems() -> list[str]:
 
 
 @contextlib.contextmanager
-def explained():
+def explain_import_errors():
     """Name the package that is to blame, in one line, where imports in this context fail.
 
     Raises:

@@ -113,7 +113,7 @@ def walking(body) -> dict:
 
 def switching(body) -> dict:
     """Return what changes of gait add to the error of motion, and the compliance after one by that before."""
-    names = gaits.fitting(body)
+    names = gaits.fitting_gaits(body)
     run = Run(body, len(names))
     run.envs.command("command", STRAIGHT[0])
     numbers = {name: np.append(run.task.named_command("gait", name)[:-1], np.nan) for name in names}

@@ -134,7 +134,7 @@ def main():
     if FLAGS.document and jax.default_backend() != "gpu":
         raise ValueError(f"--document: JAX finds no GPU here, and tables of a {jax.default_backend()} are not written")
     packages = ("mujoco", "mujoco-mjx", "warp-lang", "jax")
-    found = ", ".join(f"{name} {versions.installed(name)}" for name in packages)
+    found = ", ".join(f"{name} {versions.version_of(name)}" for name in packages)
     rows = [speed(robot, impl, int(count), FLAGS.steps) for robot in robots for impl in impls for count in FLAGS.worlds]
     header = ["robot", "impl", "worlds", "control steps/s", "compiling", "peak memory", "overflows"]
     parts = [f"{jax.devices()[0].device_kind}; {found}.", "<!-- table -->", table(header, rows)]

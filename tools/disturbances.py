@@ -64,7 +64,7 @@ def episodes(task: str, body, settings: dict, policy: str, preset: str, command=
     with contextlib.closing(rows):
         played = evaluation.episodes_in_batch(rows, acting, seeds, watch)
     first, last = places[0], places[-1]
-    way = rotations.headed(last[:, :2] - first[:, :2], rotations.yaw(first[:, 3:]))
+    way = rotations.to_heading_frame(last[:, :2] - first[:, :2], rotations.yaw(first[:, 3:]))
     asked = rows.task.definition.parameters.target_velocity * rows.task.scene.control_timestep * FLAGS.steps
     totals = np.array([episode.total for episode in played])
     figures = {name: np.array([episode.progress[name] for episode in played]) for name in played[0].progress}

@@ -57,7 +57,7 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
     settings = {name: FLAGS[name].value for name in ("space", "seed")}
     settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
-    known = setup.to_dict() | settings | {"versions": versions.recorded()}
+    known = setup.to_dict() | settings | {"versions": versions.dependency_versions()}
     with contextlib.closing(Journal(folder / "journal.jsonl", known, Generation)) as journal:
         course = Search(setup, **settings)
         for generation in journal.generations:
@@ -99,7 +99,7 @@ def main() -> None:
     checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:
         raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
-    with versions.needing("a search needs cma and matplotlib", "dev"):
+    with versions.require_extra("a search needs cma and matplotlib", "dev"):
         import cma  # noqa: F401
         from preset_search import plots
     folder = files.folder(FLAGS.output)
@@ -111,7 +111,7 @@ def main() -> None:
         metrics = evaluate(setup, preset)
         counts = {"generations": len(journal.generations), "resets": FLAGS.resets}
         file.update(setup.to_dict() | {"space": FLAGS.space, "seed": FLAGS.seed} | counts)
-        file.update(preset=preset, metrics=metrics, versions=versions.recorded())
+        file.update(preset=preset, metrics=metrics, versions=versions.dependency_versions())
     columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
     header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
     print(header, "-" * len(header), sep="\n")

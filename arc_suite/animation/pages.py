@@ -33,7 +33,11 @@ def built(name: str) -> bytes:
     """
     file = resources.files("arc_suite.animation").joinpath("web", name)
     if not file.is_file():
-        cure = "`make web` builds it" if versions.clone() else "install a wheel that `make dist` has built in a clone"
+        cure = (
+            "`make web` builds it"
+            if versions.clone_folder()
+            else "install a wheel that `make dist` has built in a clone"
+        )
         raise ValueError(f"no viewer for pages: {cure}, which needs Node")
     return file.read_bytes()
 

@@ -175,7 +175,7 @@ def _bones(body: Body, place: np.ndarray, quaternion: np.ndarray) -> list[Part]:
     """Return the parts of a body's spec without shapes, given where the torso is."""
     found, joints = [Part("torso", None, place.copy(), quaternion.copy(), None, None, ())], itertools.count()
     for leg in body.legs:
-        parent, end, turn = 0, leg.mount, rotations.turned(_AS_ABOVE, np.radians(leg.yaw_deg))
+        parent, end, turn = 0, leg.mount, rotations.turn_about_z(_AS_ABOVE, np.radians(leg.yaw_deg))
         for part in leg.parts:
             hinge = part.joint if isinstance(part, Link) else None
             joint, axis = (next(joints), np.array(hinge.axis) / np.linalg.norm(hinge.axis)) if hinge else (None, None)

@@ -93,7 +93,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
 
 def _ground(setup: Setup, arena: str) -> dict[str, Any]:
     """The MJCF of a body in an arena, with the integrator of simulations, and where the body starts."""
-    task, model = Setup.of(setup.body, setup.task, {"arena": arena}).prepared()
+    task, model = Setup.of(setup.body, setup.task, {"arena": arena}).prepare()
     text = models.text(setup.body, task.scene.arena)
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
         text = text.replace('integrator="implicitfast"', 'integrator="Euler"')

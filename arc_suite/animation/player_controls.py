@@ -27,7 +27,7 @@ def room(body: Body) -> np.ndarray:
 def named(task: Task) -> dict[str, list[float]]:
     """Return offsets, cycles, and duty factor of the gaits that fit a body, by name; first its own."""
     body, own = task.scene.body, task.parameters
-    made = {name: gaits.gait(body, name) for name in gaits.fitting(body)}
+    made = {name: gaits.gait(body, name) for name in gaits.fitting_gaits(body)}
     return {
         OWN: [*np.divide(own.phase_offsets, clock.TWO_PI), own.duty_factor],
         **{name: [*gait.offsets, gait.duty_factor] for name, gait in made.items()},

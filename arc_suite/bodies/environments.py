@@ -14,9 +14,9 @@ from arc_suite import checks, registry, rotations
 from arc_suite.bodies import tokens
 from arc_suite.bodies.groups import Group, Member, Place, grouped, scatter
 from arc_suite.bodies.tokens import Description, Tokens
-from arc_suite.envs.base_vector import MOST_ENVS, BaseVectorEnv
+from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.tasks.contract import CURRICULUM
 
 
@@ -116,9 +116,9 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self._lock, self._places, self._begun = Lock(), [], False
         given = bodies if isinstance(bodies, list | tuple) else [bodies]
         found = list(itertools.chain.from_iterable(map(registry.bodies_of, given)))
-        num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
+        num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
         if not found:
-            raise ValueError(f"bodies: expected at least one, got {checks.shown(bodies)}")
+            raise ValueError(f"bodies: expected at least one, got {checks.preview(bodies)}")
         if len(found) > num_envs:
             raise ValueError(f"num_envs: expected at least one for each of {len(found)} bodies, got {num_envs}")
         for body in found:
@@ -137,7 +137,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             "camera_id": camera_id,
             "privileged": privileged,
         }
-        made = {body: Member(*prepared(body, task_name, _of_tasks(settings))) for body in dict.fromkeys(found)}
+        made = {body: Member(*prepare_task(body, task_name, _of_tasks(settings))) for body in dict.fromkeys(found)}
         which_body = [index % len(found) for index in range(num_envs)]
         members = [made[body] for body in found]
         self.num_envs, self.bodies = num_envs, tuple(found[which] for which in which_body)

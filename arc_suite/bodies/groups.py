@@ -36,7 +36,7 @@ class Group(VectorEnv):
     def _privileged_vectors(self) -> np.ndarray:
         return tokens.spread(self._padding, super()._privileged_vectors())
 
-    def _prepared(self):
+    def _prepare_tasks(self):
         tasks, models = zip(*self._members, strict=True)
         return list(tasks), models[0] if all(task is tasks[0] for task in tasks) else list(models)
 

@@ -47,8 +47,8 @@ def findings() -> Iterator[Finding]:
 
 def _packages() -> Iterator[Finding]:
     wrong = {line.split()[0]: line.partition(": ")[2] for line in versions.problems()}
-    for package, needed in versions.NEEDS.items():
-        found = f"{versions.installed(package) or 'not installed'}, made for {needed}"
+    for package, needed in versions.REQUIREMENTS.items():
+        found = f"{versions.version_of(package) or 'not installed'}, made for {needed}"
         yield Finding(package, found, wrong.get(package))
 
 

@@ -50,7 +50,7 @@ def main() -> None:
             training_seeds=seed_ranges.to_json(training_seeds),
             seed=FLAGS.seed,
             robots={name: each.to_json() for name, each in zip(asked, found, strict=True)},
-            versions=versions.recorded(),
+            versions=versions.dependency_versions(),
         )
         if len(found) > 1 and all(each.expert is not None for each in found):
             file["return_over_expert"] = total = over_all(found)

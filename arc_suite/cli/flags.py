@@ -19,7 +19,9 @@ from arc_suite.tasks import TASKS
 FLAGS = flags.FLAGS
 
 MOST = 100_000  # episodes, or bodies: more than anyone waits for
-ROBOT_HELP = f"{', '.join(registry.words())}; a file in JSON, MJCF or URDF; module:name of one that another package has"
+ROBOT_HELP = (
+    f"{', '.join(registry.robot_words())}; a file in JSON, MJCF or URDF; module:name of one that another package has"
+)
 
 
 def define_body(robot: str | None = "queen", more: str = "") -> None:
@@ -88,8 +90,8 @@ def policy_name(name: str) -> str:
         return name
     policy_file = other_libraries.find(name)
     if policy_file is None or policy_file.extension != zips.EXTENSION:
-        given = f"--vecnormalize={checks.quoted(FLAGS.vecnormalize)}"
-        raise ValueError(f"{given}: goes with a zip of stable-baselines3, got {checks.shown(name)}")
+        given = f"--vecnormalize={checks.quote(FLAGS.vecnormalize)}"
+        raise ValueError(f"{given}: goes with a zip of stable-baselines3, got {checks.preview(name)}")
     return other_libraries.with_further_file(name, FLAGS.vecnormalize)
 
 
@@ -115,7 +117,7 @@ def made_body() -> Body | None:
         body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
     if FLAGS.length:
         body = shaping.shaped(body, links=named_values("length", FLAGS.length))
-    return body if FLAGS.palette is None else body.replace(palette=palettes.parsed(FLAGS.palette))
+    return body if FLAGS.palette is None else body.replace(palette=palettes.parse(FLAGS.palette))
 
 
 def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy: str = policies.HELP) -> None:
@@ -150,9 +152,9 @@ def bodies(near: Iterable[str] = ("all",)) -> dict[str, Body]:
     if body is None:
         return dict(ROBOTS) if robot.value == "all" else _named(robot.value, near)
     if robot.present:
-        raise ValueError(f"--robot={checks.quoted(robot.value)}: expected no robot with --spec or --legs")
+        raise ValueError(f"--robot={checks.quote(robot.value)}: expected no robot with --spec or --legs")
     for flaw in flaws(body) if FLAGS.spec is not None or FLAGS.length else ():
-        warnings.warn(f"{checks.quoted(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=2)
+        warnings.warn(f"{checks.quote(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=2)
     return {body.name: body}
 
 
@@ -160,7 +162,7 @@ def _named(robot: str, near: Iterable[str]) -> dict[str, Body]:
     found = registry.bodies_of(robot, near)
     named = {body.name: body for body in found}
     if len(named) < len(found):
-        raise ValueError(f"--robot={checks.quoted(robot)}: expected a name for each body, got two of one name")
+        raise ValueError(f"--robot={checks.quote(robot)}: expected a name for each body, got two of one name")
     return named
 
 
@@ -177,7 +179,7 @@ def only_body() -> Body:
 def _only(found: dict[str, Any]) -> Any:
     first, *others = found.values()
     if others:
-        raise ValueError(f"--robot={checks.quoted(FLAGS.robot)}: expected one robot")
+        raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected one robot")
     return first
 
 
@@ -254,7 +256,7 @@ def task() -> tuple[str, dict[str, Any]]:
     settings = named_values("set", FLAGS["set"].value)
     if "random" in settings:
         raise ValueError(
-            f"--set random={checks.quoted(settings['random'])}: programs seed every episode; "
+            f"--set random={checks.quote(settings['random'])}: programs seed every episode; "
             "see --help for the flag of the first seed"
         )
     if "arena" in settings:
@@ -287,7 +289,7 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name and equals):
-            raise ValueError(f"--{flag} {checks.quoted(text)}: expected name=value")
+            raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value")
         try:
             found[name] = json.loads(value)
         except ValueError:

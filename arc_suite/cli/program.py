@@ -106,7 +106,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
             return print(VERSION)
         places = len(inspect.signature(main).parameters)
         if len(rest) > places:
-            raise ValueError(f"unexpected argument {checks.shown(rest[places])}; {_meant(rest[places])}see --help")
+            raise ValueError(f"unexpected argument {checks.preview(rest[places])}; {_meant(rest[places])}see --help")
         return main(*rest)
 
     guard(work, name or Path(script).name)
@@ -167,13 +167,13 @@ def _parsed(arguments: Sequence[str], module: ModuleType) -> list[str]:
         given = str(error).removesuffix(f": {error.__context__}")  # flag --NAME=VALUE
         parser = flags.FLAGS[given.removeprefix("flag --").partition("=")[0]].parser
         choices = getattr(parser, "enum_values", ("true", "false"))
-        raise ValueError(f"{checks.quoted(given)}: expected {parser.syntactic_help or ' or '.join(choices)}") from None
+        raise ValueError(f"{checks.quote(given)}: expected {parser.syntactic_help or ' or '.join(choices)}") from None
 
 
 def _meant(argument: str) -> str:
     """Return the flag that an argument without one may belong to, for an error; "" where none takes it."""
     guesses = {
-        "robot": registry.words(),
+        "robot": registry.robot_words(),
         "task": TASKS,
         "policy": [*policies.POLICIES, *filter(os.path.exists, [argument])],
     }

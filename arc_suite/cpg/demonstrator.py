@@ -11,7 +11,7 @@ from arc_suite.cpg.law import checked, restarted
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import law, preset_of
 from arc_suite.envs import trees
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.soundness import hopeless
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -60,7 +60,7 @@ class Demonstrator:
         # Presets of the published law were found for a body as it is.
         if not isinstance(preset, Preset) and (found := hopeless(body)):
             raise ValueError(f"{body.name} cannot walk: {found[0].text}")
-        task = task or prepared(body, "walk")[0]
+        task = task or prepare_task(body, "walk")[0]
         self._body, self._lies, self.law = body, task.lies, law(task, preset)
         self._state, self._started = None, []
 
@@ -111,7 +111,7 @@ class Demonstrator:
         if not arrays:
             return
         like, places = self.law.initial(len(arrays["0"])), iter(range(len(arrays)))
-        self._state, self._started = trees.mapped(lambda leaf: arrays[str(next(places))].copy(), like), []
+        self._state, self._started = trees.map_leaves(lambda leaf: arrays[str(next(places))].copy(), like), []
 
     def __call__(self, timestep) -> np.ndarray:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""

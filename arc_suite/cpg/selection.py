@@ -87,7 +87,7 @@ def check_preset_name(name: str) -> str:
     """
     if isinstance(name, str) and ":" in name:
         registry.find("law", name, {})
-        return registry.bare(name)
+        return registry.bare_name(name)
     return checks.name(name, preset_names(), "preset")
 
 

@@ -70,7 +70,7 @@ class Stride(NamedTuple):
         """
         if abs(checks.number("froude", froude, -1.0, 1.0)) < _LEAST_FROUDE:
             raise ValueError(
-                f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {checks.shown(froude)}"
+                f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {checks.preview(froude)}"
             )
         body, gait = task.scene.body, gait_of(task)
         pose = standing(body)  # of the body as it came, for which the task has it at hand

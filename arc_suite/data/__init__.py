@@ -9,7 +9,7 @@ A recorded episode, replayed::
 
 from arc_suite import versions
 
-with versions.needing("datasets need Minari", "data"):
+with versions.require_extra("datasets need Minari", "data"):
     import h5py  # noqa: F401
     import minari  # noqa: F401
 

@@ -109,7 +109,7 @@ def _difference(was: dict, now: dict) -> str | None:
         if was.get(name) != value:
             if name == "presets_sha256":
                 return f"its presets {' and '.join(now['presets'])} had other numbers"
-            there, here = (checks.quoted(repr(each)) for each in (was.get(name), value))
+            there, here = (checks.quote(repr(each)) for each in (was.get(name), value))
             return f"its {name} is {there}, and not {here}"
     return None
 

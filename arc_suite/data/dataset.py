@@ -65,7 +65,7 @@ class Dataset:
         try:
             setup = Setup.from_dict(known)
         except ValueError as error:
-            raise ValueError(f"dataset {dataset_id!r}: {METADATA}: {checks.quoted(error)}") from None
+            raise ValueError(f"dataset {dataset_id!r}: {METADATA}: {checks.quote(error)}") from None
         with damages(dataset_id, path / "data" / METADATA):
             presets = _typed("presets", known["presets"], list)
             self.settings = DatasetSettings(
@@ -134,7 +134,7 @@ def damages(dataset_id: str, file: Path):
     try:
         yield
     except _DAMAGES as error:
-        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {checks.quoted(error)}") from None
+        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {checks.quote(error)}") from None
 
 
 def _typed(name: str, value, kind: type):
@@ -158,7 +158,7 @@ def _check_spec(spec: str | None, settings: DatasetSettings, known: Mapping[str,
         found["id"] = re.sub(r"-v\d+$", "", found["id"])
     for name in ("id", "entry_point", "max_episode_steps", "kwargs"):
         if there.get(name) != here[name]:
-            said, wanted = (checks.quoted(json.dumps(each)) for each in (there.get(name), here[name]))
+            said, wanted = (checks.quote(json.dumps(each)) for each in (there.get(name), here[name]))
             raise ValueError(f"{name} of its env_spec is {said}, and its settings say {wanted}")
 
 

@@ -19,12 +19,12 @@ def check(dataset_id: str) -> str:
         ValueError: it is no such id, too long, or the version is missing.
     """
     if isinstance(dataset_id, str) and len(dataset_id) > _LONGEST:
-        raise ValueError(f"dataset id {checks.shown(dataset_id)}: expected at most {_LONGEST} characters")
+        raise ValueError(f"dataset id {checks.preview(dataset_id)}: expected at most {_LONGEST} characters")
     if not _valid(dataset_id):
-        example = checks.shown(next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0"))))
+        example = checks.preview(next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0"))))
         raise ValueError(
-            f"dataset id {checks.shown(dataset_id)}: expected names of letters, digits, '-' and '_' with '/' between, "
-            f"two characters at least before the last '/', and a version at the end alone, such as {example}"
+            f"dataset id {checks.preview(dataset_id)}: expected names of letters, digits, '-' and '_' with '/' "
+            f"between, two characters at least before the last '/', and a version at the end alone, such as {example}"
         )
     return dataset_id
 
@@ -64,9 +64,9 @@ def find(dataset_id: str) -> Path:
     """
     if not folder(dataset_id).joinpath("data").is_dir():
         if parts(dataset_id).is_dir():
-            raise ValueError(f"dataset {checks.shown(dataset_id)} is unfinished: collect it again to continue it")
+            raise ValueError(f"dataset {checks.preview(dataset_id)} is unfinished: collect it again to continue it")
         there = existing()
         if not there:
-            raise ValueError(f"unknown dataset {checks.shown(dataset_id)}: there are none in {get_dataset_path()}")
+            raise ValueError(f"unknown dataset {checks.preview(dataset_id)}: there are none in {get_dataset_path()}")
         checks.name(dataset_id, there, "dataset")
     return folder(dataset_id)

@@ -68,7 +68,7 @@ class DatasetSettings(NamedTuple):
         presets = presets_of(self.setup.body) if self.presets else {}
         known = self.setup.provenance() | self._asdict() | {"presets": list(self.presets)}
         del known["setup"]
-        known["presets_sha256"] = [_sha256(repr(presets.get(registry.bare(preset)))) for preset in self.presets]
+        known["presets_sha256"] = [_sha256(repr(presets.get(registry.bare_name(preset)))) for preset in self.presets]
         if policies.is_file(self.policy):
             known["policy_sha256"] = policies.digest(self.policy)
             known["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]

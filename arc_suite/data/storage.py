@@ -86,7 +86,7 @@ class Storage:
         _make_namespace(dataset_id)
         files.folder(place.parent)
         refusal = None if wait else f"dataset {dataset_id!r} is being collected by another process"
-        with files.locked(place.with_name(f".{place.name}.lock"), refusal):
+        with files.hold_lock(place.with_name(f".{place.name}.lock"), refusal):
             yield cls(dataset_id, overwrite)
 
     @property

@@ -48,10 +48,10 @@ def verify(
         raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {setup.task}, and not of {task}")
     for package, version in now["versions"].items():
         if was["versions"].get(package) != version:
-            there = f"{package} {checks.quoted(was['versions'].get(package))}"
+            there = f"{package} {checks.quote(was['versions'].get(package))}"
             raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")
     if was.get("task_version") != now["task_version"]:
-        there = f"version {checks.quoted(was.get('task_version'))} of {setup.kind.name}"
+        there = f"version {checks.quote(was.get('task_version'))} of {setup.kind.name}"
         raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {now['task_version']} is installed")
     if was["model_sha256"] != now["model_sha256"]:
         raise ValueError(f"dataset {dataset_id!r} was collected with another model of {setup.body.name}")

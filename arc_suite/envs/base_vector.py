@@ -8,7 +8,7 @@ from gymnasium.error import ClosedEnvironmentError
 
 from arc_suite import checks
 
-MOST_ENVS = 1 << 20
+MAX_ENVS = 1 << 20
 
 # Attributes that have a value for each environment.
 _OF_EACH = ("np_random", "np_random_seed", "render", "positions", "resampled")
@@ -58,7 +58,7 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
         values = list(values) if isinstance(values, list | tuple) else [values]
         if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):
             raise ValueError(
-                f"set_attr {name!r}: environments share it; expected one value for all, got {checks.shown(values)}"
+                f"set_attr {name!r}: environments share it; expected one value for all, got {checks.preview(values)}"
             )
         setattr(self, name, values[0])
 
@@ -72,7 +72,7 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
             if len(seed) != self.num_envs:
                 raise ValueError(f"seed: expected one for each of {self.num_envs} environments, got {len(seed)}")
             return [None if each is None else checks.seed(each) for each in seed]
-        first = checks.integer("seed", checks.seed(seed), 0, checks.LARGEST_SEED - self.num_envs + 1)
+        first = checks.integer("seed", checks.seed(seed), 0, checks.MAX_SEED - self.num_envs + 1)
         return [first + index for index in range(self.num_envs)]
 
     def _reset_mask(self, options) -> np.ndarray:
@@ -88,7 +88,7 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
         mask = np.asarray(mask)
         if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
             raise ValueError(
-                f"{name}: expected {self.num_envs} booleans, at least one of them true, got {checks.shown(mask)}"
+                f"{name}: expected {self.num_envs} booleans, at least one of them true, got {checks.preview(mask)}"
             )
         return mask.copy()
 
@@ -98,5 +98,7 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
         indices = list(every if indices is None else indices)
         for index in indices:
             if index not in every:
-                raise ValueError(f"indices: expected integers from 0 to {self.num_envs - 1}, got {checks.shown(index)}")
+                raise ValueError(
+                    f"indices: expected integers from 0 to {self.num_envs - 1}, got {checks.preview(index)}"
+                )
         return indices

@@ -28,7 +28,7 @@ class KnownAttributes:
     def _check_known(self, name: str) -> None:
         if name not in self.__dict__ and not hasattr(type(self), name) and type(self).__module__ == self._made:
             raise AttributeError(
-                f"cannot set {checks.shown(name)}: there is no such attribute; "
+                f"cannot set {checks.preview(name)}: there is no such attribute; "
                 "change_settings of the environment changes settings"
             )
 
@@ -83,11 +83,11 @@ class LiveCommands:
                 value, mask = np.where(mask[:, None], value, before), mask | others
             self._latest = {**self._latest, name: (value, mask)}
 
-    def seen(self, task: Task, memory) -> Any:
+    def peek(self, task: Task, memory) -> Any:
         """Return the memory of an episode of a task as the next step will find it."""
         return _commanded(task, memory, self._latest)
 
-    def taken(self, task: Task, memory) -> Any:
+    def consume(self, task: Task, memory) -> Any:
         """Return the memory of an episode of a task after the commands, which are gone then."""
         with self._lock:
             latest, self._latest = self._latest, {}
@@ -97,7 +97,7 @@ class LiveCommands:
 def _commanded(task: Task, memory, latest) -> Any:
     for name, (value, mask) in latest.items():
         changed = task.with_command(memory, name, value)
-        memory = changed if mask is None else trees.chosen(mask, changed, memory)
+        memory = changed if mask is None else trees.where(mask, changed, memory)
     return memory
 
 
@@ -132,17 +132,17 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
         ValueError: the task has no such command, or the value has another size or is out of range.
     """
     if not task.commands:
-        raise ValueError(f"command {checks.shown(name)}: task {task.name} has no commands")
+        raise ValueError(f"command {checks.preview(name)}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
     if isinstance(value, str):
         named = task.named_command(name, value)
         if named is None:
-            raise ValueError(f"command {name!r}: expected numbers, got {checks.shown(value)}")
+            raise ValueError(f"command {name!r}: expected numbers, got {checks.preview(value)}")
         value = named
     numbers = np.full(size, np.nan) if value is None else _real(value)
     if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():
         raise ValueError(
-            f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {checks.shown(value)}"
+            f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {checks.preview(value)}"
         )
     low, high = task.command_limits.get(name, (-LARGEST, LARGEST))
     if len(outside := np.argwhere((numbers < low) | (numbers > high))):

@@ -22,7 +22,7 @@ from arc_suite.envs.calls import (
     checked_command,
     one_thread_at_a_time,
 )
-from arc_suite.envs.prepare import checked_changes, prepared
+from arc_suite.envs.prepare import checked_changes, prepare_task
 from arc_suite.envs.task_view import TaskView
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import checked_fields
@@ -73,7 +73,7 @@ def load(
     settings = dict(checks.mapping("task_kwargs", task_kwargs))
     options = checks.mapping("environment_kwargs", environment_kwargs)
     random, on_divergence = settings.pop("random", None), settings.pop("on_divergence", "raise")
-    task, _ = prepared(domain_name, task_name, settings)
+    task, _ = prepare_task(domain_name, task_name, settings)
     for name in options:
         if name in _FIXED:
             raise ValueError(f"environment setting {name!r}: {_FIXED[name]}")
@@ -151,7 +151,7 @@ class Environment(KnownAttributes, control.Environment):
         """
         if self.task.memory is None:
             raise RuntimeError("cannot take a snapshot: no episode has begun; call reset first")
-        return snapshots.arrays(self._state())
+        return snapshots.to_arrays(self._state())
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -165,7 +165,7 @@ class Environment(KnownAttributes, control.Environment):
             super().reset()
         like = self._state()
         check = functools.partial(self.physics.checked, fields=run.definition.reads)
-        state, tasks = snapshots.checked(like, run.definition, check, arrays, [run.opened], self.task_kwargs)
+        state, tasks = snapshots.from_arrays(like, run.definition, check, arrays, [run.opened], self.task_kwargs)
         self.physics.restore(state.simulations)
         run.restore(state, *(each for (each,) in tasks))
         own = {name: array[0] for name, array in state.own.items()}
@@ -280,7 +280,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
     @property
     def memory(self) -> Any:
         """The memory of the present episode."""
-        return self._commands.seen(self.definition, self._now.memory)
+        return self._commands.peek(self.definition, self._now.memory)
 
     @memory.setter
     def memory(self, value: Any):
@@ -364,7 +364,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """
         action = checked_action(action, self._motors)
         self._now.memory, inputs = self.definition.before(
-            self._commands.taken(self.definition, self._now.memory), action
+            self._commands.consume(self.definition, self._now.memory), action
         )
         data = physics.data.ptr
         physics.marker, physics.failed_legs = self.markers, self.failed_legs  # which a copy of the simulation has not
@@ -434,7 +434,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         own = (-1, self._stream_begins, steps, ended, False, observation)
         return snapshots.State(
             simulations=simulations,
-            memory=trees.mapped(lambda leaf: np.asarray(leaf)[None], self._now.memory),
+            memory=trees.map_leaves(lambda leaf: np.asarray(leaf)[None], self._now.memory),
             streams=[self._stream],
             randoms=[self._random.get_state()],
             own={name: np.asarray(value)[None] for name, value in zip(snapshots.OWN, own, strict=True)},
@@ -443,7 +443,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     def restore(self, state: snapshots.State, task: Task, next_task: Task) -> None:
         """Go on from a state, given the task of its episode and that of the next."""
-        self._now.memory = trees.mapped(
+        self._now.memory = trees.map_leaves(
             lambda leaf, like: snapshots.number(leaf[0], like), state.memory, self._now.memory
         )
         (self._stream,), (self._changes,), (self.next_changes,) = state.streams, *state.settings
@@ -453,7 +453,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     def _take_commands(self) -> None:
         if self._now.memory is not None:
-            self._now.memory = self._commands.taken(self.definition, self._now.memory)
+            self._now.memory = self._commands.consume(self.definition, self._now.memory)
 
     def _latest(self, physics):
         """The readings of the latest step."""

@@ -145,7 +145,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         self._check_open("reset")
         for name in checks.mapping("options", options):
             raise ValueError(
-                f"unknown option of reset {checks.shown(name)}: one environment has none; vector ones have reset_mask"
+                f"unknown option of reset {checks.preview(name)}: one environment has none; vector ones have reset_mask"
             )
         observation = self._env.reset(seed).observation
         gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))

@@ -18,7 +18,9 @@ from arc_suite.tasks.readings import layout
 from arc_suite.tasks.scene import CHANGEABLE, Scene
 
 
-def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> tuple[Task, mujoco.MjModel]:
+def prepare_task(
+    domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None
+) -> tuple[Task, mujoco.MjModel]:
     """Return a task, and the model of its simulation.
 
     Args:
@@ -104,7 +106,7 @@ def with_changes(task: Task, settings: Mapping[str, Any], text: str) -> Task:
         raise ValueError(f"setting {name!r}: environments keep it; {_KEPT[name]}")
     if not changes:
         return task
-    changed, _ = prepared(task.scene.body, task.name, {**settings, **changes})
+    changed, _ = prepare_task(task.scene.body, task.name, {**settings, **changes})
     for what, kept in _KEPT_OF_TASKS.items():
         if kept(task) != kept(changed):
             raise ValueError(
@@ -145,7 +147,7 @@ def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         ValueError: the body, the gait or the task is not symmetric, or see `load`.
         OSError: a file that cannot be read.
     """
-    return prepared(domain_name, task_name, task_kwargs)[0].symmetry
+    return prepare_task(domain_name, task_name, task_kwargs)[0].symmetry
 
 
 def _step_limit(time_limit, step: float) -> float:

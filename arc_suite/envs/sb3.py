@@ -40,7 +40,7 @@ class VecEnv(vec_env.VecEnv):
             raise ValueError(
                 "stable-baselines3 resets at once: expected a vector environment of this suite with "
                 "autoreset_mode='SameStep', "
-                f"got {checks.shown(environments)}{'' if mode is None else f' in the mode {mode.value}'}"
+                f"got {checks.preview(environments)}{'' if mode is None else f' in the mode {mode.value}'}"
             )
         self.environments = environments
         self._actions: np.ndarray | None = None
@@ -56,7 +56,7 @@ class VecEnv(vec_env.VecEnv):
             ValueError: options were set; there are none.
         """
         if any(self._options):
-            raise ValueError(f"options of reset: expected none, got {checks.quoted(self._options)}")
+            raise ValueError(f"options of reset: expected none, got {checks.quote(self._options)}")
         observations, _ = self.environments.reset(seed=self._seeds)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._reset_seeds()
@@ -127,7 +127,7 @@ class VecEnv(vec_env.VecEnv):
     def _check_all(self, name: str, indices) -> None:
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
             raise ValueError(
-                f"{name}: environments share it; expected all {self.num_envs}, got {checks.shown(indices)}"
+                f"{name}: environments share it; expected all {self.num_envs}, got {checks.preview(indices)}"
             )
 
 

@@ -14,7 +14,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from arc_suite import checks, registry, versions
 from arc_suite.envs import dm
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
@@ -64,19 +64,18 @@ class Setup:
 
     @classmethod
     def _checked(cls, domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None) -> "Setup":
-        several, settings = registry.names_several(domain_name), checks.mapping("task_kwargs", task_kwargs)
+        several, settings = registry.names_several_bodies(domain_name), checks.mapping("task_kwargs", task_kwargs)
         domain, task = domain_name if several else registry.body_of(domain_name), registry.task_of(task_name)
         if "random" in settings:
-            raise ValueError(
-                f"setting 'random': expected none, as every episode has a seed, got {checks.shown(settings['random'])}"
-            )
+            random = checks.preview(settings["random"])
+            raise ValueError(f"setting 'random': expected none, as every episode has a seed, got {random}")
         if several:
             checks.name(settings.get("actions", "position"), ["position"], "actions of different bodies")
-        named = {registry.importable("modifier", name): value for name, value in settings.items()}
+        named = {registry.importable_name("modifier", name): value for name, value in settings.items()}
         text = checks.json_text("task_kwargs", named)
         if isinstance(arena := settings.get("arena"), str):
             registry.arena_maker(arena)
-        return cls(domain, registry.importable("task", task.name), text)
+        return cls(domain, registry.importable_name("task", task.name), text)
 
     @property
     def several(self) -> bool:
@@ -106,7 +105,9 @@ class Setup:
         """
         if isinstance(self.domain, str):
             return self.domain
-        return registry.importable("robot", self.domain.name) if is_robot(self.domain) else body_to_json(self.domain)
+        return (
+            registry.importable_name("robot", self.domain.name) if is_robot(self.domain) else body_to_json(self.domain)
+        )
 
     @property
     def name(self) -> str:
@@ -145,16 +146,16 @@ class Setup:
         Raises:
             ValueError: a setting that does not fit.
         """
-        return self.prepared()[0]
+        return self.prepare()[0]
 
-    def prepared(self) -> tuple[Task, mujoco.MjModel]:
+    def prepare(self) -> tuple[Task, mujoco.MjModel]:
         """Return the task, ready to run, and the compiled model; of several bodies those of the first.
 
         Raises:
             ValueError: a setting that does not fit.
         """
         first = self.members()[0]
-        return prepared(first.domain, first.task, first.task_kwargs)
+        return prepare_task(first.domain, first.task, first.task_kwargs)
 
     def members(self) -> tuple["Setup", ...]:
         """Return the setup of each body; of several bodies with positions as actions."""
@@ -235,9 +236,9 @@ class Setup:
         """
         for name, kind in (("robot", str), ("task", str), ("task_kwargs", dict)):
             if not isinstance(fields.get(name), kind):
-                raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.shown(fields.get(name))}")
-        robot, task, settings = registry.stored(fields["robot"]), fields["task"], fields["task_kwargs"]
-        registry.imported("task", task)
+                raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.preview(fields.get(name))}")
+        robot, task, settings = registry.check_stored_robot(fields["robot"]), fields["task"], fields["task_kwargs"]
+        registry.refuse_import("task", task)
         registry.check_stored_settings(settings)
         return cls._checked(robot, task, settings)  # draws no body of several
 
@@ -252,11 +253,11 @@ class Setup:
         texts = "".join(map(body_to_json, self.bodies))
         known = self.to_dict() | {"task_version": self.kind.version, "body_sha256": _sha256(texts.encode())}
         if not self.several:
-            model = self.prepared()[1]
+            model = self.prepare()[1]
             buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
             mujoco.mj_saveModel(model, None, buffer)
             known["model_sha256"] = _sha256(buffer.data)
-        return known | {"versions": versions.recorded()}
+        return known | {"versions": versions.dependency_versions()}
 
     def _seeded(self, seed: int | None) -> dict[str, Any]:
         return self.task_kwargs | ({} if seed is None else {"random": seed})

@@ -47,7 +47,7 @@ class State(NamedTuple):
     settings: tuple[list[str], list[str]]
 
 
-def arrays(state: State) -> dict[str, np.ndarray]:
+def to_arrays(state: State) -> dict[str, np.ndarray]:
     """Return the snapshot of a state."""
     found = {f"batch/{name}": array for name, array in state.simulations.items()}
     found |= {f"memory/{place}": leaf.copy() for place, leaf in enumerate(trees.leaves(state.memory))}
@@ -62,7 +62,7 @@ def arrays(state: State) -> dict[str, np.ndarray]:
     return found
 
 
-def checked(
+def from_arrays(
     like: State,
     task: Task,
     simulations: Callable[[Mapping[str, np.ndarray]], Any],
@@ -93,7 +93,7 @@ def checked(
         texts = tuple(_texts(given.get(name), len(opened)) for name in _SETTINGS)
         tasks = [_tasks(opened, settings, each) for each in texts]
     except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise ValueError(f"snapshot: of another task or number of environments: {checks.quoted(error)}") from None
+        raise ValueError(f"snapshot: of another task or number of environments: {checks.quote(error)}") from None
     return State(ours, memory, streams, states, own, texts), tasks
 
 
@@ -112,7 +112,7 @@ def _memory(like, task: Task, given: Mapping[str, np.ndarray]) -> Any:
         name = f"memory/{next(places)}"
         return bounded("memory", fitting("memory", given[name], old), np.isnan(commanded)).copy()
 
-    return trees.mapped(filled, like, free)
+    return trees.map_leaves(filled, like, free)
 
 
 def _random_states(given: Mapping[str, np.ndarray], count: int) -> list[tuple]:
@@ -128,7 +128,7 @@ def _random_states(given: Mapping[str, np.ndarray], count: int) -> list[tuple]:
 def _refilled(like, given: Mapping[str, np.ndarray]) -> Any:
     """Return a tree like another one, with the values of arrays."""
     values = (given[str(place)] for place, _ in enumerate(trees.leaves(like)))
-    return trees.mapped(lambda leaf: number(_stream(next(values), np.asarray(leaf)), leaf), like)
+    return trees.map_leaves(lambda leaf: number(_stream(next(values), np.asarray(leaf)), leaf), like)
 
 
 def _stream(value: np.ndarray, like: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ def kind(task: Task) -> Hashable | None:
     return type(task), type(inner), *same, tuple(task.settings.weights), task.structure
 
 
-def stacked(tasks: Sequence[Task]) -> Task:
+def stack_tasks(tasks: Sequence[Task]) -> Task:
     """Return one task for a batch whose environment i does the i-th task.
 
     It is for the functions that drivers call in steps and resets. `start`, `stream_state` and `markers`, which have
@@ -63,14 +63,14 @@ def _with_values(task: Task, values: dict[str, Any]) -> Task:
 def _stacked(values: Sequence[Any], name: str = "") -> Any:
     first = values[0]
     if isinstance(first, Task):
-        return stacked(values)
+        return stack_tasks(values)
     if isinstance(first, Clock):
         return first if all(value is first for value in values) else Clocks.of(values)
     if isinstance(first, dict):
         return {key: _stacked([value[key] for value in values]) for key in first}
     if isinstance(first, tuple):
         names = getattr(first, "_fields", ("",) * len(first))
-        return trees.rebuilt(first, [_stacked(items, field) for field, *items in zip(names, *values, strict=True)])
+        return trees.rebuild(first, [_stacked(items, field) for field, *items in zip(names, *values, strict=True)])
     if isinstance(first, (np.ndarray, float, int)):
         if all(np.array_equal(value, first) for value in values):
             return first

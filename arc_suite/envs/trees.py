@@ -6,23 +6,23 @@ from typing import Any
 import numpy as np
 
 
-def mapped(function: Callable, tree, *others) -> Any:
+def map_leaves(function: Callable, tree, *others) -> Any:
     """Return a tree whose leaves a function makes from the leaves of trees of the same structure."""
     if isinstance(tree, tuple):
-        return rebuilt(tree, [mapped(function, *items) for items in zip(tree, *others, strict=True)])
+        return rebuild(tree, [map_leaves(function, *items) for items in zip(tree, *others, strict=True)])
     return None if tree is None else function(tree, *others)
 
 
-def at(tree, index: int) -> Any:
+def entry(tree, index: int) -> Any:
     """Return the tree of the entries that leaves have at an index of their first axis."""
-    return mapped(lambda leaf: leaf[index], tree)
+    return map_leaves(lambda leaf: leaf[index], tree)
 
 
-def chosen(mask: np.ndarray, there, elsewhere) -> Any:
+def where(mask: np.ndarray, there, elsewhere) -> Any:
     """Return a tree that is one in some environments, (num_envs,) booleans, and another in the others."""
     if mask.all():
         return there
-    return mapped(lambda new, old: np.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
+    return map_leaves(lambda new, old: np.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
 
 
 def leaves(tree) -> Iterator:
@@ -34,6 +34,6 @@ def leaves(tree) -> Iterator:
         yield tree
 
 
-def rebuilt(like: tuple, items: list) -> tuple:
+def rebuild(like: tuple, items: list) -> tuple:
     """Return a tuple of the type of another one, with other items."""
     return type(like)(*items) if hasattr(like, "_fields") else tuple(items)

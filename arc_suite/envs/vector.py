@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
 from arc_suite.envs import snapshots, stacked, trees
-from arc_suite.envs.base_vector import MOST_ENVS, BaseVectorEnv
+from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import (
     KnownAttributes,
     LiveCommands,
@@ -22,7 +22,7 @@ from arc_suite.envs.calls import (
     checked_command,
     one_thread_at_a_time,
 )
-from arc_suite.envs.prepare import checked_changes, checked_limit, prepared
+from arc_suite.envs.prepare import checked_changes, checked_limit, prepare_task
 from arc_suite.envs.task_view import TaskView
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
@@ -148,14 +148,14 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.autoreset_mode = AutoresetMode(checks.name(mode, modes, "autoreset_mode"))
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
-        self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
+        self.num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
         self._tells = checks.boolean("privileged", privileged)
         pictures.check_size(height, width)
         threads = min(usable_cores(), _MOST_THREADS) if num_threads is None else num_threads
         threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
-        self._tasks, model = self._prepared()
+        self._tasks, model = self._prepare_tasks()
         self._task = _one(self._tasks)
         pictures.check_camera(model if isinstance(model, mujoco.MjModel) else model[0], camera_id)
         self.step_limit = self._task.step_limit
@@ -256,7 +256,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._write(inputs, stepping)
         diverged = self.batch.step(task.scene.substeps, stepping)
         readings = task.read(data)
-        self._memory = memory = trees.chosen(stepping, task.after(memory, readings), before)
+        self._memory = memory = trees.where(stepping, task.after(memory, readings), before)
         self._steps += 1
 
         raw = task.terms(memory, readings)
@@ -402,7 +402,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         if self._memory is None:
             raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
         self._take_commands()
-        return snapshots.arrays(self._state())
+        return snapshots.to_arrays(self._state())
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -460,9 +460,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """The seed of each environment's stream of random numbers; -1 where none was given."""
         return tuple(self._stream_seeds.tolist())
 
-    def _prepared(self) -> tuple[list[Task], mujoco.MjModel | list[mujoco.MjModel]]:
+    def _prepare_tasks(self) -> tuple[list[Task], mujoco.MjModel | list[mujoco.MjModel]]:
         """The task of each environment, and the model of all, or that of each."""
-        task, model = prepared(*self.arguments)
+        task, model = prepare_task(*self.arguments)
         return [task] * self.num_envs, model
 
     def _state(self) -> snapshots.State:
@@ -476,7 +476,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         if self._memory is None:
             self._begin(np.ones(self.num_envs, bool), self._observation)
         self._take_commands()
-        return snapshots.checked(self._state(), self._task, self.batch.checked, arrays, self._opened, self.arguments[2])
+        return snapshots.from_arrays(
+            self._state(), self._task, self.batch.checked, arrays, self._opened, self.arguments[2]
+        )
 
     def _put(self, snapshot: tuple[snapshots.State, list[list[Task]]]) -> None:
         state, (self._tasks, self._next) = snapshot
@@ -489,12 +491,12 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             random.set_state(each)
 
     def _take_commands(self) -> None:
-        self._memory = self._commands.taken(self._task, self._memory)
+        self._memory = self._commands.consume(self._task, self._memory)
 
     def _picture_of(self, index: int) -> np.ndarray:
         task, scene, shown = self._tasks[index], self._tasks[index].scene, {}
         if self._memory is not None:
-            memory = trees.at(self._memory, index)
+            memory = trees.entry(self._memory, index)
             shown["markers"] = task.markers(memory, task.read(self.batch.part(index)))
             shown["failed_legs"] = task.failed_legs(memory)
         qpos, mocap_pos = self.batch.data.qpos[index], self.batch.mocap_pos[index]
@@ -508,14 +510,14 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             if self._streams_begin[index]:
                 self._streams[index] = own.first()
             else:
-                self._streams[index] = self._tasks[index].stream_state(trees.at(self._memory, index))
+                self._streams[index] = self._tasks[index].stream_state(trees.entry(self._memory, index))
             starts.append(own.start(self._randoms[index], self._streams[index]))
         self._streams_begin &= ~mask
         self._take_settings(mask)
         qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         mocap = None if mocap[0] is None else np.stack(mocap)
         self.batch.reset(mask, np.stack(qpos), np.stack(qvel), mocap, models)
-        memory, task, part = trees.mapped(lambda *fields: np.stack(fields), *memories), self._task, mask
+        memory, task, part = trees.map_leaves(lambda *fields: np.stack(fields), *memories), self._task, mask
         if task is not self._tasks[0]:  # a stacked one, which takes all environments
             part = np.ones(self.num_envs, bool)
             memory = memory if self._memory is None else _scattered(mask, memory, self._memory)
@@ -527,7 +529,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         memory = task.begin(memory, readings)
         observation[mask] = task.vector(task.observe(memory, readings), np.float32)[begun]
         # Before the first step there is nothing to keep, as all environments begin.
-        some = memory if begun.all() else trees.mapped(lambda leaf: leaf[begun], memory)
+        some = memory if begun.all() else trees.map_leaves(lambda leaf: leaf[begun], memory)
         self._memory = memory if self._memory is None else _scattered(mask, some, self._memory)
         self._steps[mask] = 0
         self._ended, self._resting = self._ended & ~mask, self._resting & ~mask
@@ -591,7 +593,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
 def _one(tasks: Sequence[Task]) -> Task:
     """One task for all environments, of the tasks of each."""
-    return tasks[0] if all(task is tasks[0] for task in tasks) else stacked.stacked(tasks)
+    return tasks[0] if all(task is tasks[0] for task in tasks) else stacked.stack_tasks(tasks)
 
 
 def _scattered(mask: np.ndarray, some, memory):
@@ -602,7 +604,7 @@ def _scattered(mask: np.ndarray, some, memory):
         copied[mask] = new
         return copied
 
-    return trees.mapped(scattered, some, memory)
+    return trees.map_leaves(scattered, some, memory)
 
 
 def _marked(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:

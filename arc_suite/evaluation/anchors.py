@@ -138,7 +138,7 @@ def read(path: Path) -> dict[str, dict[str, np.ndarray]]:
             for line in csv.DictReader(file):
                 found.setdefault(line["place"], {}).setdefault(line["policy"], []).append(float(line["return"]))
     except (KeyError, TypeError, ValueError, csv.Error) as error:
-        raise ValueError(f"{path}: no table of returns: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: no table of returns: {checks.quote(error)}") from None
     return {place: {name: np.array(values) for name, values in every.items()} for place, every in found.items()}
 
 

@@ -31,7 +31,7 @@ def difference(setup: Setup, steps: int = STEPS) -> str | None:
             environments.step(actions)
             together = _told(task, environments._memory, task.read(environments.batch.data))
             for index in stepping:
-                memory = trees.at(before, index)
+                memory = trees.entry(before, index)
                 readings = task.read(environments.batch.part(index))
                 alone = _told(task, task.after(task.before(memory, actions[index])[0], readings), readings)
                 different = [name for name in alone if not np.array_equal(alone[name], together[name][index])]

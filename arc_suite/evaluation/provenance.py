@@ -35,7 +35,7 @@ def training_seeds(policy, played: range) -> seed_ranges.Ranges | None:
         ValueError: it learned from some of them.
     """
     found = policies.training_seeds(policy)
-    if shared := seed_ranges.common(found or (), played):
+    if shared := seed_ranges.common_seeds(found or (), played):
         free = f"those below {seed_ranges.COLLECTING.start} are evaluation's"
         name = f"policy {policy}" if isinstance(policy, str | os.PathLike) else "policy"
         raise ValueError(f"{name}: learned from episodes of seeds {shared.start} to {shared[-1]}; {free}")

@@ -150,7 +150,7 @@ def target(task: Task, blocks: Mapping[str, np.ndarray], place: np.ndarray) -> n
     if task.parameters is None or "command" not in blocks:
         raise ValueError(f"task {task.name}: expected one that observes a command or has a target velocity")
     desired = seconds * task.parameters.target_velocity * blocks["command"][:2]
-    return rotations.headed(desired, -place[2])
+    return rotations.to_heading_frame(desired, -place[2])
 
 
 def shares(targets: np.ndarray, moved: np.ndarray, steps: float) -> tuple[float, float]:

@@ -109,7 +109,7 @@ def _said(work, lines: bool = True):
     try:
         return work()
     except ValueError as error:
-        reason = checks.quoted(error)
+        reason = checks.quote(error)
         raise SpecError(f"MuJoCo cannot read it: {reason if lines else _LINE.sub('', reason)}") from None
 
 
@@ -141,7 +141,7 @@ def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     except ValueError as error:
         unread = sorted(_unread(spec))
         if not unread:
-            raise SpecError(f"MuJoCo cannot compile it: {checks.quoted(error)}") from None
+            raise SpecError(f"MuJoCo cannot compile it: {checks.quote(error)}") from None
     for geom in list(spec.geoms):
         if geom.meshname in unread:
             spec.delete(geom)
@@ -154,7 +154,7 @@ def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     except ValueError as error:
         raise SpecError(
             f"MuJoCo cannot compile it without {len(unread)} meshes that cannot be read ({unread[0]}): "
-            f"{checks.quoted(error)}"
+            f"{checks.quote(error)}"
         ) from None
 
 

@@ -44,7 +44,7 @@ def metadata(network: Network) -> dict:
     if network.setup.several:
         raise ValueError(f"policy of {network.setup.robot}: expected one of one body; see universal.for_body")
     setup, blocks = network.setup, network.blocks
-    task, model = setup.prepared()
+    task, model = setup.prepare()
     step = task.scene.control_timestep
     known = (
         setup.to_dict()
@@ -85,7 +85,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
         OSError: the file cannot be written.
     """
     known = metadata(network)
-    with versions.needing("ONNX needs the package onnx", "learn"):
+    with versions.require_extra("ONNX needs the package onnx", "learn"):
         import onnx
         from onnx import TensorProto, helper, numpy_helper
     nodes, arrays = _standard(network.graph)

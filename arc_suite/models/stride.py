@@ -47,7 +47,7 @@ def fitted_gait(body: Body) -> gaits.Gait:
     Four legs would have to lean over three feet in a metachronal gait; in a trot the body falls less far than that.
     """
     for name in ("trot", "tripod") if body.source else ("trot",):
-        if name in gaits.fitting(body):
+        if name in gaits.fitting_gaits(body):
             return gaits.gait(body, name)._replace(duty_factor=DUTY_FACTOR)
     return gaits.metachronal(body, DUTY_FACTOR)
 

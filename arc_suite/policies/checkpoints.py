@@ -53,7 +53,7 @@ def agents(path: Path) -> list[Agent]:
         agents = [Agent(**files.read_json(file)) for file in found]
         return sorted(agents, key=lambda agent: agent.steps)
     except (OSError, TypeError, ValueError) as error:
-        raise ValueError(f"{path}: damaged: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: damaged: {checks.quote(error)}") from None
 
 
 def at(run: Path, step: int) -> Path:

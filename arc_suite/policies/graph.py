@@ -183,7 +183,7 @@ def checked(graph: Graph, size: int) -> Graph:
             if known[index].dtype != np.float32:
                 raise ValueError(f"expected float32, got {known[index].dtype}")
         except (ValueError, IndexError, TypeError) as error:
-            raise ValueError(f"node {index}, {node.operator}: {checks.quoted(error)}") from None
+            raise ValueError(f"node {index}, {node.operator}: {checks.quote(error)}") from None
     if len(shapes[index]) != 2 or known[index].shape != (len(sample), shapes[index][1]):
         raise ValueError(f"node {index}, {node.operator}: expected actions of every environment, got {shapes[index]}")
     return graph

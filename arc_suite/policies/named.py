@@ -16,7 +16,7 @@ import numpy as np
 from arc_suite import checks, files, registry, seed_ranges
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import check_preset_name, preset_names
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, other_libraries
 from arc_suite.policies.network import PACKAGED, Network
@@ -68,7 +68,7 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
 
 def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
     """A trained policy of any body that comes with the package, for walk or for tasks with a command."""
-    task = task or prepared(body, "walk")[0]
+    task = task or prepare_task(body, "walk")[0]
     universal = registry.resolve(_MANY_BODIES)
     return universal.Universal(universal.load(universal.NAME, task), task)
 
@@ -121,7 +121,7 @@ def policy(
     """
     body = registry.body_of(robot)
     if presets is None:
-        presets = suited_preset(task or prepared(body, "walk")[0]) if name == "cpg" else ()
+        presets = suited_preset(task or prepare_task(body, "walk")[0]) if name == "cpg" else ()
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
         check_preset_name(preset)
@@ -291,7 +291,7 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
         return _from_other_library(policy_file, body, task)
     made = network.load(path)
     if made.setup.several:
-        return registry.resolve(_MANY_BODIES).Universal(made, task or prepared(body, "walk")[0])
+        return registry.resolve(_MANY_BODIES).Universal(made, task or prepare_task(body, "walk")[0])
     _check(path, made.setup, body, task)
     _check_joints(path, made.joints, body)
     return made
@@ -324,12 +324,12 @@ def _check_joints(path: Path, joints: int, body: Body) -> None:
 
 def _from_path(path: str, body: Body, num_envs: int) -> Policy:
     resolve = _in_file if path.rpartition(":")[0].endswith(MODULE) else pkgutil.resolve_name
-    factory = checks.imported(path, "policy", resolve)
+    factory = checks.import_object(path, "policy", resolve)
     if not callable(factory):
-        raise ValueError(f"policy {checks.shown(path)}: expected a function that makes a policy from a robot's name")
+        raise ValueError(f"policy {checks.preview(path)}: expected a function that makes a policy from a robot's name")
     make = _checked(path, factory, body.name if is_robot(body) else body)
     make()  # finds out at once whether it makes one
-    return Individuals(make, num_envs, len(body.joint_names), f"policy {checks.shown(path)}")
+    return Individuals(make, num_envs, len(body.joint_names), f"policy {checks.preview(path)}")
 
 
 def _in_file(path: str) -> Any:
@@ -347,7 +347,9 @@ def _checked(path: str, factory: Callable, robot: str | Body) -> Callable[[], Ca
         made = factory(robot)
         if not callable(made):
             kind = type(made).__name__
-            raise ValueError(f"policy {checks.shown(path)}: expected it to return a function of a TimeStep, got {kind}")
+            raise ValueError(
+                f"policy {checks.preview(path)}: expected it to return a function of a TimeStep, got {kind}"
+            )
         return made
 
     return make

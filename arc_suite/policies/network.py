@@ -135,7 +135,7 @@ def load(path: str | os.PathLike) -> Network:
     except registry.NotImported as error:
         raise ValueError(f"policy {path}: {error}") from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ValueError(f"{path}: no policy, or a damaged one: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: no policy, or a damaged one: {checks.quote(error)}") from None
 
 
 def checkpoint_files(folder: Path) -> list[Path]:

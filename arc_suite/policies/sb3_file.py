@@ -51,7 +51,7 @@ class Saved:
             self._policy = data["policy_class"](*spaces, lambda _: 0.0, **data["policy_kwargs"])
             self._policy.load_state_dict(parameters["policy"])
         except (zipfile.BadZipFile, ValueError, KeyError, TypeError, RuntimeError, AssertionError) as error:
-            raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quoted(error)}") from None
+            raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quote(error)}") from None
         self._policy.set_training_mode(False)
         self._size, (self.joints,) = spaces[0].shape, spaces[1].shape
         self._statistics = None if statistics is None else _statistics(statistics, self._size)
@@ -85,7 +85,7 @@ class Saved:
         try:
             made = Network(traced(self._traced, task.size), setup, task.sizes)
         except (KeyError, AttributeError, TypeError) as error:
-            raise ValueError(f"policy {self._path}: expected a perceptron, got {checks.quoted(error)}") from None
+            raise ValueError(f"policy {self._path}: expected a perceptron, got {checks.quote(error)}") from None
         samples = np.random.default_rng(0).standard_normal((8, *self._size), np.float32)
         if np.abs(made.actions(samples) - self._actions(samples)).max() > _TOLERANCE:
             raise ValueError(f"policy {self._path}: expected a perceptron, got another network")
@@ -112,7 +112,7 @@ def _statistics(path: Path, size: tuple[int, ...]) -> VecNormalize:
     except OSError:
         raise
     except Exception as error:  # a pickle may raise anything
-        raise ValueError(f"{path}: no statistics of VecNormalize: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: no statistics of VecNormalize: {checks.quote(error)}") from None
     if not isinstance(found, VecNormalize):
         raise ValueError(f"{path}: expected statistics of VecNormalize, got {type(found).__name__}")
     if found.norm_obs and found.obs_rms.mean.shape != size:

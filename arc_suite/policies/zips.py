@@ -32,7 +32,7 @@ def content(path: Path) -> dict[str, Any]:
         with zipfile.ZipFile(path) as archive:
             return dict(json.loads(archive.read("data")))
     except (zipfile.BadZipFile, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quoted(error)}") from None
+        raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quote(error)}") from None
 
 
 def setup(path: Path) -> Setup | None:
@@ -73,7 +73,7 @@ def load(path: Path, further: Path | None) -> Loaded:
         ValueError: stable-baselines3 is not installed, or as `statistics` and `sb3_file.Saved`.
         OSError: a file cannot be read.
     """
-    with versions.needing(f"policy {path}: zips need stable-baselines3", "sb3"):
+    with versions.require_extra(f"policy {path}: zips need stable-baselines3", "sb3"):
         from arc_suite.policies import sb3_file
     return sb3_file.Saved(path, statistics(path, further))
 

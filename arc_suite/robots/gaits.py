@@ -80,7 +80,7 @@ _GAITS = {
 NAMES = tuple(_GAITS)
 
 
-def fitting(body: Body) -> tuple[str, ...]:
+def fitting_gaits(body: Body) -> tuple[str, ...]:
     """Return the names of the gaits that fit the legs of a body."""
     sides = [leg.side for leg in body.legs]
     even = sides.count("left") == sides.count("right")
@@ -94,8 +94,9 @@ def gait(body: Body, name: str) -> Gait:
         ValueError: an unknown gait, or one that does not fit the legs.
     """
     checks.name(name, NAMES, "gait")
-    if name not in fitting(body):
+    valid = fitting_gaits(body)
+    if name not in valid:
         raise ValueError(
-            f"gait {name!r} does not fit {body.name} with its {len(body.legs)} legs (fit: {', '.join(fitting(body))})"
+            f"gait {name!r} does not fit {body.name} with its {len(body.legs)} legs (fit: {', '.join(valid)})"
         )
     return _GAITS[name].make(body)

@@ -28,7 +28,7 @@ def colors(palette: str | int) -> dict[str, Color]:
     )
 
 
-def parsed(text: str) -> str | int:
+def parse(text: str) -> str | int:
     """Return the palette that a text names: digits are a seed."""
     return int(text) if text.isdecimal() else text
 

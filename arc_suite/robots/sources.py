@@ -121,7 +121,7 @@ def _parsed(text: str) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:  # ValueError: an encoding that Python lacks
-        _fail(f"expected MJCF: {checks.quoted(error)}")
+        _fail(f"expected MJCF: {checks.quote(error)}")
 
 
 def _check_elements(root: ElementTree.Element) -> None:

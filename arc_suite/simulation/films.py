@@ -199,7 +199,7 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
     Raises:
         ValueError: imageio-ffmpeg is not installed.
     """
-    with versions.needing("MP4 needs imageio-ffmpeg", "video"):
+    with versions.require_extra("MP4 needs imageio-ffmpeg", "video"):
         import imageio_ffmpeg  # noqa: F401
     with imageio.get_writer(
         path,

@@ -126,16 +126,16 @@ def _values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
         found = np.broadcast_to(np.asarray(values, float), like.shape).copy()
     except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(
-            f"model field {name!r}: expected numbers of shape {like.shape}, got {checks.shown(values)}"
+            f"model field {name!r}: expected numbers of shape {like.shape}, got {checks.preview(values)}"
         ) from None
     least = np.where(like > 0.0, 1e-15, low) if name in _POSITIVE else low
     if not ((found >= least) & (found <= high)).all():
         above = ", above 0 where the model's are" if name in _POSITIVE else ""
         raise ValueError(
-            f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {checks.shown(values)}"
+            f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {checks.preview(values)}"
         )
     if name == "body_iquat" and (abs(np.linalg.norm(found, axis=-1) - 1.0) > _ROUNDING).any():
-        raise ValueError(f"model field {name!r}: expected quaternions of length 1, got {checks.shown(values)}")
+        raise ValueError(f"model field {name!r}: expected quaternions of length 1, got {checks.preview(values)}")
     return found
 
 

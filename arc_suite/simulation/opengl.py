@@ -301,7 +301,7 @@ def _explain(error: Exception) -> str:
     if (isinstance(cause, ValueError) or _DEVICE in str(cause)) and (wrong := _wrong_device()):
         return f"cannot render: {wrong}"
     missing = isinstance(error, AttributeError)  # PyOpenGL's way to say that a library is not there
-    reason = "the OpenGL library is missing" if missing else checks.quoted(cause).rstrip(".")
+    reason = "the OpenGL library is missing" if missing else checks.quote(cause).rstrip(".")
     backend = f" with MUJOCO_GL={setting}" if setting else ""
     return f"cannot render{backend}: {reason}; {_remedy()}"
 
@@ -315,7 +315,7 @@ def _wrong_device() -> str | None:
     if last < 0 or (device.strip().isdecimal() and int(device) <= last):
         return None
     expected = f"an integer from 0 to {last}" if last else "0, as there is one device"
-    return f"{_DEVICE}: expected {expected}, got {checks.quoted(device)!r}; unset it to take any device"
+    return f"{_DEVICE}: expected {expected}, got {checks.quote(device)!r}; unset it to take any device"
 
 
 def _remedy() -> str:

@@ -114,7 +114,7 @@ class Physics(dm_mujoco.Physics):
         time = data.time
         self._warnings.fill(0)
         if nstep < 1:
-            raise ValueError(f"nstep: expected an integer from 1, got {checks.shown(nstep)}")
+            raise ValueError(f"nstep: expected an integer from 1, got {checks.preview(nstep)}")
         with timers.off:
             if nstep > 1 and not self._shared:  # whose options another thread may be using
                 flags = option.disableflags

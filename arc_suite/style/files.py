@@ -47,7 +47,7 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
     if len(setups) != 1:
         raise ValueError(f"tracks: expected those of one setup, got {sorted(map(str, setups))}")
     (setup,) = setups
-    known = {"setup": setup.to_dict(), "versions": versions.recorded()}
+    known = {"setup": setup.to_dict(), "versions": versions.dependency_versions()}
     arrays: dict[str, Any] = {"format": FORMAT, **{name: json.dumps(value) for name, value in known.items()}}
     for index, track in enumerate(tracks):
         fields = track._asdict()
@@ -89,7 +89,7 @@ def load(path: str | os.PathLike) -> list[Track]:
     except registry.NotImported as error:
         raise ValueError(f"{path}: {error}") from None
     except Exception as error:  # a damaged archive may raise anything
-        raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quote(error)}") from None
     raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
 
 

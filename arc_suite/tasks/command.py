@@ -494,4 +494,4 @@ def _goal(goals, reached):
 
 def _to_goal(goals, reached, place):
     """Where the present goal is from the torso (..., 2), forward and left, m."""
-    return rotations.headed(_goal(goals, reached) - place[..., :2], place[..., 2])
+    return rotations.to_heading_frame(_goal(goals, reached) - place[..., :2], place[..., 2])

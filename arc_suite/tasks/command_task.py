@@ -280,7 +280,7 @@ class CommandTask(Task):
         ground_memory, displacement = ground.place(context, random, stream)
         qpos, qvel = self.settings.noise.drawn(ground.pose(self.scene), random)
         qpos[:2] += displacement
-        qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
+        qpos[3:7] = rotations.turn_about_z(qpos[3:7], random.uniform(-self.yaw, self.yaw))
         schedule = self.settings.command.schedule(random, ground.share(ground_memory))
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
         command_memory = self._start_command(random, schedule)
@@ -306,15 +306,15 @@ class CommandTask(Task):
         layout, heading = self.scene.layout, rotations.yaw(data.qpos[..., 3:7])
         forces = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit
         numpy, across = forces.__array_namespace__(), heading[..., None]
-        torque = rotations.headed(forces[..., 0:2], across)
-        force = rotations.headed(forces[..., 3:5], across)
+        torque = rotations.to_heading_frame(forces[..., 0:2], across)
+        force = rotations.to_heading_frame(forces[..., 3:5], across)
         forces = numpy.concatenate([torque, forces[..., 2:3], force, forces[..., 5:6]], axis=-1)
         readings = reading.read(data, layout, self.scene.arena, forces)
         touches = self.settings.ground.touches(data)
         if self.settings.gait_and_pose is None:
             return Sensed(*readings, heading, touches, None)
         apart = data.xpos[..., layout.feet, :2] - data.xpos[..., layout.torso, None, :2]
-        return Sensed(*readings, heading, touches, rotations.headed(apart, across))
+        return Sensed(*readings, heading, touches, rotations.to_heading_frame(apart, across))
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
@@ -379,8 +379,10 @@ class CommandTask(Task):
     def _motion(self, core: Core, place):
         """The mean velocity (..., 3), of steps in the frame of the heading at their start."""
         context, numpy, moved = self.context, place.__array_namespace__(), place - core.place
-        turn = rotations.wrapped(moved[..., 2])
-        moved = numpy.concatenate([rotations.headed(moved[..., :2], core.place[..., 2]), turn[..., None]], axis=-1)
+        turn = rotations.wrap_angle(moved[..., 2])
+        moved = numpy.concatenate(
+            [rotations.to_heading_frame(moved[..., :2], core.place[..., 2]), turn[..., None]], axis=-1
+        )
         return (1.0 - context.leaks) * core.motion + context.leaks * moved / context.step_units
 
     def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
@@ -417,8 +419,8 @@ class CommandTask(Task):
         """Return the blocks as the torso heads, without a clock at a stop and without negative zeros."""
         core, context, heading = memory.core, self.context, readings.heading
         numpy, posture, velocities = core.motion.__array_namespace__(), readings.posture, readings.velocities
-        quaternion = rotations.turned(readings.torso_quaternion, -heading)
-        velocity = rotations.headed(velocities[..., :2], heading)
+        quaternion = rotations.turn_about_z(readings.torso_quaternion, -heading)
+        velocity = rotations.to_heading_frame(velocities[..., :2], heading)
         gait_and_pose = self.settings.gait_and_pose
         if gait_and_pose is None:
             circle, more = self.clock.at(self.clock.circle, core.tick), {}

@@ -137,7 +137,7 @@ class GaitAndPose:
         """
         poses = checks.number("poses", overrides.get("poses", self.poses), 0.0, 1.0)
         names = overrides.get("gaits", self.gaits)
-        names = None if names is None else checks.names("gaits", names, gaits.fitting(body), "gait")
+        names = None if names is None else checks.names("gaits", names, gaits.fitting_gaits(body), "gait")
         return dataclasses.replace(self, poses=poses, gaits=names)
 
     def live(self, body: Body) -> dict[str, int]:
@@ -166,7 +166,7 @@ class GaitAndPose:
         body, rest = scene.body, posture.rest(scene.body)
         height, step = body.torso.standing_height, scene.control_timestep
         own = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))
-        names = [name for name in STEADY if name in gaits.fitting(body)] if self.gaits is None else self.gaits
+        names = [name for name in STEADY if name in gaits.fitting_gaits(body)] if self.gaits is None else self.gaits
         made = [gaits.gait(body, name) for name in names]
         drawn = [np.array((*gait.offsets, gait.duty_factor, parameters.gait_frequency)) for gait in made] or [own]
         tempi = (1.0, 1.0) if names == () else _TEMPI

@@ -439,7 +439,7 @@ class PillarField(Ground):
         """Return the distances (..., 24) of pillars along `sensors.RAYS`, as shares of `SIGHT`, at most 1."""
         numpy, unit = place.__array_namespace__(), context.arena.unit
         apart = memory.pillars - place[..., None, :2]
-        apart = rotations.headed(apart, place[..., 2:]) / unit
+        apart = rotations.to_heading_frame(apart, place[..., 2:]) / unit
         x, y = apart[..., None, :, 0], apart[..., None, :, 1]
         forward, left = numpy.asarray(RAYS)[..., None]
         along = x * forward + y * left

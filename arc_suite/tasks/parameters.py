@@ -214,7 +214,7 @@ def parameters(body: Body, given: Mapping[str, Any], backward: bool = True) -> P
     speed = checks.number("target_velocity", given["target_velocity"], low if backward else LEAST_SPEED, high)
     if abs(speed) < LEAST_SPEED:
         raise ValueError(
-            f"target_velocity: expected at least {LEAST_SPEED:g} m/s in either direction, got {checks.shown(speed)}"
+            f"target_velocity: expected at least {LEAST_SPEED:g} m/s in either direction, got {checks.preview(speed)}"
         )
     names = [name for name in Parameters._fields if name not in (*sizes, "target_velocity")]
     numbers = {name: checks.number(name, given[name], *BOUNDS[name]) for name in names}
@@ -246,7 +246,7 @@ def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, cha
         ValueError: an unknown term, or a weight that is no finite number.
     """
     if not isinstance(changed, Mapping | None):
-        raise ValueError(f"weights: expected a mapping of names to numbers, got {checks.shown(changed)}")
+        raise ValueError(f"weights: expected a mapping of names to numbers, got {checks.preview(changed)}")
     found = {name: of_body.get(name, weight) for name, weight in of_task.items()}
     for name, weight in (changed or {}).items():
         found[checks.name(name, found, "weight")] = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)

@@ -43,7 +43,7 @@ def observed(scene, data) -> dict:
     numpy, height = data.qpos.__array_namespace__(), scene.standing[..., 2:3]
     unit, rate, torso = (GRAVITY * height) ** 0.5, (GRAVITY / height) ** 0.5, data.qpos[..., :3]
     linear, heading = data.qvel[..., :3], rotations.yaw(data.qpos[..., 3:7])
-    along = rotations.headed(linear[..., :2], heading)
+    along = rotations.to_heading_frame(linear[..., :2], heading)
     velocity = [along / unit, linear[..., 2:] / unit, data.qvel[..., 3:6] / rate]
     feet = data.xpos[..., scene.layout.feet, :]
     ground = scene.arena.height(feet[..., 0], feet[..., 1]) + 0.0 * feet[..., 0]

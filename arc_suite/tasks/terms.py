@@ -70,7 +70,7 @@ def _refuse(terms: Mapping, weights: Mapping) -> None:
         checks.name(name, terms, "weight")
     without = next(name for name in terms if name not in weights)
     near = checks.hint(without, weights)
-    raise ValueError(f"term {checks.shown(without)} has no weight{near} (there are: {', '.join(weights)})")
+    raise ValueError(f"term {checks.preview(without)} has no weight{near} (there are: {', '.join(weights)})")
 
 
 def _limited(terms: Mapping, weights: Mapping, limit) -> dict:

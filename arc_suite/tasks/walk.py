@@ -200,5 +200,5 @@ class Walk(Task):
 def _healthy_range(value: Any) -> tuple[float, float]:
     low, high = checks.array("healthy_range", value, 2)
     if not low < high:
-        raise ValueError(f"healthy_range: expected low < high, got {checks.shown(value)}")
+        raise ValueError(f"healthy_range: expected low < high, got {checks.preview(value)}")
     return float(low), float(high)

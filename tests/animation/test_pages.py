@@ -132,7 +132,7 @@ def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_pack
     monkeypatch.setattr(pages.resources, "files", lambda package: tmp_path)
     with pytest.raises(ValueError, match="^no viewer for pages: `make web` builds it, which needs Node$"):
         pages.viewer()
-    monkeypatch.setattr(pages.versions, "clone", lambda: None)
+    monkeypatch.setattr(pages.versions, "clone_folder", lambda: None)
     with pytest.raises(ValueError, match="^no viewer for pages: install a wheel that `make dist` has built in a clone"):
         pages.viewer()
 

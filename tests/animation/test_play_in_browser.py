@@ -169,7 +169,7 @@ def test_keys_and_sliders_pose(tab):
 
 def test_keys_and_the_list_change_the_gait(tab):
     own = tab.evaluate(f"{ASKED}.gait")
-    names = ["own", *gaits.fitting(ROBOTS["tick"])]
+    names = ["own", *gaits.fitting_gaits(ROBOTS["tick"])]
     assert tab.locator("#gait option").all_text_contents() == names
     tab.keyboard.down("w")
     advanced(tab, 1.0)

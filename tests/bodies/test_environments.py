@@ -18,7 +18,7 @@ from arc_suite import registry
 from arc_suite.bodies import BodiesEnv, generator, tokens
 from arc_suite.bodies.families import sound_body, varied_body
 from arc_suite.envs import stacked
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import command
@@ -156,7 +156,7 @@ def test_a_task_that_inherits_shares_a_batch_only_if_it_declares_what_follows_fr
     class Stroll(Walk):
         name, from_body = "stroll", Walk.from_body
 
-    task, _ = prepared(FEW[0], "walk")
+    task, _ = prepare_task(FEW[0], "walk")
     kinds = [stacked.kind(each(task.scene, task.settings)) for each in (Walk, Saunter, Stroll)]
     assert [found is None for found in kinds] == [False, True, False]
 
@@ -314,7 +314,7 @@ def test_pictures_show_each_body():
         ({"bodies": "varied:0-9", "num_envs": 4}, "num_envs: expected at least one for each of 10 bodies, got 4"),
         ({"bodies": [], "num_envs": 4}, "bodies: expected at least one, got []"),
         ({"bodies": "vared:0-9"}, "unknown family 'vared'; did you mean 'varied'? (there are: "),
-        ({"bodies": ["queen", 3]}, f"unknown robot 3 (there are: {', '.join(registry.words())})"),
+        ({"bodies": ["queen", 3]}, f"unknown robot 3 (there are: {', '.join(registry.robot_words())})"),
         ({"task_kwargs": {"actions": "torque"}}, "unknown actions of different bodies 'torque' (there are: position)"),
         ({"task_kwargs": {"weigths": {}}}, "unknown setting of walk 'weigths'; did you mean 'weights'?"),
         ({"task_kwargs": {"history": 2}}, "history: expected 0 for different bodies, as tokens of "),

@@ -23,7 +23,7 @@ def doctor(*path, **variables):
     assert done.stderr == ""
     *lines, verdict = done.stdout.splitlines()
     found = {line.split()[1]: (line.split()[0], line[21:]) for line in lines}
-    assert list(found) == ["system", *versions.NEEDS, "cores", "MUJOCO_GL", "picture"]
+    assert list(found) == ["system", *versions.REQUIREMENTS, "cores", "MUJOCO_GL", "picture"]
     return done.returncode, found, verdict
 
 
@@ -95,7 +95,7 @@ def test_needs_are_those_of_the_package():
     config = configparser.ConfigParser()
     config.read(ROOT / "setup.cfg")
     required = [line.partition(";")[0] for line in config["options"]["install_requires"].split("\n")]
-    for package, needed in versions.NEEDS.items():
+    for package, needed in versions.REQUIREMENTS.items():
         assert f"{package}{needed}" in required
 
 

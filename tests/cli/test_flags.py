@@ -15,7 +15,7 @@ from arc_suite.registry import FAMILIES
 from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 
-SPIDER, WORDS = EXAMPLES["spider"], ", ".join(registry.words())
+SPIDER, WORDS = EXAMPLES["spider"], ", ".join(registry.robot_words())
 NO_PALETTE = f"Body(walker_4x3).palette: expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got 'mos'"
 
 

@@ -216,7 +216,7 @@ def test_stacked_controls_are_single_ones():
     stacked = Prescribed.stacked(controls)
     random = np.random.default_rng(0)
     for clock in (0, 3, 14, 15, 40, 500):
-        quaternions = rotations.turned(UPRIGHT, random.uniform(-1.0, 1.0, len(presets)))
+        quaternions = rotations.turn_about_z(UPRIGHT, random.uniform(-1.0, 1.0, len(presets)))
         angles, velocities = random.normal(0.0, 0.3, (2, len(presets), 18))
         actions = stacked(np.full(len(presets), clock), quaternions, angles, velocities)
         for index, control in enumerate(controls):
@@ -235,7 +235,7 @@ def test_torques_ahead_are_harmonics_of_the_legs_phase_and_steering_by_yaw():
     control, still, yaw = Prescribed.fit(body, limp), np.zeros(12), 0.3
     offsets = dict(zip((leg.name for leg in body.legs), medium.phase_offsets, strict=True))
     for clock in (0, 1, 7, 123):
-        action = control(np.array(clock), rotations.turned(UPRIGHT, np.array(yaw)), still, still)
+        action = control(np.array(clock), rotations.turn_about_z(UPRIGHT, np.array(yaw)), still, still)
         for name, found in zip(body.joint_names, action, strict=True):
             leg, _, joint = name.partition("_")
             phase = 2.0 * np.pi * (medium.frequency * 0.05 * clock + offsets[leg])

@@ -20,7 +20,7 @@ def test_metadata():
     dataset = data.open(ID)
     assert dataset.settings == settings and len(dataset) == 3
     about = dataset.metadata["arc_suite"]
-    assert about["versions"] == versions.recorded()
+    assert about["versions"] == versions.dependency_versions()
     assert len(about["model_sha256"]) == 64
     told = {"policy": "cpg", "presets": ["slow", "fast"], "noise": 0.1, "seed": 10_007, "steps": 20}
     told |= {"robot": "queen", "task": "walk", "task_kwargs": {}, "task_version": 0}

@@ -215,14 +215,14 @@ def test_a_dataset_that_is_moved_to_its_place_meanwhile_is_gone_on_with(root, mo
     collect(ID, SETTINGS, 2)
     away = place.with_name("away")
     place.rename(away)
-    locked = files.locked
+    locked = files.hold_lock
 
     def moved_before(path, refusal):
         if not place.exists():
             away.rename(place)
         return locked(path, refusal)
 
-    monkeypatch.setattr(files, "locked", moved_before)
+    monkeypatch.setattr(files, "hold_lock", moved_before)
     assert collect(ID, SETTINGS, 3) == 1
     assert not list(place.parent.glob(".*"))
 

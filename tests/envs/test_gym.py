@@ -336,7 +336,7 @@ def there(names):
         ({"camera_id": 4}, f"no camera 4: expected -1 (free) to 3, or one of {CAMERAS}"),
         ({"camera_id": None}, f"no camera None: expected -1 (free) to 3, or one of {CAMERAS}"),
         ({"task_kwargs": WRONG}, f"unknown weight 'controll'; did you mean 'control'? ({there(Walk.weights)})"),
-        ({"domain_name": "quen"}, f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.words())})"),
+        ({"domain_name": "quen"}, f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.robot_words())})"),
         ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)})"),
     ],
 )

@@ -15,7 +15,7 @@ from arc_suite.bodies import BodiesEnv, generator, shaping
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.gym import Env
-from arc_suite.envs.prepare import prepared, symmetry
+from arc_suite.envs.prepare import prepare_task, symmetry
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models import source
@@ -250,6 +250,6 @@ def test_a_setup_keeps_the_source(body):
 
 
 def test_tasks_are_prepared_with_the_substeps_of_the_file(body):
-    task, model = prepared(body, "walk")
+    task, model = prepare_task(body, "walk")
     assert model.opt.timestep * task.scene.substeps == pytest.approx(0.02)
     assert task.actions == "position"

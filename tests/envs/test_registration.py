@@ -103,7 +103,7 @@ for call in (
     except ValueError as error:
         print(error)
 """
-    words = [*ROBOTS, "hopper", *registry.words()[len(ROBOTS) :]]
+    words = [*ROBOTS, "hopper", *registry.robot_words()[len(ROBOTS) :]]
     assert package(code) == [
         f"unknown robot 'hoper'; did you mean 'hopper'? (there are: {', '.join(words)})",
         f"unknown task 'strol'; did you mean 'stroll'? (there are: {', '.join(TASKS)}, stroll)",
@@ -297,7 +297,16 @@ class Misnamed(Walk):
     ],
 )
 def test_mistakes_are_one_line_and_register_nothing(arguments, message):
-    tables = (ROBOTS, PARAMETERS["walk"], PRESETS, TASKS, ARENAS, LAWS, registry.MODULES, *registry.ADDITIONS.values())
+    tables = (
+        ROBOTS,
+        PARAMETERS["walk"],
+        PRESETS,
+        TASKS,
+        ARENAS,
+        LAWS,
+        registry.MODULE_OF_NAME,
+        *registry.ADDITIONS.values(),
+    )
     before = [dict(table) for table in tables]
     with refused(message, begins=True):
         arc_suite.register(**arguments)

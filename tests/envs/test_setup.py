@@ -112,7 +112,7 @@ def test_files_import_nothing_and_open_nothing(change, message):
 
 
 def test_tasks_of_other_packages_are_told_with_their_module(monkeypatch):
-    monkeypatch.setitem(registry.MODULES, ("task", "steer"), __name__)
+    monkeypatch.setitem(registry.MODULE_OF_NAME, ("task", "steer"), __name__)
     setup = Setup.of("queen", f"{__name__}:steer")
     assert (setup.task, setup.kind.name) == (f"{__name__}:steer", "steer")
     assert setup == Setup.of("queen", "steer") == Setup.from_dict(setup.to_dict())
@@ -131,7 +131,7 @@ def test_settings_of_a_setup_change_and_go():
 def test_names_of_several_bodies():
     several = ["varied:0-3", "queen,tick", "random:0,varied:1", "module:family:3-4"]
     one = ["varied:7", "queen", "module:family:3", '{"name": "a,b:1-2"}', "a,b.json"]
-    assert [name for name in several + one if registry.names_several(name)] == several
+    assert [name for name in several + one if registry.names_several_bodies(name)] == several
 
 
 def test_several_bodies_go_into_files_and_come_back():

@@ -91,7 +91,7 @@ def test_every_seed_has_one_owner():
     [([], range(0)), ([range(100, 200)], range(0)), ([range(50, 90), range(5, 12)], range(5, 10))],
 )
 def test_what_ranges_have_in_common(ranges, shared):
-    assert seed_ranges.common(ranges, range(10)) == shared
+    assert seed_ranges.common_seeds(ranges, range(10)) == shared
 
 
 def saved(path, *ranges, known=True):

@@ -26,7 +26,7 @@ PLACES = {
     "module of a robot": lambda: arc_suite.load(f"{LONG}:queen", "walk"),
     "no module of a robot": lambda: arc_suite.load(f"{LONG}-:queen", "walk"),
     "name in a module": lambda: arc_suite.load(f"creature:{LONG}", "walk"),
-    "name in a file": lambda: registry.imported("task", f"{LONG}:walk"),
+    "name in a file": lambda: registry.refuse_import("task", f"{LONG}:walk"),
     "task": lambda: arc_suite.load("tick", LONG),
     "setting": lambda: arc_suite.load("tick", "walk", {LONG: 1}),
     "value of a setting": lambda: arc_suite.load("tick", "walk", {"target_velocity": LONG}),
@@ -44,7 +44,7 @@ PLACES = {
     "blocks": lambda: SoftActorCritic(exclude_blocks=(LONG, 1)),
     "updates": lambda: SoftActorCritic(utd_ratio=LONG),
     "share": lambda: ProximalPolicy(discount=LONG),
-    "import": lambda: checks.imported(f"os:{LONG}", "policy"),
+    "import": lambda: checks.import_object(f"os:{LONG}", "policy"),
 }
 
 

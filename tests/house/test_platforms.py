@@ -37,7 +37,7 @@ from arc_suite.robots import ROBOTS, spec_files
 environment = arc_suite.load("queen", "walk", {"random": 0})
 environment.reset()
 assert environment.step(np.zeros(environment.action_spec().shape)).reward > 0.0
-with files.locked(".lock"):
+with files.hold_lock(".lock"):
     with files.writing_json("a.json") as report:
         report["leg"] = "Füße"
     assert os.system(sys.executable + " other.py") == 0
@@ -54,7 +54,7 @@ assert len(data.open("test-v0")) == 2
 OTHER = """
 from arc_suite import files
 try:
-    with files.locked(".lock", "held"):
+    with files.hold_lock(".lock", "held"):
         raise SystemExit("not locked")
 except ValueError as error:
     assert str(error) == "held"

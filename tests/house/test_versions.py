@@ -9,7 +9,7 @@ from arc_suite import versions
 
 
 def test_versions():
-    found = versions.recorded()
+    found = versions.dependency_versions()
     assert list(found) == ["arc_suite", "mujoco", "dm_control", "numpy"]
     assert found["mujoco"] == mujoco.__version__
     assert found["numpy"] == np.__version__
@@ -18,8 +18,8 @@ def test_versions():
 @pytest.mark.parametrize(("python", "options"), [((3, 12), ""), ((3, 13), "--no-deps ")])
 def test_the_command_that_installs_dm_control(monkeypatch, python, options):
     monkeypatch.setattr(versions.sys, "version_info", python)
-    monkeypatch.setattr(versions, "installed", lambda package: None)
-    monkeypatch.setattr(versions, "NEEDS", {"dm-control": "==1.0.50"})
+    monkeypatch.setattr(versions, "version_of", lambda package: None)
+    monkeypatch.setattr(versions, "REQUIREMENTS", {"dm-control": "==1.0.50"})
     command = f"pip install {options}'dm-control==1.0.50'"
     assert versions.problems() == [f"dm-control is not installed and should be ==1.0.50: {command}"]
 

@@ -94,7 +94,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def without_additions(monkeypatch):
     """Take back what the import of the module registers."""
-    tables = (*registry.ADDITIONS.values(), registry.MODULES, registry.ROBOTS, registry.TASKS, registry.ARENAS)
+    tables = (*registry.ADDITIONS.values(), registry.MODULE_OF_NAME, registry.ROBOTS, registry.TASKS, registry.ARENAS)
     tables += (registry.FAMILIES, registry.MODIFIERS, selection.LAWS)
     before = [dict(table) for table in tables]
     yield

@@ -12,7 +12,7 @@ from conftest import WORLDS, compiled
 
 import arc_suite
 from arc_suite.bodies import generator
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.worlds import device, mjx
 from arc_suite.learning.worlds.randomization import randomization_fn
@@ -222,7 +222,7 @@ except ImportError as error:
 
 @pytest.mark.parametrize(("robot", "sizes"), [("queen", (21, 102)), ("leaper", (18, 84))])
 def test_sizes_of_tables(robot, sizes):
-    model = prepared(robot, "walk")[1]
+    model = prepare_task(robot, "walk")[1]
     assert device.table_sizes(model) == sizes
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

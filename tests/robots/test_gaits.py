@@ -65,7 +65,7 @@ def test_walk_of_a_quadruped_is_a_lateral_sequence():
     ],
 )
 def test_gaits_that_fit_can_be_asked_for(body, fit):
-    assert gaits.fitting(body) == fit
+    assert gaits.fitting_gaits(body) == fit
     for name in gaits.NAMES:
         if name in fit:
             gait = gaits.gait(body, name)

@@ -51,14 +51,14 @@ def test_the_ground_of_an_arena_compiles_where_the_heap_cannot_grow():
     """MuJoCo's parser takes the errno of an allocation that succeeded elsewhere for a fault of a long list."""
     script = """if True:
         import ctypes
-        from arc_suite.envs.prepare import prepared
+        from arc_suite.envs.prepare import prepare_task
         libc = ctypes.CDLL(None)
         libc.sbrk.restype, libc.mmap.restype = ctypes.c_void_p, ctypes.c_void_p
         libc.mmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t] + [ctypes.c_int] * 3 + [ctypes.c_long]
         page = -(-libc.sbrk(0) // 4096) * 4096
         fixed_anonymous_private = 0x100022
         assert libc.mmap(page, 4096, 0, fixed_anonymous_private, -1, 0) == page
-        assert prepared("tick", "course", {"curriculum": True})[1].nhfielddata > 200_000
+        assert prepare_task("tick", "course", {"curriculum": True})[1].nhfielddata > 200_000
     """
     assert interpreters.printed(script) == []
 

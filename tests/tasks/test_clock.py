@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks.clock import Clock, desired_contacts
 
@@ -15,7 +15,7 @@ TWO_PI = 2.0 * math.pi
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_phases_are_summed_step_by_step(robot):
-    task, _ = prepared(robot, "walk")
+    task, _ = prepare_task(robot, "walk")
     phase, turn = 0.0, TWO_PI * task.parameters.gait_frequency * 0.05
     for tick in range(1001):
         assert task.clock.phases[tick] == phase

@@ -15,7 +15,7 @@ import arc_suite
 from arc_suite.arenas import ARENAS
 from arc_suite.bodies import generator
 from arc_suite.envs import trees
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.batch import Batch
@@ -80,7 +80,7 @@ def read_only(batch, task):
 
 @every_place_and_body
 def test_functions_are_pure_and_read_what_is_declared(task_name, body, settings):
-    task, _ = prepared(BODIES[body], task_name, settings)
+    task, _ = prepare_task(BODIES[body], task_name, settings)
     batch, memory = started(task)
     rng = np.random.RandomState(1)
     for _ in range(5):
@@ -112,7 +112,7 @@ def leaves(value):
 @pytest.mark.parametrize(("body", "task_name"), tiers(itertools.product(BODIES, TASKS), turns(BODIES, TASKS)))
 def test_the_number_of_draws_is_fixed(task_name, body):
     """Whatever is drawn, and whatever the settings are, the stream is at the same place afterwards."""
-    task, _ = prepared(BODIES[body], task_name)
+    task, _ = prepare_task(BODIES[body], task_name)
     numbers = []
     for seed in range(20):
         random = Counting(seed)
@@ -150,7 +150,7 @@ class Counting(np.random.RandomState):
 )
 def test_an_environment_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
     """Over several episodes, among environments that fall or stand still at other times."""
-    settings = settings | {"time_limit": 14 * prepared(BODIES[body], "walk")[0].scene.control_timestep}
+    settings = settings | {"time_limit": 14 * prepare_task(BODIES[body], "walk")[0].scene.control_timestep}
     envs = VectorEnv(BODIES[body], task_name, 3, threads, task_kwargs=settings)
     single = gymnasium.make(SINGLE, domain_name=BODIES[body], task_name=task_name, task_kwargs=settings)
     observations, observation = envs.reset(seed=40)[0], single.reset(seed=41)[0]

@@ -17,7 +17,7 @@ import arc_suite
 from arc_suite.arenas import terrain
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
@@ -44,7 +44,7 @@ def inner(memory):
     ],
 )
 def test_height_is_that_of_rays_in_every_lane(name, settings, kinds, lanes):
-    task, model = prepared("leaper", name, settings)
+    task, model = prepare_task("leaper", name, settings)
     arena, random = task.scene.arena, np.random.RandomState(0)
     assert len(arena.lanes) == lanes
     assert {kind for kind, _ in arena.lanes} == set(kinds)
@@ -60,7 +60,7 @@ DIGESTS = ("eeeaf6d1f9e96022", "20855599f2a44947", "65c2f128f3489abc", "c388d4d1
 @every_kind
 def test_ground_is_a_function_of_its_settings(kind):
     def heights(**settings):
-        arena = prepared("queen", kind, settings)[0].scene.arena
+        arena = prepare_task("queen", kind, settings)[0].scene.arena
         x, y = np.random.RandomState(0).uniform((-3.0, -80.0), (40.0, 80.0), (500, 2)).T
         return np.round(arena.height(x * arena.unit, y * arena.unit), 9)
 
@@ -72,7 +72,7 @@ def test_ground_is_a_function_of_its_settings(kind):
 
 def profile(robot, kind, **settings):
     """Heights, m, along the middle of the first lane, every centimeter."""
-    arena = prepared(robot, kind, settings)[0].scene.arena
+    arena = prepare_task(robot, kind, settings)[0].scene.arena
     x = np.arange(0.0, 12.0, 0.01)
     return arena.height(x, arena.start(0) + 0.0 * x)
 
@@ -139,7 +139,7 @@ def test_a_height_field_lies_over_the_plane_below_stairs():
 
 @pytest.mark.parametrize("kind", ["rough", "slopes"])
 def test_difficulty_0_is_level(kind):
-    arena = prepared("bastion", kind, {"difficulty": 0.0})[0].scene.arena
+    arena = prepare_task("bastion", kind, {"difficulty": 0.0})[0].scene.arena
     x, y = np.random.RandomState(0).uniform(-3.0, 12.0, (2, 100))
     assert not arena.height(x, y).any()
 
@@ -283,7 +283,7 @@ def test_a_master_of_all_levels_spends_most_episodes_at_the_highest():
 
 
 def test_levels_of_gaps_differ():
-    arena = prepared("tick", "gaps", {"curriculum": True})[0].scene.arena
+    arena = prepare_task("tick", "gaps", {"curriculum": True})[0].scene.arena
     x = np.arange(terrain.LEVEL, terrain.LEVEL + 1.0, 1.0 / 32.0) * arena.unit  # the first trench begins here
     trenches = [(arena.height(x, arena.start(level) + 0.0 * x) < 0.0).mean() for level in range(LEVELS)]
     assert_allclose(trenches, np.arange(1, LEVELS + 1) / 16.0)
@@ -344,7 +344,7 @@ def test_roaming_follows_commands_from_the_middle_of_the_lane():
 
 
 def test_trenches_and_hurdles_stand_apart():
-    arena = prepared("queen", "leap", {"width": 0.75, "rise": 0.3})[0].scene.arena
+    arena = prepare_task("queen", "leap", {"width": 0.75, "rise": 0.3})[0].scene.arena
     x = np.arange(0.0, 40.0, 1.0 / 32.0) + 1.0 / 64.0
     for lane, (kind, _) in enumerate(arena.lanes):
         heights = arena.height(x * arena.unit, np.full_like(x, arena.start(lane))) / arena.unit

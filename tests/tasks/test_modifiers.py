@@ -21,7 +21,7 @@ from tiers import never, tiers, turn
 
 import arc_suite
 from arc_suite import rotations
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.outline import torso_box
 from arc_suite.models.sizing import GRAVITY
@@ -142,7 +142,7 @@ MODIFIED = [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all"
 )
 def test_an_environment_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
     """Over three episodes with kicks and limping, a snapshot and a pickle, among others."""
-    length = 50 * prepared(BODIES[body], "walk")[0].scene.control_timestep
+    length = 50 * prepare_task(BODIES[body], "walk")[0].scene.control_timestep
     settings = CASES[case] | {"time_limit": length}
     names = {"domain_name": BODIES[body], "task_name": task_name, "task_kwargs": settings}
     envs = VectorEnv(num_envs=3, num_threads=threads, **names)
@@ -561,7 +561,7 @@ def test_a_wrong_modifier_is_one_line(settings, message):
         with refused(message, begins=True):
             use("tick", "walk", settings)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
-        modified_task.modified(prepared("tick", "walk")[0], {"kick": 1.0})
+        modified_task.modified(prepare_task("tick", "walk")[0], {"kick": 1.0})
 
 
 GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()

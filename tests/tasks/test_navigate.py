@@ -64,7 +64,7 @@ def test_ranges_are_those_of_mujocos_rays(robot):
         unit = task.scene.arena.unit
         for ray, share in zip(sensors.RAYS.T, timestep.observation["ranges"], strict=True):
             start = np.array([*memory.core.place[:2], 0.5 * task.scene.arena.top])
-            direction = np.array([*rotations.headed(ray, -memory.core.place[2]), 0.0])
+            direction = np.array([*rotations.to_heading_frame(ray, -memory.core.place[2]), 0.0])
             group = np.array([1, 0, 0, 0, 0, 0], np.uint8)
             # The body's own parts are in the way of rays from within it, so that rays go on behind them.
             far = 0.0

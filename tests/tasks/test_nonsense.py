@@ -65,10 +65,10 @@ def test_arguments(kind):
 
 
 def test_messages_show_the_beginning_of_values():
-    assert checks.shown(3) == "3" and checks.shown("walk") == "'walk'"
-    assert checks.shown(np.zeros((2, 2))) == "array([[0., 0.], [0., 0.]])"
-    assert checks.shown(nested()) == "a list that cannot be shown"
-    assert checks.shown("x" * 10**6) == "'" + "x" * 299
+    assert checks.preview(3) == "3" and checks.preview("walk") == "'walk'"
+    assert checks.preview(np.zeros((2, 2))) == "array([[0., 0.], [0., 0.]])"
+    assert checks.preview(nested()) == "a list that cannot be shown"
+    assert checks.preview("x" * 10**6) == "'" + "x" * 299
 
 
 def test_errors_of_a_family_name_family_and_seed():

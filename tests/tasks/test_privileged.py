@@ -27,11 +27,11 @@ def test_velocity_and_ground_are_those_of_the_simulation_without_scale():
     environment = begun("leaper", "stairs", observation_noise=1.0)
     physics, arena, height = environment.physics, environment.task.scene.arena, 0.5
     physics.data.qpos[0] += 6.0  # onto the stairs
-    physics.data.qpos[3:7] = rotations.turned(physics.data.qpos[3:7].copy(), 1.0)
+    physics.data.qpos[3:7] = rotations.turn_about_z(physics.data.qpos[3:7].copy(), 1.0)
     physics.data.qvel[:6] = (0.3, -0.2, 0.1, 1.0, 2.0, 3.0)
     physics.forward()
     found, torso = environment.task.privileged, physics.data.qpos[:3]
-    along = rotations.headed(np.array((0.3, -0.2)), rotations.yaw(physics.data.qpos[3:7]))
+    along = rotations.to_heading_frame(np.array((0.3, -0.2)), rotations.yaw(physics.data.qpos[3:7]))
     unit, rate = (9.81 * height) ** 0.5, (9.81 / height) ** 0.5
     assert_allclose(found["velocity"], [*(along / unit), 0.1 / unit, 1.0 / rate, 2.0 / rate, 3.0 / rate], rtol=1e-12)
     feet = np.array([physics.named.data.xpos[name] for name in environment.task.body.foot_names])
@@ -107,9 +107,9 @@ def test_kicks_forces_and_failures_are_there_in_the_step_in_which_they_act():
         environment.step(np.zeros(18))
         found, heading = environment.task.privileged, rotations.yaw(environment.physics.data.qpos[3:7])
         kick = kicks.kicks[0] / (9.81 * height) ** 0.5 if step == first else np.zeros(2)
-        assert_allclose(found["kick"], rotations.headed(kick, heading), atol=1e-12)
+        assert_allclose(found["kick"], rotations.to_heading_frame(kick, heading), atol=1e-12)
         force = environment.physics.data.xfrc_applied[1, :2] / task.modifier(Pushes).weight
-        assert_allclose(found["force"], rotations.headed(force, heading), atol=1e-12)
+        assert_allclose(found["force"], rotations.to_heading_frame(force, heading), atol=1e-12)
         assert_array_equal(found["strength"] == 0.0, motors.failing & (step > FAILS_FROM))
     assert found["force"].any() or found["kick"].any()
 

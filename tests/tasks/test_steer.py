@@ -252,10 +252,10 @@ def test_nothing_tells_where_the_body_heads(robot):
     task, memory, turn = environment.task.definition, environment.task.memory, 1.234
     data = types.SimpleNamespace(**{name: getattr(environment.physics.data.ptr, name).copy() for name in task.reads})
     before = task.observe(memory, task.read(data))
-    data.qpos[3:7] = rotations.turned(data.qpos[3:7], turn)
+    data.qpos[3:7] = rotations.turn_about_z(data.qpos[3:7], turn)
     forces = data.cfrc_ext
     for array in (data.qpos[None, :2], data.qvel[None, :2], data.xpos[:, :2], forces[:, :2], forces[:, 3:5]):
-        array[:] = rotations.headed(array.copy(), -turn)
+        array[:] = rotations.to_heading_frame(array.copy(), -turn)
     assert np.abs(before["contact_forces"]).max() > 0.01
     for name, block in task.observe(memory, task.read(data)).items():
         assert_allclose(block, before[name], atol=1e-12, err_msg=name)
@@ -292,12 +292,14 @@ def test_pictures_show_the_command_as_arrows():
     assert (hub.shape, going.shape, turning.shape) == ("cylinder", "arrow", "arrow")
     assert_array_equal(hub.start[:2], going.start[:2])
     assert_array_equal(going.end, turning.start)
-    ahead = rotations.headed(hub.start[:2] - readings.torso_position[:2], heading)
+    ahead = rotations.to_heading_frame(hub.start[:2] - readings.torso_position[:2], heading)
     assert ahead[0] > 0.5 * reach and abs(ahead[1]) < 1e-12  # in front of the torso
     assert hub.start[2] == 0.0
     assert_allclose([going.start[2], going.end[2], turning.end[2]], going.radius)  # they lie on the ground
-    assert_allclose(rotations.headed((going.end - going.start)[:2], heading), (0.5 * reach, -0.25 * reach))
-    assert_allclose(rotations.headed((turning.end - turning.start)[:2], heading), (0.0, 0.5 * reach), atol=1e-12)
+    assert_allclose(rotations.to_heading_frame((going.end - going.start)[:2], heading), (0.5 * reach, -0.25 * reach))
+    assert_allclose(
+        rotations.to_heading_frame((turning.end - turning.start)[:2], heading), (0.0, 0.5 * reach), atol=1e-12
+    )
     shown = environment.physics.render(60, 80)
     environment.command("command", (0.0, 0.0, 0.0))
     assert [mark.shape for mark in task.markers(environment.task.memory, readings)] == ["cylinder"]

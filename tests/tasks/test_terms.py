@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
 from arc_suite.envs import dm
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import terms
@@ -30,7 +30,7 @@ class Longer(Steer):
 
 def reward_of_a_step(kind):
     """The reward of a step of a class of tasks, and its terms."""
-    plain, _ = prepared("tick", "steer")
+    plain, _ = prepare_task("tick", "steer")
     task = kind(plain.scene, kind.settings_for(plain.scene.body, {}))
     run = dm.TaskRun(task, 0)
     environment = dm.Environment(Physics.from_body(task.scene.body, task.scene.arena), run, {})

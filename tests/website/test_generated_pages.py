@@ -87,7 +87,7 @@ def test_bounds_are_those_of_the_task(task, name):
     outside = [float(low) - 1, *([float(high) + 1] if high else [])]
     for value in outside:
         with pytest.raises(ValueError, match=name):
-            Setup.of("tick", task, {name: int(value) if value == int(value) else value}).prepared()
+            Setup.of("tick", task, {name: int(value) if value == int(value) else value}).prepare()
 
 
 def test_robots_have_the_torques_and_ranges_of_their_specs():

@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 
 from arc_suite.cpg import Demonstrator
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from benchmark import contestants, growth, ordinary
 from benchmark.contestants import Contestant
 
@@ -91,7 +91,7 @@ class _Field:
                 stack.callback(contestant.close)
                 self._contestants.append(contestant)
         self._contestants.sort(key=lambda contestant: contestants.ORDER.index(contestant.name))
-        self._task, _ = prepared(robot, "walk")
+        self._task, _ = prepare_task(robot, "walk")
         self._policies = [Demonstrator(robot) for _ in self._contestants]
         self._observations = [contestant.reset() for contestant in self._contestants]
         self._times = [[] for _ in self._contestants]

@@ -16,7 +16,7 @@ def page(robot: str, player: str = "") -> str:
         player: Markdown of a page in which it walks; without one there is a film.
     """
     setup = Setup.of(robot)
-    task, model = setup.prepared()
+    task, model = setup.prepare()
     return markdown.page(
         f"`{robot}`",
         f"{about(robot)} Gymnasium id: `{setup.env_id}`; each task has one.",
@@ -117,7 +117,7 @@ def gallery(frame: str) -> str:
 
 
 def _creature(name: str) -> list[str]:
-    task, model = Setup.of(name).prepared()
+    task, model = Setup.of(name).prepare()
     body, gait = task.scene.body, task.parameters
     numbers = model.body_mass.sum(), body.torso.standing_height, *gait[:3]
     return [f"`{name}`", f"{len(body.legs)}", f"{model.nu}", *map(markdown.number, numbers)]

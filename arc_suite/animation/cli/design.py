@@ -104,7 +104,7 @@ def settled(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
     values = {"task": trial.task, "goal": trial.goal}
     values |= {name: getattr(trial, name)._asdict() for name in ("budget", "first", "second")}
     values |= {"map": cells._asdict(), "around": around and body_to_json(around), "amount": around and FLAGS.amount}
-    values |= {"seed": FLAGS.seed, "random": FLAGS.random, "versions": versions.recorded()}
+    values |= {"seed": FLAGS.seed, "random": FLAGS.random, "versions": versions.dependency_versions()}
     return json.loads(json.dumps(values))
 
 

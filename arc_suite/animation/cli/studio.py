@@ -30,7 +30,7 @@ flags.DEFINE_integer("port", 8080, "Port to listen on; the next free one if it i
 
 def main() -> None:
     """Open the page and step until Ctrl-C."""
-    with versions.needing("the studio needs viser", "animate"):
+    with versions.require_extra("the studio needs viser", "animate"):
         from arc_suite.animation.studio.page import serve
     serve(Session(_sketch()), FLAGS.host, FLAGS.port, lambda url: print(f"the studio is at {url}", flush=True))
 

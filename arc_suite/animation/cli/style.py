@@ -102,7 +102,7 @@ def pictures() -> Callable[[pathlib.Path, dict], None]:
     Raises:
         ValueError: matplotlib is not installed.
     """
-    with versions.needing("pictures need matplotlib", "animate"):
+    with versions.require_extra("pictures need matplotlib", "animate"):
         from arc_suite.animation.style_plots import OF_GAIT, PICTURES
 
     def draw(folder, tracks):
@@ -167,4 +167,4 @@ def main() -> None:
             page.write_text(pages.page(played), encoding="utf-8")
         setup = next(iter(chosen_for.values()))
         named = {"task": setup.task, "task_kwargs": setup.task_kwargs, "episodes": FLAGS.episodes, "seed": FLAGS.seed}
-        file.update(named, robots=reports, versions=versions.recorded())
+        file.update(named, robots=reports, versions=versions.dependency_versions())

@@ -149,7 +149,7 @@ def clip_of(name: str) -> Kind:
     clip = registry.find("clip", name, CLIPS)
     if not isinstance(clip, Kind):
         kinds = ", ".join(kind.__name__ for kind in get_args(Kind))
-        raise ValueError(f"clip {registry.bare(name)!r}: expected one of {kinds}, got {type(clip).__name__}")
+        raise ValueError(f"clip {registry.bare_name(name)!r}: expected one of {kinds}, got {type(clip).__name__}")
     return clip
 
 

@@ -122,7 +122,7 @@ def _write_glb(
     reduce: bool = False,
 ) -> dict[str, Any]:
     """Write a glTF file and return its metrics."""
-    generator = f"arc_suite {versions.installed('arc_suite')}"
+    generator = f"arc_suite {versions.version_of('arc_suite')}"
     path.write_bytes(glb(body, clips, rig, root_motion, generator, triangles, uv, reduce))
     return sidecar(body, clips, root_motion)
 

@@ -99,7 +99,7 @@ def clips(
         raise ValueError(f"clips: expected one or more of {', '.join(catalog.names())}, got none")
     for name in names:
         catalog.clip_of(name)
-    names = [registry.bare(name) for name in names]
+    names = [registry.bare_name(name) for name in names]
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
     if policy == "cpg" and preset is None and "command" in setup.definition.blocks and not setup.kind.own_arena:

@@ -227,7 +227,7 @@ def _animations(
         # A root that stays has keys too: in players it would otherwise be wherever the clip before left it.
         path, at = (motion.root, None) if moves else (np.zeros((2, 3)), ends)
         ground = np.concatenate([path[:, :2], np.zeros((len(path), 1))], axis=-1)
-        heading = rotations.turned(np.array((1.0, 0.0, 0.0, 0.0)), path[:, 2])
+        heading = rotations.turn_about_z(np.array((1.0, 0.0, 0.0, 0.0)), path[:, 2])
         channels = [track(root, "translation", ground, at), track(root, "rotation", heading, at), *shared]
         samplers = [{"input": times, "output": output} for _, _, times, output in channels]
         targets = [{"node": node, "path": target} for node, target, _, _ in channels]

@@ -82,8 +82,8 @@ def _count(clip: Clip) -> int:
 def _views(body: Body, clip: Clip, frames, headings, size: int, transparent: bool) -> Iterator[np.ndarray]:
     """Yield pictures (size, size, channels) of frames (n,) under headings (n,), rad."""
     poses = clip.motion._replace(root=0.0 * clip.motion.root).poses()[frames]
-    poses[:, :2] = rotations.headed(poses[:, :2], -headings)
-    poses[:, 3:7] = rotations.turned(poses[:, 3:7], headings)
+    poses[:, :2] = rotations.to_heading_frame(poses[:, :2], -headings)
+    poses[:, 3:7] = rotations.turn_about_z(poses[:, 3:7], headings)
     model = compiled(body)
     positions = readings.positions(poses, readings.layout(model, body), stood(model))
     stage = opengl.call(lambda: _stage(body, positions[: _count(clip)], transparent))

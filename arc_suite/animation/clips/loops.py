@@ -153,10 +153,11 @@ def straightened(motion: Motion, course: float) -> Motion:
     forward, left, _ = motion.twist
     speed, astray = np.hypot(forward, left), np.arctan2(left, forward) - course
     twist = np.array((speed * np.cos(course), speed * np.sin(course), 0.0))
+    positions = [rotations.to_heading_frame(motion.positions[:, :2], astray), motion.positions[:, 2:]]
     return motion._replace(
         root=along(twist, motion.step * np.arange(len(motion.joints))),
-        positions=np.concatenate([rotations.headed(motion.positions[:, :2], astray), motion.positions[:, 2:]], axis=-1),
-        quaternions=rotations.turned(motion.quaternions, -astray),
+        positions=np.concatenate(positions, axis=-1),
+        quaternions=rotations.turn_about_z(motion.quaternions, -astray),
         twist=twist,
     )
 

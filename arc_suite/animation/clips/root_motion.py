@@ -58,9 +58,9 @@ class Motion(NamedTuple):
         """Return poses in the world, (samples, 7 + joints); see `Recording`."""
         heading = self.root[:, 2]
         ahead, left, height = self.positions.T
-        across = rotations.headed(np.stack([ahead, left], axis=-1), -heading)
+        across = rotations.to_heading_frame(np.stack([ahead, left], axis=-1), -heading)
         place = np.concatenate([self.root[:, :2] + across, height[:, None]], axis=-1)
-        return np.concatenate([place, rotations.turned(self.quaternions, heading), self.joints], axis=-1)
+        return np.concatenate([place, rotations.turn_about_z(self.quaternions, heading), self.joints], axis=-1)
 
     def lowered(self, height: float) -> "Motion":
         """Return the motion with the torso lower by a height, m."""
@@ -117,7 +117,7 @@ class Motion(NamedTuple):
         place = places(self.poses()[[end]])[0]
         wanted = after(place, relative(_place(pose), np.zeros(3)))
         error = relative(self.root[end], wanted) * (1.0, 1.0, 0.0)
-        error[2] = rotations.wrapped(wanted[2] - self.root[end, 2])
+        error[2] = rotations.wrap_angle(wanted[2] - self.root[end, 2])
         root = after(self.root, self._fading(end, len(self.joints) - 1)[:, None] * error)
         motion = self.on_root(root)
         root = relative(root[0], root)
@@ -214,7 +214,7 @@ def on_root(step: float, poses, root, local) -> Motion:
     """Put poses onto a root, given where the torso is (samples, 3) in the root's frame, seen from above."""
     turn = local[:, 2] - rotations.yaw(poses[:, 3:7])
     positions = np.concatenate([local[:, :2], poses[:, 2:3]], axis=-1)
-    quaternions = _continuous(rotations.turned(poses[:, 3:7], turn))
+    quaternions = _continuous(rotations.turn_about_z(poses[:, 3:7], turn))
     return Motion(step, root, positions, quaternions, poses[:, 7:].copy(), np.zeros(3))
 
 
@@ -236,7 +236,7 @@ def _continuous(quaternions) -> np.ndarray:
 def relative(origin, place) -> np.ndarray:
     """Return places relative to others."""
     origin, place = np.asarray(origin, float), np.asarray(place, float)
-    offset = rotations.headed(place[..., :2] - origin[..., :2], origin[..., 2])
+    offset = rotations.to_heading_frame(place[..., :2] - origin[..., :2], origin[..., 2])
     return np.concatenate([offset, place[..., 2:] - origin[..., 2:]], axis=-1)
 
 
@@ -250,19 +250,19 @@ def along(twist, times) -> np.ndarray:
     angle = 0.5 * twist[2] * times
     # A chord of the arc: its length is the arc's by sin(a) / a, its direction that of half the turn.
     chord = times * np.sinc(angle / np.pi)
-    displacement = rotations.headed(np.stack([chord * twist[0], chord * twist[1]], axis=-1), -angle)
+    displacement = rotations.to_heading_frame(np.stack([chord * twist[0], chord * twist[1]], axis=-1), -angle)
     return np.concatenate([displacement, 2.0 * angle[:, None]], axis=-1)
 
 
 def logarithm(place) -> np.ndarray:
     """Return the constant velocities (..., 3) that lead from 0 to places (..., 3) in a unit of time."""
     half = 0.5 * place[..., 2]
-    displacement = rotations.headed(place[..., :2], half) / np.sinc(half / np.pi)[..., None]
+    displacement = rotations.to_heading_frame(place[..., :2], half) / np.sinc(half / np.pi)[..., None]
     return np.concatenate([displacement, place[..., 2:]], axis=-1)
 
 
 def after(first, second) -> np.ndarray:
     """Return the places (..., 3) that `second` are relative to `first`."""
     first, second = np.asarray(first, float), np.asarray(second, float)
-    moved = first[..., :2] + rotations.headed(second[..., :2], -first[..., 2])
+    moved = first[..., :2] + rotations.to_heading_frame(second[..., :2], -first[..., 2])
     return np.concatenate([moved, first[..., 2:] + second[..., 2:]], axis=-1)

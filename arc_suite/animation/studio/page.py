@@ -200,7 +200,7 @@ class Page:
     def _fit(self, creature: Creature) -> None:
         """Show the choices, the check and the lines that belong to a creature."""
         body, widgets = creature.setup.body, self._widgets
-        widgets["gait"].options = layout.listed(creature.sketch.gait, (OWN, *gaits.fitting(body)))
+        widgets["gait"].options = layout.listed(creature.sketch.gait, (OWN, *gaits.fitting_gaits(body)))
         widgets["preset"].options = layout.listed(creature.sketch.preset, (OWN, *presets_of(body)))
         legs = (_ALL, *(leg.name for leg in body.legs))
         if self._leg.value not in legs:

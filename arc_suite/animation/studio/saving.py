@@ -67,7 +67,7 @@ def glb(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     sketch = creature.sketch
     clips = export.clips(creature.setup, export.DEFAULT, sketch.policy, sketches.preset(sketch))
     return export.glb(
-        creature.setup.body, clips, generator=f"arc_suite {versions.installed('arc_suite') or ''}".strip()
+        creature.setup.body, clips, generator=f"arc_suite {versions.version_of('arc_suite') or ''}".strip()
     )
 
 

@@ -104,7 +104,7 @@ def body(sketch: Sketch) -> Body:
     """
     made = source_body(sketch)
     made = shaped(made, **_shape(sketch, made))
-    return made if sketch.palette == OWN else made.replace(palette=palettes.parsed(sketch.palette))
+    return made if sketch.palette == OWN else made.replace(palette=palettes.parse(sketch.palette))
 
 
 def field(sketch: Sketch) -> Mapping[str, Any]:
@@ -159,7 +159,7 @@ def preset(sketch: Sketch) -> str | None:
         NotImported: the preset's module has not been imported yet: a visitor of the page imports nothing.
     """
     given = _given(sketch.preset)
-    return given and registry.imported("law", given)
+    return given and registry.refuse_import("law", given)
 
 
 def file_name(made: Body) -> str:
@@ -184,7 +184,7 @@ def python_lines(sketch: Sketch) -> str:
         changes = ", ".join(f"{name}={value!r}" for name, value in shape.items())
         robots, code = [*robots, "shaping"], f"shaping.shaped({code}, {changes})"
     if sketch.palette != OWN:
-        code = f"{code}.replace(palette={palettes.parsed(sketch.palette)!r})"
+        code = f"{code}.replace(palette={palettes.parse(sketch.palette)!r})"
     options = settings(sketch, body(sketch))
     packages = (("arc_suite", ["policies"]), ("arc_suite.models", models), ("arc_suite.robots", robots))
     imports = "".join(f"from {package} import {', '.join(names)}\n" for package, names in packages if names)

@@ -164,7 +164,7 @@ def _read(kind: type, value: Any, what: str) -> Any:
 
 def _text(what: str, value: Any) -> str:
     if not isinstance(value, str):
-        raise ValueError(f"{what}: expected a text, got {checks.shown(value)}")
+        raise ValueError(f"{what}: expected a text, got {checks.preview(value)}")
     return value
 
 
@@ -174,7 +174,7 @@ def _pairs(what: str, value: Any) -> tuple:
     for pair in value if isinstance(value, list) else [value]:
         name, given = pair if isinstance(pair, list) and len(pair) == 2 else (None, None)
         if not isinstance(name, str):
-            raise ValueError(f"{what}: expected pairs of a name and its value, got {checks.shown(value)}")
+            raise ValueError(f"{what}: expected pairs of a name and its value, got {checks.preview(value)}")
         several = what.endswith("ends")
         found.append((name, tuple(checks.array(what, given, 3).tolist()) if several else checks.number(what, given)))
     return tuple(found)

@@ -60,8 +60,9 @@ class Algorithm(NamedTuple):
             kind = type(fields[checks.name(name, fields, "hyperparameter")])
             kinds = (int, float) if kind is float else kind
             if not isinstance(value, kinds) or isinstance(value, bool) != (kind is bool):
+                example = fields[name]
                 raise ValueError(
-                    f"hyperparameter {name}: expected {kind.__name__} like {fields[name]!r}, got {checks.shown(value)}"
+                    f"hyperparameter {name}: expected {kind.__name__} like {example!r}, got {checks.preview(value)}"
                 )
         return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changes))
 
@@ -94,7 +95,7 @@ def _learn(hp, context) -> Iterator[Any]:
     Raises:
         ValueError: JAX is not installed.
     """
-    with versions.needing("training needs JAX", "learn"):
+    with versions.require_extra("training needs JAX", "learn"):
         from arc_suite.learning.agents import bc, dagger, off_policy, on_policy
     learners = {SoftActorCritic: off_policy, ProximalPolicy: on_policy, DAgger: dagger, BehaviorCloning: bc}
     return learners[type(hp)].learn(hp, context)
@@ -205,5 +206,5 @@ def algorithm(name: str) -> Algorithm:
     """
     definition = registry.find("algorithm", name, ALGORITHMS)
     if not isinstance(definition, Algorithm):
-        raise ValueError(f"algorithm {checks.shown(name)}: expected an Algorithm, got {type(definition).__name__}")
+        raise ValueError(f"algorithm {checks.preview(name)}: expected an Algorithm, got {type(definition).__name__}")
     return definition

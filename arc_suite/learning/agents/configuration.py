@@ -98,11 +98,11 @@ class Configuration:
         checks.integer("steps", steps, 1)
         checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
-            raise ValueError(f"prior: expected the id of a dataset, got {checks.shown(prior)}")
+            raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
         training = checks.mapping("training", training)
         _check_training(setup, definition, training)
         text = checks.json_text("training", dict(training))
-        algorithm = registry.importable("algorithm", registry.bare(algorithm))
+        algorithm = registry.importable_name("algorithm", registry.bare_name(algorithm))
         hyperparameters = _with_modules(definition.hyperparameters)
         return cls(setup, algorithm, hyperparameters, seed, steps, evaluate_every, prior, text)
 
@@ -203,7 +203,7 @@ class Configuration:
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
         for kind, name in _registered_names(fields):
-            registry.imported(kind, name)
+            registry.refuse_import(kind, name)
         setup = Setup.of(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
         return cls.of(setup, **{name: fields[name] for name in _OWN if name in fields})
 
@@ -220,7 +220,7 @@ class Configuration:
             ValueError: a setting of the task that does not fit.
         """
         provenance = self.setup.provenance()
-        packages = {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")}
+        packages = {name: versions.version_of(name) for name in ("jax", "jaxlib", "optax")}
         own = {"episodes": evaluation.CURVE_EPISODES, "versions": provenance["versions"] | packages}
         return self.to_dict() | provenance | own | self._views()
 
@@ -249,7 +249,7 @@ def _registered_names(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _names_of_bodies(robot) -> list[str]:
-    return registry.names_in(robot) if isinstance(robot, str) else []
+    return registry.names_in_robot(robot) if isinstance(robot, str) else []
 
 
 def _with_modules(hyperparameters):
@@ -257,8 +257,8 @@ def _with_modules(hyperparameters):
     changes = {}
     for field, kind in _NAMES_IN_HYPERPARAMETERS.items():
         name = getattr(hyperparameters, field, None)
-        if isinstance(name, str) and registry.bare(name) in registry.ADDITIONS[kind]:
-            changes[field] = registry.importable(kind, registry.bare(name))
+        if isinstance(name, str) and registry.bare_name(name) in registry.ADDITIONS[kind]:
+            changes[field] = registry.importable_name(kind, registry.bare_name(name))
     return dataclasses.replace(hyperparameters, **changes)
 
 
@@ -280,14 +280,14 @@ def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Ma
     if setup.task_kwargs.get(CURRICULUM[0]):
         raise ValueError(
             f"setting {CURRICULUM[0]}: expected among the settings of training (--train_set), as an evaluation would "
-            f"begin at the first level, got {checks.shown(setup.task_kwargs[CURRICULUM[0]])}"
+            f"begin at the first level, got {checks.preview(setup.task_kwargs[CURRICULUM[0]])}"
         )
     if training and not definition.acts:
         raise ValueError(f"training: expected no settings, as the algorithm makes no step, got {', '.join(training)}")
     for name in training:
         if name in ("random", "exclude_blocks"):
             other = "as every run has a seed" if name == "random" else "as it is a hyperparameter"
-            raise ValueError(f"training: setting {name}: expected none, {other}, got {checks.shown(training[name])}")
+            raise ValueError(f"training: setting {name}: expected none, {other}, got {checks.preview(training[name])}")
 
 
 def read(path: Path) -> Configuration:
@@ -305,4 +305,4 @@ def read(path: Path) -> Configuration:
     except registry.NotImported as error:
         raise registry.NotImported(f"{path}: {error}") from None
     except ValueError as error:
-        raise ValueError(f"{path}: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: {checks.quote(error)}") from None

@@ -100,7 +100,7 @@ class SoftActorCritic:
         if not whole or whole != round(whole):
             raise ValueError(
                 f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, of each if "
-                f"it is above 1, got {checks.shown(self.utd_ratio)}"
+                f"it is above 1, got {checks.preview(self.utd_ratio)}"
             )
         checks.name(self.critics, ("squared", "categorical"), "critics")
         checks.name(self.network, NETWORKS, "network of soft actor-critic")
@@ -259,6 +259,6 @@ def _check(hp, ranges: Mapping[str, tuple]) -> None:
         elif field.type is float:
             checks.number(name, value, *ranges.get(name, ()))
             if name not in ranges and not 0.0 < value < 1.0:
-                raise ValueError(f"{name}: expected a number between 0 and 1, got {checks.shown(value)}")
+                raise ValueError(f"{name}: expected a number between 0 and 1, got {checks.preview(value)}")
         elif isinstance(value, tuple) and not all(isinstance(each, str) for each in value):
-            raise ValueError(f"{name}: expected names of blocks, got {checks.shown(value)}")
+            raise ValueError(f"{name}: expected names of blocks, got {checks.preview(value)}")

@@ -99,7 +99,7 @@ def restoring() -> Iterator[None]:
     try:
         yield
     except (KeyError, ValueError) as error:
-        raise Damaged(checks.quoted(error)) from None
+        raise Damaged(checks.quote(error)) from None
 
 
 def generator(seed: int, purpose: str, count: int) -> np.random.Generator:

@@ -25,7 +25,7 @@ def check(prior: str | None, needed: bool) -> None:
     """
     if (prior is not None) != needed:
         expected = "needs the id of a dataset, which arc-suite collect makes" if needed else "takes no prior data"
-        raise ValueError(f"prior: the algorithm {expected}, got {checks.shown(prior)}")
+        raise ValueError(f"prior: the algorithm {expected}, got {checks.preview(prior)}")
 
 
 def digest(prior: str) -> str:
@@ -44,10 +44,10 @@ def seeds(prior: str) -> range:
         ValueError: no such dataset, or one with episodes of evaluation.
     """
     found = _opened(prior).seeds
-    if seed_ranges.common([found], seed_ranges.EVALUATION):
+    if seed_ranges.common_seeds([found], seed_ranges.EVALUATION):
         least = seed_ranges.COLLECTING.start
         expected = f"expected seeds from {least} on, got {found.start}"
-        raise ValueError(f"prior {checks.shown(prior)}: {expected}; collect it anew")
+        raise ValueError(f"prior {checks.preview(prior)}: {expected}; collect it anew")
     return found
 
 
@@ -64,22 +64,22 @@ def mapped(context: RunContext, task: Task) -> Replay:
     found, setup = dataset.settings.setup, context.setup
     whole = setup.definition.sizes
     if found.body != setup.body:
-        raise ValueError(f"prior {checks.shown(context.prior)}: of {found.body.name}, and not of {setup.body.name}")
+        raise ValueError(f"prior {checks.preview(context.prior)}: of {found.body.name}, and not of {setup.body.name}")
     if found != setup:
-        raise ValueError(f"prior {checks.shown(context.prior)}: of {found}, and not of {setup}")
+        raise ValueError(f"prior {checks.preview(context.prior)}: of {found}, and not of {setup}")
     version = dataset.metadata["arc_suite"].get("task_version")
     if version != setup.kind.version:  # of other dynamics, rewards or observations
-        there, here = checks.quoted(version), f"{setup.kind.version} is installed"
-        raise ValueError(f"prior {checks.shown(context.prior)}: of version {there} of {setup.kind.name}; {here}")
+        there, here = checks.quote(version), f"{setup.kind.version} is installed"
+        raise ValueError(f"prior {checks.preview(context.prior)}: of version {there} of {setup.kind.name}; {here}")
     summaries = dataset.summaries()
     size, joints = task.size, len(setup.body.joint_names)
     count = sum(summary["length"] for summary in summaries)
     if not count:
-        raise ValueError(f"prior {checks.shown(context.prior)}: holds no episode")
+        raise ValueError(f"prior {checks.preview(context.prior)}: holds no episode")
     columns = np.concatenate([np.full(count, name in task.sizes) for name, count in whole.items()])
     left_out = "".join(f"-{name}" for name in whole if name not in task.sizes)
     folder = files.folder(Path(context.folder).parent / f"prior-{_digest(summaries)[:16]}{left_out}")
-    with files.locked(folder / ".lock"):
+    with files.hold_lock(folder / ".lock"):
         if not (folder / _COUNT).exists():
             replay = Replay(folder, count, size, joints)
             for episode in dataset:
@@ -97,8 +97,8 @@ def mapped(context: RunContext, task: Task) -> Replay:
         replay.restore(*(checks.integer(name, known[name], 0) for name in ("total", "ends", "checksum")))
         return replay
     except (Damaged, ValueError, KeyError, TypeError) as error:
-        damage = f"{folder} is damaged: {checks.quoted(error)}"
-        raise ValueError(f"prior {checks.shown(context.prior)}: {damage}; delete it") from None
+        damage = f"{folder} is damaged: {checks.quote(error)}"
+        raise ValueError(f"prior {checks.preview(context.prior)}: {damage}; delete it") from None
 
 
 def _opened(prior: str):

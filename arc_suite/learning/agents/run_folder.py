@@ -108,9 +108,9 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence
     with contextlib.ExitStack() as stack:
         stack.enter_context(_made(Path(path)))
         path = files.folder(path)
-        stack.enter_context(files.locked(path / LOCK, f"{path}: another process goes on with this run"))
+        stack.enter_context(files.hold_lock(path / LOCK, f"{path}: another process goes on with this run"))
         _configure(path, config, growing)
-        files.delete_unfinished(path / CHECKPOINT)  # megabytes
+        files.delete_temporaries(path / CHECKPOINT)  # megabytes
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
         stack.callback(folder.close)
         yield folder
@@ -125,7 +125,7 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
     try:
         config = files.read_json(Path(path) / CONFIG)
     except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: no folder of a run: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: no folder of a run: {checks.quote(error)}") from None
     if not isinstance(config, dict):
         raise ValueError(f"{path}: no folder of a run")
     return config
@@ -163,7 +163,7 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
             )
         if name.partition(".")[0] not in (*left_out, *_FORMER):
             raise ValueError(
-                f"{path}: of another run, with {name} {checks.shown(there)}, not {checks.shown(here)}; "
+                f"{path}: of another run, with {name} {checks.preview(there)}, not {checks.preview(here)}; "
                 "write to another folder"
             )
 
@@ -190,7 +190,7 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
             raise ValueError(f"expected a column {missing[0]}")
         return [dict(zip(found, line.split(","), strict=True)) for line in others]
     except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: no table of a run: {checks.quoted(error)}") from None
+        raise ValueError(f"{path}: no table of a run: {checks.quote(error)}") from None
 
 
 def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
@@ -203,7 +203,7 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     try:
         return {column: np.array([line[column] for line in found], float) for column in (found or [{}])[0]}
     except ValueError as error:
-        raise ValueError(f"{Path(path) / name}.csv: no table of a run: {checks.quoted(error)}") from None
+        raise ValueError(f"{Path(path) / name}.csv: no table of a run: {checks.quote(error)}") from None
 
 
 def check_evaluated(path: str | os.PathLike, step: int) -> None:
@@ -216,7 +216,7 @@ def check_evaluated(path: str | os.PathLike, step: int) -> None:
     if step != steps[-1]:
         raise ValueError(
             f"{Path(path) / CHECKPOINT} is damaged: evaluated: expected {steps[-1]:g}, as in evaluations.csv, "
-            f"got {checks.shown(step)}; delete it to start the run over"
+            f"got {checks.preview(step)}; delete it to start the run over"
         )
 
 
@@ -278,7 +278,7 @@ def _checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np.ndar
             checks.number(name, progress[name])
         return arrays, progress
     except (OSError, ValueError, KeyError, RecursionError) as error:
-        raise ValueError(f"{path} is damaged: {checks.quoted(error)}; delete it to start the run over") from None
+        raise ValueError(f"{path} is damaged: {checks.quote(error)}; delete it to start the run over") from None
 
 
 def _cell(value) -> str:

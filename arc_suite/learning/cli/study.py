@@ -89,7 +89,7 @@ def submit(command: Sequence[str], jobs: int, folder: Path, results: Path) -> in
     Raises:
         ValueError: submitit is not installed.
     """
-    with versions.needing("--submit needs submitit", "learn"):
+    with versions.require_extra("--submit needs submitit", "learn"):
         from arc_suite.learning.studies import cluster
     command = (*command, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
     parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}

@@ -243,7 +243,7 @@ def configured() -> list[Configuration]:
             raise ValueError(f"{error}, by --modules") from None
     hyperparameters = named_values("hp", FLAGS.hp)
     run = FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior, named_values("train_set", FLAGS.train_set)
-    several = registry.names_several(FLAGS.robot) and made_body() is None
+    several = registry.names_several_bodies(FLAGS.robot) and made_body() is None
     setup = Setup.of(FLAGS.robot if several else only_body(), *task())
     return [Configuration.of(setup, FLAGS.algorithm, hyperparameters, seed, *run) for seed in seeds(FLAGS.seed)]
 
@@ -256,7 +256,7 @@ def seeds(texts: Sequence[str]) -> list[int]:
     """
     found = [int(text) for text in texts if text.isdecimal()]
     if not texts or len(set(found)) < len(texts):
-        raise ValueError(f"--seed={checks.quoted(','.join(texts))}: expected different integers, such as 0,1,2")
+        raise ValueError(f"--seed={checks.quote(','.join(texts))}: expected different integers, such as 0,1,2")
     return found
 
 
@@ -282,7 +282,7 @@ def events(folder: Path) -> Iterator[Callable]:
     Raises:
         ValueError: tensorboardX is not installed.
     """
-    with versions.needing("--tensorboard needs tensorboardX", "learn"):
+    with versions.require_extra("--tensorboard needs tensorboardX", "learn"):
         from tensorboardX import SummaryWriter
     writers = []
 

@@ -7,6 +7,6 @@ be committed, `results` reads these, and `report` writes the report from them.
 
 from arc_suite import versions
 
-with versions.needing("studies need JAX, Minari and matplotlib", "learn"):
+with versions.require_extra("studies need JAX, Minari and matplotlib", "learn"):
     import matplotlib  # noqa: F401
     import minari  # noqa: F401

@@ -13,7 +13,7 @@ from arc_suite.evaluation.published import CURVES
 from arc_suite.learning.agents.configuration import CONFIGURATION, PROVENANCE, TRAINING_SEEDS
 from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
-from arc_suite.seed_ranges import EVALUATION, Ranges, common, from_json
+from arc_suite.seed_ranges import EVALUATION, Ranges, common_seeds, from_json
 
 RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators.csv"
 
@@ -62,7 +62,7 @@ class RunResult(NamedTuple):
         few = few_episodes(self.finals)
         if self.training_seeds is None:
             return (*few, provenance.UNKNOWN)
-        return few + (SHARED,) * bool(common(self.training_seeds, EVALUATION))
+        return few + (SHARED,) * bool(common_seeds(self.training_seeds, EVALUATION))
 
 
 Groups = Mapping[str, Mapping[str, Sequence[RunResult]]]  # results by place and kind
@@ -80,7 +80,7 @@ def results(runs: Sequence[Run], published: Path) -> list[RunResult]:
     try:
         return [_result(run, episodes[run.name], rows[run.name]) for run in runs if run.name in episodes]
     except (KeyError, ValueError) as error:
-        raise ValueError(f"{published / EVALUATIONS}: damaged: {checks.quoted(error)}") from None
+        raise ValueError(f"{published / EVALUATIONS}: damaged: {checks.quote(error)}") from None
 
 
 def episodes_of(published: Path) -> dict[str, list[dict[str, str]]]:

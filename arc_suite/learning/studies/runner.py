@@ -45,7 +45,7 @@ def prepare(runs: Sequence[Run], folder: Path, threads: int, progress: Callable 
         settings = run.prior.settings(run.configuration.setup)
         data.collect(dataset, settings, episodes, threads=threads, progress=progress, wait=True)  # others may, too
         if (found := len(data.open(dataset))) != episodes:
-            what = f"dataset {checks.shown(dataset)} has {found} episodes, and the study takes {episodes}"
+            what = f"dataset {checks.preview(dataset)} has {found} episodes, and the study takes {episodes}"
             raise ValueError(f"{run.name}: {what}; delete it, to have it collected anew")
     return waiting
 

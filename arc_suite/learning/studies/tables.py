@@ -151,11 +151,11 @@ def study(name: str) -> Study:
         return benchmark(division, algorithm)
     if ":" not in name:
         expected = "expected module:attribute, a Study on Python's path, or <division>-<algorithm> of the benchmark"
-        raise ValueError(f"study {checks.shown(name)}: {expected}, such as {next(iter(DIVISIONS))}-ppo")
-    found = checks.imported(name, "study")
+        raise ValueError(f"study {checks.preview(name)}: {expected}, such as {next(iter(DIVISIONS))}-ppo")
+    found = checks.import_object(name, "study")
     if not isinstance(found, Study):
-        raise ValueError(f"study {checks.shown(name)}: expected a Study, got {type(found).__name__}")
+        raise ValueError(f"study {checks.preview(name)}: expected a Study, got {type(found).__name__}")
     for each, count in collections.Counter(each.name for each in found.runs).items():
         if count > 1:
-            raise ValueError(f"study {checks.shown(name)}: {count} runs are named {each}; a label tells them apart")
+            raise ValueError(f"study {checks.preview(name)}: {count} runs are named {each}; a label tells them apart")
     return found

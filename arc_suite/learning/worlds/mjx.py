@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.prepare import prepare_task
 from arc_suite.learning.worlds import device, starts
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
@@ -115,7 +115,7 @@ class Env:
         self.num_starts, self.first_seed = num_starts, checks.seed(first_seed)
         self._starts = starts.drawn(domain_name, task_name, task_kwargs, num_starts, first_seed, privileged)
         settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
-        self.task, self.mj_model = prepared(domain_name, task_name, settings)
+        self.task, self.mj_model = prepare_task(domain_name, task_name, settings)
         if self.task.adapts:
             why = "as its starts depend on the episode before"
             raise ValueError(f"task {self.task.name}: expected no curriculum, {why}")

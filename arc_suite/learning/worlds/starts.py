@@ -66,5 +66,7 @@ def drawn(
         parts.append(Starts(*state, environments._memory, observation, model, info.get("privileged")))
     environments.close()
     joined = {name: np.concatenate([part.model[name] for part in parts])[:count] for name in parts[0].model}
-    table = trees.mapped(lambda *arrays: np.concatenate(arrays)[:count], *(part._replace(model=None) for part in parts))
+    table = trees.map_leaves(
+        lambda *arrays: np.concatenate(arrays)[:count], *(part._replace(model=None) for part in parts)
+    )
     return table._replace(model=joined)

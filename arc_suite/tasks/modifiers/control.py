@@ -71,7 +71,7 @@ class Control(_ControlFields, Modifier):
         gains = cls.check_span("gains", settings)
         actions = _check_actions(settings["actions"], body)
         if actions == "torque" and gains != (1.0, 1.0):
-            value = checks.shown(settings["gains"])
+            value = checks.preview(settings["gains"])
             raise ValueError(f"gains: torques have none, expected actions='position', got {value}")
         stiffness, damping = position_gains(sized(body), standing(body).inertias)
         return cls(gains, actions, bool(body.source), stiffness, damping, reaches(body))

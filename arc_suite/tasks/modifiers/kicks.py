@@ -92,7 +92,7 @@ class Kicks(_KicksFields, Modifier):
         """Return the kick as the torso heads."""
         has_begun = elapsed > 0
         kick = state.due(elapsed - has_begun) * has_begun / (GRAVITY * self.height) ** 0.5
-        return {"kick": rotations.headed(kick, heading)}
+        return {"kick": rotations.to_heading_frame(kick, heading)}
 
     def markers(self, scene: Scene, state: KicksState, readings: Readings, elapsed: int) -> Iterator[Marker]:
         """Yield an arrow for some steps after a kick."""

@@ -92,7 +92,7 @@ class Pushes(_PushesFields, Modifier):
         """Return the force as the torso heads."""
         xp = state.forces.__array_namespace__()
         force = state.acting(elapsed) * (elapsed > 0) / xp.asarray(self.weight)[..., None]
-        return {"force": rotations.headed(force, heading)}
+        return {"force": rotations.to_heading_frame(force, heading)}
 
     def markers(self, scene: Scene, state: PushesState, readings: Readings, elapsed: int) -> Iterator[Marker]:
         """Yield an arrow for a force that acts."""

@@ -52,7 +52,7 @@ def test_differences_are_additive(register):
 
 def test_a_name_may_have_its_module(monkeypatch, register):
     register(creep=WalkLoop((0.35, 0.0, 0.0)))
-    monkeypatch.setitem(registry.MODULES, ("clip", "creep"), __name__)
+    monkeypatch.setitem(registry.MODULE_OF_NAME, ("clip", "creep"), __name__)
     (creep,) = export.clips(TICK, [f"{__name__}:creep"], fps=30)
     assert creep.name == "creep" and names()[-1] == "creep"
     with refused("clips: expected each once, got creep, creep"):
@@ -84,7 +84,7 @@ def test_names_of_the_suite_stay_its_own(register):
 
 
 def test_a_registered_name_is_taken(monkeypatch):
-    monkeypatch.setattr(registry, "MODULES", dict(registry.MODULES))
+    monkeypatch.setattr(registry, "MODULE_OF_NAME", dict(registry.MODULE_OF_NAME))
     with refused("clip 'mine' is already registered; choose another name"):
         for turn in (Turn(9.0), Turn(8.0)):
             arc_suite.register(clips={"mine": turn})

@@ -25,7 +25,7 @@ def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
     )
     roll = 0.05 * np.sin(phase) + drift * times
     tilt = np.stack([np.cos(0.5 * roll), np.sin(0.5 * roll), 0.0 * roll, 0.0 * roll], axis=-1)
-    quaternions = rotations.turned(tilt, place[:, 2])
+    quaternions = rotations.turn_about_z(tilt, place[:, 2])
     joints = np.stack([np.sin(phase), 0.3 * np.sin(2.0 * phase) + 0.2 * np.cos(phase) + drift * times], axis=-1)
     height = 0.5 + 0.01 * np.cos(2.0 * phase)
     return Recording(STEP, 25, np.concatenate([place[:, :2], height[:, None], quaternions, joints], axis=-1))
@@ -75,7 +75,7 @@ def test_a_loop(twist):
     here = np.concatenate([poses[:, :2], rotations.yaw(poses[:, 3:7])[:, None]], axis=-1)
     difference = root_motion.relative(here[0], here) - root_motion.relative(there[0], there)
     np.testing.assert_allclose(difference[:, :2], 0.0, atol=1e-9)
-    np.testing.assert_allclose(rotations.wrapped(difference[:, 2]), 0.0, atol=1e-9)
+    np.testing.assert_allclose(rotations.wrap_angle(difference[:, 2]), 0.0, atol=1e-9)
     np.testing.assert_allclose(poses[:, 7:], recording.poses[137:413, 7:], atol=1e-9)
 
 
@@ -164,7 +164,7 @@ def test_a_straight_loop_goes_where_it_is_to():
     # In the first moment the torso moves over the ground in the direction that it had, seen from itself.
     ways = [np.diff(root_motion.places(motion.poses())[:2], axis=0)[0] for motion in (loop, straight)]
     headings = [rotations.yaw(motion.poses()[0, 3:7]) for motion in (loop, straight)]
-    seen = [rotations.headed(way[:2], heading) for way, heading in zip(ways, headings, strict=True)]
+    seen = [rotations.to_heading_frame(way[:2], heading) for way, heading in zip(ways, headings, strict=True)]
     np.testing.assert_allclose(seen[0], seen[1], atol=1e-5)
 
 
@@ -194,7 +194,7 @@ def test_a_passage_keeps_the_way():
     there = recording.poses[500:1101]
     poses = passage.poses()
     turn = rotations.yaw(poses[:1, 3:7])[0] - rotations.yaw(there[:1, 3:7])[0]
-    way = rotations.headed(there[:, :2] - there[0, :2], -turn)
+    way = rotations.to_heading_frame(there[:, :2] - there[0, :2], -turn)
     np.testing.assert_allclose(poses[:, :2] - poses[0, :2], way, atol=1e-9)
     np.testing.assert_allclose(passage.root[0], 0.0, atol=1e-12)
     speeds = np.hypot(*np.diff(passage.root[:, :2], axis=0).T) / STEP

@@ -218,7 +218,7 @@ def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
     body = dataclasses.replace(generator.generate(4, 2), name="creature")
     monkeypatch.setitem(sys.modules, "others", types.ModuleType("others"))
     monkeypatch.setitem(registry.ROBOTS, "creature", body)
-    monkeypatch.setitem(registry.MODULES, ("robot", "creature"), "others")
+    monkeypatch.setitem(registry.MODULE_OF_NAME, ("robot", "creature"), "others")
     each = run("others:creature", "sac", 100)
     assert each.configuration.setup.body is body and each.name == "creature-walk-sac-0"
     assert each.configuration.to_dict()["robot"] == "others:creature"
