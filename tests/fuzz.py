@@ -28,7 +28,7 @@ from tqdm import tqdm
 import arc_suite
 from arc_suite import data, evaluation, policies, style
 from arc_suite.animation.design.axes import Map
-from arc_suite.animation.design.genes import Budget, Made
+from arc_suite.animation.design.genes import Budget, ProportionGenes
 from arc_suite.animation.design.search import Candidates, Search
 from arc_suite.animation.design.trials import Trial, evaluate
 from arc_suite.envs.setup import Setup
@@ -127,7 +127,7 @@ class Generation(NamedTuple):
 def _design() -> None:
     """Begin or resume a search for creatures."""
     trial = Trial.of("walk", {}, "speed", Budget(mass=12.0, span=1.5), 10)
-    search = Search(Made(), Map.of(("legs", "links"), None, 0.1), trial, 0, "design")
+    search = Search(ProportionGenes(), Map.of(("legs", "links"), None, 0.1), trial, 0, "design")
     with contextlib.closing(Journal("bodies.jsonl", {"goal": "speed"}, Candidates.restored)) as journal:
         for batch in journal.generations:
             search.add(batch)

@@ -20,7 +20,7 @@ from arc_suite import checks, files, registry
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
 from arc_suite.cli import program
-from arc_suite.cli.flags import MOST, define_task, task
+from arc_suite.cli.flags import MAX_COUNT, define_task, task_from_flags
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.registry import FAMILIES
@@ -33,7 +33,7 @@ flags.DEFINE_string(
     "family", "random", f"Of the bodies: {', '.join(FAMILIES)}, or module:name of one that another package has."
 )
 flags.DEFINE_integer("first", 0, "First seed.", lower_bound=0)
-flags.DEFINE_integer("count", 500, "Number of bodies.", 1, MOST)
+flags.DEFINE_integer("count", 500, "Number of bodies.", 1, MAX_COUNT)
 flags.DEFINE_integer("legs", None, "Number of legs, of the family random. [default: random]", *generator.LEGS)
 flags.DEFINE_integer(
     "links", None, "Actuated links of each leg, of the family random. [default: random, 2 to 4]", *generator.LINKS
@@ -71,7 +71,7 @@ def member(seed: int) -> Body:
 
 def main() -> None:
     """Run the survey and print it."""
-    name, settings = task()
+    name, settings = task_from_flags()
     settings = {"time_limit": FLAGS.seconds} | settings
     seeds = range(FLAGS.first, FLAGS.first + FLAGS.count)
     with contextlib.ExitStack() as stack:

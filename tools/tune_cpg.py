@@ -19,7 +19,7 @@ from preset_search.space import SPACES
 
 from arc_suite import checks, evaluation, files, versions
 from arc_suite.cli import program
-from arc_suite.cli.flags import MOST, define_task, task
+from arc_suite.cli.flags import MAX_COUNT, define_task, task_from_flags
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
@@ -33,15 +33,15 @@ flags.DEFINE_string(
     "space", "law", "law: parameters of the paper's law, around `medium`; torques: added to it, around `tuned`."
 )
 for name, least, most, what in (
-    ("generations", 1, MOST, "Generations of the search, more make a finished one go on"),
-    ("episodes", 1, MOST, "Episodes by which a candidate is evaluated"),
+    ("generations", 1, MAX_COUNT, "Generations of the search, more make a finished one go on"),
+    ("episodes", 1, MAX_COUNT, "Episodes by which a candidate is evaluated"),
     ("steps", 1, STEPS, "Control steps of these episodes"),
-    ("starts", 0, MOST, f"Starts; candidates are judged in the {HARD} hardest of them; 0 for none"),
+    ("starts", 0, MAX_COUNT, f"Starts; candidates are judged in the {HARD} hardest of them; 0 for none"),
 ):
     usual = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
     flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
-flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", 1, MOST)
+flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", 1, MAX_COUNT)
 flags.DEFINE_string(
     "output", "out/tune", "Folder of the journal, the plot and the result, made if need be.", short_name="o"
 )
@@ -94,7 +94,7 @@ def violations(metrics: dict) -> list[str]:
 
 def main() -> None:
     """Search, evaluate, print and write."""
-    setup = Setup.of(FLAGS.robot, *task())
+    setup = Setup.of(FLAGS.robot, *task_from_flags())
     checks.name(setup.body.name, PRESETS, "robot with presets")
     checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:

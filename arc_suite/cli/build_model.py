@@ -21,8 +21,8 @@ from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
-from arc_suite.cli.flags import define_body, define_task, made_body, task
-from arc_suite.cli.summary import summary
+from arc_suite.cli.flags import custom_body, define_body, define_task, task_from_flags
+from arc_suite.cli.summary import body_summary
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import spec_files
 from arc_suite.robots.spec import Body
@@ -69,7 +69,7 @@ def main() -> None:
             physics.forward()
             imageio.imwrite(path, physics.render(camera_id="portrait", quality="still"))
         if FLAGS.summary:
-            print(summary(body))
+            print(body_summary(body))
     for path in filter(None, (FLAGS.output, FLAGS.render)):
         print(f"wrote {path}")
 
@@ -83,7 +83,7 @@ def _body() -> Body:
         for name in ("links", "layout"):
             if FLAGS[name].value is not None:
                 raise ValueError(f"--{name}={FLAGS[name].value}: goes with --legs or --seed, not with --{sources[0]}")
-        body = made_body() or registry.body_of(FLAGS.robot)
+        body = custom_body() or registry.body_of(FLAGS.robot)
     elif "seed" in sources:
         body = sound_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
     else:
@@ -97,7 +97,7 @@ def _arena(body: Body) -> Arena:
         return FLAT
     if FLAGS.no_arena:
         raise ValueError("--no_arena: goes without --task and --set, which bring an arena")
-    return Setup.of(body, *task()).definition.scene.arena
+    return Setup.of(body, *task_from_flags()).definition.scene.arena
 
 
 def _text(body: Body, arena: Arena) -> str:

@@ -18,7 +18,7 @@ Exit status 1 if there is any flaw, fall, slow walk or difference.
 from absl import flags
 
 from arc_suite import registry
-from arc_suite.cli.flags import ROBOT_HELP, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, define_task, task_from_flags
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance, cures
 from arc_suite.models.soundness import flaws
@@ -78,7 +78,7 @@ def _said(tried: cures.FirstWalk) -> str:
 
 
 def _check_task() -> int:
-    setup = Setup.of(FLAGS.robot, *task())
+    setup = Setup.of(FLAGS.robot, *task_from_flags())
     found = conformance.difference(setup)
     same = f"a batch of environments equals each of them alone over {conformance.STEPS} steps"
     print(f"{setup}: {same}" if found is None else f"{setup}: a batch of environments differs from one alone: {found}")

@@ -19,7 +19,15 @@ import numpy as np
 from absl import flags
 
 from arc_suite import policies, seed_ranges
-from arc_suite.cli.flags import MOST, define_body, define_policy, define_task, made_body, policy_name, setups
+from arc_suite.cli.flags import (
+    MAX_COUNT,
+    custom_body,
+    define_body,
+    define_policy,
+    define_task,
+    policy_name,
+    setups_from_flags,
+)
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
 from arc_suite.cpg.selection import check_preset_name
@@ -44,7 +52,7 @@ flags.DEFINE_list(
     f"{policies.PRESET_HELP} Several with commas take turns. [default: the one that suits the task and the body]",
 )
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
-flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", 1, MOST)
+flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", 1, MAX_COUNT)
 flags.DEFINE_integer(
     "steps", STEPS, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=STEPS
 )
@@ -70,10 +78,10 @@ def main() -> None:
         from arc_suite import data
     except ImportError as error:
         raise ValueError(str(error)) from None
-    asked = setups()
+    asked = setups_from_flags()
     if FLAGS.verify is not None:
         setup = next(iter(asked.values()))
-        body = setup.body if FLAGS["robot"].present or made_body() else None
+        body = setup.body if FLAGS["robot"].present or custom_body() else None
         task = setup.task if FLAGS["task"].present else None
         count = data.verify(FLAGS.verify, body, FLAGS.num_envs, FLAGS.threads, progress, task)
         print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")

@@ -17,28 +17,28 @@ import functools
 from absl import flags
 
 from arc_suite import checks, evaluation, files, seed_ranges, versions
-from arc_suite.cli.flags import MOST, define_walk, policy_name, setups
+from arc_suite.cli.flags import MAX_COUNT, define_walk, policy_name, setups_from_flags
 from arc_suite.cli.program import progress
-from arc_suite.cli.summary import footnote
+from arc_suite.cli.summary import transport_footnote
 from arc_suite.evaluation import provenance, reports
 
 FLAGS = flags.FLAGS
 define_walk("all", ", or all")
-flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", 1, MOST)
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", 1, MAX_COUNT)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
 
 
 def main() -> None:
     """Print the table and write the JSON."""
-    asked = setups()
+    asked = setups_from_flags()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     chosen, seeds = policy_name(FLAGS.policy), range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     training_seeds = provenance.training_seeds(chosen, seeds)
     players = [reports.player(chosen, setup, FLAGS.preset) for setup in asked.values()]
     with files.writing_json(FLAGS.json) as file:
         found = played(players, seeds)
-        if "cost_of_transport" in found[0].progress and (text := footnote(each.setup.body for each in found)):
+        if "cost_of_transport" in found[0].progress and (text := transport_footnote(each.setup.body for each in found)):
             print(text)
         if training_seeds is None:
             print(f"policy {chosen}: {provenance.UNKNOWN}")

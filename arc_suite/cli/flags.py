@@ -18,7 +18,7 @@ from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
 
-MOST = 100_000  # episodes, or bodies: more than anyone waits for
+MAX_COUNT = 100_000  # episodes, or bodies: more than anyone waits for
 ROBOT_HELP = (
     f"{', '.join(registry.robot_words())}; a file in JSON, MJCF or URDF; module:name of one that another package has"
 )
@@ -95,7 +95,7 @@ def policy_name(name: str) -> str:
     return other_libraries.with_further_file(name, FLAGS.vecnormalize)
 
 
-def made_body() -> Body | None:
+def custom_body() -> Body | None:
     """Return the body that --spec or --legs ask for, as --length and --palette shape it, or None.
 
     Raises:
@@ -135,7 +135,7 @@ def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy
     define_preset()
 
 
-def bodies(near: Iterable[str] = ("all",)) -> dict[str, Body]:
+def bodies_from_flags(near: Iterable[str] = ("all",)) -> dict[str, Body]:
     """Return bodies by name: the one made, or those that --robot names, which may be "all".
 
     For names see `registry.bodies_of`. Flaws of the body of --spec, such as feet in the floor, are warned of with the
@@ -145,10 +145,10 @@ def bodies(near: Iterable[str] = ("all",)) -> dict[str, Body]:
         near: other values of --robot that an unknown robot may mean.
 
     Raises:
-        ValueError: as `made_body`, or an unknown robot, or a robot and a body.
-        OSError: as `made_body`.
+        ValueError: as `custom_body`, or an unknown robot, or a robot and a body.
+        OSError: as `custom_body`.
     """
-    body, robot = made_body(), FLAGS["robot"]
+    body, robot = custom_body(), FLAGS["robot"]
     if body is None:
         return dict(ROBOTS) if robot.value == "all" else _named(robot.value, near)
     if robot.present:
@@ -167,13 +167,13 @@ def _named(robot: str, near: Iterable[str]) -> dict[str, Body]:
 
 
 def only_body() -> Body:
-    """Return the body of a program that takes one alone; see `bodies`.
+    """Return the body of a program that takes one alone; see `bodies_from_flags`.
 
     Raises:
-        ValueError: as `bodies`, or several bodies.
-        OSError: as `bodies`.
+        ValueError: as `bodies_from_flags`, or several bodies.
+        OSError: as `bodies_from_flags`.
     """
-    return _only(bodies(near=()))
+    return _only(bodies_from_flags(near=()))
 
 
 def _only(found: dict[str, Any]) -> Any:
@@ -183,7 +183,7 @@ def _only(found: dict[str, Any]) -> Any:
     return first
 
 
-def setups(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
+def setups_from_flags(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
     """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
 
     A trained policy, or a file of tracks, brings what the flags leave open, and a line says what: its body; without
@@ -191,16 +191,18 @@ def setups(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[
 
     Args:
         stored: the setup of tracks; None for that of --policy.
-        near: see `bodies`.
+        near: see `bodies_from_flags`.
 
     Raises:
-        ValueError: as `bodies`, `task` and `policies.setup_of`.
-        OSError: as `bodies` and `policies.setup_of`.
+        ValueError: as `bodies_from_flags`, `task_from_flags` and `policies.setup_of`.
+        OSError: as `bodies_from_flags` and `policies.setup_of`.
     """
-    named, (name, settings) = bodies(near), task()  # first: this imports the modules that flags name
-    own = stored or trained()
-    name, settings = completed(own, name, settings)
-    found = {body.name: Setup.of(body, name, settings) for body in own_bodies(own, named).values()}
+    # First: this imports the modules that flags name.
+    named = bodies_from_flags(near)
+    name, settings = task_from_flags()
+    own = stored or policy_setup()
+    name, settings = complete_task(own, name, settings)
+    found = {body.name: Setup.of(body, name, settings) for body in choose_bodies(own, named).values()}
     fitting = [each for each in found.values() if own and (own.several or each.body == own.body)]
     if fitting and not stored:
         others = [each for each in fitting if (each.task, each.task_kwargs) != (own.task, own.task_kwargs)]
@@ -208,7 +210,7 @@ def setups(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[
     return found
 
 
-def trained(policy: str | None = None) -> Setup | None:
+def policy_setup(policy: str | None = None) -> Setup | None:
     """Return the setup that judges a policy, see `Setup.judging`; None for one that is no file.
 
     Args:
@@ -222,29 +224,29 @@ def trained(policy: str | None = None) -> Setup | None:
     return own and own.judging()
 
 
-def own_bodies(own: Setup | None, named: dict[str, Body]) -> dict[str, Body]:
+def choose_bodies(own: Setup | None, named: dict[str, Body]) -> dict[str, Body]:
     """Return the body of a policy or of tracks by name where no flag names one, else those of the flags."""
-    if own is None or own.several or FLAGS["robot"].present or made_body():
+    if own is None or own.several or FLAGS["robot"].present or custom_body():
         return named
     return {own.body.name: own.body}
 
 
-def completed(own: Setup | None, name: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+def complete_task(own: Setup | None, name: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return task and settings of the flags; without --task those of a policy or of tracks, which --set changes."""
     return (name, settings) if own is None or FLAGS["task"].present else (own.task, own.task_kwargs | settings)
 
 
 def only_setup() -> Setup:
-    """Return the setup of a program that takes one body; see `setups`.
+    """Return the setup of a program that takes one body; see `setups_from_flags`.
 
     Raises:
-        ValueError: as `setups`, or several bodies.
-        OSError: as `setups`.
+        ValueError: as `setups_from_flags`, or several bodies.
+        OSError: as `setups_from_flags`.
     """
-    return _only(setups(near=()))
+    return _only(setups_from_flags(near=()))
 
 
-def task() -> tuple[str, dict[str, Any]]:
+def task_from_flags() -> tuple[str, dict[str, Any]]:
     """Return the name of the task and its settings, `task_kwargs` of `arc_suite.load`.
 
     The modules that the flags name are imported. What settings a task has is checked where an environment is opened.
@@ -264,7 +266,7 @@ def task() -> tuple[str, dict[str, Any]]:
     return FLAGS.task, settings
 
 
-def check_extension(extension: str, own: Mapping[str, Iterable[str]]) -> None:
+def check_flags_suit_file(extension: str, own: Mapping[str, Iterable[str]]) -> None:
     """Check that no flag is given that is for other files.
 
     Args:

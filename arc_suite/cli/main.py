@@ -6,7 +6,7 @@ from types import ModuleType
 
 from arc_suite import checks, registry, versions
 from arc_suite.cli import program
-from arc_suite.cli.programs import FORMER, PROGRAMS, installed, usage
+from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, installed_programs, usage
 
 
 def main(*given: str) -> None:
@@ -34,9 +34,9 @@ def main(*given: str) -> None:
 def _program_of_another_package(name: str) -> ModuleType:
     """Return the module of a program by `module:name`, or by the name of an entry point; exit where there is none."""
     try:
-        points = installed()
-        if name in FORMER:
-            raise ValueError(f"{name} is no program any more; {FORMER[name]}")
+        points = installed_programs()
+        if name in FORMER_PROGRAMS:
+            raise ValueError(f"{name} is no program any more; {FORMER_PROGRAMS[name]}")
         if name in points:
             name = f"{points[name].value}:{name}"
         elif ":" not in name:

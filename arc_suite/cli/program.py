@@ -70,7 +70,7 @@ def resumable(place) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def termination() -> Iterator[Callable[[], bool]]:
+def watch_for_termination() -> Iterator[Callable[[], bool]]:
     """Yield a function that returns whether SIGTERM has come.
 
     The signal does not end the process meanwhile.

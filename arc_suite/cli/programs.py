@@ -5,7 +5,7 @@ from importlib import metadata
 from pathlib import Path
 
 # Entry points of installed packages: the name of a program, and the module whose import registers it.
-GROUP = "arc_suite.programs"
+ENTRY_POINT_GROUP = "arc_suite.programs"
 
 # The package of each program: the core's own, and those of the wings, which nothing else of the core names.
 PROGRAMS = {
@@ -30,7 +30,7 @@ PROGRAMS = {
 }
 
 # Names of former programs: what to run in place of each.
-FORMER = {
+FORMER_PROGRAMS = {
     "survey": "a clone has python tools/survey.py",
     "tune_cpg": "a clone has python tools/tune_cpg.py",
     "enter": "the leaderboard is made of committed studies, by python tools/study.py NAME --report in a clone",
@@ -47,18 +47,18 @@ arc-suite MODULE:NAME runs a program that another package registers."""
 
 def usage() -> str:
     """Return the help of `arc-suite`; no program is imported for it."""
-    summaries = {name: summary(name) for name in PROGRAMS}
-    summaries |= {name: f"of the package {point.dist.name}" for name, point in installed().items()}
+    summaries = {name: program_summary(name) for name in PROGRAMS}
+    summaries |= {name: f"of the package {point.dist.name}" for name, point in installed_programs().items()}
     width = max(map(len, summaries))
     return _USAGE.format(programs="\n".join(f"  {name:<{width}}  {text}" for name, text in summaries.items()))
 
 
-def installed() -> dict[str, metadata.EntryPoint]:
+def installed_programs() -> dict[str, metadata.EntryPoint]:
     """Return the entry points of programs of installed packages by name, without those that have a program's name."""
-    return {point.name: point for point in metadata.entry_points(group=GROUP) if point.name not in PROGRAMS}
+    return {point.name: point for point in metadata.entry_points(group=ENTRY_POINT_GROUP) if point.name not in PROGRAMS}
 
 
-def summary(name: str) -> str:
+def program_summary(name: str) -> str:
     """Return the first line of a program's docstring, read from its source without importing it."""
     folder = Path(__file__).parents[2].joinpath(*PROGRAMS[name].split("."))
     source = (folder / f"{name}.py").read_text(encoding="utf-8")

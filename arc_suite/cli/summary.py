@@ -11,7 +11,7 @@ from arc_suite.tasks.energy import torques
 _STRONG = 50.0  # torque of a motor by weight and standing height; those that the suite sizes have some 2 to 20
 
 
-def summary(body: Body) -> str:
+def body_summary(body: Body) -> str:
     """Return a table of a body's size, gait and flaws, as text of several lines."""
     pose, task = standing(body), Setup.of(body).definition
     parameters = task.parameters
@@ -34,7 +34,7 @@ def summary(body: Body) -> str:
     return "\n".join(f"{name:<{width}}  {value}" for name, value in lines)
 
 
-def footnote(bodies: Iterable[Body]) -> str:
+def transport_footnote(bodies: Iterable[Body]) -> str:
     """Return the line under a table with costs of transport; "" where no body's motors make it high."""
     strength = {body.name: torques(body).max() / standing(body).height for body in bodies}
     strong = [f"{name} ({share:.0f} times weight times height)" for name, share in strength.items() if share > _STRONG]

@@ -77,10 +77,10 @@ def test_settings_are_json_where_they_parse():
     code = """
 import sys
 from absl import flags
-from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.flags import define_task, task_from_flags
 define_task()
 flags.FLAGS(["program", *sys.argv[1:]])
-print(task())
+print(task_from_flags())
 """
     settings = ["a=1", "b=2.5", "c=ripple", 'd="ripple"', 'e={"x": [1, null]}', "f=x=y", "g=", "a=true", "h=Infinity"]
     printed = interpreters.printed(code, *(f"--set={setting}" for setting in settings))

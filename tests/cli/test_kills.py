@@ -92,7 +92,7 @@ def test_sigterm_is_one_line_and_143(capsys):
 
 
 def test_sigterm_can_be_asked_for():
-    with program.termination() as came:
+    with program.watch_for_termination() as came:
         assert not came()
         os.kill(os.getpid(), signal.SIGTERM)
         assert came()

@@ -14,7 +14,7 @@ import pytest
 import arc_suite
 from arc_suite.cli import main
 from arc_suite.cli.help_text import GROUPS
-from arc_suite.cli.programs import FORMER, summary
+from arc_suite.cli.programs import FORMER_PROGRAMS, program_summary
 from arc_suite.policies import POLICIES
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -67,10 +67,10 @@ def test_an_unknown_program_is_one_line_with_the_nearest(argument, near):
     programs.refused(run(argument, "--robot=queen"), line)
 
 
-@pytest.mark.parametrize("name", FORMER)
+@pytest.mark.parametrize("name", FORMER_PROGRAMS)
 def test_a_former_program_says_what_to_run_instead(name):
-    programs.refused(run(name, "--help"), f"arc-suite: {name} is no program any more; {FORMER[name]}\n")
-    (tool,) = re.findall(r"python (tools/\w+\.py)", FORMER[name])
+    programs.refused(run(name, "--help"), f"arc-suite: {name} is no program any more; {FORMER_PROGRAMS[name]}\n")
+    (tool,) = re.findall(r"python (tools/\w+\.py)", FORMER_PROGRAMS[name])
     assert name not in main.PROGRAMS and (ROOT / tool).is_file()
 
 
@@ -144,7 +144,7 @@ def help_of(program):
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_help_of_a_program(program):
     text = help_of(program)
-    assert text.startswith(f"{summary(program)}\n\n")
+    assert text.startswith(f"{program_summary(program)}\n\n")
     assert f"\n  arc-suite {program}" in text
     names = re.findall(r"^  (?:-., )?(--\w+)", text, re.MULTILINE)
     headings = re.findall(r"^(\w+):$", text, re.MULTILINE)

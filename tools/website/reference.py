@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
-from arc_suite.cli.programs import PROGRAMS, summary
+from arc_suite.cli.programs import PROGRAMS, program_summary
 from arc_suite.learning.studies.text_tables import table
 from website import markdown, returns, settings
 
@@ -67,7 +67,7 @@ def commands_page() -> str:
     with ThreadPoolExecutor() as pool:
         helps = list(pool.map(_help, PROGRAMS))
     parts = [f"## `{name}`\n\n```text\n{text}\n```" for name, text in zip(PROGRAMS, helps, strict=True)]
-    listed = table(("program", "does"), ([f"[`{name}`](#{name})", summary(name)] for name in PROGRAMS))
+    listed = table(("program", "does"), ([f"[`{name}`](#{name})", program_summary(name)] for name in PROGRAMS))
     return markdown.page(TITLES["commands"], "What `arc-suite PROGRAM --help` prints.", listed, *parts)
 
 

@@ -25,10 +25,10 @@ from arc_suite import checks, files, registry, versions
 from arc_suite.animation import pages
 from arc_suite.animation.design import axes, gallery
 from arc_suite.animation.design.axes import Map
-from arc_suite.animation.design.genes import Around, Budget, Made, extent
-from arc_suite.animation.design.search import BATCH, RANDOM, Candidates, Search
-from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, walk
-from arc_suite.cli.flags import MOST, ROBOT_HELP, named_values
+from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, extent
+from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
+from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, measure_walk
+from arc_suite.cli.flags import MAX_COUNT, ROBOT_HELP, named_values
 from arc_suite.cli.program import progress, resumable, say
 from arc_suite.journal import Journal
 from arc_suite.models.standing import standing
@@ -56,14 +56,18 @@ flags.DEFINE_list(
     "map", None, f"One or two axes of the map: {axes.HELP}. [default: legs,links, with --around height,width]"
 )
 flags.DEFINE_integer(
-    "bodies", 260, f"Bodies to evaluate, rounded up to batches of {BATCH}; more make a finished search go on.", 1, MOST
+    "bodies",
+    260,
+    f"Bodies to evaluate, rounded up to batches of {BATCH_SIZE}; more make a finished search go on.",
+    1,
+    MAX_COUNT,
 )
 flags.DEFINE_integer(
     "random",
-    RANDOM,
+    RANDOM_BODIES,
     "Bodies of random genes, with which it begins; as many as --bodies for a control.",
     1,
-    MOST,
+    MAX_COUNT,
 )
 flags.DEFINE_integer("steps", 200, "Control steps of the first evaluation; the second takes twice as many.", 10, 500)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 2**32 - 1)
@@ -113,18 +117,18 @@ def search(folder: pathlib.Path, course: Search, known: Mapping[str, Any]) -> No
     with contextlib.closing(Journal(folder / "journal.jsonl", known, Candidates.restored)) as journal:
         for batch in journal.generations:
             course.add(batch)
-        done, batches = len(journal.generations), -(-FLAGS.bodies // BATCH)
+        done, batches = len(journal.generations), -(-FLAGS.bodies // BATCH_SIZE)
         if done >= batches:
             return
-        say(f"{folder}: {BATCH * batches} bodies")
+        say(f"{folder}: {BATCH_SIZE * batches} bodies")
         with (
             evaluators(FLAGS.processes) as evaluated,
-            progress(total=BATCH * batches, initial=BATCH * done, desc=FLAGS.goal, unit="body") as bar,
+            progress(total=BATCH_SIZE * batches, initial=BATCH_SIZE * done, desc=FLAGS.goal, unit="body") as bar,
         ):
             for _ in range(done, batches):
                 journal.append(course.batch(evaluated))
                 bar.set_postfix_str(f"{len(course.elites)} cells", refresh=False)
-                bar.update(BATCH)
+                bar.update(BATCH_SIZE)
 
 
 def main() -> None:
@@ -134,7 +138,7 @@ def main() -> None:
         raise ValueError("no folder to write to; say --output=FOLDER")
     goal = GOALS[checks.name(FLAGS.goal, GOALS, "goal")]
     around = None if FLAGS.around is None else registry.body_of(FLAGS.around)
-    space = Made() if around is None else Around(around, FLAGS.amount)
+    space = ProportionGenes() if around is None else VariantGenes(around, FLAGS.amount)
     cells = Map.of(FLAGS.map or (("legs", "links") if around is None else ("height", "width")), around, FLAGS.amount)
     task, settings = FLAGS.task or goal.task, named_values("set", FLAGS["set"].value)
     trial = Trial.of(task, settings, FLAGS.goal, budget(around), FLAGS.steps)
@@ -174,7 +178,7 @@ def check(trial: Trial, body: Body | str) -> None:
         raise ValueError(body)
     goal = GOALS[trial.goal]
     for episodes in (trial.first, trial.second):
-        tried = walk(body, trial.task, episodes._replace(steps=1), goal)
+        tried = measure_walk(body, trial.task, episodes._replace(steps=1), goal)
     if math.isnan(goal.value(tried)):
         raise ValueError(f"--goal={trial.goal}: task {trial.task} does not measure {goal.metric}")
 

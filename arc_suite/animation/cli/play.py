@@ -16,7 +16,15 @@ from absl import flags
 
 from arc_suite import checks, files
 from arc_suite.animation import play_pages
-from arc_suite.cli.flags import bodies, define_body, define_policy, define_preset, own_bodies, policy_name, trained
+from arc_suite.cli.flags import (
+    bodies_from_flags,
+    choose_bodies,
+    define_body,
+    define_policy,
+    define_preset,
+    policy_name,
+    policy_setup,
+)
 from arc_suite.cli.program import progress
 
 FLAGS = flags.FLAGS
@@ -31,8 +39,8 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
     checks.extension(FLAGS.output, [".html"])
-    named = bodies()  # first: this imports the modules that flags name
-    walkers = progress(own_bodies(trained(), named).values(), "fitting", leave=False)
+    named = bodies_from_flags()  # first: this imports the modules that flags name
+    walkers = progress(choose_bodies(policy_setup(), named).values(), "fitting", leave=False)
     with files.writing(FLAGS.output) as temporary:
         page = play_pages.page([play_pages.creature(body, policy_name(FLAGS.policy), FLAGS.preset) for body in walkers])
         temporary.write_text(page, encoding="utf-8")

@@ -23,7 +23,7 @@ from absl import flags
 
 from arc_suite import checks, files, style
 from arc_suite.animation import pages
-from arc_suite.cli.flags import check_extension, define_walk, policy_name, setups
+from arc_suite.cli.flags import check_flags_suit_file, define_walk, policy_name, setups_from_flags
 from arc_suite.cli.program import progress
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
@@ -59,7 +59,7 @@ flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif, .webp or .
 
 def main() -> None:
     """Play the episodes, write the file and print the returns."""
-    walkers = setups()
+    walkers = setups_from_flags()
     usual = "profile" if len(walkers) == 1 else "portrait"
     camera = checks.name(usual if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
     environments = {name: setup.load(FLAGS.seed) for name, setup in walkers.items()}
@@ -73,7 +73,7 @@ def main() -> None:
     steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
     if steps < 1 and extension != ".png":
         raise ValueError(f"--steps={steps}: expected 1 or more for a film or a page")
-    check_extension(extension, _OWN)
+    check_flags_suit_file(extension, _OWN)
     films.check_fps(FLAGS.fps or 0.0, extension)
 
     with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:

@@ -18,7 +18,7 @@ from absl import flags
 
 from arc_suite import versions
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import OWN, Sketch, cured, sources
+from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, apply_cure, sources
 from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name
 from arc_suite.cpg.selection import check_preset_name
 
@@ -42,7 +42,7 @@ def _sketch() -> Sketch:
         check_preset_name(FLAGS.preset)
     settings = setup.task_kwargs
     ground, kicks = settings.pop("arena", "flat"), settings.pop("kicks", 0.0)
-    player = {"policy": policy_name(FLAGS.policy), "preset": FLAGS.preset or OWN}
+    player = {"policy": policy_name(FLAGS.policy), "preset": FLAGS.preset or DEFAULT_CHOICE}
     directed = player["policy"] == "cpg" and not FLAGS["task"].present
     doing = Sketch(
         task=Sketch.task if directed else setup.task,
@@ -51,9 +51,9 @@ def _sketch() -> Sketch:
         settings=json.dumps(settings),
         **player,
     )
-    shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or OWN}
+    shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or DEFAULT_CHOICE}
     if FLAGS.legs is not None:
         return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)
     if (source := FLAGS.spec or (FLAGS.robot if FLAGS["robot"].present else setup.robot)) in sources():
         return dataclasses.replace(doing, source=source, **shape)
-    return cured(doing, setup.body)
+    return apply_cure(doing, setup.body)

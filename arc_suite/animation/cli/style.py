@@ -20,16 +20,23 @@ from absl import flags
 
 from arc_suite import evaluation, files, style, versions
 from arc_suite.animation import pages
-from arc_suite.cli.flags import MOST, bodies, define_walk, policy_name, setups, task
+from arc_suite.cli.flags import (
+    MAX_COUNT,
+    bodies_from_flags,
+    define_walk,
+    policy_name,
+    setups_from_flags,
+    task_from_flags,
+)
 from arc_suite.cli.program import progress
-from arc_suite.cli.summary import footnote
+from arc_suite.cli.summary import transport_footnote
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
 define_walk(more=", or all; without it, the one of stored tracks", policy=sources.HELP)
 flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
 flags.DEFINE_string("compare_preset", None, "Preset of --compare, if that is cpg. [default: as of --preset]")
-flags.DEFINE_integer("episodes", evaluation.CURVE_EPISODES, "How many episodes; of stored ones, at most.", 1, MOST)
+flags.DEFINE_integer("episodes", evaluation.CURVE_EPISODES, "How many episodes; of stored ones, at most.", 1, MAX_COUNT)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON.")
 flags.DEFINE_string("output", None, "Folder of pictures; of several robots, a folder in it for each.", short_name="o")
@@ -134,9 +141,9 @@ def check_files(robots: list[str]) -> None:
 
 def main() -> None:
     """Record, measure, print and write."""
-    bodies(), task()  # first: this imports the modules that flags name, which files cannot import
+    bodies_from_flags(), task_from_flags()  # first: this imports the modules that flags name, which files cannot import
     chosen = chosen_sources()
-    chosen_for = setups(next((source.setup for source in chosen.values() if source.setup), None))
+    chosen_for = setups_from_flags(next((source.setup for source in chosen.values() if source.setup), None))
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     recorders = {
         robot: {label: source.recorders(setup, seeds) for label, source in chosen.items()}
@@ -161,7 +168,7 @@ def main() -> None:
                 style.save(saved, next(iter(tracks.values())))
             if draw:
                 draw(pathlib.Path(FLAGS.output, robot if len(recorders) > 1 else ""), firsts)
-        if text := footnote(setup.body for setup in chosen_for.values()):
+        if text := transport_footnote(setup.body for setup in chosen_for.values()):
             print(text)
         if page:
             page.write_text(pages.page(played), encoding="utf-8")

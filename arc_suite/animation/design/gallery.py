@@ -20,7 +20,7 @@ from arc_suite import files, policies, style
 from arc_suite.animation import pages
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.search import Search
-from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, opened
+from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, open_walk
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
@@ -97,7 +97,7 @@ def pictures(best: Iterable[Elite], cells: Map, trial: Trial) -> dict[tuple[int,
     """
     views = {}
     for elite in best:
-        environment, policy = opened(elite.body, trial.task, trial.first, GOALS[trial.goal])
+        environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
         act = policies.alone(policy, trial.first.seeds[0])
         footage = films.Footage(elite.label, environment, act, "portrait", _SIZE)
         for _ in range(_BEFORE_PICTURE):
@@ -123,7 +123,7 @@ def write_walks(folder: Path, best: Iterable[Elite], cells: Map, trial: Trial) -
     """
     files.folder(folder)
     for elite in best:
-        environment, policy = opened(elite.body, trial.task, trial.first, GOALS[trial.goal])
+        environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
         track = style.record(environment, policy, trial.first.seeds[0], STEPS)
         environment.close()
         files.write(folder / f"{elite.label}.html", pages.page({caption(elite, cells, trial.goal): track}))

@@ -15,7 +15,7 @@ from arc_suite.models.outline import outline
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 
-DEVIATIONS = 2.0  # standard deviations of a mutation that a gene spans to either side
+GENE_DEVIATIONS = 2.0  # standard deviations of a mutation that a gene spans to either side
 
 
 class Budget(NamedTuple):
@@ -52,7 +52,7 @@ _RANGES = {
 _RADIAL = 0.7
 
 
-class Made:
+class ProportionGenes:
     """Bodies of all the proportions of `generator.random_body`, whose unequal legs change evenly along the body."""
 
     names = tuple(_RANGES)
@@ -92,7 +92,7 @@ class Made:
         return dict(zip(_RANGES, (low + (high - low) * genes).tolist(), strict=True))
 
 
-class Around:
+class VariantGenes:
     """Bodies like another one: legs of other lengths and headings, as those of `generator.mutated`."""
 
     def __init__(self, body: Body, amount: float):
@@ -102,13 +102,13 @@ class Around:
 
     def shape(self, genes: np.ndarray) -> Body:
         """Return the deformed body; genes of 0.5 leave it as it is."""
-        return generator.deformed(self._body, self._amount * DEVIATIONS * (2.0 * genes - 1.0))
+        return generator.deformed(self._body, self._amount * GENE_DEVIATIONS * (2.0 * genes - 1.0))
 
     def size(self, genes: np.ndarray) -> None:
         """Return None: variants have the size of the body."""
 
 
-Genes = Made | Around
+Genes = ProportionGenes | VariantGenes
 
 
 def extent(body: Body) -> np.ndarray:
@@ -118,7 +118,7 @@ def extent(body: Body) -> np.ndarray:
     return points.max(axis=0) - np.append(points.min(axis=0)[:2], lowest)
 
 
-def within(budget: Budget, space: Genes, genes: np.ndarray, name: str) -> Body:
+def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: str) -> Body:
     """Return the body of genes, scaled and of the density that keeps a budget.
 
     Args:

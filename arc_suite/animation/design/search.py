@@ -13,15 +13,18 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.animation.design.axes import Map
-from arc_suite.animation.design.genes import Genes, within
+from arc_suite.animation.design.genes import Genes, body_within_budget
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, WalkMeans
 from arc_suite.robots.spec import Body
 
-BATCH = 20
-RANDOM = 40  # bodies of random genes, with which a search begins if not said otherwise
-ISOTROPIC, LINE = 0.15, 0.2  # standard deviations of the moves, shares of a gene's range and of the distance
-BIAS = 3.0  # towards good elites: the rank of a parent, by their number, is a uniform number to this power
-REDRAWN = 0.05  # probability that a gene is drawn anew, by which counts change too
+BATCH_SIZE = 20
+RANDOM_BODIES = 40  # bodies of random genes, with which a search begins if not said otherwise
+ISOTROPIC_DEVIATION, LINE_DEVIATION = (
+    0.15,
+    0.2,
+)  # standard deviations of the moves, shares of a gene's range and of the distance
+PARENT_BIAS = 3.0  # towards good elites: the rank of a parent, by their number, is a uniform number to this power
+REDRAW_PROBABILITY = 0.05  # probability that a gene is drawn anew, by which counts change too
 
 
 class Candidate(NamedTuple):
@@ -66,7 +69,7 @@ class Search:
         elites: by cell, the index of the best in `candidates`.
     """
 
-    def __init__(self, space: Genes, cells: Map, trial: Trial, seed: int, stem: str, random: int = RANDOM):
+    def __init__(self, space: Genes, cells: Map, trial: Trial, seed: int, stem: str, random: int = RANDOM_BODIES):
         """Start a search.
 
         Args:
@@ -112,22 +115,22 @@ class Search:
     def body(self, genes: Sequence[float], index: int) -> Body | str:
         """Return the body of genes, named by its index; where they make none, the reason."""
         try:
-            return within(self._trial.budget, self._space, np.array(genes), f"{self._stem}_{index}")
+            return body_within_budget(self._trial.budget, self._space, np.array(genes), f"{self._stem}_{index}")
         except ValueError as error:
             return f"no body: {error}"
 
     def _genes(self) -> np.ndarray:
         """Return the genes (BATCH, n) of the next batch, rounded as files hold them."""
         random = np.random.default_rng((self._seed, len(self.candidates)))
-        drawn = random.uniform(size=(BATCH, len(self._space.names)))
+        drawn = random.uniform(size=(BATCH_SIZE, len(self._space.names)))
         best = sorted(self.elites, key=self._value, reverse=True)
         parents = [self.candidates[self.elites[cell]].genes for cell in best]
         if len(self.candidates) >= self._random and parents:
-            ranks = len(parents) * random.uniform(size=(2, BATCH)) ** BIAS
+            ranks = len(parents) * random.uniform(size=(2, BATCH_SIZE)) ** PARENT_BIAS
             first, second = np.array(parents)[ranks.astype(int)]
-            moved = first + ISOTROPIC * random.standard_normal(drawn.shape)
-            moved += LINE * random.standard_normal((BATCH, 1)) * (second - first)
-            drawn = np.where(random.uniform(size=drawn.shape) < REDRAWN, drawn, moved.clip(0.0, 1.0))
+            moved = first + ISOTROPIC_DEVIATION * random.standard_normal(drawn.shape)
+            moved += LINE_DEVIATION * random.standard_normal((BATCH_SIZE, 1)) * (second - first)
+            drawn = np.where(random.uniform(size=drawn.shape) < REDRAW_PROBABILITY, drawn, moved.clip(0.0, 1.0))
         return drawn.round(6)
 
     def _value(self, cell: tuple[int, ...] | None) -> float:

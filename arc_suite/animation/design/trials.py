@@ -146,18 +146,18 @@ def evaluate(trial: Trial, body: Body | str, elite: float) -> Outcome:
         return Outcome(f"unsound: {found[0].text}")
     goal = GOALS[trial.goal]
     try:
-        first = walk(body, trial.task, trial.first, goal)
-        reason = excluded(goal, trial.budget, first)
+        first = measure_walk(body, trial.task, trial.first, goal)
+        reason = exclusion_reason(goal, trial.budget, first)
         if reason or goal.value(first) <= elite:
             return Outcome(reason, first)
-        second = walk(body, trial.task, trial.second, goal)
+        second = measure_walk(body, trial.task, trial.second, goal)
     except ValueError as error:
         return Outcome(f"refused: {error}")
-    reason = excluded(goal, trial.budget, second)
+    reason = exclusion_reason(goal, trial.budget, second)
     return Outcome(f"evaluated again: {reason}" if reason else "", first, second)
 
 
-def excluded(goal: Goal, budget: Budget, walk: WalkMeans) -> str:
+def exclusion_reason(goal: Goal, budget: Budget, walk: WalkMeans) -> str:
     """Return why a walk counts for nothing; empty if it counts."""
     if walk.falls and not goal.may_fall:
         return "fell"
@@ -168,13 +168,13 @@ def excluded(goal: Goal, budget: Budget, walk: WalkMeans) -> str:
     return "" if math.isfinite(goal.value(walk)) else "no finite metric"
 
 
-def walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMeans:
+def measure_walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMeans:
     """Let the demonstrator walk a body and return means over the episodes.
 
     Raises:
         ValueError: a setting that does not fit, or a body that no demonstrator walks.
     """
-    environment, policy = opened(body, task, episodes, goal)
+    environment, policy = open_walk(body, task, episodes, goal)
     try:
         walks = [_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
     finally:
@@ -182,7 +182,7 @@ def walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMeans:
     return WalkMeans(*map(float, np.mean(walks, axis=0)))
 
 
-def opened(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environment, Policy]:
+def open_walk(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environment, Policy]:
     """Open an environment and fit the demonstrator.
 
     Raises:

@@ -47,18 +47,18 @@ class Creature(NamedTuple):
     materials: Mapping[str, Material]
 
 
-def opened(sketch: Sketch) -> Creature:
+def open_creature(sketch: Sketch) -> Creature:
     """Open a sketch.
 
     Raises:
         ValueError: a name or a value that does not fit.
         OSError: a file cannot be read.
     """
-    setup = sketches.setup(sketch)
+    setup = sketches.make_setup(sketch)
     parts, materials = described(setup.body)
-    environment = load(setup, time_limit=math.inf, on_divergence="terminate")
-    act = alone(policy(sketch, environment))
-    act(load(setup).reset())  # finds out at once whether the policy knows the observation
+    environment = load_environment(setup, time_limit=math.inf, on_divergence="terminate")
+    act = alone(load_policy(sketch, environment))
+    act(load_environment(setup).reset())  # finds out at once whether the policy knows the observation
     return Creature(
         sketch=sketch,
         setup=setup,
@@ -73,7 +73,7 @@ def opened(sketch: Sketch) -> Creature:
     )
 
 
-def load(setup: Setup, **options) -> dm.Environment:
+def load_environment(setup: Setup, **options) -> dm.Environment:
     """Open an environment of a setup, with the same first episode every time.
 
     Args:
@@ -83,7 +83,7 @@ def load(setup: Setup, **options) -> dm.Environment:
     return dm.load(setup.body, setup.task, options | setup.task_kwargs | {"random": 0})
 
 
-def policy(sketch: Sketch, environment: dm.Environment) -> Policy:
+def load_policy(sketch: Sketch, environment: dm.Environment) -> Policy:
     """Return the policy of a sketch for one environment.
 
     Raises:
@@ -91,4 +91,4 @@ def policy(sketch: Sketch, environment: dm.Environment) -> Policy:
         OSError: a file cannot be read.
     """
     task = environment.task.definition
-    return policies.policy(sketch.policy, task.scene.body, sketches.preset(sketch), task=task)
+    return policies.policy(sketch.policy, task.scene.body, sketches.chosen_preset(sketch), task=task)

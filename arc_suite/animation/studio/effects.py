@@ -4,13 +4,13 @@ from arc_suite.animation import player_controls
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.sketch import LEGS, RANDOM
-from arc_suite.animation.studio.states import POSE, VELOCITY, Command
+from arc_suite.animation.studio.states import POSE, VELOCITY, VisitorCommand
 from arc_suite.bodies.shaping import Shape
 
 _SHAPE = (*Shape._fields[: Shape._fields.index("links")], "lengths")
 
 
-def idle_fields(creature: Creature, command: Command) -> frozenset[str]:
+def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
     """Return the fields of a state that change nothing of a creature, by name.
 
     Args:
@@ -18,7 +18,7 @@ def idle_fields(creature: Creature, command: Command) -> frozenset[str]:
         command: of now.
     """
     sketch, setup, task = creature.sketch, creature.setup, creature.environment.task.definition
-    field, by_hand, directs = sketches.field(sketch), command.by_hand, player_controls.directs(task)
+    field, by_hand, directs = sketches.settings_field(sketch), command.by_hand, player_controls.directs(task)
     rules = (
         (("legs", "links", "layout"), sketch.source != LEGS),
         (("seed",), sketch.source != RANDOM),

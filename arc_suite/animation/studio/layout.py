@@ -7,8 +7,8 @@ import viser
 
 from arc_suite.animation import player_controls
 from arc_suite.animation.studio import sketch as sketches
-from arc_suite.animation.studio.sketch import OWN, Sketch
-from arc_suite.animation.studio.states import POSE, VELOCITY, State
+from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch
+from arc_suite.animation.studio.states import POSE, VELOCITY, PageState
 from arc_suite.arenas import ARENAS
 from arc_suite.bodies import generator
 from arc_suite.cpg.selection import preset_names
@@ -31,10 +31,10 @@ _PROPORTIONS = (
 def source(gui: viser.GuiApi, first: Sketch) -> dict[str, Any]:
     """Add where the body comes from."""
     return {
-        "source": gui.add_dropdown("Body", listed(first.source, sketches.sources()), initial_value=first.source),
+        "source": gui.add_dropdown("Body", list_with(first.source, sketches.sources()), initial_value=first.source),
         "legs": gui.add_slider("Legs", *generator.LEGS, 1, first.legs),
         "links": gui.add_slider("Links", *generator.LINKS, 1, first.links),
-        "layout": gui.add_dropdown("Layout", [OWN, *generator.LAYOUTS], initial_value=first.layout),
+        "layout": gui.add_dropdown("Layout", [DEFAULT_CHOICE, *generator.LAYOUTS], initial_value=first.layout),
         "seed": gui.add_number("Seed", first.seed, min=0, max=2**32 - 1, step=1),
     }
 
@@ -45,26 +45,26 @@ def shape(gui: viser.GuiApi, first: Sketch) -> dict[str, Any]:
         name: gui.add_slider(label, low, high, step, getattr(first, name))
         for name, label, low, high, step in _PROPORTIONS
     }
-    palettes = listed(first.palette, (OWN, *PALETTES))
+    palettes = list_with(first.palette, (DEFAULT_CHOICE, *PALETTES))
     return sliders | {"palette": gui.add_dropdown("Palette", palettes, initial_value=first.palette)}
 
 
 def task(gui: viser.GuiApi, first: Sketch) -> dict[str, Any]:
     """Add the task and who acts."""
-    most, presets = max(3.0, first.kicks), listed(first.preset, (OWN, *preset_names()))
+    most, presets = max(3.0, first.kicks), list_with(first.preset, (DEFAULT_CHOICE, *preset_names()))
     return {
-        "task": gui.add_dropdown("Task", listed(first.task, TASKS), initial_value=first.task),
-        "ground": gui.add_dropdown("Ground", listed(first.ground, ARENAS), initial_value=first.ground),
-        "gait": gui.add_dropdown("Gait", [OWN, *gaits.NAMES], initial_value=first.gait),
+        "task": gui.add_dropdown("Task", list_with(first.task, TASKS), initial_value=first.task),
+        "ground": gui.add_dropdown("Ground", list_with(first.ground, ARENAS), initial_value=first.ground),
+        "gait": gui.add_dropdown("Gait", [DEFAULT_CHOICE, *gaits.NAMES], initial_value=first.gait),
         "speed": gui.add_slider("Speed", 0.2, 2.0, 0.05, first.speed, hint="Multiple of the body's own"),
         "kicks": gui.add_slider("Kicks", 0.0, most, 0.1, first.kicks, hint="At most, sqrt(g h)"),
         "settings": gui.add_text("Settings", first.settings, hint="Of the task, as a JSON object"),
-        "policy": gui.add_dropdown("Policy", listed(first.policy, POLICIES), initial_value=first.policy),
+        "policy": gui.add_dropdown("Policy", list_with(first.policy, POLICIES), initial_value=first.policy),
         "preset": gui.add_dropdown("Preset", presets, initial_value=first.preset),
     }
 
 
-def velocity(gui: viser.GuiApi, first: State) -> dict[str, Any]:
+def velocity(gui: viser.GuiApi, first: PageState) -> dict[str, Any]:
     """Add the velocity by command."""
     by_hand = gui.add_checkbox("By hand", first.command.by_hand, hint="Else the task's own command")
     sliders = {name: gui.add_slider(_label(name), -1.0, 1.0, 0.05, first.value(name)) for name in VELOCITY}
@@ -80,7 +80,7 @@ def pose(gui: viser.GuiApi) -> dict[str, Any]:
     return {"gait_now": gait, "tempo": tempo} | sliders
 
 
-def listed(chosen: str, names: Iterable[str]) -> list[str]:
+def list_with(chosen: str, names: Iterable[str]) -> list[str]:
     """Return names for a list to choose from, with the chosen one."""
     return list(dict.fromkeys((*names, chosen)))
 

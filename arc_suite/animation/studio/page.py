@@ -25,18 +25,26 @@ from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.gate import Server, offers
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import OWN, Sketch, cured, dragged, length, lengthened, opened_file
+from arc_suite.animation.studio.sketch import (
+    DEFAULT_CHOICE,
+    Sketch,
+    apply_cure,
+    drag_end,
+    length_factor,
+    open_file,
+    set_length_factor,
+)
 from arc_suite.animation.studio.states import (
     POSE,
-    Command,
     Edits,
-    State,
-    edited,
+    PageState,
+    VisitorCommand,
     from_json,
     is_state,
-    redone,
+    record_edit,
+    redo,
     to_json,
-    undone,
+    undo,
 )
 from arc_suite.animation.studio.view import View
 from arc_suite.cpg.selection import presets_of
@@ -92,7 +100,7 @@ class Page:
         """Lay out the page."""
         self._server, self._gui, self._session, self._drawn = server, server.gui, session, -math.inf
         self._creatures: tuple[Creature | None, Creature | None] = None, None
-        self._first = State(session.creature.sketch)
+        self._first = PageState(session.creature.sketch)
         self._edits, self._lock = Edits(self._first), threading.Lock()
         self._widgets: dict[str, Any] = {}  # by the fields of a `State` that they show
         self._fixed: frozenset[str] = frozenset()  # numbers of a pose without room
@@ -200,8 +208,8 @@ class Page:
     def _fit(self, creature: Creature) -> None:
         """Show the choices, the check and the lines that belong to a creature."""
         body, widgets = creature.setup.body, self._widgets
-        widgets["gait"].options = layout.listed(creature.sketch.gait, (OWN, *gaits.fitting_gaits(body)))
-        widgets["preset"].options = layout.listed(creature.sketch.preset, (OWN, *presets_of(body)))
+        widgets["gait"].options = layout.list_with(creature.sketch.gait, (DEFAULT_CHOICE, *gaits.fitting_gaits(body)))
+        widgets["preset"].options = layout.list_with(creature.sketch.preset, (DEFAULT_CHOICE, *presets_of(body)))
         legs = (_ALL, *(leg.name for leg in body.legs))
         if self._leg.value not in legs:
             self._leg.value = _ALL
@@ -216,7 +224,7 @@ class Page:
             for flaw in creature.flaws:
                 if flaw.cure is not None:
                     button = self._gui.add_button(f"Apply: {flaw.text.rpartition(': ')[2]}")
-                    sketch = cured(creature.sketch, flaw.cure)
+                    sketch = apply_cure(creature.sketch, flaw.cure)
                     button.on_click(lambda event, sketch=sketch: self._sketched(sketch, "cure"))
                     self._cures.append(button)
         self._lines.content = texts.copied(creature.sketch)
@@ -238,7 +246,7 @@ class Page:
         with self._lock:
             state, creature = self._edits.now, self._session.creature
             idle = idle_fields(creature, state.command) | self._fixed
-            self._widgets["source"].options = layout.listed(state.sketch.source, sketches.sources())
+            self._widgets["source"].options = layout.list_with(state.sketch.source, sketches.sources())
             for name, widget in self._widgets.items():
                 widget.value = _shown(widget, state.value(name))
                 _show(widget, name not in idle)
@@ -249,7 +257,7 @@ class Page:
                 _show(slider, name is not None)  # none is removed: a browser that is late would update it
                 if slider.label != (name or ""):
                     slider.label = name or ""
-                slider.value = _shown(slider, 1.0 if name is None else length(state.sketch, name))
+                slider.value = _shown(slider, 1.0 if name is None else length_factor(state.sketch, name))
 
     def _shown_links(self, creature: Creature) -> tuple[str, ...]:
         """The names of the links of all legs, or of the parts of the one to change."""
@@ -270,13 +278,13 @@ class Page:
     def _dragged(self, part: str, by: np.ndarray) -> None:
         """Move the end of a link, in the frame of the link, m."""
         symmetric = self._symmetric.value
-        self._edit(lambda state: state._replace(sketch=dragged(state.sketch, part, by, symmetric)), part)
+        self._edit(lambda state: state._replace(sketch=drag_end(state.sketch, part, by, symmetric)), part)
         self._render()
 
-    def _edit(self, state: Callable[[State], State], name: str) -> None:
+    def _edit(self, state: Callable[[PageState], PageState], name: str) -> None:
         """Take another state, which depends on that of now, under a name of what changes it."""
         with self._lock:
-            self._edits = edited(self._edits, state(self._edits.now), name, time.monotonic())
+            self._edits = record_edit(self._edits, state(self._edits.now), name, time.monotonic())
             self._ask()
 
     def _go(self, move: Callable[[Edits], Edits]) -> None:
@@ -294,10 +302,10 @@ class Page:
         self._session.direct(state.pose, *state.gait)
 
     def _undo(self) -> None:
-        self._go(undone)
+        self._go(undo)
 
     def _redo(self) -> None:
-        self._go(redone)
+        self._go(redo)
 
     def _reset(self) -> None:
         """Return to the state in which the studio began, as one change."""
@@ -306,13 +314,15 @@ class Page:
 
     async def _changed(self, name: str, event: viser.GuiEvent) -> None:  # viser keeps the order of async calls alone
         if event.client_id is not None:  # a visitor changed it, and not the page itself
-            self._edit(lambda state: state.having(**{name: event.target.value}), name)
+            self._edit(lambda state: state.replace_fields(**{name: event.target.value}), name)
             self._render()
 
     async def _lengthened(self, index: int, event: viser.GuiEvent) -> None:
         if event.client_id is not None and index < len(self._links):
             link, factor, symmetric = self._links[index], event.target.value, self._symmetric.value
-            self._edit(lambda state: state._replace(sketch=lengthened(state.sketch, link, factor, symmetric)), link)
+            self._edit(
+                lambda state: state._replace(sketch=set_length_factor(state.sketch, link, factor, symmetric)), link
+            )
 
     def _sketched(self, sketch: Sketch, name: str) -> None:
         """Take another sketch, and show it."""
@@ -326,15 +336,15 @@ class Page:
         except ValueError as error:
             self._session.refuse(str(error))
             return
-        self._edit(lambda now: state or now._replace(sketch=opened_file(now.sketch, text)), "file")
+        self._edit(lambda now: state or now._replace(sketch=open_file(now.sketch, text)), "file")
         self._render()
 
-    def _opened(self, text: str) -> State:
+    def _opened(self, text: str) -> PageState:
         """Return the state of a file, which imports nothing and asks for no more than the widgets offer."""
         state = from_json(text)
         for name in ("task", "policy"):
             checks.name(state.value(name), self._widgets[name].options, name)
-        for name in (field.name for field in dataclasses.fields(Command) if field.name != "gait_now"):
+        for name in (field.name for field in dataclasses.fields(VisitorCommand) if field.name != "gait_now"):
             if not offers(self._widgets[name], state.value(name)) and name not in POSE:
                 raise ValueError(f"command.{name}: expected a value that its slider has, got {state.value(name)!r}")
         return state
@@ -346,16 +356,17 @@ class Page:
     def _stand(self) -> None:
         """Ask for the pose at rest and the body's own gait, at its own frequency."""
         self._edit(
-            lambda state: state.having(gait_now=player_controls.OWN, tempo=1.0, **dict.fromkeys(POSE, 0.0)), "upright"
+            lambda state: state.replace_fields(gait_now=player_controls.OWN, tempo=1.0, **dict.fromkeys(POSE, 0.0)),
+            "upright",
         )
         self._render()
 
     def _press(self, name: str, change: float, event: viser.CommandEvent) -> None:
         """Change a number of the command by a step."""
 
-        def pressed(state: State) -> State:
+        def pressed(state: PageState) -> PageState:
             number = min(max(state.value(name) + change, -1.0), 1.0)
-            return state.having(by_hand=True, **{name: number})
+            return state.replace_fields(by_hand=True, **{name: number})
 
         self._edit(pressed, name)
         self._render()
@@ -363,7 +374,7 @@ class Page:
     def _save(self, file: saving.File, event: viser.GuiEvent) -> None:
         """Make a file, and send it to the visitor who asks for it."""
         creature, commands = self._session.creature, self._session.commands
-        name, client = saving.name(creature, file), event.client
+        name, client = saving.download_name(creature, file), event.client
         note = client.add_notification(f"Making {name}", "", loading=True)
         try:
             content = file.content(creature, creature.environment.physics.data.qpos.copy(), commands)
@@ -385,5 +396,5 @@ def _shown(widget: Any, value: Any) -> Any:
     if isinstance(widget, viser.GuiSliderHandle):
         return min(max(value, widget.min), widget.max)
     if isinstance(widget, viser.GuiDropdownHandle):
-        return value if value in widget.options else OWN
+        return value if value in widget.options else DEFAULT_CHOICE
     return value

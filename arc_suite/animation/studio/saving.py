@@ -14,7 +14,7 @@ from arc_suite import models, style, versions
 from arc_suite.animation import clips as export
 from arc_suite.animation import pages, play_pages
 from arc_suite.animation.studio import sketch as sketches
-from arc_suite.animation.studio.creature import Creature, load, policy
+from arc_suite.animation.studio.creature import Creature, load_environment, load_policy
 from arc_suite.animation.studio.sketch import Sketch
 from arc_suite.envs.dm import Environment
 from arc_suite.policies import Individuals, alone
@@ -42,43 +42,43 @@ class File(NamedTuple):
     content: Callable[[Creature, np.ndarray, Commands], bytes]
 
 
-def name(creature: Creature, file: File) -> str:
+def download_name(creature: Creature, file: File) -> str:
     """Return the name under which a file is saved."""
     return f"{creature.setup.body.name}{file.extension}"
 
 
-def spec(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
+def make_spec(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return the spec as JSON."""
     return body_to_json(creature.setup.body).encode()
 
 
-def mjcf(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
+def make_mjcf(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return the model, on the ground of the task, as MuJoCo loads it."""
     arena = creature.environment.task.definition.scene.arena
     return models.text(creature.setup.body, arena).encode()
 
 
-def glb(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
+def make_clips(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return animation clips as binary glTF; see `export.clips`.
 
     Raises:
         ValueError: a clip cannot be made.
     """
     sketch = creature.sketch
-    clips = export.clips(creature.setup, export.DEFAULT, sketch.policy, sketches.preset(sketch))
+    clips = export.clips(creature.setup, export.DEFAULT, sketch.policy, sketches.chosen_preset(sketch))
     return export.glb(
         creature.setup.body, clips, generator=f"arc_suite {versions.version_of('arc_suite') or ''}".strip()
     )
 
 
-def page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
+def make_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a page that plays an episode.
 
     Raises:
         ValueError: the viewer of pages has not been built.
     """
     pages.viewer()  # finds out at once whether there is one
-    environment = load(creature.setup)
+    environment = load_environment(creature.setup)
     with contextlib.closing(environment):
         act = _commanded(environment, creature.sketch, commands)
         acting = Individuals(lambda: act, 1, len(creature.setup.body.joint_names))
@@ -86,17 +86,19 @@ def page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     return pages.page({creature.setup.body.name: track}).encode()
 
 
-def playable(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
+def make_playable_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a page in which keys walk the creature about; see `play_pages`.
 
     Raises:
         ValueError: the scripts of pages have not been built, or the policy does not run in a page.
     """
     sketch = creature.sketch
-    return play_pages.page([play_pages.creature(creature.setup.body, sketch.policy, sketches.preset(sketch))]).encode()
+    return play_pages.page(
+        [play_pages.creature(creature.setup.body, sketch.policy, sketches.chosen_preset(sketch))]
+    ).encode()
 
 
-def image(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
+def make_picture(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a picture of the creature where it stands, as PNG.
 
     Raises:
@@ -108,13 +110,13 @@ def image(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     return imageio.imwrite("<bytes>", view, extension=".png")
 
 
-def film(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
+def make_film(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a film of an episode, as MP4.
 
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
-    environment = load(creature.setup)
+    environment = load_environment(creature.setup)
     act = _commanded(environment, creature.sketch, commands)
     footage = films.Footage(creature.setup.body.name, environment, act, "profile", _SIZE)
     frame = films.frame_seconds(footage.control_timestep)
@@ -127,7 +129,7 @@ def film(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
 
 def _commanded(environment: Environment, sketch: Sketch, commands: Commands):
     """Return the policy of a sketch as a function of a `TimeStep`, which sets commands at the start of episodes."""
-    act = alone(policy(sketch, environment))
+    act = alone(load_policy(sketch, environment))
 
     def acting(timestep):
         if timestep.first():
@@ -139,11 +141,11 @@ def _commanded(environment: Environment, sketch: Sketch, commands: Commands):
 
 
 FILES = (
-    File("Spec", ".json", spec),
-    File("MJCF", ".xml", mjcf),
-    File("Clips", ".glb", glb),
-    File("Page", ".html", page),
-    File("Page to play in", "_play.html", playable),
-    File("Picture", ".png", image),
-    File("Film", ".mp4", film),
+    File("Spec", ".json", make_spec),
+    File("MJCF", ".xml", make_mjcf),
+    File("Clips", ".glb", make_clips),
+    File("Page", ".html", make_page),
+    File("Page to play in", "_play.html", make_playable_page),
+    File("Picture", ".png", make_picture),
+    File("Film", ".mp4", make_film),
 )

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite.animation import player_controls
 from arc_suite.animation.episodes import LONGEST, Episodes
-from arc_suite.animation.studio.creature import Creature, opened
+from arc_suite.animation.studio.creature import Creature, open_creature
 from arc_suite.animation.studio.history import History
 from arc_suite.animation.studio.sketch import Sketch
 
@@ -81,7 +81,7 @@ class Session:
         self.pose: np.ndarray | None = np.zeros(6)
         self.gait: tuple[str | None, float] = player_controls.OWN, 1.0
         self.kept: Walker | None = None
-        self._replace(opened(sketch))
+        self._replace(open_creature(sketch))
 
     @property
     def creature(self) -> Creature:
@@ -193,7 +193,7 @@ class Session:
             return
         self._tried = sketch
         try:
-            creature = opened(sketch)
+            creature = open_creature(sketch)
         except (ValueError, OSError) as error:
             self.do(functools.partial(self._refuse, str(error)))
         except Exception as error:  # a mistake of ours: the creature before walks on
@@ -206,7 +206,7 @@ class Session:
         self.error = " ".join(line.split())
 
     def _keep(self, sketch: Sketch | None) -> None:
-        kept = None if sketch is None else Walker(opened(sketch))  # with an environment of its own
+        kept = None if sketch is None else Walker(open_creature(sketch))  # with an environment of its own
 
         def change():
             self.kept = kept

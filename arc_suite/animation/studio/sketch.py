@@ -19,7 +19,7 @@ from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json
 LEGS, RANDOM, FILE = "legs and links", "random", "file"
 _DOING = ("task", "gait", "speed", "ground", "kicks", "settings", "policy", "preset")  # fields that are not the body's
 _SAME = 3e-5  # of the lengths of two vectors, by which they may differ: ends are rounded
-OWN = "own"  # the gait, layout or preset that the body or task has by itself
+DEFAULT_CHOICE = "own"  # the gait, layout or preset that the body or task has by itself
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Sketch:
     source: str = LEGS
     legs: int = 8
     links: int = 3
-    layout: str = OWN
+    layout: str = DEFAULT_CHOICE
     seed: int = 0
     file: str = ""
     scale: float = 1.0
@@ -60,15 +60,15 @@ class Sketch:
     fan: float = 0.0
     lengths: tuple[tuple[str, float], ...] = ()
     ends: tuple[tuple[str, Vector], ...] = ()
-    palette: str = OWN
+    palette: str = DEFAULT_CHOICE
     task: str = "directed"
-    gait: str = OWN
+    gait: str = DEFAULT_CHOICE
     speed: float = 1.0
     ground: str = "flat"
     kicks: float = 0.0
     settings: str = "{}"
     policy: str = "cpg"
-    preset: str = OWN
+    preset: str = DEFAULT_CHOICE
 
 
 def sources() -> list[str]:
@@ -96,7 +96,7 @@ def _source_body(source: str, legs: int, links: int, layout: str | None, seed: i
     return registry.body_of(checks.name(source, sources(), "source", near=(FILE,)))
 
 
-def body(sketch: Sketch) -> Body:
+def make_body(sketch: Sketch) -> Body:
     """Return the body.
 
     Raises:
@@ -104,10 +104,10 @@ def body(sketch: Sketch) -> Body:
     """
     made = source_body(sketch)
     made = shaped(made, **_shape(sketch, made))
-    return made if sketch.palette == OWN else made.replace(palette=palettes.parse(sketch.palette))
+    return made if sketch.palette == DEFAULT_CHOICE else made.replace(palette=palettes.parse(sketch.palette))
 
 
-def field(sketch: Sketch) -> Mapping[str, Any]:
+def settings_field(sketch: Sketch) -> Mapping[str, Any]:
     """Return the further settings of the task.
 
     Raises:
@@ -119,14 +119,14 @@ def field(sketch: Sketch) -> Mapping[str, Any]:
         raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
 
 
-def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
+def make_settings(sketch: Sketch, made: Body) -> dict[str, Any]:
     """Return the settings of the task, `task_kwargs` of `arc_suite.load`; those of the field come before the sliders'.
 
     Raises:
         ValueError: the field holds no JSON object, a gait that does not fit, or an arena that is not registered.
     """
-    given, kind = field(sketch), registry.task_of(sketch.task)
-    found: dict[str, Any] = {} if sketch.gait == OWN else {"gait": sketch.gait}
+    given, kind = settings_field(sketch), registry.task_of(sketch.task)
+    found: dict[str, Any] = {} if sketch.gait == DEFAULT_CHOICE else {"gait": sketch.gait}
     if sketch.speed != 1.0:
         own = getattr(kind.settings_for(made, found), "parameters", None)
         if own is None:
@@ -142,17 +142,17 @@ def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
     return found
 
 
-def setup(sketch: Sketch) -> Setup:
+def make_setup(sketch: Sketch) -> Setup:
     """Return body, task and settings.
 
     Raises:
         ValueError: a name or a value that does not fit.
     """
-    made = body(sketch)
-    return Setup.of(made, sketch.task, settings(sketch, made))
+    made = make_body(sketch)
+    return Setup.of(made, sketch.task, make_settings(sketch, made))
 
 
-def preset(sketch: Sketch) -> str | None:
+def chosen_preset(sketch: Sketch) -> str | None:
     """Return the demonstrator's preset; None for the one that suits the task and the body.
 
     Raises:
@@ -171,7 +171,7 @@ def python_lines(sketch: Sketch) -> str:
     """Return Python that opens the same environment and policy; a body from a file is read from `file_name`."""
     made, models, robots = source_body(sketch), [], []
     if sketch.source == LEGS:
-        layout = "" if sketch.layout == OWN else f', "{sketch.layout}"'
+        layout = "" if sketch.layout == DEFAULT_CHOICE else f', "{sketch.layout}"'
         robots, code = ["generator"], f"generator.generate({sketch.legs}, {sketch.links}{layout})"
     elif sketch.source == RANDOM:
         models, code = ["families"], f"families.sound_body({sketch.seed})"
@@ -183,32 +183,33 @@ def python_lines(sketch: Sketch) -> str:
     if shape := _shape(sketch, made):
         changes = ", ".join(f"{name}={value!r}" for name, value in shape.items())
         robots, code = [*robots, "shaping"], f"shaping.shaped({code}, {changes})"
-    if sketch.palette != OWN:
+    if sketch.palette != DEFAULT_CHOICE:
         code = f"{code}.replace(palette={palettes.parse(sketch.palette)!r})"
-    options = settings(sketch, body(sketch))
+    options = make_settings(sketch, make_body(sketch))
     packages = (("arc_suite", ["policies"]), ("arc_suite.models", models), ("arc_suite.robots", robots))
     imports = "".join(f"from {package} import {', '.join(names)}\n" for package, names in packages if names)
+    preset = chosen_preset(sketch)
     return (
         f"import arc_suite\n{imports}\n"
         f"body = {code}\n"
         f'environment = arc_suite.load(body, "{sketch.task}"{f", {options!r}" if options else ""})\n'
-        f"policy = policies.policy({sketch.policy!r}, body, {preset(sketch)!r}, task=environment.task.definition)\n"
+        f"policy = policies.policy({sketch.policy!r}, body, {preset!r}, task=environment.task.definition)\n"
     )
 
 
-def opened_file(sketch: Sketch, text: str) -> Sketch:
+def open_file(sketch: Sketch, text: str) -> Sketch:
     """Return the sketch with the body of a spec file's text, in its own proportions."""
     as_it_is: dict[str, Any]
     as_it_is = {field.name: field.default for field in dataclasses.fields(Sketch) if field.name not in _DOING}
     return dataclasses.replace(sketch, **as_it_is | {"source": FILE, "file": text})
 
 
-def cured(sketch: Sketch, cure: Body) -> Sketch:
+def apply_cure(sketch: Sketch, cure: Body) -> Sketch:
     """Return the sketch with another body, as a file in its own proportions."""
-    return opened_file(sketch, body_to_json(cure))
+    return open_file(sketch, body_to_json(cure))
 
 
-def length(sketch: Sketch, link: str) -> float:
+def length_factor(sketch: Sketch, link: str) -> float:
     """Return the length of a link as a multiple of the body's own.
 
     Args:
@@ -221,27 +222,27 @@ def length(sketch: Sketch, link: str) -> float:
     return math.hypot(*dict(sketch.ends).get(link, own[link])) / math.hypot(*own[link])
 
 
-def lengthened(sketch: Sketch, link: str, factor: float, symmetric: bool) -> Sketch:
+def set_length_factor(sketch: Sketch, link: str, factor: float, symmetric: bool) -> Sketch:
     """Return the sketch with another length of a link, as `length` returns it; `symmetric` as for `moved`."""
     own = _own_ends(sketch)
     if link in own:
-        ratio, end = factor / length(sketch, link), dict(sketch.ends).get(link, own[link])
-        return moved(sketch, link, tuple(ratio * number for number in end), symmetric)
+        ratio, end = factor / length_factor(sketch, link), dict(sketch.ends).get(link, own[link])
+        return set_end(sketch, link, tuple(ratio * number for number in end), symmetric)
     lengths = dict(sketch.lengths) | {link: factor}
     return dataclasses.replace(sketch, lengths=tuple((name, each) for name, each in lengths.items() if each != 1.0))
 
 
-def dragged(sketch: Sketch, part: str, by: Sequence[float], symmetric: bool) -> Sketch:
+def drag_end(sketch: Sketch, part: str, by: Sequence[float], symmetric: bool) -> Sketch:
     """Return the sketch with the end of a link of one leg moved in its frame, m as the body is; see `moved`."""
     own = _own_ends(sketch)
     if part not in own:
         return sketch
     factor = sketch.scale * next((each for name, each in sketch.lengths if part.endswith(f"_{name}")), 1.0)
     end = dict(sketch.ends).get(part, own[part])
-    return moved(sketch, part, tuple(old + new / factor for old, new in zip(end, by, strict=True)), symmetric)
+    return set_end(sketch, part, tuple(old + new / factor for old, new in zip(end, by, strict=True)), symmetric)
 
 
-def moved(sketch: Sketch, part: str, end: Vector, symmetric: bool) -> Sketch:
+def set_end(sketch: Sketch, part: str, end: Vector, symmetric: bool) -> Sketch:
     """Return the sketch with another end of a link of one leg.
 
     Args:
@@ -287,7 +288,7 @@ def _near(one: Vector, other: Vector) -> bool:
 
 def command_line(sketch: Sketch) -> str:
     """Return the command that shows the same in a window; a body of its own is read from its saved spec."""
-    made = body(sketch)
+    made = make_body(sketch)
     unchanged = made == source_body(sketch)
     if sketch.source in ROBOTS and unchanged:
         chosen = ["--robot", sketch.source]
@@ -297,9 +298,9 @@ def command_line(sketch: Sketch) -> str:
         chosen = ["--legs", str(sketch.legs), "--links", str(sketch.links)]
     else:
         chosen = ["--spec", file_name(made)]
-    options = [f"--set={name}={_flag(value)}" for name, value in settings(sketch, made).items()]
+    options = [f"--set={name}={_flag(value)}" for name, value in make_settings(sketch, made).items()]
     policy = [] if sketch.policy == "cpg" else ["--policy", sketch.policy]
-    given = [] if sketch.preset == OWN else ["--preset", sketch.preset]
+    given = [] if sketch.preset == DEFAULT_CHOICE else ["--preset", sketch.preset]
     return shlex.join(["arc-suite", "view", *chosen, "--task", sketch.task, *options, *policy, *given])
 
 
@@ -308,7 +309,7 @@ def _flag(value: Any) -> str:
 
 
 def _given(choice: str) -> str | None:
-    return None if choice == OWN else choice
+    return None if choice == DEFAULT_CHOICE else choice
 
 
 def _shape(sketch: Sketch, made: Body) -> dict[str, Any]:

@@ -14,7 +14,7 @@ _LONGEST = 200  # states that are kept
 
 
 @dataclasses.dataclass(frozen=True)
-class Command:
+class VisitorCommand:
     """What a visitor asks of the creature.
 
     Attributes:
@@ -44,17 +44,17 @@ VELOCITY = ("forward", "left", "turn")  # fields of the velocity
 POSE = ("height", "shift_forward", "shift_left", "roll", "pitch", "yaw")  # and of a pose
 
 
-class State(NamedTuple):
+class PageState(NamedTuple):
     """What the widgets of the page say."""
 
     sketch: Sketch
-    command: Command = Command()
+    command: VisitorCommand = VisitorCommand()
 
     def value(self, name: str) -> Any:
         """Return a field of the sketch or of the command."""
         return getattr(self.sketch if hasattr(self.sketch, name) else self.command, name)
 
-    def having(self, **values: Any) -> "State":
+    def replace_fields(self, **values: Any) -> "PageState":
         """Return the state with other values of fields of the sketch or of the command."""
         changed = self
         for name, value in values.items():
@@ -91,13 +91,13 @@ class Edits(NamedTuple):
         latest: name of what changed last, and when, s.
     """
 
-    now: State
-    before: tuple[State, ...] = ()
-    after: tuple[State, ...] = ()
+    now: PageState
+    before: tuple[PageState, ...] = ()
+    after: tuple[PageState, ...] = ()
     latest: tuple[str, float] = ("", -math.inf)
 
 
-def edited(edits: Edits, state: State, name: str, time: float) -> Edits:
+def record_edit(edits: Edits, state: PageState, name: str, time: float) -> Edits:
     """Return the history with a new state.
 
     Args:
@@ -113,18 +113,18 @@ def edited(edits: Edits, state: State, name: str, time: float) -> Edits:
     return Edits(state, before, (), (name, time))
 
 
-def undone(edits: Edits) -> Edits:
+def undo(edits: Edits) -> Edits:
     """Return the history at the state before; the same if there is none."""
     *before, now = (*edits.before, edits.now)
     return Edits(before[-1], tuple(before[:-1]), (now, *edits.after)) if before else edits
 
 
-def redone(edits: Edits) -> Edits:
+def redo(edits: Edits) -> Edits:
     """Return the history at the state that was undone last; the same if there is none."""
     return Edits(edits.after[0], (*edits.before, edits.now), edits.after[1:]) if edits.after else edits
 
 
-def to_json(state: State) -> str:
+def to_json(state: PageState) -> str:
     """Return a state as JSON: what differs from the defaults."""
     parts = {}
     for name, part in state._asdict().items():
@@ -139,17 +139,17 @@ def is_state(text: str) -> bool:
         value = json.loads(text)
     except (ValueError, RecursionError):
         return False
-    return isinstance(value, dict) and set(State._fields) <= set(value)
+    return isinstance(value, dict) and set(PageState._fields) <= set(value)
 
 
-def from_json(text: str) -> State:
+def from_json(text: str) -> PageState:
     """Return the state that a text describes; whether its names and numbers fit turns out when it is opened.
 
     Raises:
         ValueError: an unknown field, or a value of another kind.
     """
     value = json.loads(text)
-    return State(_read(Sketch, value["sketch"], "sketch"), _read(Command, value["command"], "command"))
+    return PageState(_read(Sketch, value["sketch"], "sketch"), _read(VisitorCommand, value["command"], "command"))
 
 
 def _read(kind: type, value: Any, what: str) -> Any:

@@ -20,15 +20,15 @@ from absl import flags
 from arc_suite import checks, policies
 from arc_suite.bodies import universal
 from arc_suite.cli.flags import (
-    completed,
+    complete_task,
+    custom_body,
     define_body,
     define_task,
     define_vecnormalize,
-    made_body,
     only_body,
     policy_name,
-    task,
-    trained,
+    policy_setup,
+    task_from_flags,
 )
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import onnx_file
@@ -47,8 +47,8 @@ def main(run: str | None = None) -> None:
     source, name = Path(run), policy_name(run)
     output = Path(FLAGS.output or (source if source.is_dir() else source.parent) / "policy.onnx")
     checks.extension(output, [".onnx"])
-    if FLAGS["robot"].present or made_body() is not None:
-        setup = Setup.of(only_body(), *completed(trained(run), *task()))
+    if FLAGS["robot"].present or custom_body() is not None:
+        setup = Setup.of(only_body(), *complete_task(policy_setup(run), *task_from_flags()))
         policy = universal.for_body(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")

@@ -29,8 +29,8 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, evaluation, files, registry, versions
-from arc_suite.cli.flags import define_body, define_task, made_body, named_values, only_body, task
-from arc_suite.cli.program import TERMINATED, progress, resumable, say, termination
+from arc_suite.cli.flags import custom_body, define_body, named_values, only_body, task_from_flags
+from arc_suite.cli.program import TERMINATED, progress, resumable, say, watch_for_termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning import onnx_file, outcomes, processes
@@ -63,7 +63,7 @@ def hyperparameters() -> str:
 
 FLAGS = flags.FLAGS
 define_body(more="; or several with commas, such as varied:0-127,queen, for a policy of any body")
-define_task()
+define_task_from_flags()
 flags.DEFINE_string(
     "algorithm",
     "ppo",
@@ -166,7 +166,7 @@ def only(run: Configuration, level: float | None) -> int:
             return progress(*args, **kwargs)
 
         limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
-        with resumable(folder), termination() as terminated:
+        with resumable(folder), watch_for_termination() as terminated:
 
             def stop():
                 return terminated() or reached() is not None
@@ -243,8 +243,8 @@ def configured() -> list[Configuration]:
             raise ValueError(f"{error}, by --modules") from None
     hyperparameters = named_values("hp", FLAGS.hp)
     run = FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior, named_values("train_set", FLAGS.train_set)
-    several = registry.names_several_bodies(FLAGS.robot) and made_body() is None
-    setup = Setup.of(FLAGS.robot if several else only_body(), *task())
+    several = registry.names_several_bodies(FLAGS.robot) and custom_body() is None
+    setup = Setup.of(FLAGS.robot if several else only_body(), *task_from_flags())
     return [Configuration.of(setup, FLAGS.algorithm, hyperparameters, seed, *run) for seed in seeds(FLAGS.seed)]
 
 

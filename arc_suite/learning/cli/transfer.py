@@ -19,7 +19,7 @@ from absl import flags
 
 from arc_suite import checks, policies
 from arc_suite.bodies import universal
-from arc_suite.cli.flags import completed, define_task, task
+from arc_suite.cli.flags import complete_task, define_task, task_from_flags
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.learning.studies import bodies
@@ -34,7 +34,7 @@ flags.DEFINE_string("name", None, "Of the policy in this table. [default: the st
 
 def main() -> None:
     """Play, print the table and write the episodes."""
-    name, settings = completed(policies.setup_of(FLAGS.policy), *task())
+    name, settings = complete_task(policies.setup_of(FLAGS.policy), *task_from_flags())
     for family in FLAGS.families:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:

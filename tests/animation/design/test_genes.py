@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from arc_suite.animation.design.axes import AXES, Map
-from arc_suite.animation.design.genes import Around, Budget, Made, extent, within
+from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, body_within_budget, extent
 from arc_suite.bodies.generator import deformations, mutated, random_body
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import standing
@@ -17,12 +17,12 @@ BUDGET = Budget(mass=12.0, span=1.5)
 
 def bodies(space, budget, count, seed=0):
     random = np.random.default_rng(seed)
-    return [within(budget, space, random.uniform(size=len(space.names)), f"body_{i}") for i in range(count)]
+    return [body_within_budget(budget, space, random.uniform(size=len(space.names)), f"body_{i}") for i in range(count)]
 
 
 def test_bodies_weigh_the_same_and_keep_the_span():
     spans = []
-    for body in bodies(Made(), BUDGET, 40):
+    for body in bodies(ProportionGenes(), BUDGET, 40):
         assert math.isclose(standing(body).mass, 12.0, rel_tol=1e-9)
         assert all("overlap" in flaw.text for flaw in flaws(body)), body.name
         spans.append(extent(body).max())
@@ -30,42 +30,46 @@ def test_bodies_weigh_the_same_and_keep_the_span():
 
 
 def test_genes_reach_all_numbers_of_legs_and_links():
-    made, many = Made(), bodies(Made(), BUDGET, 300)
+    made, many = ProportionGenes(), bodies(ProportionGenes(), BUDGET, 300)
     assert {len(body.legs) for body in many} == set(range(4, 13))
     assert {len(body.legs[0].links) for body in many} == {2, 3, 4}
     for genes in (np.zeros(len(made.names)), np.ones(len(made.names))):
-        assert not flaws(within(BUDGET, made, genes, "edge"))
+        assert not flaws(body_within_budget(BUDGET, made, genes, "edge"))
 
 
 def test_legs_change_evenly_along_the_body():
-    genes = np.full(len(Made.names), 0.5)
-    genes[Made.names.index("reach_front")], genes[Made.names.index("reach_rear")] = 1.0, 0.0
-    genes[Made.names.index("layout")] = 0.0
-    left = [leg for leg in within(BUDGET, Made(), genes, "body").legs if leg.name.startswith("l")]
+    genes = np.full(len(ProportionGenes.names), 0.5)
+    genes[ProportionGenes.names.index("reach_front")], genes[ProportionGenes.names.index("reach_rear")] = 1.0, 0.0
+    genes[ProportionGenes.names.index("layout")] = 0.0
+    left = [
+        leg for leg in body_within_budget(BUDGET, ProportionGenes(), genes, "body").legs if leg.name.startswith("l")
+    ]
     reaches = [math.dist(leg.mount[:2], leg.foot_position[:2]) for leg in left]
     assert reaches == sorted(reaches, reverse=True) and reaches[0] > 1.4 * reaches[-1]
 
 
 def test_a_bound_on_the_height_is_kept():
-    heights = [body.torso.standing_height for body in bodies(Made(), BUDGET._replace(height=0.2), 20)]
+    heights = [body.torso.standing_height for body in bodies(ProportionGenes(), BUDGET._replace(height=0.2), 20)]
     assert 0.15 < max(heights) <= 0.2 + 1e-12
 
 
 def test_variants_differ_are_no_larger_and_in_the_middle_are_the_creature():
     tick = ROBOTS["tick"]
     budget = Budget(standing(tick).mass, float(extent(tick).max()))
-    body = within(budget, Around(tick, 0.1), np.full(deformations(tick), 0.5), "tick_0")
+    body = body_within_budget(budget, VariantGenes(tick, 0.1), np.full(deformations(tick), 0.5), "tick_0")
     plain = mutated(tick, 0, amount=0.0)
     assert body.replace(name=plain.name, density=plain.density) == plain
     assert math.isclose(body.density, tick.density, rel_tol=1e-9)
-    many = bodies(Around(tick, 0.2), budget, 20)
+    many = bodies(VariantGenes(tick, 0.2), budget, 20)
     assert max(extent(body).max() for body in many) <= budget.span + 1e-9
     assert len({body.legs for body in many}) == 20
 
 
 def test_a_budget_that_no_body_keeps_is_one_line():
     with pytest.raises(ValueError, match="expected") as error:
-        within(Budget(mass=1e12, span=1e-3), Made(), np.full(len(Made.names), 0.5), "body")
+        body_within_budget(
+            Budget(mass=1e12, span=1e-3), ProportionGenes(), np.full(len(ProportionGenes.names), 0.5), "body"
+        )
     assert "\n" not in str(error.value)
 
 

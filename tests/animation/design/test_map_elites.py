@@ -3,8 +3,8 @@
 import json
 
 from arc_suite.animation.design.axes import Map
-from arc_suite.animation.design.genes import Budget, Made
-from arc_suite.animation.design.search import BATCH, RANDOM, Candidates, Search
+from arc_suite.animation.design.genes import Budget, ProportionGenes
+from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
 from arc_suite.animation.design.trials import Outcome, Round, Trial, WalkMeans
 
 ROUND = Round({}, (0,), 10)
@@ -26,8 +26,8 @@ def evaluated(jobs):
     return found
 
 
-def search(seed=3, goes=10, random=RANDOM):
-    course = Search(Made(), Map.of(["legs", "links"]), TRIAL, seed, "body", random)
+def search(seed=3, goes=10, random=RANDOM_BODIES):
+    course = Search(ProportionGenes(), Map.of(["legs", "links"]), TRIAL, seed, "body", random)
     return course, [course.batch(evaluated) for _ in range(goes)]
 
 
@@ -39,12 +39,12 @@ def test_a_search_is_a_function_of_its_seed():
     (first, _), (second, _), (other, _) = search(), search(), search(4)
     assert first.candidates == second.candidates and first.elites == second.elites
     assert first.candidates != other.candidates
-    assert len(first.candidates) == 10 * BATCH
+    assert len(first.candidates) == 10 * BATCH_SIZE
 
 
 def test_a_search_restored_from_json_goes_on_as_if_nothing_had_happened():
     straight, batches = search()
-    again = Search(Made(), Map.of(["legs", "links"]), TRIAL, 3, "body")
+    again = Search(ProportionGenes(), Map.of(["legs", "links"]), TRIAL, 3, "body")
     for batch in batches[:6]:
         again.add(Candidates.restored(**json.loads(json.dumps(batch._asdict()))))
     for _ in range(4):
@@ -62,21 +62,21 @@ def test_elites_are_the_best_of_their_cells():
 
 
 def test_a_search_beats_as_many_random_bodies():
-    (course, _), (control, _) = search(goes=15), search(goes=15, random=15 * BATCH)
-    assert course.candidates[:RANDOM] == control.candidates[:RANDOM]
-    assert len(course.candidates) == len(control.candidates) > RANDOM
+    (course, _), (control, _) = search(goes=15), search(goes=15, random=15 * BATCH_SIZE)
+    assert course.candidates[:RANDOM_BODIES] == control.candidates[:RANDOM_BODIES]
+    assert len(course.candidates) == len(control.candidates) > RANDOM_BODIES
     assert min(costs(course)) < 0.97 * min(costs(control))
 
 
 def test_one_that_is_excluded_the_second_time_takes_no_cell():
-    course = Search(Made(), Map.of(["legs"]), TRIAL, 0, "body")
+    course = Search(ProportionGenes(), Map.of(["legs"]), TRIAL, 0, "body")
     course.batch(lambda jobs: [Outcome("evaluated again: fell", fake(body), fake(body)) for _, body, _ in jobs])
-    assert not course.elites and len(course.candidates) == BATCH
+    assert not course.elites and len(course.candidates) == BATCH_SIZE
 
 
 def test_an_elite_is_challenged_by_the_second_metric():
     """A body of a better first walk and a worse second one leaves the elite where it is."""
-    course = Search(Made(), Map.of(["legs"]), TRIAL, 0, "body")
+    course = Search(ProportionGenes(), Map.of(["legs"]), TRIAL, 0, "body")
     course.batch(evaluated)
     before = dict(course.elites)
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from arc_suite.animation.design.genes import Budget
-from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, evaluate, excluded, walk
+from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, evaluate, exclusion_reason, measure_walk
 from arc_suite.bodies.generator import generate
 
 BUDGET = Budget(12.0, 1.5)
@@ -25,7 +25,7 @@ GOOD = WalkMeans(0.5, 0.9, math.nan, 1.5, 6.0, 0.0)
     ],
 )
 def test_guards(goal, walked, reason):
-    assert excluded(GOALS[goal], BUDGET._replace(power=20.0), walked) == reason
+    assert exclusion_reason(GOALS[goal], BUDGET._replace(power=20.0), walked) == reason
 
 
 def test_goals_are_raised_or_lowered():
@@ -56,7 +56,7 @@ def test_a_body_walks_and_challenges_an_elite():
 
 def test_tracking_counts_steps_after_a_fall_as_nothing():
     trial = Trial.of("shoved", {"kicks": 30.0}, "robustness", BUDGET, 150)
-    found = walk(generate(4, 3), "shoved", trial.first, GOALS["robustness"])
-    calm = walk(generate(4, 3), "shoved", trial.first._replace(settings={"kicks": 0.0}), GOALS["robustness"])
+    found = measure_walk(generate(4, 3), "shoved", trial.first, GOALS["robustness"])
+    calm = measure_walk(generate(4, 3), "shoved", trial.first._replace(settings={"kicks": 0.0}), GOALS["robustness"])
     assert found.falls == 1.0 and calm.falls == 0.0
     assert found.tracking < 0.8 * calm.tracking

@@ -264,11 +264,15 @@ def test_one_leg_and_the_leg_across(served, tab):
     served.until(lambda: served.session.creature.sketch == Sketch(legs=8, links=2))
     choose(tab, "Legs to change", "l1")
     press(tab, "l1_lower", "ArrowRight", 4)
-    served.until(lambda: sketches.length(served.session.creature.sketch, "r1_lower") == pytest.approx(1.2, rel=1e-3))
+    served.until(
+        lambda: sketches.length_factor(served.session.creature.sketch, "r1_lower") == pytest.approx(1.2, rel=1e-3)
+    )
     tab.get_by_role("checkbox", name="Symmetric").click()
     press(tab, "l1_lower", "ArrowRight", 2)
-    served.until(lambda: sketches.length(served.session.creature.sketch, "l1_lower") == pytest.approx(1.3, rel=1e-3))
-    assert sketches.length(served.session.creature.sketch, "r1_lower") == pytest.approx(1.2, rel=1e-3)
+    served.until(
+        lambda: sketches.length_factor(served.session.creature.sketch, "l1_lower") == pytest.approx(1.3, rel=1e-3)
+    )
+    assert sketches.length_factor(served.session.creature.sketch, "r1_lower") == pytest.approx(1.2, rel=1e-3)
     tab.get_by_role("checkbox", name="Symmetric").click()
     choose(tab, "Legs to change", "all")
     tab.get_by_role("button", name="Reset").click()

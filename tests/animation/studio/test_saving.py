@@ -10,7 +10,7 @@ import pytest
 
 from arc_suite.animation import pages
 from arc_suite.animation.studio import saving
-from arc_suite.animation.studio.creature import opened
+from arc_suite.animation.studio.creature import open_creature
 from arc_suite.animation.studio.sketch import Sketch
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import body_from_json
@@ -21,7 +21,7 @@ AHEAD = np.array((1.0, 0.0, 0.0))
 
 @pytest.fixture(scope="module")
 def creature():
-    made = opened(Sketch(source="tick", width=1.1))
+    made = open_creature(Sketch(source="tick", width=1.1))
     made.environment.reset()
     return made
 
@@ -31,7 +31,7 @@ def content(creature, label, **commands):
 
 
 def test_names(creature):
-    names = {saving.name(creature, file) for file in saving.FILES}
+    names = {saving.download_name(creature, file) for file in saving.FILES}
     ends = (".json", ".xml", ".glb", ".html", "_play.html", ".png", ".mp4")
     assert names == {f"tick_shaped{end}" for end in ends}
 
@@ -43,7 +43,7 @@ def test_spec_and_model(creature):
 
 
 def test_the_model_stands_on_the_ground_of_the_task():
-    made = opened(Sketch(source="tick", ground="bumps"))
+    made = open_creature(Sketch(source="tick", ground="bumps"))
     assert mujoco.MjModel.from_xml_string(content(made, "MJCF").decode()).nhfield == 1
 
 

@@ -12,7 +12,7 @@ from arc_suite.animation import player_controls
 from arc_suite.animation.episodes import Episodes
 from arc_suite.animation.studio import session as sessions
 from arc_suite.animation.studio import texts
-from arc_suite.animation.studio.creature import load, opened, policy
+from arc_suite.animation.studio.creature import load_environment, load_policy, open_creature
 from arc_suite.animation.studio.history import History
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import Sketch
@@ -152,7 +152,7 @@ def test_a_mistake_of_ours_is_told_too(monkeypatch, capsys):
         raise RuntimeError("no such\nluck")
 
     with running() as (session, shown):
-        monkeypatch.setattr(sessions, "opened", opened)
+        monkeypatch.setattr(sessions, "open_creature", opened)
         session.ask(Sketch(legs=4))
         shown.until(lambda: session.error)
         assert session.error == "RuntimeError: no such luck"
@@ -203,14 +203,14 @@ def test_history_and_states_of_a_walk():
 @pytest.mark.parametrize("task", ["walk", "directed"])
 def test_rewards_and_contacts_are_those_of_reports(task):
     sketch = Sketch(legs=6, links=2, task=task)
-    creature = opened(sketch)
+    creature = open_creature(sketch)
     episodes = Episodes(creature.environment, creature.act)
     history = History(episodes)
     for _ in range(100):
         episodes.step()
         history.observe()
-    environment = load(creature.setup)
-    track = style.record(environment, policy(sketch, environment), 0, 100)
+    environment = load_environment(creature.setup)
+    track = style.record(environment, load_policy(sketch, environment), 0, 100)
     np.testing.assert_allclose(episodes.environment.physics.data.qpos[:3], track.positions[-1])
     np.testing.assert_allclose(sum(history.terms().values()), track.rewards)
     np.testing.assert_array_equal(history.contacts()[0], track.stance)

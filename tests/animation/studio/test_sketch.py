@@ -9,7 +9,7 @@ import pytest
 from refusals import refused
 
 from arc_suite.animation.studio import sketch as sketches
-from arc_suite.animation.studio.creature import opened
+from arc_suite.animation.studio.creature import open_creature
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
 from arc_suite.bodies import generator, shaping
 from arc_suite.bodies.families import sound_body
@@ -45,38 +45,38 @@ SKETCHES = {
     ],
 )
 def test_the_body(name, body):
-    assert sketches.body(SKETCHES[name]) == body
+    assert sketches.make_body(SKETCHES[name]) == body
 
 
 def test_settings_of_the_task():
-    assert sketches.setup(SKETCHES["legs"]).task_kwargs == {}
-    assert sketches.setup(SKETCHES["robot"]).task_kwargs == {"arena": "bumps", "kicks": 0.5}
-    assert sketches.setup(SKETCHES["layout"]).task_kwargs == {"gait": "wave"}
-    own = sketches.setup(dataclasses.replace(SKETCHES["shaped"], speed=1.0)).definition.parameters.target_velocity
-    (speed,) = sketches.setup(SKETCHES["shaped"]).task_kwargs.values()
+    assert sketches.make_setup(SKETCHES["legs"]).task_kwargs == {}
+    assert sketches.make_setup(SKETCHES["robot"]).task_kwargs == {"arena": "bumps", "kicks": 0.5}
+    assert sketches.make_setup(SKETCHES["layout"]).task_kwargs == {"gait": "wave"}
+    own = sketches.make_setup(dataclasses.replace(SKETCHES["shaped"], speed=1.0)).definition.parameters.target_velocity
+    (speed,) = sketches.make_setup(SKETCHES["shaped"]).task_kwargs.values()
     assert speed == pytest.approx(0.8 * own, rel=1e-3)
     # A task with a ground of its own ignores the ground; settings of the field come before those of sliders.
     sketch = dataclasses.replace(SKETCHES["example"], ground="bumps")
-    assert sketches.setup(sketch).task_kwargs == {"difficulty": 0.5}
+    assert sketches.make_setup(sketch).task_kwargs == {"difficulty": 0.5}
     sketch = Sketch(kicks=0.5, settings='{"kicks": 1.0, "friction": 0.5}')
-    assert sketches.setup(sketch).task_kwargs == {"kicks": 1.0, "friction": 0.5}
+    assert sketches.make_setup(sketch).task_kwargs == {"kicks": 1.0, "friction": 0.5}
 
 
 def test_a_link_of_one_leg_and_of_the_leg_across():
     """Lengths and dragged ends hold in the body's own proportions, and the way back leaves nothing."""
     sketch = Sketch(legs=6, links=2, scale=2.0, lengths=(("lower", 1.5),))
     own = {part: end for part, end in shaping.link_ends(sketches.source_body(sketch)).items() if "lower" in part}
-    longer = sketches.lengthened(sketch, "l1_lower", 1.2, True)
-    assert sketches.length(longer, "r1_lower") == pytest.approx(1.2, rel=1e-3)
-    assert sketches.length(longer, "l2_lower") == 1.0 and sketches.length(longer, "lower") == 1.5
-    assert sketches.lengthened(longer, "r1_lower", 1.0, True) == sketch
-    (alone,) = sketches.lengthened(sketch, "l1_lower", 1.2, False).ends
+    longer = sketches.set_length_factor(sketch, "l1_lower", 1.2, True)
+    assert sketches.length_factor(longer, "r1_lower") == pytest.approx(1.2, rel=1e-3)
+    assert sketches.length_factor(longer, "l2_lower") == 1.0 and sketches.length_factor(longer, "lower") == 1.5
+    assert sketches.set_length_factor(longer, "r1_lower", 1.0, True) == sketch
+    (alone,) = sketches.set_length_factor(sketch, "l1_lower", 1.2, False).ends
     assert alone[0] == "l1_lower"
-    moved = sketches.dragged(sketch, "r1_lower", (0.3, 0.6, 0.0), True)
+    moved = sketches.drag_end(sketch, "r1_lower", (0.3, 0.6, 0.0), True)
     x, y, z = own["l1_lower"]
     assert dict(moved.ends)["l1_lower"] == pytest.approx((x + 0.1, y - 0.2, z), rel=1e-3)
     assert dict(moved.ends)["r1_lower"] == pytest.approx((x + 0.1, -y + 0.2, z), rel=1e-3)
-    ends = shaping.link_ends(sketches.body(moved))
+    ends = shaping.link_ends(sketches.make_body(moved))
     assert ends["l1_lower"] == pytest.approx([3.0 * (x + 0.1), 3.0 * (y - 0.2), 3.0 * z], rel=1e-3)
     assert ends["l2_lower"] == pytest.approx([3.0 * number for number in own["l2_lower"]])
 
@@ -84,14 +84,14 @@ def test_a_link_of_one_leg_and_of_the_leg_across():
 def test_links_change_while_other_widgets_make_no_body():
     """A page shows and changes lengths of the creature that walks on."""
     odd = Sketch(legs=5, links=2, layout="pairs")
-    longer = sketches.lengthened(odd, "lower", 1.2, True)
-    assert (sketches.length(odd, "lower"), sketches.length(longer, "lower")) == (1.0, 1.2)
-    assert sketches.dragged(odd, "l1_lower", (0.1, 0.0, 0.0), True) == odd
+    longer = sketches.set_length_factor(odd, "lower", 1.2, True)
+    assert (sketches.length_factor(odd, "lower"), sketches.length_factor(longer, "lower")) == (1.0, 1.2)
+    assert sketches.drag_end(odd, "l1_lower", (0.1, 0.0, 0.0), True) == odd
 
 
 def test_factors_of_links_that_the_body_lacks_are_ignored():
     sketch = Sketch(legs=6, links=2, lengths=(("middle", 1.5), ("lower", 1.0)))
-    assert sketches.body(sketch) == generator.generate(6, 2)
+    assert sketches.make_body(sketch) == generator.generate(6, 2)
 
 
 @pytest.mark.parametrize("sketch", SKETCHES.values(), ids=SKETCHES)
@@ -100,8 +100,8 @@ def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
     (tmp_path / sketches.file_name(sketches.source_body(sketch))).write_text(body_to_json(sketches.source_body(sketch)))
     made = {}
     exec(sketches.python_lines(sketch), made)
-    assert made["body"] == sketches.body(sketch)
-    assert made["environment"].task_kwargs == sketches.setup(sketch).task_kwargs
+    assert made["body"] == sketches.make_body(sketch)
+    assert made["environment"].task_kwargs == sketches.make_setup(sketch).task_kwargs
     policy = made["policy"]
     assert policy.act(made["environment"].reset().observation, 0.0).shape[-1:] == (len(made["body"].joint_names),)
 
@@ -110,7 +110,7 @@ def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
 @pytest.mark.parametrize("sketch", [SKETCHES["legs"], SKETCHES["shaped"], SKETCHES["robot"]], ids=lambda s: s.source)
 def test_the_command_line_is_understood(sketch, tmp_path):
     """The window of `view` needs a display; `evaluate` takes the same flags."""
-    body = sketches.body(sketch)
+    body = sketches.make_body(sketch)
     (tmp_path / sketches.file_name(body)).write_text(body_to_json(body))
     program, view, *flags = shlex.split(sketches.command_line(sketch))
     assert (program, view) == ("arc-suite", "view")
@@ -131,7 +131,7 @@ def test_command_lines():
 
 @pytest.mark.parametrize("name", ["legs", "robot", "example"])
 def test_a_creature_walks(name):
-    creature = opened(SKETCHES[name])
+    creature = open_creature(SKETCHES[name])
     timestep = creature.environment.reset()
     for _ in range(5):
         timestep = creature.environment.step(creature.act(timestep))
@@ -141,21 +141,21 @@ def test_a_creature_walks(name):
 def test_what_check_says_can_be_applied():
     """The body that mends the flaw comes as a file, and what the creature does stays."""
     sketch = dataclasses.replace(SKETCHES["file"], gait="ripple", kicks=0.2, scale=1.5)
-    creature = opened(dataclasses.replace(sketch, scale=1.0))
+    creature = open_creature(dataclasses.replace(sketch, scale=1.0))
     (flaw,) = creature.flaws
     assert flaw.text == "feet hang 0.1 m above the floor: standing_height 0.4 fits"
-    mended = sketches.cured(sketch, flaw.cure)
+    mended = sketches.apply_cure(sketch, flaw.cure)
     assert (mended.source, mended.gait, mended.kicks, mended.scale) == (FILE, "ripple", 0.2, 1.0)
-    assert sketches.body(mended).torso.standing_height == 0.4 and flaws(sketches.body(mended)) == []
+    assert sketches.make_body(mended).torso.standing_height == 0.4 and flaws(sketches.make_body(mended)) == []
 
 
 def test_legs_that_overlap_are_moved_apart():
     sketch = Sketch(legs=12, links=3, layout="pairs")
-    (flaw,) = opened(sketch).flaws
+    (flaw,) = open_creature(sketch).flaws
     assert re.fullmatch(
         r"[lr]\d+_\w+ and [lr]\d+_\w+ overlap by .* m in a stride: legs mounted .* as far out fit", flaw.text
     )
-    assert opened(sketches.cured(sketch, flaw.cure)).flaws == ()
+    assert open_creature(sketches.apply_cure(sketch, flaw.cure)).flaws == ()
 
 
 @pytest.mark.parametrize(
@@ -182,4 +182,4 @@ def test_legs_that_overlap_are_moved_apart():
 )
 def test_a_bad_combination_is_one_line(sketch, message):
     with refused(message, begins=True):
-        opened(sketch)
+        open_creature(sketch)

@@ -2,7 +2,7 @@
 
 import interpreters
 
-from arc_suite.animation.studio.sketch import FILE, OWN, Sketch
+from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, FILE, Sketch
 from arc_suite.bodies import generator
 from arc_suite.robots.spec_files import body_to_json
 
@@ -34,7 +34,7 @@ def test_flags(tmp_path):
             source="spider", task="directed", ground="bumps", kicks=0.5, settings='{"friction": 0.7}'
         ),
         ("--spec=own.json", "--policy=zero"): Sketch(
-            source=FILE, file=body_to_json(body), task="walk", policy="zero", preset=OWN
+            source=FILE, file=body_to_json(body), task="walk", policy="zero", preset=DEFAULT_CHOICE
         ),
     }
     code = SKETCHES.format(arguments=[list(each) for each in arguments])
