@@ -63,7 +63,7 @@ def hyperparameters() -> str:
 
 FLAGS = flags.FLAGS
 define_body(more="; or several with commas, such as varied:0-127,queen, for a policy of any body")
-define_task_from_flags()
+define_task()
 flags.DEFINE_string(
     "algorithm",
     "ppo",
