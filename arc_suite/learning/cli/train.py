@@ -29,7 +29,7 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, evaluation, files, registry, versions
-from arc_suite.cli.flags import custom_body, define_body, named_values, only_body, task_from_flags
+from arc_suite.cli.flags import custom_body, define_body, define_task, named_values, only_body, task_from_flags
 from arc_suite.cli.program import TERMINATED, progress, resumable, say, watch_for_termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
