@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from arc_suite.animation.clips import planting
 from arc_suite.animation.clips.catalog import CLIPS, DEFAULT, WalkLoop
-from arc_suite.animation.clips.drafts import drafts, passage
+from arc_suite.animation.clips.drafts import cut_passage, make_drafts
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
@@ -32,7 +32,7 @@ LOW = 0.01  # of a sole that slips
 class Kept(Recorder):
     """A recorder that records each passage once."""
 
-    transition = functools.cache(Recorder.transition)
+    transition = functools.cache(Recorder.record_transition)
 
 
 def apart(body, one, other) -> float:
@@ -62,18 +62,18 @@ def slip(body, motion) -> tuple[float, float]:
 def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     """Return numbers of the default clips of a body by name, and the reasons of those that are left out."""
     recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
-    made = drafts(recorder, DEFAULT, iter, left_out)
+    made = make_drafts(recorder, DEFAULT, iter, left_out)
     loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], WalkLoop)]
     found = {"clips": len(DEFAULT) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
     found["seam"] = np.degrees(max((draft.motion.seam for draft in loops), default=np.nan))
     if "walk" in made:
-        walk, transition = made["walk"], recorder.transition(CLIPS["walk"].command)
-        start, stop = (passage(body, CLIPS[name], transition).motion for name in ("start", "stop"))
+        walk, transition = made["walk"], recorder.record_transition(CLIPS["walk"].command)
+        start, stop = (cut_passage(body, CLIPS[name], transition).motion for name in ("start", "stop"))
         pairs = {"start": (start.pose(-1), walk.start), "stop": (stop.pose(0), walk.start)}
         pairs["idle"] = stop.pose(-1), made["idle"].start
         found |= {name: apart(body, *pair) for name, pair in pairs.items()}
         found["slip"], found["sinks"] = slip(body, walk.motion)
-        found["slip planted"], found["sinks planted"] = slip(body, walk.planted(body).motion)
+        found["slip planted"], found["sinks planted"] = slip(body, walk.plant_feet(body).motion)
     return found, left_out
 
 

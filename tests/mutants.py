@@ -142,8 +142,8 @@ MUTANTS = {
     # Clips and pages.
     "axes of glTF are a mirror": "_AXES = («1, 2, 0→0, 2, 1»)",
     "the seam of a loop is left": "np.«linspace(-0.5, 0.5, →zeros(»len(motion.joints))",
-    "clips begin anywhere": "draft.motion.begun(«begin→0»)",
-    "soles of clips hover": "self.motion.lowered(«height→0.0»)",
+    "clips begin anywhere": "draft.motion.start_at(«begin→0»)",
+    "soles of clips hover": "self.motion.lower(«height→0.0»)",
     "sRGB written as linear": "linear = np.where(«color <= 0.04045, color / 12.92→True, color»,",
     "the mouse pulls at nothing": "data.xfrc_applied[:] = «forces→0.0»",
     # Studies and datasets of agents.

@@ -156,7 +156,7 @@ def in_place(view: View, size: tuple[int, int], steps: int) -> Iterator[np.ndarr
     setup = Setup.of(view.robot, view.task, dict(view.settings))
     (clip,) = clips.clips(setup, ["walk"], fps=_FPS)
     above = round(_ABOVE * (width - height))
-    for square in filming.loop(setup.body, clip, width, heading=math.radians(-90.0 - view.azimuth)):
+    for square in filming.film_pictures(setup.body, clip, width, heading=math.radians(-90.0 - view.azimuth)):
         yield square[above : above + height]
 
 

@@ -20,7 +20,7 @@ TERM_COLORS = {
 _SPARE = ("#44AA99", "#AA4499", "#DDCC77", "#6699CC")
 
 
-def of_terms(names: Iterable[str]) -> dict[str, str]:
+def term_colors(names: Iterable[str]) -> dict[str, str]:
     """Return colors of a reward's terms by name; those that have none of their own get what others have not."""
     names = list(names)
     free = itertools.cycle([*(color for name, color in TERM_COLORS.items() if name not in names), *_SPARE])

@@ -9,7 +9,7 @@ from arc_suite.animation import player_controls
 from arc_suite.markers import Marker
 from arc_suite.simulation.episode_loop import play_episode
 
-LONGEST = 0.5  # s of simulated time between two pictures; a slower machine shows slow motion
+MAX_SECONDS_PER_PICTURE = 0.5  # s of simulated time between two pictures; a slower machine shows slow motion
 _ENDS = ("start", "end")  # of a debug marker
 
 
@@ -21,7 +21,7 @@ class Episodes:
         follows_velocities: whether the task has a command of velocities.
         desired: (3,) command that a person has set; None for that of the task.
         timestep: the latest.
-        earned: sum of the rewards of the present episode.
+        episode_return: sum of the rewards of the present episode.
         steps: control steps of the present episode.
         control_timestep: s.
     """
@@ -45,7 +45,7 @@ class Episodes:
         """Start the next episode, with the command that a person has set."""
         self._episode = play_episode(self.environment, self._act)
         self.timestep = next(self._episode)
-        self.earned, self.steps = 0.0, 0
+        self.episode_return, self.steps = 0.0, 0
         self._command()
         self._before, self._markers = self._qpos(), 2 * (self._asked(),)
 
@@ -78,7 +78,7 @@ class Episodes:
         self._before = self._qpos()
         self.environment.physics.data.xfrc_applied[:] = forces
         self.timestep = next(self._episode)
-        self.earned += self.timestep.reward
+        self.episode_return += self.timestep.reward
         self.steps += 1
         self._markers = self._markers[1], self._asked()
 

@@ -62,7 +62,7 @@ def show(
     steps = checks.integer("steps", usual if steps is None else steps, 1)
     if film:
         return Inline(_film(played, actor, seed, steps))
-    pages.viewer()  # finds out at once whether there is one
+    pages.viewer_script()  # finds out at once whether there is one
     track = style.record(played, actor, seed, steps)
     page = pages.page({f"{setup.body.name}, {name}": track})
     return Inline(_element("iframe", srcdoc=page, width="100%", height=str(_HEIGHT), style="border: 0"))

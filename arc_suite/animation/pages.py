@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from arc_suite import versions
-from arc_suite.animation.colors import of_terms
-from arc_suite.animation.parts import parts as described
-from arc_suite.animation.scenery import scenery
+from arc_suite.animation.colors import term_colors
+from arc_suite.animation.parts import describe_body as described
+from arc_suite.animation.scenery import describe_scenery
 from arc_suite.models.outline import outline
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
@@ -25,7 +25,7 @@ from arc_suite.style.tracks import Track
 _DIGITS = 6  # behind the point: micrometers, microradians
 
 
-def built(name: str) -> bytes:
+def read_built_file(name: str) -> bytes:
     """Return a file that `make web` builds.
 
     Raises:
@@ -42,9 +42,9 @@ def built(name: str) -> bytes:
     return file.read_bytes()
 
 
-def viewer() -> str:
+def viewer_script() -> str:
     """Return the script of the viewer, three.js included; errors as `built`."""
-    return built("viewer.js").decode()
+    return read_built_file("viewer.js").decode()
 
 
 def template(name: str) -> string.Template:
@@ -52,7 +52,7 @@ def template(name: str) -> string.Template:
     return string.Template(resources.files("arc_suite.animation").joinpath(name).read_text(encoding="utf-8"))
 
 
-def packed(value) -> str:
+def pack(value) -> str:
     """Return JSON of a value, deflated, in base64."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
@@ -66,38 +66,38 @@ def page(tracks: Mapping[str, Track]) -> str:
     """
     return template("page.html").substitute(
         title=html.escape(", ".join(tracks)),
-        data=packed([_walk(label, track) for label, track in tracks.items()]),
-        viewer=viewer(),
+        data=pack([_walk(label, track) for label, track in tracks.items()]),
+        viewer=viewer_script(),
     )
 
 
-def drawn(body: Body) -> dict[str, Any]:
+def body_drawing(body: Body) -> dict[str, Any]:
     """Return what a page draws of a body, its parts and their materials, with its height and reach, m."""
     parts, materials = described(body)
     sizes = {"height": body.torso.standing_height, "reach": float(abs(outline(body)).max())}
-    return sizes | {"parts": plain(parts), "materials": plain(materials)}
+    return sizes | {"parts": to_json_values(parts), "materials": to_json_values(materials)}
 
 
 def _walk(label: str, track: Track) -> dict[str, Any]:
     """What the viewer takes of a track, in MuJoCo's axes."""
     stance = track.parameters is not None
-    return drawn(track.body) | {
+    return body_drawing(track.body) | {
         "label": label,
         "step": track.time_step,
-        "scenery": plain(scenery(track)),
-        "positions": plain(track.positions),
-        "quaternions": plain(track.quaternions),
-        "joints": plain(track.joint_angles),
+        "scenery": to_json_values(describe_scenery(track)),
+        "positions": to_json_values(track.positions),
+        "quaternions": to_json_values(track.quaternions),
+        "joints": to_json_values(track.joint_angles),
         "legs": list(track.legs),
         "stance": track.stance.astype(int).tolist() if stance else None,
         "schedule": track.schedule.astype(int).tolist() if stance else None,
-        "terms": {name: plain(track.weights[name] * values) for name, values in track.terms.items()},
-        "colors": of_terms(track.terms),
-        "totals": plain(track.rewards.cumsum()),
+        "terms": {name: to_json_values(track.weights[name] * values) for name, values in track.terms.items()},
+        "colors": term_colors(track.terms),
+        "totals": to_json_values(track.rewards.cumsum()),
     }
 
 
-def plain(value, digits: int | None = _DIGITS):
+def to_json_values(value, digits: int | None = _DIGITS):
     """Return a value of arrays, tuples and dictionaries as JSON has it.
 
     Args:
@@ -107,9 +107,9 @@ def plain(value, digits: int | None = _DIGITS):
     if hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, dict):
-        return {name: plain(item, digits) for name, item in value.items()}
+        return {name: to_json_values(item, digits) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item, digits) for item in value]
+        return [to_json_values(item, digits) for item in value]
     if isinstance(value, np.ndarray) and value.dtype.kind == "i":
         return value.tolist()
     if isinstance(value, np.ndarray):

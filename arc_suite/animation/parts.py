@@ -90,7 +90,7 @@ class Material(NamedTuple):
     roughness: float
 
 
-def parts(body: Body) -> tuple[list[Part], dict[str, Material]]:
+def describe_body(body: Body) -> tuple[list[Part], dict[str, Material]]:
     """Return the parts of a body in the order of its `part_names`, and the materials of what they show by name."""
     model = models.parsed(body, decorated=True).compile()
     ids = [model.body(name).id for name in body.part_names]
@@ -136,7 +136,7 @@ def _hull(model: mujoco.MjModel, index: int) -> Hull:
     return Hull(points, triangles.reshape(-1, 3))
 
 
-def simplified(hull: Hull, most: int) -> Hull:
+def simplify_hull(hull: Hull, most: int) -> Hull:
     """Return the hull of the outermost of a hull's points, at most a number of them."""
     if len(hull.points) <= most:
         return hull
@@ -162,7 +162,7 @@ def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:
         owners.setdefault(index, owners.get(int(model.body_parentid[index])))
     shapes: list[list[Shape]] = [[] for _ in body.part_names]
     bones = _bones(body, *(data.body("torso").xpos, data.body("torso").xquat))
-    places, turns = frames(bones)
+    places, turns = part_frames(bones)
     for geom in np.flatnonzero(model.geom_bodyid).tolist():  # those of the world are the ground's
         part, turn = owners[int(model.geom_bodyid[geom])], np.empty(4)
         mujoco.mju_mat2Quat(turn, (turns[part].T @ data.geom_xmat[geom].reshape(3, 3)).ravel())
@@ -184,7 +184,7 @@ def _bones(body: Body, place: np.ndarray, quaternion: np.ndarray) -> list[Part]:
     return found
 
 
-def frames(parts: Sequence[Part]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def part_frames(parts: Sequence[Part]) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Return the places (3,) and rotation matrices (3, 3) of parts in the standing pose."""
     places, turns = [], []
     for part in parts:

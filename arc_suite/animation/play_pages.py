@@ -46,9 +46,9 @@ def page(creatures: Sequence[Mapping[str, Any]]) -> str:
     return pages.template("play.html").substitute(
         title=html.escape(", ".join(creature["name"] for creature in creatures)),
         licenses=licenses(),
-        data=pages.packed(creatures),
-        engine=base64.b64encode(pages.built("mujoco.wasm.zlib")).decode(),
-        script=pages.built("play.js").decode(),
+        data=pages.pack(creatures),
+        engine=base64.b64encode(pages.read_built_file("mujoco.wasm.zlib")).decode(),
+        script=pages.read_built_file("play.js").decode(),
     )
 
 
@@ -78,7 +78,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         task, driver = commanded, _law(commanded, preset or "steered")
     else:
         task, driver = _graph(body, policy, commanded)
-    return pages.drawn(body) | {
+    return pages.body_drawing(body) | {
         "name": body.name,
         "timestep": commanded.scene.control_timestep / commanded.scene.substeps,
         "substeps": commanded.scene.substeps,
@@ -86,8 +86,8 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
             {"part": body.part_names.index(leg.full_name(leg.foot)), "radius": leg.foot.radius} for leg in body.legs
         ],
         "grounds": {name: _ground(setup, arena) for name, arena in GROUNDS.items()},
-        "task": pages.plain(_task(task, commanded), digits=None),
-        "policy": pages.plain(driver, digits=None),
+        "task": pages.to_json_values(_task(task, commanded), digits=None),
+        "policy": pages.to_json_values(driver, digits=None),
     }
 
 
@@ -100,7 +100,7 @@ def _ground(setup: Setup, arena: str) -> dict[str, Any]:
     data = mujoco.MjData(model)
     data.qpos[:] = task.scene.standing
     mujoco.mj_forward(model, data)
-    return {"xml": text, "start": pages.plain(task.cleared(task.read(data)), digits=None)}
+    return {"xml": text, "start": pages.to_json_values(task.cleared(task.read(data)), digits=None)}
 
 
 def _task(task: Task, commanded: Task) -> dict[str, Any]:
@@ -129,7 +129,7 @@ def _task(task: Task, commanded: Task) -> dict[str, Any]:
         "lowest": health.lowest * context.height,
         "lying": health.lying,
         "least_upright": health.least_upright,
-        "direction": _direction(task) if player_controls.directs(task) else None,
+        "direction": _direction(task) if player_controls.is_directed(task) else None,
     }
 
 
@@ -141,9 +141,9 @@ def _direction(task: Task) -> dict[str, Any]:
         "step": reference.step,
         "rate": (body.torso.standing_height / GRAVITY) ** 0.5 / reference.step,
         "names": posture.NAMES,
-        "room": player_controls.room(body),
+        "room": player_controls.pose_room(body),
         "frequency": task.parameters.gait_frequency,
-        "gaits": player_controls.named(task),
+        "gaits": player_controls.gaits_by_name(task),
     }
 
 

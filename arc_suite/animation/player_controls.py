@@ -10,26 +10,26 @@ from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 
-OWN = "own"  # the gait that a task prescribes
-TEMPI = (0.6, 1.4)  # of a gait, multiples of the prescribed frequency
+OWN_GAIT = "own"  # the gait that a task prescribes
+TEMPO_RANGE = (0.6, 1.4)  # of a gait, multiples of the prescribed frequency
 
 
-def directs(task: Task) -> bool:
+def is_directed(task: Task) -> bool:
     """Return whether pose and gait of a task are by command."""
     return task.commands.get("pose") == len(posture.NAMES) and "gait" in task.commands
 
 
-def room(body: Body) -> np.ndarray:
+def pose_room(body: Body) -> np.ndarray:
     """Return how far each number of a pose can go, (6, 2) in whole hundredths, with feet that may slide."""
     return np.trunc((100.0 * posture.room(body, planted=False)).round(4)) / 100.0
 
 
-def named(task: Task) -> dict[str, list[float]]:
+def gaits_by_name(task: Task) -> dict[str, list[float]]:
     """Return offsets, cycles, and duty factor of the gaits that fit a body, by name; first its own."""
     body, own = task.scene.body, task.parameters
     made = {name: gaits.gait(body, name) for name in gaits.fitting_gaits(body)}
     return {
-        OWN: [*np.divide(own.phase_offsets, clock.TWO_PI), own.duty_factor],
+        OWN_GAIT: [*np.divide(own.phase_offsets, clock.TWO_PI), own.duty_factor],
         **{name: [*gait.offsets, gait.duty_factor] for name, gait in made.items()},
     }
 
@@ -51,10 +51,10 @@ def commands(
         tempo: multiple of the prescribed frequency of a gait.
     """
     asked: dict[str, Any] = {"command": desired} if task.commands.get("command") == 3 else {}
-    if directs(task):
-        numbers = named(task)
-        own = [*numbers.get(gait, numbers[OWN]), tempo * task.parameters.gait_frequency] if gait else None
-        asked |= {"pose": None if pose is None else _within(room(task.scene.body), np.asarray(pose)), "gait": own}
+    if is_directed(task):
+        numbers = gaits_by_name(task)
+        own = [*numbers.get(gait, numbers[OWN_GAIT]), tempo * task.parameters.gait_frequency] if gait else None
+        asked |= {"pose": None if pose is None else _within(pose_room(task.scene.body), np.asarray(pose)), "gait": own}
     return asked
 
 

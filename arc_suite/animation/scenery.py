@@ -16,7 +16,7 @@ _MARGIN = 12.0  # standing heights of ground around the path
 _SAME = 1e-3  # of the standing height, by which an episode that is repeated may differ from the recorded one
 
 
-def scenery(track: Track) -> dict[str, Any]:
+def describe_scenery(track: Track) -> dict[str, Any]:
     """Return the scenery of an episode; lengths are in m and the world's axes.
 
     The episode is started again by its seed, which places the obstacles, and replayed by its actions for the debug
@@ -38,13 +38,13 @@ def scenery(track: Track) -> dict[str, Any]:
     environment.reset(track.seed)
     margin = _MARGIN * track.body.torso.standing_height
     low, high = track.positions[:, :2].min(axis=0) - margin, track.positions[:, :2].max(axis=0) + margin
-    found = ground(environment, low, high)
+    found = describe_ground(environment, low, high)
     styles, marks, failed = _marks(environment, track)
     environment.close()
     return found | {"styles": styles, "marks": marks, "failed": failed}
 
 
-def ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
+def describe_ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
     """Return the ground and the obstacles of an episode between two corners (2,), m: `level` to `solids` of `scenery`.
 
     Args:

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from arc_suite.animation.colors import BLUE, FAINT, INK, PALE, VERMILION, of_terms
+from arc_suite.animation.colors import BLUE, FAINT, INK, PALE, VERMILION, term_colors
 from arc_suite.style import metrics
 from arc_suite.style.tracks import Track
 
@@ -115,7 +115,7 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
             floor = np.zeros(len(track.times))
             for name in names:
                 ceiling = floor + _over_a_cycle(track, weighted[name])
-                look = {"facecolor": of_terms(weighted)[name], "linewidth": 0}
+                look = {"facecolor": term_colors(weighted)[name], "linewidth": 0}
                 label = f"{weighted[name].mean():+.3f}  {name.replace('_', ' ')}"
                 handles[name] = axis.fill_between(track.times, floor, ceiling, label=label, **look)
                 floor = ceiling
@@ -187,7 +187,7 @@ def path(tracks: Mapping[str, Track]) -> Figure:
 
 
 PICTURES = {function.__name__: function for function in (gait, reward, speed, path)}
-OF_GAIT = ("gait",)  # those that only tracks of a task with a gait have
+GAIT_PICTURES = ("gait",)  # those that only tracks of a task with a gait have
 
 
 def _rows(tracks, height, **shared):

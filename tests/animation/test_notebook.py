@@ -26,7 +26,7 @@ SETTINGS = {"random": 5, "time_limit": 0.5, "gait": "wave"}
 @pytest.fixture
 def bundle(monkeypatch):
     """Something in place of the viewer, with what a page must hide from the notebook around it."""
-    monkeypatch.setattr(pages, "viewer", lambda: 'window.viewer = "</iframe>" && 1;')
+    monkeypatch.setattr(pages, "viewer_script", lambda: 'window.viewer = "</iframe>" && 1;')
 
 
 def element(shown):

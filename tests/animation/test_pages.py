@@ -37,7 +37,7 @@ def tracks():
 @pytest.fixture
 def bundle(monkeypatch):
     """Something in place of the viewer, for tests of what is around it."""
-    monkeypatch.setattr(pages, "viewer", lambda: "window.viewer = null;")
+    monkeypatch.setattr(pages, "viewer_script", lambda: "window.viewer = null;")
 
 
 def qpos_of(track):
@@ -66,7 +66,7 @@ def scenery_of(task, settings, steps, preset="steered"):
     """The scenery of an episode, and the environment where it ended."""
     environment = arc_suite.load("tick", task, {"random": 0, **settings})
     track = record(environment, policy("cpg", "tick", preset), 3, steps)
-    return scenery.scenery(track), environment
+    return scenery.describe_scenery(track), environment
 
 
 def test_the_ground_of_an_uneven_arena_comes_along():
@@ -131,10 +131,10 @@ def test_marks_end_where_actions_do_not_repeat_the_episode():
 def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_package(tmp_path, monkeypatch):
     monkeypatch.setattr(pages.resources, "files", lambda package: tmp_path)
     with pytest.raises(ValueError, match="^no viewer for pages: `make web` builds it, which needs Node$"):
-        pages.viewer()
+        pages.viewer_script()
     monkeypatch.setattr(pages.versions, "clone_folder", lambda: None)
     with pytest.raises(ValueError, match="^no viewer for pages: install a wheel that `make dist` has built in a clone"):
-        pages.viewer()
+        pages.viewer_script()
 
 
 def test_programs_without_a_viewer_write_nothing(tmp_path):
@@ -155,7 +155,7 @@ def test_programs_write_pages(tmp_path):
     page = (tmp_path / "walk.html").read_text()
     assert len(page) < 1_300_000
     assert "Permission is hereby granted, free of charge" in page  # three.js's license
-    assert len(zlib.compress(pages.viewer().encode())) < 200_000
+    assert len(zlib.compress(pages.viewer_script().encode())) < 200_000
     compare = ("--robot=tick", "--compare=zero", "--episodes=1", "--page=both.html")
     programs.passed(programs.run("-m", "arc_suite", "style", *compare, cwd=tmp_path))
     labels = [walk["label"] for walk in data_of((tmp_path / "both.html").read_text())]
@@ -234,7 +234,7 @@ def test_goals_are_drawn(browser, tmp_path):
         tab.evaluate("viewer.pause(false)")
         for row in (0, 2):
             (marks,) = tab.evaluate(f"viewer.seek({track.times[row]}), viewer.marks()")
-            wanted = [ends[:3] for _, *ends in scenery.scenery(track)["marks"][row]]
+            wanted = [ends[:3] for _, *ends in scenery.describe_scenery(track)["marks"][row]]
             np.testing.assert_allclose(sorted(marks), sorted(wanted), atol=1e-5)
 
 
@@ -244,7 +244,7 @@ def test_a_limp_leg_is_dark(browser, tmp_path):
     track = paged(tmp_path / "limp.html", "limp", FAILS_FROM + 5)
     with tabs.opened(browser, tmp_path / "limp.html", "window.viewer", 800, 600) as (tab, _):
         tab.evaluate("viewer.pause(false)")
-        wanted = scenery.scenery(track)["failed"]
+        wanted = scenery.describe_scenery(track)["failed"]
         for row in (FAILS_FROM - 2, FAILS_FROM + 1, 0):
             (dark,) = tab.evaluate(f"viewer.seek({track.times[row]}), viewer.dark()")
             assert dark == wanted[row]

@@ -22,13 +22,13 @@ def bent(found, pose):
             half = 0.5 * pose[7 + part.joint]
             turn = rotations.product(turn, np.array((np.cos(half), *(np.sin(half) * part.axis))))
         turned.append(part._replace(place=place, quaternion=turn))
-    return parts.frames(turned)
+    return parts.part_frames(turned)
 
 
 @pytest.mark.parametrize("name", BODIES)
 def test_shapes_are_where_the_simulation_has_them(name):
     body = BODIES[name]()
-    found, materials = parts.parts(body)
+    found, materials = parts.describe_body(body)
     assert [part.name for part in found] == list(body.part_names)
     assert set(materials) == {"shell", "limb", "glow"}
     model = models.parsed(body, decorated=True).compile()
@@ -53,24 +53,24 @@ def test_shapes_are_where_the_simulation_has_them(name):
 
 def test_a_mesh_is_a_closed_hull_seen_from_outside():
     """What lies within the hull is left out."""
-    torso = parts.parts(imports.with_arm())[0][0]
+    torso = parts.describe_body(imports.with_arm())[0][0]
     (shape,) = [shape for shape in torso.shapes if shape.kind == "hull"]
     points, triangles = shape.hull
     assert len(points) == 6 and len(triangles) == 8
     corners = points[triangles] - points.mean(axis=0)
     assert (np.linalg.det(corners) > 0.0).all()
     assert np.linalg.det(corners).sum() / 6.0 == pytest.approx(0.2 * 0.1 * 0.1 / 2.0, rel=1e-5)
-    (drawn,) = [each for each in pages.drawn(imports.with_arm())["parts"][0]["shapes"] if each["kind"] == "hull"]
+    (drawn,) = [each for each in pages.body_drawing(imports.with_arm())["parts"][0]["shapes"] if each["kind"] == "hull"]
     assert drawn["hull"]["triangles"] == triangles.tolist()
 
 
 def test_a_simple_hull_is_nearly_as_large():
     sphere = np.random.default_rng(0).normal(size=(300, 3))
     points = sphere / np.linalg.norm(sphere, axis=-1, keepdims=True) * (0.3, 0.1, 0.05) + (1.0, 2.0, 3.0)
-    found = parts.simplified(parts.Hull(points, np.empty((0, 3), int)), 32)
+    found = parts.simplify_hull(parts.Hull(points, np.empty((0, 3), int)), 32)
     assert len(found.points) == 32 and len(found.triangles) == 60
     assert abs(points[:, None] - found.points).sum(axis=-1).min(axis=0).max() < 1e-6  # they are some of the points
     corners = found.points[found.triangles] - points.mean(axis=0)
     assert 0.7 < np.linalg.det(corners).sum() / 6.0 / (4.0 / 3.0 * np.pi * 0.3 * 0.1 * 0.05) < 1.0
     few = parts.Hull(points[:20], np.empty((0, 3), int))
-    assert parts.simplified(few, 32) is few
+    assert parts.simplify_hull(few, 32) is few

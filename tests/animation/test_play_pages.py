@@ -252,7 +252,7 @@ def test_bodies_walk_from_their_start(script, ground):
 
 def test_what_a_page_holds_of_a_body(monkeypatch):
     """Names of bodies come from files of others: they are text."""
-    monkeypatch.setattr(pages, "built", lambda name: f"built {name}".encode())
+    monkeypatch.setattr(pages, "read_built_file", lambda name: f"built {name}".encode())
     creature = play_pages.creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
     page = play_pages.page([creature])
     assert "<title>&lt;leaper&gt;</title>" in page
@@ -268,7 +268,7 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
 
 
 def test_a_page_begins_with_the_licenses(monkeypatch):
-    monkeypatch.setattr(pages, "built", lambda name: b"[" + name.encode() + b"]")
+    monkeypatch.setattr(pages, "read_built_file", lambda name: b"[" + name.encode() + b"]")
     page = play_pages.page([play_pages.creature(ROBOTS["leaper"])])
     assert page.index('<meta charset="utf-8">') < 200  # where browsers look for it
     order = ["Apache License", "Third-party licenses", "Qhull", "-->", "[play.js]", "<body", 'id="engine"']

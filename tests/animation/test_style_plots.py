@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 from synthetic import DT, synthetic
 
 import arc_suite
-from arc_suite.animation.style_plots import BLUE, OF_GAIT, PALE, PICTURES, VERMILION, gait
+from arc_suite.animation.style_plots import BLUE, GAIT_PICTURES, PALE, PICTURES, VERMILION, gait
 from arc_suite.cpg import Demonstrator
 from arc_suite.style import record
 from arc_suite.style.tracks import UNTIMED
@@ -32,7 +32,7 @@ def test_pictures_of_a_task_without_a_gait_or_a_way_to_go():
     steer, stay = (
         walk._replace(target_velocity=math.nan, **changes) for changes in ({}, UNTIMED | {"parameters": None})
     )
-    for track, names in ((walk, set(PICTURES)), (steer, set(PICTURES)), (stay, set(PICTURES) - set(OF_GAIT))):
+    for track, names in ((walk, set(PICTURES)), (steer, set(PICTURES)), (stay, set(PICTURES) - set(GAIT_PICTURES))):
         figures = {name: PICTURES[name]({"a": track}) for name in names}
         legend = {text.get_text() for text in figures["speed"].legends[0].get_texts()}
         told = {"target: 0.50 m/s"} if track is walk else set()

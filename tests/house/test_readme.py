@@ -69,7 +69,7 @@ def test_the_readme_is_short():
 @pytest.mark.parametrize("block", BLOCKS)
 def test_code(block, dataset, monkeypatch):
     monkeypatch.chdir(ROOT)  # pages name files of examples/
-    monkeypatch.setattr(pages, "viewer", lambda: "")  # which needs Node
+    monkeypatch.setattr(pages, "viewer_script", lambda: "")  # which needs Node
     exec(compile(block, "page.md", "exec"), {})
 
 

@@ -44,18 +44,20 @@ flags.DEFINE_integer(
     "triangles",
     None,
     "At most so many, for creatures far away: 3000 fits most bodies.",
-    *clip_files.BOUNDS["triangles"],
+    *clip_files.OPTION_BOUNDS["triangles"],
 )
 flags.DEFINE_bool("uv", False, "Faces have places in a texture, to be painted.")
 flags.DEFINE_bool("reduce", False, "Leave out keys that lines between others replace within 0.1 degrees.")
-flags.DEFINE_integer("size", clip_files.SIZE, "Of films: width and height, in pixels.", *clip_files.BOUNDS["size"])
+flags.DEFINE_integer(
+    "size", clip_files.DEFAULT_SIZE, "Of films: width and height, in pixels.", *clip_files.OPTION_BOUNDS["size"]
+)
 flags.DEFINE_bool("transparent", False, "Of films and sheets, .webp or .png: the body alone.")
 flags.DEFINE_bool("turntable", False, "Of films: the body turns once while its clip is repeated.")
 flags.DEFINE_integer(
     "directions",
-    clip_files.DIRECTIONS,
+    clip_files.DEFAULT_DIRECTIONS,
     "Of sheets: rows; the first goes to the right, the next to its left.",
-    *clip_files.BOUNDS["directions"],
+    *clip_files.OPTION_BOUNDS["directions"],
 )
 flags.DEFINE_string("output", None, "File to write, .glb, .mp4, .gif, .webp or .png. Required.", short_name="o")
 
@@ -74,7 +76,7 @@ def main() -> None:
         policy=policy_name(FLAGS.policy),
         **{name: FLAGS[name].value for name in ("preset", "fps", "straight", "plant")},
         progress=progress,
-        **{name: FLAGS[name].value for name in clip_files.OPTIONS if FLAGS[name].present},
+        **{name: FLAGS[name].value for name in clip_files.OPTION_EXTENSIONS if FLAGS[name].present},
     )
     if FLAGS.output.lower().endswith(".glb"):
         print_table(clips)

@@ -146,7 +146,7 @@ def main() -> None:
     course = Search(space, cells, trial, FLAGS.seed, stem, FLAGS.random)
     check(trial, course.middle())
     if FLAGS.pages:
-        pages.viewer()  # finds out at once whether there is one
+        pages.viewer_script()  # finds out at once whether there is one
     folder = files.folder(FLAGS.output)
     known = settled(trial, cells, around)
     with resumable(folder):

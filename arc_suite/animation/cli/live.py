@@ -8,7 +8,7 @@ import glfw
 import mujoco
 import numpy as np
 
-from arc_suite.animation.episodes import LONGEST, Episodes
+from arc_suite.animation.episodes import MAX_SECONDS_PER_PICTURE, Episodes
 from arc_suite.envs.window import Window
 from arc_suite.simulation.pictures import Decorated
 
@@ -55,7 +55,7 @@ class Live(Episodes):
 
     def text(self) -> str:
         """Return a line about the episode."""
-        told = [f"return {self.earned:.0f} in {self.steps * self.control_timestep:.1f} s"]
+        told = [f"return {self.episode_return:.0f} in {self.steps * self.control_timestep:.1f} s"]
         if self.desired is not None:
             told.append("forward {:+.2f}, turn {:+.2f}".format(*self.desired[[0, 2]]))
         return ", ".join(told + ["paused"] * self.paused)
@@ -77,7 +77,7 @@ def play(window: Window, live: Live, keys: queue.SimpleQueue) -> None:
             live.press(keys.get())
         now = time.monotonic()
         if not live.paused:
-            ahead += min(now - last, LONGEST)
+            ahead += min(now - last, MAX_SECONDS_PER_PICTURE)
         last = now
         while ahead >= live.control_timestep:
             live.pose(1.0)  # a pull ends where the body has come to, however seldom it is shown

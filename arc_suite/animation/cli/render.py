@@ -96,7 +96,7 @@ def main() -> None:
 
 def write_page(path: Path, environments: Mapping, policies: Mapping[str, Policy], steps: int) -> None:
     """Record an episode of each policy and write the page that plays them side by side."""
-    pages.viewer()  # finds out at once whether there is one
+    pages.viewer_script()  # finds out at once whether there is one
     tracks = {}
     for name, walker in progress(policies.items(), "walking", leave=False):
         tracks[name] = style.record(environments[name], walker, FLAGS.seed, steps)

@@ -110,11 +110,11 @@ def pictures() -> Callable[[pathlib.Path, dict], None]:
         ValueError: matplotlib is not installed.
     """
     with versions.require_extra("pictures need matplotlib", "animate"):
-        from arc_suite.animation.style_plots import OF_GAIT, PICTURES
+        from arc_suite.animation.style_plots import GAIT_PICTURES, PICTURES
 
     def draw(folder, tracks):
         gaits = all(track.parameters is not None for track in tracks.values())
-        for name in PICTURES if gaits else PICTURES.keys() - OF_GAIT:
+        for name in PICTURES if gaits else PICTURES.keys() - GAIT_PICTURES:
             with files.writing(files.folder(folder) / f"{name}.png") as file:
                 PICTURES[name](tracks).savefig(file)
 
@@ -134,7 +134,7 @@ def check_files(robots: list[str]) -> None:
     if FLAGS.save is not None and len(robots) > 1:
         raise ValueError(f"--save={FLAGS.save}: expected one robot, got {', '.join(robots)}")
     if FLAGS.page is not None:
-        pages.viewer()
+        pages.viewer_script()
     if FLAGS.output is not None:
         files.folder(FLAGS.output)
 

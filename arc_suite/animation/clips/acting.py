@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite.animation.clips import gestures
 from arc_suite.animation.clips.recordings import Recording
-from arc_suite.animation.clips.root_motion import Motion, Pose, advancing, standing
+from arc_suite.animation.clips.root_motion import Motion, Pose, advance_straight, stay_at_start
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.selection import presets_of
@@ -35,11 +35,11 @@ def rise(body: Body, rest: Pose) -> Motion:
     """
     sink, hold = _steps(body, _SINK), _steps(body, _HOLD)
     share = np.concatenate([_eased(sink), np.ones(hold), _eased(sink)[::-1], np.zeros(hold)])
-    joints = gestures.sunk(body, rest, share * _depth(body, rest))
+    joints = gestures.lower_torso(body, rest, share * _depth(body, rest))
     recording = _driven(body, rest, joints + _holding(body, rest) - rest.joints)
     first = sizing.simulation(body).substeps * (sink + hold)
     _check_lies(body, rest, recording.poses[first])
-    return standing(recording, first, len(recording.poses) - 1 - first)
+    return stay_at_start(recording, first, len(recording.poses) - 1 - first)
 
 
 def jump(body: Body, rest: Pose) -> Motion:
@@ -49,7 +49,7 @@ def jump(body: Body, rest: Pose) -> Motion:
         ValueError: its feet do not leave the ground, or it does not land on them.
     """
     recording = _leapt(body, rest, leaps.JUMPS, "clearance")
-    return standing(recording, 0, len(recording.poses) - 1)
+    return stay_at_start(recording, 0, len(recording.poses) - 1)
 
 
 def leap(body: Body, rest: Pose) -> Motion:
@@ -58,7 +58,7 @@ def leap(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: its feet do not leave the ground, or it does not land on them.
     """
-    return advancing(_leapt(body, rest, presets_of(body)["leaping"].choice, "distance"))
+    return advance_straight(_leapt(body, rest, presets_of(body)["leaping"].choice, "distance"))
 
 
 def _leapt(body: Body, rest: Pose, choice: tuple[leaps.Leap, ...], measure: str) -> Recording:
@@ -76,11 +76,11 @@ def death(body: Body, rest: Pose) -> Motion:
         ValueError: the legs hardly fold.
     """
     give, fall = _steps(body, _GIVE), _steps(body, _FALL)
-    joints = gestures.sunk(body, rest, np.append(_eased(give), 1.0) * _depth(body, rest))
+    joints = gestures.lower_torso(body, rest, np.append(_eased(give), 1.0) * _depth(body, rest))
     limp = np.full((fall, len(rest.joints)), np.nan)
     recording = _driven(body, rest, np.concatenate([joints, limp]), damping=_FLACCID)
     _check_lies(body, rest, recording.poses[-1])
-    return standing(recording, 0, len(recording.poses) - 1)
+    return stay_at_start(recording, 0, len(recording.poses) - 1)
 
 
 def _depth(body: Body, rest: Pose) -> float:

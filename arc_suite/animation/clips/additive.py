@@ -15,7 +15,7 @@ _DEEPEST = 0.03  # standing heights, that a sole may be below the ground
 _STARTS = 4  # phases of a loop in which a clip that is not in step with it begins
 
 
-def bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose) -> list[str]:
+def find_bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose) -> list[str]:
     """Return the names of the loops over which an additive clip brings no sole deeper than 0.03 standing heights.
 
     Args:
@@ -32,7 +32,7 @@ def bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[st
     ]
 
 
-def added(clip: Motion, idle: Pose, base: Motion, indices: np.ndarray) -> np.ndarray:
+def add_clip(clip: Motion, idle: Pose, base: Motion, indices: np.ndarray) -> np.ndarray:
     """Return the poses (frames, 7 + joints) of a clip added to samples (frames,) of another, over a root at 0."""
     turns = rotations.product(clip.quaternions, idle.quaternion * (1.0, -1.0, -1.0, -1.0))
     positions = base.positions[indices] + clip.positions - idle.position
@@ -48,5 +48,5 @@ def _depth(body: Body, name: str, base: str, motion: Mapping[str, Motion], idle:
         starts = np.round(frames * around / frames[-1]).astype(int)[None]
     else:
         starts = frames + np.arange(_STARTS)[:, None] * around // _STARTS
-    poses = np.concatenate([added(clip, idle, under, each % around) for each in starts])
+    poses = np.concatenate([add_clip(clip, idle, under, each % around) for each in starts])
     return -float(sole_heights(compiled(body), body, poses).min()) / body.torso.standing_height

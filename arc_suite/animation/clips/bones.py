@@ -7,13 +7,13 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.root_motion import Pose
-from arc_suite.animation.parts import Part, frames
+from arc_suite.animation.parts import Part, part_frames
 
 _ALONG = np.sqrt(0.5)  # cosine: a link that is nearer to its hinge than to the plane across lies along it
 _SAME = 1e-4  # of the longest link, by which places differ
 
 
-def limbs(parts: Sequence[Part]) -> list[Part]:
+def align_bones(parts: Sequence[Part]) -> list[Part]:
     """Return the same parts with other frames, in which a joint is one curve, and a bone points along its link.
 
     In glTF's axes, x is the hinge, and y points to the next part as far as it can across x. The bone of a link that
@@ -22,7 +22,7 @@ def limbs(parts: Sequence[Part]) -> list[Part]:
     Args:
         parts: of a body, those above first.
     """
-    places, turns = frames(parts)
+    places, turns = part_frames(parts)
     axes: list[np.ndarray] = []
     for index, part in enumerate(parts):
         if part.parent is None:
@@ -33,19 +33,19 @@ def limbs(parts: Sequence[Part]) -> list[Part]:
     return [_reframed(part, index, places, turns, axes) for index, part in enumerate(parts)]
 
 
-def posed(parts: Sequence[Part], pose: Pose) -> list[Part]:
+def pose_parts(parts: Sequence[Part], pose: Pose) -> list[Part]:
     """Return the parts as they stand in a pose."""
     found = []
     for part in parts:
         if part.parent is None:
             part = part._replace(place=pose.position, quaternion=pose.quaternion)
         elif part.joint is not None:
-            part = part._replace(quaternion=hinged(part, pose.joints[part.joint]))
+            part = part._replace(quaternion=hinge_orientations(part, pose.joints[part.joint]))
         found.append(part)
     return found
 
 
-def hinged(part: Part, angles) -> np.ndarray:
+def hinge_orientations(part: Part, angles) -> np.ndarray:
     """Return the orientations (..., 4) of a part on the one above, at angles (...) of its joint, rad."""
     half = 0.5 * np.asarray(angles)[..., None]
     return rotations.product(part.quaternion, np.concatenate([np.cos(half), np.sin(half) * part.axis], axis=-1))

@@ -111,15 +111,15 @@ CLIPS: dict[str, Kind] = {
     "idle_look": Acted(gestures.glance, (0, -1), loops=True),
     "idle_settle": Acted(gestures.settle, (0, -1), loops=True, steps=True),
     "crouch_walk": WalkLoop((0.6, 0.0, 0.0), crouch=0.3),
-    "lean_left": Acted(functools.partial(gestures.turned, number="roll", sign=-1.0), (0, -1)),
-    "lean_right": Acted(functools.partial(gestures.turned, number="roll", sign=1.0), (0, -1)),
-    "look_up": Acted(functools.partial(gestures.turned, number="pitch", sign=-1.0), (0, -1)),
-    "look_down": Acted(functools.partial(gestures.turned, number="pitch", sign=1.0), (0, -1)),
+    "lean_left": Acted(functools.partial(gestures.turn_torso, number="roll", sign=-1.0), (0, -1)),
+    "lean_right": Acted(functools.partial(gestures.turn_torso, number="roll", sign=1.0), (0, -1)),
+    "look_up": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=-1.0), (0, -1)),
+    "look_down": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=1.0), (0, -1)),
     "limp_walk": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "limp": Difference("limp_walk", "walk"),
     **{
         f"hit_{side}": Acted(functools.partial(gestures.hit, side=side), (0, -1), additive=True)
-        for side in gestures.HITS
+        for side in gestures.HIT_DIRECTIONS
     },
     "attack": Acted(gestures.strike, (0, -1), steps=True),
     "rise": Acted(acting.rise, (-1,)),
@@ -130,12 +130,16 @@ CLIPS: dict[str, Kind] = {
     "refined": Showcase("refined"),
 }
 DEFAULT = ("walk", "slow", "fast", "turn_left", "turn_right", "start", "stop", "idle")
-PACES = {"slow": (0.0, 1.0 / 1.1), "fast": (1.1, math.inf), "run": (1.4, math.inf)}  # speeds, of that of the walk
+SPEED_RATIOS = {
+    "slow": (0.0, 1.0 / 1.1),
+    "fast": (1.1, math.inf),
+    "run": (1.4, math.inf),
+}  # speeds, of that of the walk
 ALL = "all"  # in place of all names
 REST = "rest"  # the recording of a stop, of rest and of a start
 
 
-def names() -> list[str]:
+def clip_names() -> list[str]:
     """Return the names of all clips, those of other packages included."""
     return [*CLIPS, *registry.ADDITIONS["clip"]]
 
@@ -159,7 +163,7 @@ def is_additive(name: str) -> bool:
     return isinstance(clip, Difference) or (isinstance(clip, Acted) and clip.additive)
 
 
-def sources(names: Sequence[str]) -> dict[str, list[str]]:
+def recordings_needed(names: Sequence[str]) -> dict[str, list[str]]:
     """Return the names of the recordings that clips are made of, each with the clips that cannot be made without it."""
     found: dict[str, list[str]] = {}
     for name in names:
@@ -177,6 +181,6 @@ def sources(names: Sequence[str]) -> dict[str, list[str]]:
             found.setdefault(source, []).append(name)
         if isinstance(clip, Difference):
             found.setdefault(clip.base, [])
-        if isinstance(clip, Passage) or name in PACES:
+        if isinstance(clip, Passage) or name in SPEED_RATIOS:
             found.setdefault("walk", [])
     return found

@@ -21,16 +21,21 @@ from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
 
-FILMS = (".mp4", ".gif", ".webp")
-EXTENSIONS = (".glb", *FILMS, ".png")
+FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
+EXTENSIONS = (".glb", *FILM_EXTENSIONS, ".png")
 _CLEAR = (".webp", ".png")  # with an alpha
 # The extensions of each option that suits some files alone.
-OPTIONS = {
+OPTION_EXTENSIONS = {
     **dict.fromkeys(("rig", "root_motion", "triangles", "uv", "reduce"), (".glb",)),
-    **{"transparent": _CLEAR, "turntable": FILMS, "directions": (".png",), "size": (*FILMS, ".png")},
+    **{
+        "transparent": _CLEAR,
+        "turntable": FILM_EXTENSIONS,
+        "directions": (".png",),
+        "size": (*FILM_EXTENSIONS, ".png"),
+    },
 }
-BOUNDS = {"size": (16, MAX_HEIGHT), "directions": (1, 64), "triangles": (1, None)}
-SIZE, DIRECTIONS = 480, 8
+OPTION_BOUNDS = {"size": (16, MAX_HEIGHT), "directions": (1, 64), "triangles": (1, None)}
+DEFAULT_SIZE, DEFAULT_DIRECTIONS = 480, 8
 _WIDEST = 16384  # pixels of a sheet
 _CONVERTED = (".fbx", ".bvh", ".blend")  # what tools/to_fbx.py writes
 
@@ -77,7 +82,7 @@ def animate(
     with contextlib.ExitStack() as stack:
         temporary = stack.enter_context(files.writing(path))
         metrics = stack.enter_context(files.writing_json(metrics_file(path) if extension == ".glb" else None))
-        names = catalog.names() if names == [ALL] else names
+        names = catalog.clip_names() if names == [ALL] else names
         made = recorded(setup, names, policy, preset, fps, recording, straight, plant)
         if extension == ".glb":
             metrics |= _write_glb(temporary, setup.body, made, **options)
@@ -97,15 +102,15 @@ def _checked(path: Path, names: Sequence[str], fps: float, options: Mapping[str,
         raise ValueError(f"{path}: clips are written as .glb; tools/to_fbx.py makes {extension} of it, by Blender")
     extension = checks.extension(path, EXTENSIONS)
     for name in options:
-        fitting = OPTIONS[checks.name(name, OPTIONS, "option of clips")]
+        fitting = OPTION_EXTENSIONS[checks.name(name, OPTION_EXTENSIONS, "option of clips")]
         if extension not in fitting:
             raise ValueError(f"{name}: it is for {', '.join(fitting)}, not for {extension}")
     if extension != ".glb" and (len(names) != 1 or names == [ALL]):
         raise ValueError(f"clips: expected one for {extension}, got {', '.join(names)}")
     films.check_fps(fps, extension)
-    for name in BOUNDS.keys() & options.keys():
+    for name in OPTION_BOUNDS.keys() & options.keys():
         if options[name] is not None:
-            checks.integer(name, options[name], *BOUNDS[name])
+            checks.integer(name, options[name], *OPTION_BOUNDS[name])
     checks.name(options.get("rig", RIGS[0]), RIGS, "rig")
     checks.name(options.get("root_motion", "both"), ROOT_MOTIONS, "root_motion")
     return extension
@@ -133,17 +138,17 @@ def _write_pictures(
     body: Body,
     clip: Clip,
     progress: Callable,
-    size: int = SIZE,
+    size: int = DEFAULT_SIZE,
     transparent: bool = False,
     turntable: bool = False,
-    directions: int = DIRECTIONS,
+    directions: int = DEFAULT_DIRECTIONS,
 ) -> None:
     """Write a film or a sheet of a clip."""
     if extension != ".png":
-        frames = filming.loop(body, clip, size, transparent, turntable)
-        frames = progress(frames, "rendering", filming.length(clip, turntable), leave=False)
-        films.WRITERS[extension](path, frames, clip.motion.step)
+        frames = filming.film_pictures(body, clip, size, transparent, turntable)
+        frames = progress(frames, "rendering", filming.count_film_pictures(clip, turntable), leave=False)
+        films.WRITERS[extension](path, frames, clip.motion.time_step)
         return
     if (width := size * len(clip.times)) > _WIDEST:
         raise ValueError(f"the sheet is {width} pixels wide, more than {_WIDEST}; lower fps or size")
-    films.write_png(path, [filming.sheet(body, clip, size, directions, transparent)], 0.0)
+    films.write_png(path, [filming.sprite_sheet(body, clip, size, directions, transparent)], 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import checks, registry
 from arc_suite.animation.clips import additive, catalog, planting
-from arc_suite.animation.clips.drafts import Draft, drafts
+from arc_suite.animation.clips.drafts import Draft, make_drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.animation.clips.root_motion import Motion
@@ -46,7 +46,7 @@ class Clip(NamedTuple):
     @property
     def times(self) -> np.ndarray:
         """Times (frames,) of the frames, s."""
-        return self.motion.step * np.arange(len(self.motion.joints))
+        return self.motion.time_step * np.arange(len(self.motion.joints))
 
     @property
     def moves(self) -> bool:
@@ -96,7 +96,7 @@ def clips(
     """
     checks.number("fps", fps, 1.0, 1000.0)
     if not names:
-        raise ValueError(f"clips: expected one or more of {', '.join(catalog.names())}, got none")
+        raise ValueError(f"clips: expected one or more of {', '.join(catalog.clip_names())}, got none")
     for name in names:
         catalog.clip_of(name)
     names = [registry.bare_name(name) for name in names]
@@ -105,7 +105,7 @@ def clips(
     if policy == "cpg" and preset is None and "command" in setup.definition.blocks and not setup.kind.own_arena:
         preset = _PRESET
     recorder, left_out = Recorder(setup, policy, preset), {}
-    made = drafts(recorder, names, progress, left_out, straight, plant)
+    made = make_drafts(recorder, names, progress, left_out, straight, plant)
     told = {name: f"{setup.body.name}, clip {name}" for name in names if name in left_out}
     if len(told) == len(names):
         name = names[0]
@@ -116,7 +116,7 @@ def clips(
     motions = {name: clip.motion for name, clip in framed.items()}
     loops = {name: clip.loops for name, clip in framed.items()}
     for name in filter(catalog.is_additive, framed):
-        over = additive.bases(setup.body, name, motions, loops, made["idle"].start)
+        over = additive.find_bases(setup.body, name, motions, loops, made["idle"].start)
         framed[name] = framed[name]._replace(additive_over=tuple(over))
     return list(framed.values())
 
@@ -127,8 +127,11 @@ def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     lasts = draft.cycles * draft.cycle if draft.loops and draft.cycles else draft.motion.seconds
     seconds = max(1, round(lasts * _RATE)) / _RATE
     cycle = draft.cycle * seconds / lasts
-    draft = draft._replace(motion=draft.motion.stretched(seconds), cycle=cycle)
+    draft = draft._replace(motion=draft.motion.stretch_to(seconds), cycle=cycle)
     frames = max(1, round(seconds * fps))
-    motion, contacts = draft.motion.at(np.linspace(0.0, seconds, frames + 1)), tuple(draft.contacts(body)[1])
+    motion, contacts = (
+        draft.motion.sample_at(np.linspace(0.0, seconds, frames + 1)),
+        tuple(draft.find_foot_contacts(body)[1]),
+    )
     slip = planting.slip(body, motion) if draft.loops else None
     return Clip(name, motion, draft.loops, draft.cycles, contacts, body.foot_names, slip)

@@ -14,10 +14,10 @@ from arc_suite.animation.clips import bones, keys, shapes
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.gltf import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
 from arc_suite.animation.clips.meshes import body_meshes
-from arc_suite.animation.clips.metadata import ROOT_MOTIONS, animations, metadata
+from arc_suite.animation.clips.metadata import ROOT_MOTIONS, clip_metadata, name_animations
 from arc_suite.animation.clips.shapes import Mesh
-from arc_suite.animation.parts import Material, Part, frames
-from arc_suite.animation.parts import parts as described
+from arc_suite.animation.parts import Material, Part, part_frames
+from arc_suite.animation.parts import describe_body as described
 from arc_suite.robots.spec import Body
 
 RIGS = ("skin", "nodes")
@@ -40,8 +40,8 @@ def glb(
 
     Its scene has the node `root`, on the ground below the torso, with the parts of the body under it as in the body
     tree; as a skin, also a node with the mesh, whose skeleton they are. A bone of the skin lies in its limb; see
-    `bones.limbs`. The body is bound in the first pose of idle. An animation is called after its clip, with `_in_place`
-    where the root stays although the clip moves, and `_loop` at the end where it loops; its extras are those of the
+    `bones.align_bones`. The body is bound in the first pose of idle. An animation is called after its clip, with
+    `_in_place` where the root stays although the clip moves, and `_loop` at the end where it loops; its extras are those of the
     `sidecar`.
 
     Args:
@@ -60,7 +60,7 @@ def glb(
     """
     document, (parts, looks), height = Document(generator), described(body), body.torso.standing_height
     if rig == "skin":
-        parts = bones.limbs(parts)
+        parts = bones.align_bones(parts)
     meshes = body_meshes(parts, height, triangles, uv)
     bound = _bound(parts, meshes, clips)
     root, nodes = _hierarchy(document, bound)
@@ -105,10 +105,10 @@ def _bound(parts: list[Part], meshes: list[dict[str, Mesh]], clips: Sequence[Cli
     """Return the parts in the first pose of idle; without that clip, standing on the ground."""
     for clip in clips:
         if clip.name == "idle":
-            return bones.posed(parts, clip.motion.pose(0))
+            return bones.pose_parts(parts, clip.motion.pose(0))
     low = min(
         (place + mesh.points @ turn.T)[:, 2].min()
-        for own, place, turn in zip(meshes, *frames(parts), strict=True)
+        for own, place, turn in zip(meshes, *part_frames(parts), strict=True)
         for mesh in own.values()
     )
     return [part if part.parent is not None else part._replace(place=part.place - (0.0, 0.0, low)) for part in parts]
@@ -138,12 +138,12 @@ def _node(part: Part) -> dict:
 
 def _skinned(document: Document, name: str, parts, meshes, joints: list[int], materials) -> int:
     """Add the mesh with its skin, and return its node."""
-    places, turns = frames(parts)
+    places, turns = part_frames(parts)
     places, turns = [np.zeros(3), *places], [np.eye(3), *turns]  # of the root first
     by_material: dict[str, list[tuple[int, Mesh]]] = {}
     for joint, own in enumerate(meshes, start=1):
         for material, mesh in own.items():
-            by_material.setdefault(material, []).append((joint, mesh.moved(places[joint], turns[joint])))
+            by_material.setdefault(material, []).append((joint, mesh.transform(places[joint], turns[joint])))
     kind = np.uint8 if len(joints) <= 256 else np.dtype("<u2")
     primitives = []
     for material, several in by_material.items():
@@ -152,7 +152,7 @@ def _skinned(document: Document, name: str, parts, meshes, joints: list[int], ma
         bound[:, 0] = np.repeat([joint for joint, _ in several], counts)
         weights = np.zeros((sum(counts), 4), np.uint8)
         weights[:, 0] = 255
-        primitive = _primitive(document, shapes.joined([mesh for _, mesh in several]), materials[material])
+        primitive = _primitive(document, shapes.join_meshes([mesh for _, mesh in several]), materials[material])
         primitive["attributes"] |= {
             "JOINTS_0": document.accessor(bound, ARRAY_BUFFER),
             "WEIGHTS_0": document.accessor(weights, ARRAY_BUFFER, normalized=True),
@@ -208,7 +208,7 @@ def _animations(
     def track(node: int, target: str, values: np.ndarray, at: np.ndarray | None = None):
         """Add a track, and return its node and target, and the accessors of its times and values."""
         if at is None:
-            at = np.arange(len(values)) if bounds is None else keys.needed(values, bounds[target])
+            at = np.arange(len(values)) if bounds is None else keys.select_keys(values, bounds[target])
             values = values[at]
         if (key := at.tobytes()) not in inputs:  # tracks with the same keys share them
             inputs[key] = document.accessor(_float32(clip.times[at]), bounds=True)
@@ -221,9 +221,9 @@ def _animations(
             shared.append(track(node, "translation", motion.positions))
             shared.append(track(node, "rotation", motion.quaternions))
         elif part.joint is not None:
-            shared.append(track(node, "rotation", bones.hinged(part, motion.joints[:, part.joint])))
+            shared.append(track(node, "rotation", bones.hinge_orientations(part, motion.joints[:, part.joint])))
     ends = np.array((0, len(motion.joints) - 1))
-    for name, moves in animations(clip, moving).items():
+    for name, moves in name_animations(clip, moving).items():
         # A root that stays has keys too: in players it would otherwise be wherever the clip before left it.
         path, at = (motion.root, None) if moves else (np.zeros((2, 3)), ends)
         ground = np.concatenate([path[:, :2], np.zeros((len(path), 1))], axis=-1)
@@ -232,7 +232,7 @@ def _animations(
         samplers = [{"input": times, "output": output} for _, _, times, output in channels]
         targets = [{"node": node, "path": target} for node, target, _, _ in channels]
         own = {"channels": [{"sampler": index, "target": target} for index, target in enumerate(targets)]}
-        document.add("animations", own | {"name": name, "samplers": samplers, "extras": metadata(clip)})
+        document.add("animations", own | {"name": name, "samplers": samplers, "extras": clip_metadata(clip)})
 
 
 def _turn(quaternions: np.ndarray) -> np.ndarray:

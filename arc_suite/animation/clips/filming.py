@@ -25,7 +25,7 @@ _SOLID = pictures.QUALITIES["still"]  # of many pixels, body or not, whose mean 
 _GROUNDED = pictures.QUALITIES["film"]
 
 
-def loop(
+def film_pictures(
     body: Body, clip: Clip, size: int, transparent: bool = False, turntable: bool = False, heading: float = 0.0
 ) -> Iterator[np.ndarray]:
     """Yield the pictures of a film that plays forever, one for each frame of the clip.
@@ -44,18 +44,18 @@ def loop(
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
-    total = length(clip, turntable)
+    total = count_film_pictures(clip, turntable)
     headings = heading + np.linspace(0.0, 2.0 * np.pi * turntable, total, endpoint=False)
     yield from _views(body, clip, np.arange(total) % _count(clip), headings, size, transparent)
 
 
-def length(clip: Clip, turntable: bool = False) -> int:
-    """Return the number of pictures of a film; see `loop`."""
+def count_film_pictures(clip: Clip, turntable: bool = False) -> int:
+    """Return the number of pictures of a film; see `film_pictures`."""
     rounds = max(1, round(_AROUND / clip.motion.seconds)) if turntable else 1
     return rounds * _count(clip)
 
 
-def sheet(body: Body, clip: Clip, size: int, directions: int, transparent: bool = False) -> np.ndarray:
+def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent: bool = False) -> np.ndarray:
     """Return one picture with a row for each direction and a column for each frame of the clip.
 
     The first row goes to the right in the picture; each next one is turned further to the left. Other arguments are

@@ -16,7 +16,7 @@ TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
 # lower one.
 _RISES, _LASTS = 0.5, 0.2
 _BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
-LEAST_RISE = 0.005  # of the standing height: a foot that rises less never leaves the ground
+MIN_RISE = 0.005  # of the standing height: a foot that rises less never leaves the ground
 _NEAR = 0.005  # of the standing height: a sole that is lower touches
 
 
@@ -56,7 +56,7 @@ def sole_heights(model: mujoco.MjModel, body: Body, poses: np.ndarray) -> np.nda
     return heights - [leg.foot.radius for leg in body.legs]
 
 
-def swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.ndarray:
+def find_swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.ndarray:
     """Return when a foot swings, (samples,) booleans.
 
     Args:
@@ -79,7 +79,7 @@ def swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.
     return np.roll(up, begin)
 
 
-def touching(heights: np.ndarray, up: np.ndarray, near: float, loops: bool) -> np.ndarray:
+def find_touching(heights: np.ndarray, up: np.ndarray, near: float, loops: bool) -> np.ndarray:
     """Return when a foot touches the ground, (samples,) booleans: while it is near, once in each stance.
 
     Args:
@@ -108,8 +108,8 @@ def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
 
 
-def foot_contacts(
-    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, least: float = LEAST_RISE
+def find_foot_contacts(
+    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, least: float = MIN_RISE
 ) -> tuple[list[FootContact], np.ndarray]:
     """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
 
@@ -125,12 +125,12 @@ def foot_contacts(
     found, swing = [], np.zeros(heights.shape, bool)
 
     for leg, foot in enumerate(body.foot_names):
-        up = swings(heights[:end, leg], least * height, _BOUNCE * cycle / motion.step, loops)
-        down = touching(heights[:end, leg], up, _NEAR * height, loops)
+        up = find_swings(heights[:end, leg], least * height, _BOUNCE * cycle / motion.time_step, loops)
+        down = find_touching(heights[:end, leg], up, _NEAR * height, loops)
         before = np.roll(down, 1) if loops else np.concatenate([down[:1], down[:-1]])
         for event, at in ((LIFT_OFF, ~down & before), (TOUCH_DOWN, down & ~before)):
             samples = np.flatnonzero(at).tolist()
-            found += [FootContact(foot, event, sample, sample * motion.step) for sample in samples]
+            found += [FootContact(foot, event, sample, sample * motion.time_step) for sample in samples]
         swing[:end, leg] = up
     swing[end:] = swing[:1]
     return sorted(found, key=lambda contact: (contact.sample, contact.foot, contact.event)), ~swing

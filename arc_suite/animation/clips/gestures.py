@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.root_motion import Motion, Pose, fading
+from arc_suite.animation.clips.root_motion import Motion, Pose, fade_out
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
@@ -47,7 +47,12 @@ _SHIFT = ((0.5, 0.0), (2.8, 0.06), (6.6, 0.06), (9.0, -0.02), (11.5, 0.0))
 
 _BLOW, _PEAK, _REBOUND = 7.0, 0.9, 0.3  # times of the whole and of the peak; share of the sway back
 _PITCH, _PUSH, _GIVE = 0.2, 0.07, 0.1  # rad, and how far a blow moves a torso along its way, and down
-HITS = {"front": (-1.0, 0.0), "back": (1.0, 0.0), "left": (0.0, -1.0), "right": (0.0, 1.0)}  # ways of the torso
+HIT_DIRECTIONS = {
+    "front": (-1.0, 0.0),
+    "back": (1.0, 0.0),
+    "left": (0.0, -1.0),
+    "right": (0.0, 1.0),
+}  # ways of the torso
 
 _STRIKE = 9.0
 _RAISED = {  # of the torso, and of the foot ahead and upwards
@@ -59,7 +64,7 @@ _AHEAD = ((0.8, 0.0), (2.4, 0.1), (3.0, 0.12), (3.8, 0.4), (4.8, 0.4), (6.6, 0.0
 _UP = ((0.8, 0.0), (2.4, 0.7), (3.0, 0.72), (3.8, 0.0), (4.8, 0.0), (5.7, 0.15), (6.6, 0.0))
 
 
-def held(pose: Pose, samples: int, step: float) -> Motion:
+def hold_pose(pose: Pose, samples: int, step: float) -> Motion:
     """Return a pose held for a number of samples after the first one, with a root that stays."""
     positions, quaternions, joints = (np.tile(values, (samples + 1, 1)) for values in pose)
     return Motion(step, np.zeros((samples + 1, 3)), positions, quaternions, joints, np.zeros(3))
@@ -93,9 +98,9 @@ def idle(body: Body, rest: Pose) -> Motion:
     poses = _poses(times, {}) + _breath(times)
     poses[:, posture.NAMES.index("left")] = _SWAY * sway
     poses[:, posture.NAMES.index("roll")] = -_ROLL * sway
-    _, astray = over_feet(body, rest, poses)
+    _, astray = keep_feet_in_place(body, rest, poses)
     poses *= min(1.0, _ASTRAY * body.torso.standing_height / max(astray.max(), 1e-9))
-    return _looped(_posed(body, rest, poses, over_feet(body, rest, poses)[0]))
+    return _looped(_posed(body, rest, poses, keep_feet_in_place(body, rest, poses)[0]))
 
 
 def glance(body: Body, rest: Pose) -> Motion:
@@ -139,14 +144,14 @@ def hit(body: Body, rest: Pose, side: str) -> Motion:
         ValueError: the legs leave no room for it.
     """
     times = _times(body, _BLOW)
-    forward, left = HITS[side]
+    forward, left = HIT_DIRECTIONS[side]
 
     def impulse(start):
         share = (times - start).clip(0.0) / _PEAK
         return share**2 * np.exp(2.0 - 2.0 * share)
 
-    sway = (impulse(0.0) - _REBOUND * impulse(2.0 * _PEAK)) * fading(times / _BLOW * 2.0 - 1.0)
-    give = (impulse(0.2 * _PEAK) + 0.3 * impulse(_PEAK)) * fading(times / _BLOW * 2.0 - 1.0)
+    sway = (impulse(0.0) - _REBOUND * impulse(2.0 * _PEAK)) * fade_out(times / _BLOW * 2.0 - 1.0)
+    give = (impulse(0.2 * _PEAK) + 0.3 * impulse(_PEAK)) * fade_out(times / _BLOW * 2.0 - 1.0)
     poses = sway[:, None] * np.array((0.0, _PUSH * forward, _PUSH * left, -_PITCH * left, _PITCH * forward, 0.0))
     poses[:, 0] = -_GIVE * give
     return _followed(body, rest, poses, "sway")
@@ -165,7 +170,7 @@ def strike(body: Body, rest: Pose) -> Motion:
     return _followed(body, rest, _poses(times, _RAISED), "strike", lifts)
 
 
-def turned(body: Body, rest: Pose, number: str, sign: float) -> Motion:
+def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> Motion:
     """Return how a torso turns over its feet, stays so, and turns back.
 
     Args:
@@ -184,10 +189,10 @@ def turned(body: Body, rest: Pose, number: str, sign: float) -> Motion:
     end = _EASE + _SHOWN
     times = _times(body, end + _EASE)
     poses = _poses(times, {number: ((0.0, 0.0), (_EASE, size), (end, size), (end + _EASE, 0.0))})
-    return _posed(body, rest, poses, over_feet(body, rest, poses)[0])
+    return _posed(body, rest, poses, keep_feet_in_place(body, rest, poses)[0])
 
 
-def sunk(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
+def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
     """Return joint angles (samples, joints), rad, that keep soles in place while the torso sinks.
 
     Args:
@@ -195,10 +200,10 @@ def sunk(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
         rest: pose from which it sinks.
         depths: (samples,) m.
     """
-    return over_feet(body, rest, -depths[:, None] / body.torso.standing_height * np.eye(6)[0])[0]
+    return keep_feet_in_place(body, rest, -depths[:, None] / body.torso.standing_height * np.eye(6)[0])[0]
 
 
-def over_feet(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None):
+def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None):
     """Return joint angles (samples, joints), rad, that hold feet under a posed torso, and how far they miss, m.
 
     Args:
@@ -232,7 +237,7 @@ def _followed(body: Body, rest: Pose, poses: np.ndarray, act: str, lifts: np.nda
     fastest = _FASTEST * math.sqrt(sizing.GRAVITY / height) * _step(body)
     for share, deeper in itertools.product(_SHARES, _DEEPER):
         tried = share * poses * (deeper, 1.0, 1.0, 1.0, 1.0, 1.0)
-        joints, missed = over_feet(body, rest, tried, share * lifts)
+        joints, missed = keep_feet_in_place(body, rest, tried, share * lifts)
         joints = _smooth(joints)
         if (missed <= bounds).all() and abs(np.diff(joints, axis=0)).max() <= fastest:
             return _posed(body, rest, tried, joints)
@@ -246,7 +251,7 @@ def _posed(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> Mot
     for axis in range(3):
         turn = np.concatenate([np.cos(half[:, [axis]]), np.sin(half[:, [axis]]) * np.eye(3)[axis]], axis=-1)
         quaternions = rotations.product(turn, quaternions)
-    motion = held(rest, len(poses) - 1, _step(body))
+    motion = hold_pose(rest, len(poses) - 1, _step(body))
     return motion._replace(positions=rest.position + forward_left_up, quaternions=quaternions, joints=joints)
 
 
@@ -258,7 +263,7 @@ def _smooth(joints: np.ndarray) -> np.ndarray:
 
 
 def _looped(motion: Motion) -> Motion:
-    return motion.mapped(lambda values: np.concatenate([values[:-1], values[:1]]))
+    return motion.map_arrays(lambda values: np.concatenate([values[:-1], values[:1]]))
 
 
 def _legs(body: Body) -> Legs:
@@ -301,4 +306,4 @@ def _track(times: np.ndarray, keys: tuple) -> np.ndarray:
     before = np.searchsorted(at[1:-1], times, side="right") if len(at) > 2 else np.zeros(len(times), int)
     after = np.minimum(before + 1, len(at) - 1)
     share = (times - at[before]) / np.maximum(at[after] - at[before], 1e-9)
-    return values[after] + (values[before] - values[after]) * fading(share)
+    return values[after] + (values[before] - values[after]) * fade_out(share)

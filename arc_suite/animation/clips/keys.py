@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def needed(values: np.ndarray, bound: float) -> np.ndarray:
+def select_keys(values: np.ndarray, bound: float) -> np.ndarray:
     """Return the indices of keys with which a track stays within a bound of all its samples, both ends included.
 
     Intervals are halved at their worst sample until they are within the bound (Ramer, "An iterative procedure for the

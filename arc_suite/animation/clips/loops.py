@@ -12,10 +12,18 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
-from arc_suite.animation.clips.root_motion import Motion, after, along, logarithm, on_root, places, relative
+from arc_suite.animation.clips.root_motion import (
+    Motion,
+    compose,
+    ground_poses,
+    integrate_twist,
+    put_on_root,
+    relative_pose,
+    twist_to,
+)
 
-CLOSED = np.radians(0.5)  # a seam up to which loops are equally good
-OPEN = np.radians(2.0)  # a seam from which a loop is refused
+GOOD_SEAM = np.radians(0.5)  # a seam up to which loops are equally good
+MAX_SEAM = np.radians(2.0)  # a seam from which a loop is refused
 
 _RETURNED = 0.3  # of the largest distance between two poses: a cycle later the distance is less
 _SPEED = 10.0  # how much more a loop's speed matters than its drift and turn, in the choice among loops
@@ -38,7 +46,7 @@ def period(recording: Recording) -> float | None:
     )
     middle = distances[1:-1]
     returns = (middle <= distances[:-2]) & (middle < distances[2:]) & (middle < _RETURNED * distances.max())
-    return float(recording.step * (1 + returns.argmax())) if returns.any() else None
+    return float(recording.time_step * (1 + returns.argmax())) if returns.any() else None
 
 
 class Closing(NamedTuple):
@@ -53,7 +61,7 @@ class Closing(NamedTuple):
     samples: int
 
 
-def closings(recording: Recording, cycle: float, most: int) -> Mapping[int, Closing]:
+def find_closings(recording: Recording, cycle: float, most: int) -> Mapping[int, Closing]:
     """Return how a recording closes, by the number of cycles.
 
     Args:
@@ -63,7 +71,7 @@ def closings(recording: Recording, cycle: float, most: int) -> Mapping[int, Clos
     """
     found, substeps = {}, recording.substeps
     for cycles in range(1, most + 1):
-        length = cycles * cycle / recording.step / substeps
+        length = cycles * cycle / recording.time_step / substeps
         # A cycle of a whole number of control steps is one up to rounding.
         lengths = {substeps * int(np.floor(length + 1e-6)), substeps * int(np.ceil(length - 1e-6))}
         loops = [
@@ -76,7 +84,7 @@ def closings(recording: Recording, cycle: float, most: int) -> Mapping[int, Clos
     return found
 
 
-def best(closings: Mapping[str, Mapping[int, Closing]], bound: float) -> int:
+def choose_cycles(closings: Mapping[str, Mapping[int, Closing]], bound: float) -> int:
     """Return the least number of cycles with which the fewest of several recordings are refused or over a bound.
 
     Args:
@@ -92,12 +100,12 @@ def best(closings: Mapping[str, Mapping[int, Closing]], bound: float) -> int:
 
     def over(cycles):
         seams = [each[cycles].seam for each in closings.values()]
-        return sum(seam > OPEN for seam in seams), sum(seam > bound for seam in seams)
+        return sum(seam > MAX_SEAM for seam in seams), sum(seam > bound for seam in seams)
 
     return min(common, key=over)
 
 
-def usual(recording: Recording, samples: int) -> int:
+def choose_start(recording: Recording, samples: int) -> int:
     """Return the sample with which the most typical loop begins, among those that close, or nearly so if none does.
 
     Loops are compared by the displacement of the root, as the torso's depends on where in its sway the loop begins.
@@ -106,11 +114,11 @@ def usual(recording: Recording, samples: int) -> int:
         recording: to choose from.
         samples: of the loop.
     """
-    place = places(recording.poses)
-    mean = logarithm(relative(place[:-samples], place[samples:]))
+    place = ground_poses(recording.poses)
+    mean = twist_to(relative_pose(place[:-samples], place[samples:]))
     speed, (_, left, turning) = np.hypot(mean[:, 0], mean[:, 1]).mean(), mean.mean(axis=0)
     seams = _seams(recording.poses[:-samples], recording.poses[samples:])
-    bound = max(CLOSED, min(_NEAREST * seams.min(), OPEN), seams.min())
+    bound = max(GOOD_SEAM, min(_NEAREST * seams.min(), MAX_SEAM), seams.min())
     firsts = np.flatnonzero(seams <= bound)
     firsts = firsts[:: -(-len(firsts) // _TRIED)]
     displacements = np.stack([_rooted(place[first : first + samples + 1])[0] for first in firsts])
@@ -119,7 +127,7 @@ def usual(recording: Recording, samples: int) -> int:
     return int(firsts[(_SPEED * wrong + astray).argmin()])
 
 
-def loop(recording: Recording, first: int, samples: int) -> Motion:
+def cut_loop(recording: Recording, first: int, samples: int) -> Motion:
     """Return a part of a recording as a loop: a root of constant velocity, and a pose that returns exactly.
 
     Args:
@@ -128,22 +136,22 @@ def loop(recording: Recording, first: int, samples: int) -> Motion:
         samples: of it; the sample after the last is the first one again.
     """
     poses = recording.poses[first : first + samples + 1]
-    displacement, local = _rooted(places(poses))
-    root = along(displacement, np.linspace(0.0, 1.0, len(poses)))
-    motion = closed(on_root(recording.step, poses, root, local))
+    displacement, local = _rooted(ground_poses(poses))
+    root = integrate_twist(displacement, np.linspace(0.0, 1.0, len(poses)))
+    motion = close_loop(put_on_root(recording.time_step, poses, root, local))
     return motion._replace(twist=displacement / motion.seconds, seam=float(_seams(poses[:1], poses[-1:])[0]))
 
 
-def closed(motion: Motion) -> Motion:
+def close_loop(motion: Motion) -> Motion:
     """Close a loop: spread the difference of its last pose and its first over it, half to either end."""
     difference = motion.pose(0).relative(motion.pose(-1))
-    motion = motion.moved(difference, np.linspace(-0.5, 0.5, len(motion.joints)))
+    motion = motion.add_difference(difference, np.linspace(-0.5, 0.5, len(motion.joints)))
     for values in (motion.joints, motion.positions, motion.quaternions):
         values[-1] = values[0]  # up to rounding they are equal already
     return motion
 
 
-def straightened(motion: Motion, course: float) -> Motion:
+def straighten_loop(motion: Motion, course: float) -> Motion:
     """Return a loop whose root goes in a constant direction, without turning, at the same speed.
 
     Args:
@@ -153,10 +161,11 @@ def straightened(motion: Motion, course: float) -> Motion:
     forward, left, _ = motion.twist
     speed, astray = np.hypot(forward, left), np.arctan2(left, forward) - course
     twist = np.array((speed * np.cos(course), speed * np.sin(course), 0.0))
-    positions = [rotations.to_heading_frame(motion.positions[:, :2], astray), motion.positions[:, 2:]]
     return motion._replace(
-        root=along(twist, motion.step * np.arange(len(motion.joints))),
-        positions=np.concatenate(positions, axis=-1),
+        root=integrate_twist(twist, motion.time_step * np.arange(len(motion.joints))),
+        positions=np.concatenate(
+            [rotations.to_heading_frame(motion.positions[:, :2], astray), motion.positions[:, 2:]], axis=-1
+        ),
         quaternions=rotations.turn_about_z(motion.quaternions, -astray),
         twist=twist,
     )
@@ -178,7 +187,7 @@ def _rooted(place) -> tuple[np.ndarray, np.ndarray]:
     Args:
         place: (samples, 3) of the torso in the world, both ends included.
     """
-    place = relative(place[0], place)
-    local = relative(along(logarithm(place[-1]), np.linspace(0.0, 1.0, len(place))), place)
+    place = relative_pose(place[0], place)
+    local = relative_pose(integrate_twist(twist_to(place[-1]), np.linspace(0.0, 1.0, len(place))), place)
     center = local[:-1].mean(axis=0)
-    return logarithm(relative(center, after(place[-1], center))), relative(center, local)
+    return twist_to(relative_pose(center, compose(place[-1], center))), relative_pose(center, local)

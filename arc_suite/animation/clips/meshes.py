@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from arc_suite import checks, rotations
 from arc_suite.animation.clips import shapes, unwrapping
 from arc_suite.animation.clips.shapes import Mesh
-from arc_suite.animation.parts import Part, Shape, simplified
+from arc_suite.animation.parts import Part, Shape, simplify_hull
 
 _TOLERANCE = 0.004  # of the standing height, by which a face may cut into a round shape
 _COARSER = 1.1  # ratio of two tolerances that are tried
@@ -38,7 +38,7 @@ def body_meshes(
     if triangles is not None and _count(drawn) > checks.integer("triangles", triangles, 1):
         drawn = _coarse(parts, height, triangles)
     if uv:
-        places = iter(unwrapping.unwrapped([mesh for own in drawn for _, mesh in own]))
+        places = iter(unwrapping.unwrap([mesh for own in drawn for _, mesh in own]))
         drawn = [[(shape, next(places)) for shape, _ in own] for own in drawn]
     return [
         _by_material(part._replace(shapes=tuple(shape for shape, _ in own)), [mesh for _, mesh in own])
@@ -68,16 +68,18 @@ def _count(drawn: Sequence[Sequence[tuple[Shape, Mesh]]]) -> int:
 
 
 def _simple(shape: Shape) -> Shape:
-    return shape._replace(hull=simplified(shape.hull, _HULL)) if shape.hull else shape
+    return shape._replace(hull=simplify_hull(shape.hull, _HULL)) if shape.hull else shape
 
 
-def _mesh(shape: Shape, tolerance: float, fewest: int = shapes.FEWEST) -> Mesh:
+def _mesh(shape: Shape, tolerance: float, fewest: int = shapes.MIN_SEGMENTS) -> Mesh:
     """Return a shape in its own frame."""
-    return shapes.polyhedron(*shape.hull) if shape.hull else shapes.shape(shape.kind, shape.size, tolerance, fewest)
+    return (
+        shapes.polyhedron(*shape.hull) if shape.hull else shapes.shape_mesh(shape.kind, shape.size, tolerance, fewest)
+    )
 
 
 def _by_material(part: Part, meshes: Sequence[Mesh]) -> dict[str, Mesh]:
     found: dict[str, list[Mesh]] = {}
     for shape, mesh in zip(part.shapes, meshes, strict=True):
-        found.setdefault(shape.material, []).append(mesh.moved(shape.place, rotations.matrix(shape.quaternion)))
-    return {material: shapes.joined(several) for material, several in found.items()}
+        found.setdefault(shape.material, []).append(mesh.transform(shape.place, rotations.matrix(shape.quaternion)))
+    return {material: shapes.join_meshes(several) for material, several in found.items()}

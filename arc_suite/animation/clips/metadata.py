@@ -28,12 +28,12 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
         "body": body.name,
         "units": {"length": "m", "time": "s", "angle": "rad"},
         "axes": {"up": "y", "forward": "z", "left": "x"},
-        "clips": {name: metadata(clip) for clip in clips for name in animations(clip, moving)},
+        "clips": {name: clip_metadata(clip) for clip in clips for name in name_animations(clip, moving)},
         "blend": _spaces(clips, moving),
     }
 
 
-def metadata(clip: Clip) -> dict[str, Any]:
+def clip_metadata(clip: Clip) -> dict[str, Any]:
     """Return the metadata of a clip.
 
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
@@ -60,7 +60,7 @@ def missing_steps(clip: Clip) -> dict[str, int]:
     return {foot: clip.cycles - downs[foot] for foot in clip.feet if downs[foot] < clip.cycles}
 
 
-def animations(clip: Clip, moving: Sequence[bool]) -> dict[str, bool]:
+def name_animations(clip: Clip, moving: Sequence[bool]) -> dict[str, bool]:
     """Return the names of a clip's animations, and whether the root moves in them."""
     end = "_loop" if clip.loops else ""
     if not clip.moves:
@@ -77,8 +77,8 @@ def _spaces(clips: Sequence[Clip], moving: Sequence[bool]) -> dict[str, Any]:
             spec = clip_of(clip.name)
             walks = isinstance(spec, WalkLoop) and spec.failing is None and spec.command[zero] == 0.0
             if walks or clip.name == "idle":
-                figures = metadata(clip)
-                animation = next(iter(animations(clip, moving)))
+                figures = clip_metadata(clip)
+                animation = next(iter(name_animations(clip, moving)))
                 points.append({"animation": animation, "at": [figures[axis] for axis in axes]})
         found[name] = {"axes": list(axes), "points": points}
     return found

@@ -3,7 +3,7 @@
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.root_motion import Motion, along, fading
+from arc_suite.animation.clips.root_motion import Motion, fade_out, integrate_twist
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
 
@@ -20,7 +20,7 @@ _SMOOTH = 0.036  # of a cycle, to either side, over which corrections are smooth
 _PASSES = 3  # in each, a foot stays in the middle of where the pass before could bring it
 
 
-def planted(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
+def plant_feet(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     """Return the motion with feet that neither slide nor sink in stance.
 
     A foot in stance stays in the middle of its places. Between two stances the correction of one goes over into that of
@@ -36,14 +36,14 @@ def planted(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     legs, height = Legs.of(body, used=1.0), body.torso.standing_height
     low = _feet(legs, _repeated(motion) if loops else motion)[..., 2] - legs.radii < _STANDS * height
     longest = len(motion.joints) - 1 if loops else None
-    stances = [_stances(each, round(_LIFTS * cycle / motion.step), longest) for each in low.T]
+    stances = [_stances(each, round(_LIFTS * cycle / motion.time_step), longest) for each in low.T]
     angles = legs.by_leg(motion.joints)
     # A joint may be a little beyond its range, as limits are soft.
     legs = legs._replace(low=np.minimum(legs.low, angles.min(axis=0)), high=np.maximum(legs.high, angles.max(axis=0)))
     fastest, before = _FASTER * _paces(angles), motion.joints
     for _ in range(_PASSES):
         motion = _nearer(legs, height, motion, stances, fastest, loops)
-    change = _smooth(motion.joints - before, round(_SMOOTH * cycle / motion.step), loops)
+    change = _smooth(motion.joints - before, round(_SMOOTH * cycle / motion.time_step), loops)
     return motion._replace(joints=before + change)
 
 
@@ -132,8 +132,8 @@ def _paces(angles: np.ndarray) -> np.ndarray:
 def _repeated(motion: Motion) -> Motion:
     """Return a loop three times over, on one path of the root."""
     count = len(motion.joints) - 1
-    root = along(motion.twist, motion.step * np.arange(3 * count + 1))
-    return motion.mapped(lambda values: values[np.arange(3 * count + 1) % count])._replace(root=root)
+    root = integrate_twist(motion.twist, motion.time_step * np.arange(3 * count + 1))
+    return motion.map_arrays(lambda values: values[np.arange(3 * count + 1) % count])._replace(root=root)
 
 
 def _stances(low: np.ndarray, least: int, longest: int | None) -> list[tuple[int, int]]:
@@ -155,7 +155,7 @@ def _corrections(places: np.ndarray, radius: float, intervals: list[tuple[int, i
     before: tuple[int, np.ndarray] = (0, np.zeros(3))  # the end of the latest stance, and its correction there
     for start, end in intervals:
         share = (np.arange(end - start) / max(end - start - 1, 1))[:, None]
-        weights = [fading(share), fading(1.0 - share)]  # of the motion's own first and last places
+        weights = [fade_out(share), fade_out(1.0 - share)]  # of the motion's own first and last places
         kept = [keeps_ends and start == 0, keeps_ends and end == count]
         anchors = [places[start], places[end - 1]]
         if kept == [False, False]:
@@ -178,6 +178,6 @@ def _bridge(found: np.ndarray, start: int, at_start: np.ndarray, end: int, at_en
     """Fill in corrections between two samples; that of the height soon fades."""
     if end > start + 1:
         share = (np.arange(1, end - start) / (end - start))[:, None]
-        found[start + 1 : end] = fading(share) * at_start + (1.0 - fading(share)) * at_end
-        height = fading(share / _LANDS) * at_start + fading((1.0 - share) / _LANDS) * at_end
+        found[start + 1 : end] = fade_out(share) * at_start + (1.0 - fade_out(share)) * at_end
+        height = fade_out(share / _LANDS) * at_start + fade_out((1.0 - share) / _LANDS) * at_end
         found[start + 1 : end, 2] = height[:, 2]

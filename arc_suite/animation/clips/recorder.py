@@ -22,7 +22,7 @@ _TRIES, _LEAST_TURN = 3, 0.25  # recordings of a turn, for one by the angle; its
 _BEFORE, _REST, _AFTER = 2, 5, 4  # gait cycles before a stop, at rest, and after the start
 
 
-class Recorded(NamedTuple):
+class GaitRecording(NamedTuple):
     """A recording of a gait.
 
     Attributes:
@@ -38,11 +38,11 @@ class Recorded(NamedTuple):
 
     def wait(self, sample: int) -> int:
         """Return the samples from a sample to the next touchdown of the first foot that the clock schedules."""
-        cycle = self.cycle / self.recording.step
+        cycle = self.cycle / self.recording.time_step
         return round((-self.phase * cycle - sample) % cycle) % round(cycle)
 
 
-class Transition(NamedTuple):
+class TransitionRecording(NamedTuple):
     """A body that walks, stops, stands, starts and walks.
 
     Attributes:
@@ -52,13 +52,13 @@ class Transition(NamedTuple):
         late: samples from a scheduled touchdown to the command's change.
     """
 
-    recorded: Recorded
+    recorded: GaitRecording
     stop: int
     start: int
     late: int
 
 
-class Turned(NamedTuple):
+class TurnRecording(NamedTuple):
     """A body that stands, turns on the spot, and stands.
 
     Attributes:
@@ -67,7 +67,7 @@ class Turned(NamedTuple):
         samples: until it stands again.
     """
 
-    recorded: Recorded
+    recorded: GaitRecording
     first: int
     samples: int
 
@@ -77,8 +77,8 @@ class Recorder:
 
     Attributes:
         body: of the recordings.
-        follows: whether the task has a command.
-        units: (3,) of commands: forward and left, m/s, turning, rad/s; None without a command.
+        has_command: whether the task has a command.
+        velocity_units: (3,) of commands: forward and left, m/s, turning, rad/s; None without a command.
     """
 
     def __init__(self, setup: Setup, policy: str, preset: str | None):
@@ -99,17 +99,19 @@ class Recorder:
         task = setup.definition
         named_policy(policy, setup.body, preset, task=task)  # errors of the policy are no errors of a clip
         self.body, self._policy, self._preset = setup.body, policy, preset
-        self.follows = task.commands.get("command") == 3 and task.parameters is not None
-        if self.follows and "gait_frequency" not in setup.task_kwargs:
+        self.has_command = task.commands.get("command") == 3 and task.parameters is not None
+        if self.has_command and "gait_frequency" not in setup.task_kwargs:
             step = task.scene.control_timestep
             steps = max(1, round(1.0 / (task.parameters.gait_frequency * step)))
             setup = _changed(setup, gait_frequency=1.0 / (steps * step))
-        self.units = velocity_units(self.body, task.parameters.target_velocity) if self.follows else None
+        self.velocity_units = velocity_units(self.body, task.parameters.target_velocity) if self.has_command else None
         if "pose" in task.commands:
             setup = _changed(setup, **_UNDRAWN)
         self._setup = setup
 
-    def walk(self, command: tuple[float, float, float], failing: int | None = None, crouch: float = 0.0) -> Recorded:
+    def record_walk(
+        self, command: tuple[float, float, float], failing: int | None = None, crouch: float = 0.0
+    ) -> GaitRecording:
         """Return a recording of the policy under a command.
 
         Args:
@@ -126,9 +128,9 @@ class Recorder:
             setup, held = self._directed(), {"pose": (-self._crouch(crouch), *(0.0,) * 5)}
         cycle, offset, step = self._gait()
         recording = self._recorded(setup, _SETTLE, round(_CYCLES * cycle / step), [(0, command)], **held)
-        return Recorded(recording, cycle, (_SETTLE * step / cycle + offset) % 1.0)
+        return GaitRecording(recording, cycle, (_SETTLE * step / cycle + offset) % 1.0)
 
-    def alone(self) -> Recorded:
+    def record_without_command(self) -> GaitRecording:
         """Return a recording of the policy in a task without a command.
 
         Raises:
@@ -136,7 +138,7 @@ class Recorder:
         """
         return _periodic(self._recorded(self._setup, _SETTLE, _LONG))
 
-    def showcase(self, preset: str) -> Recorded:
+    def record_showcase(self, preset: str) -> GaitRecording:
         """Return a recording of a preset of the demonstrator that walks straight ahead in the task walk.
 
         Raises:
@@ -148,7 +150,7 @@ class Recorder:
         actor = named_policy("cpg", self.body, preset, task=environment.task.definition)
         return _periodic(record(environment, actor, _SETTLE, _LONG))
 
-    def transition(self, command: tuple[float, float, float]) -> Transition:
+    def record_transition(self, command: tuple[float, float, float]) -> TransitionRecording:
         """Return a recording of a stop from a command, and of a start into it.
 
         Raises:
@@ -168,9 +170,9 @@ class Recorder:
         substeps = recording.substeps
         late = round(substeps * steps * phase(stop))
         stop, start = (substeps * (count - _SETTLE) for count in (stop, start))
-        return Transition(Recorded(recording, cycle, phase(_SETTLE)), stop - late, start, late)
+        return TransitionRecording(GaitRecording(recording, cycle, phase(_SETTLE)), stop - late, start, late)
 
-    def turn(self, angle: float) -> Turned:
+    def record_turn(self, angle: float) -> TurnRecording:
         """Return a recording of a turn on the spot by about an angle, rad.
 
         Raises:
@@ -178,7 +180,7 @@ class Recorder:
         """
         cycle, _, step = self._gait()
         around, rest = round(cycle / step), round(_REST * cycle / step)
-        rate = float(np.copysign(self.units[2], angle))
+        rate = float(np.copysign(self.velocity_units[2], angle))
         count = round(angle / rate / step)
         for _ in range(_TRIES):
             commands = [(0, (0.0, 0.0, 0.0)), (_SETTLE + around, (0.0, 0.0, np.sign(angle)))]
@@ -193,7 +195,7 @@ class Recorder:
             if not missing:
                 break
             count += missing
-        return Turned(Recorded(recording, cycle), first, samples)
+        return TurnRecording(GaitRecording(recording, cycle), first, samples)
 
     def _directed(self) -> Setup:
         """The setup with a pose by command."""
@@ -211,7 +213,7 @@ class Recorder:
 
     def _gait(self) -> tuple[float, float, float]:
         """The cycle, s, the offset of the first foot, cycles, and the control step, s; ValueError without a command."""
-        if not self.follows:
+        if not self.has_command:
             raise ValueError(f"the task {self._setup.kind.name} has no command")
         task, gait = self._setup.definition, self._setup.definition.parameters
         return 1.0 / gait.gait_frequency, gait.phase_offsets[0] / (2.0 * np.pi), task.scene.control_timestep
@@ -222,12 +224,12 @@ class Recorder:
         return record(environment, actor, settle, steps, commands, **held)
 
 
-def _periodic(recording: Recording) -> Recorded:
+def _periodic(recording: Recording) -> GaitRecording:
     cycle = loops.period(recording)
     if cycle is None:
-        seconds = len(recording.poses) * recording.step / 2.0
+        seconds = len(recording.poses) * recording.time_step / 2.0
         raise ValueError(f"the pose does not return within {seconds:.3g} s")
-    return Recorded(recording, cycle)
+    return GaitRecording(recording, cycle)
 
 
 def _changed(setup: Setup, **settings) -> Setup:

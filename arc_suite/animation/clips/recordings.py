@@ -19,13 +19,13 @@ class Recording(NamedTuple):
     """Poses of one body, one for every substep.
 
     Attributes:
-        step: s between two poses.
+        time_step: s between two poses.
         substeps: of a control step.
         poses: (samples, 7 + joints): torso position and quaternion in the world, joint angles from the standing pose,
             rad.
     """
 
-    step: float
+    time_step: float
     substeps: int
     poses: np.ndarray
 

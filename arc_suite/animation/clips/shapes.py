@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 KINDS = ("sphere", "capsule", "cylinder", "ellipsoid", "box")
-FEWEST, _MOST = 8, 32  # segments around a shape
+MIN_SEGMENTS, _MOST = 8, 32  # segments around a shape
 
 
 class Mesh(NamedTuple):
@@ -24,12 +24,12 @@ class Mesh(NamedTuple):
     triangles: np.ndarray
     uv: np.ndarray | None = None
 
-    def moved(self, place: np.ndarray, rotation: np.ndarray) -> "Mesh":
+    def transform(self, place: np.ndarray, rotation: np.ndarray) -> "Mesh":
         """Return the mesh turned by a matrix (3, 3), then moved by a vector (3,)."""
         return self._replace(points=self.points @ rotation.T + place, normals=self.normals @ rotation.T)
 
 
-def joined(meshes: list[Mesh]) -> Mesh:
+def join_meshes(meshes: list[Mesh]) -> Mesh:
     """Return several meshes as one."""
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
@@ -38,7 +38,7 @@ def joined(meshes: list[Mesh]) -> Mesh:
     return Mesh(np.concatenate(points), np.concatenate(normals), np.concatenate(triangles), places)
 
 
-def shape(kind: str, size, tolerance: float, fewest: int = FEWEST) -> Mesh:
+def shape_mesh(kind: str, size, tolerance: float, fewest: int = MIN_SEGMENTS) -> Mesh:
     """Return a shape about its center.
 
     Args:
@@ -50,7 +50,7 @@ def shape(kind: str, size, tolerance: float, fewest: int = FEWEST) -> Mesh:
     if kind == "box":
         return _box(size)
     radius = sorted(size)[1] if kind == "ellipsoid" else size[0]
-    count = segments(radius, tolerance, fewest)
+    count = segment_count(radius, tolerance, fewest)
     if kind == "cylinder":
         return _cylinder(size[0], size[1], count)
     if kind == "ellipsoid":
@@ -66,7 +66,7 @@ def polyhedron(points: np.ndarray, triangles: np.ndarray) -> Mesh:
     return Mesh(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.arange(corners[..., 0].size).reshape(-1, 3))
 
 
-def segments(radius: float, tolerance: float, fewest: int = FEWEST) -> int:
+def segment_count(radius: float, tolerance: float, fewest: int = MIN_SEGMENTS) -> int:
     """Return into how many segments, an even number, a circle is cut for a chord to be within a tolerance of it."""
     count = math.pi / math.acos(max(1.0 - tolerance / radius, 0.0))
     return 2 * math.ceil(min(max(count, fewest), _MOST) / 2.0)
@@ -118,7 +118,7 @@ def _cylinder(radius: float, half_length: float, count: int) -> Mesh:
     fan = np.stack([np.zeros(count - 2, int), np.arange(1, count - 1), np.arange(2, count)], axis=-1)
     top = Mesh(rims[0], np.tile(up, (count, 1)), fan)
     bottom = Mesh(rims[1], np.tile(-up, (count, 1)), fan[:, ::-1])
-    return joined([side, top, bottom])
+    return join_meshes([side, top, bottom])
 
 
 def _box(size) -> Mesh:
@@ -132,4 +132,4 @@ def _box(size) -> Mesh:
             corners = [normal + a * first + b * second for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
             triangles = np.array([[0, 1, 2], [0, 2, 3]])
             faces.append(Mesh(np.array(corners) * size, np.tile(normal, (4, 1)), triangles))
-    return joined(faces)
+    return join_meshes(faces)

@@ -11,7 +11,7 @@ _MARGIN = 0.003  # of the side of a square as large as all rectangles, between t
 _TRIES = 4  # widths, each nearer to a square
 
 
-def unwrapped(meshes: Sequence[Mesh]) -> list[Mesh]:
+def unwrap(meshes: Sequence[Mesh]) -> list[Mesh]:
     """Return convex meshes with places in a texture that they share, seen from the six directions of their axes.
 
     No two faces share a place, and nothing is mirrored. A face is at most 1.8 times smaller than it would be flat.
@@ -21,7 +21,7 @@ def unwrapped(meshes: Sequence[Mesh]) -> list[Mesh]:
     corners, width = _packed(sizes)
     places = iter(corners)
     return [
-        shapes.joined([side._replace(uv=(side.uv - side.uv.min(axis=0) + next(places)) / width) for side in each])
+        shapes.join_meshes([side._replace(uv=(side.uv - side.uv.min(axis=0) + next(places)) / width) for side in each])
         for each in sides
     ]
 

@@ -4,7 +4,7 @@ import numpy as np
 import viser
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
-from arc_suite.animation.colors import BLUE, INK, PALE, VERMILION, of_terms
+from arc_suite.animation.colors import BLUE, INK, PALE, VERMILION, term_colors
 from arc_suite.animation.studio.history import History
 
 _HEIGHT = 190  # of a chart, pixels
@@ -48,7 +48,7 @@ class Charts:
         None is removed: a browser that is late applies updates of a widget after it has removed the widget.
         """
         if terms not in self._rewards:
-            series, empty = ({"label": "s"}, *_series(of_terms(terms))), (np.zeros(1),) * (1 + len(terms))
+            series, empty = ({"label": "s"}, *_series(term_colors(terms))), (np.zeros(1),) * (1 + len(terms))
             with self._folder:
                 self._rewards[terms] = self._gui.add_uplot(empty, series, height=_HEIGHT + 60, **_OPTIONS)
         for each, chart in self._rewards.items():

@@ -18,7 +18,7 @@ def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
         command: of now.
     """
     sketch, setup, task = creature.sketch, creature.setup, creature.environment.task.definition
-    field, by_hand, directs = sketches.settings_field(sketch), command.by_hand, player_controls.directs(task)
+    field, by_hand, directs = sketches.settings_field(sketch), command.by_hand, player_controls.is_directed(task)
     rules = (
         (("legs", "links", "layout"), sketch.source != LEGS),
         (("seed",), sketch.source != RANDOM),

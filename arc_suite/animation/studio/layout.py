@@ -73,8 +73,8 @@ def velocity(gui: viser.GuiApi, first: PageState) -> dict[str, Any]:
 
 def pose(gui: viser.GuiApi) -> dict[str, Any]:
     """Add pose and gait by command."""
-    gait = gui.add_dropdown("Gait now", [player_controls.OWN], initial_value=player_controls.OWN)
-    tempo = gui.add_slider("Frequency", *player_controls.TEMPI, 0.05, 1.0, hint="Multiple of the gait's own")
+    gait = gui.add_dropdown("Gait now", [player_controls.OWN_GAIT], initial_value=player_controls.OWN_GAIT)
+    tempo = gui.add_slider("Frequency", *player_controls.TEMPO_RANGE, 0.05, 1.0, hint="Multiple of the gait's own")
     hint = "Standing heights or rad"
     sliders = {name: gui.add_slider(_label(name), -1.0, 1.0, 0.01, 0.0, hint=hint) for name in POSE}
     return {"gait_now": gait, "tempo": tempo} | sliders

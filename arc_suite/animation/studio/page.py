@@ -233,10 +233,10 @@ class Page:
         """Offer the poses and gaits of a body, if they are by command in its task."""
         task, widgets = creature.environment.task.definition, self._widgets
         self._fixed = frozenset()
-        if not player_controls.directs(task):
+        if not player_controls.is_directed(task):
             return
-        widgets["gait_now"].options = list(player_controls.named(task))
-        rooms = dict(zip(POSE, player_controls.room(creature.setup.body), strict=True))
+        widgets["gait_now"].options = list(player_controls.gaits_by_name(task))
+        rooms = dict(zip(POSE, player_controls.pose_room(creature.setup.body), strict=True))
         self._fixed = frozenset(name for name, (low, high) in rooms.items() if low >= high)
         for name in rooms.keys() - self._fixed:
             widgets[name].min, widgets[name].max = map(float, rooms[name])
@@ -356,7 +356,9 @@ class Page:
     def _stand(self) -> None:
         """Ask for the pose at rest and the body's own gait, at its own frequency."""
         self._edit(
-            lambda state: state.replace_fields(gait_now=player_controls.OWN, tempo=1.0, **dict.fromkeys(POSE, 0.0)),
+            lambda state: state.replace_fields(
+                gait_now=player_controls.OWN_GAIT, tempo=1.0, **dict.fromkeys(POSE, 0.0)
+            ),
             "upright",
         )
         self._render()

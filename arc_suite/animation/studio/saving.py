@@ -77,7 +77,7 @@ def make_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
     Raises:
         ValueError: the viewer of pages has not been built.
     """
-    pages.viewer()  # finds out at once whether there is one
+    pages.viewer_script()  # finds out at once whether there is one
     environment = load_environment(creature.setup)
     with contextlib.closing(environment):
         act = _commanded(environment, creature.sketch, commands)

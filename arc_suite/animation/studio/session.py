@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite.animation import player_controls
-from arc_suite.animation.episodes import LONGEST, Episodes
+from arc_suite.animation.episodes import MAX_SECONDS_PER_PICTURE, Episodes
 from arc_suite.animation.studio.creature import Creature, open_creature
 from arc_suite.animation.studio.history import History
 from arc_suite.animation.studio.sketch import Sketch
@@ -79,7 +79,7 @@ class Session:
         self.pace = 1.0
         self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
         self.pose: np.ndarray | None = np.zeros(6)
-        self.gait: tuple[str | None, float] = player_controls.OWN, 1.0
+        self.gait: tuple[str | None, float] = player_controls.OWN_GAIT, 1.0
         self.kept: Walker | None = None
         self._replace(open_creature(sketch))
 
@@ -175,7 +175,7 @@ class Session:
             while not self._calls.empty():
                 self._calls.get()()
             now = time.monotonic()
-            passed = 0.0 if self.paused else min(now - last, LONGEST)
+            passed = 0.0 if self.paused else min(now - last, MAX_SECONDS_PER_PICTURE)
             last = now
             simulated += self.walker.advance(passed)
             if self.kept is not None:

@@ -20,7 +20,7 @@ class VisitorCommand:
     Attributes:
         by_hand: whether all others hold; else the task's own command does.
         forward, left, turn: velocity, -1 to 1 each.
-        gait_now: name of the gait by command, or `player_controls.OWN`.
+        gait_now: name of the gait by command, or `player_controls.OWN_GAIT`.
         tempo: multiple of the gait's frequency.
         height, shift_forward, shift_left: numbers of a pose, standing heights.
         roll, pitch, yaw: numbers of a pose, rad.
@@ -30,7 +30,7 @@ class VisitorCommand:
     forward: float = 1.0
     left: float = 0.0
     turn: float = 0.0
-    gait_now: str = player_controls.OWN
+    gait_now: str = player_controls.OWN_GAIT
     tempo: float = 1.0
     height: float = 0.0
     shift_forward: float = 0.0

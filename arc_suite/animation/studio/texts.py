@@ -41,7 +41,7 @@ def status(session: Session) -> str:
     told = {
         "walks": _walk(session.walker),
         **({} if session.kept is None else {"kept": _walk(session.kept)}),
-        "return": f"{episodes.earned:.0f} in {episodes.steps * episodes.control_timestep:.1f} s",
+        "return": f"{episodes.episode_return:.0f} in {episodes.steps * episodes.control_timestep:.1f} s",
         "pace": pace,
     }
     lines = [_element("tr", _element("td", name), _element("td", value)) for name, value in told.items()]

@@ -12,7 +12,7 @@ import viser
 
 from arc_suite.animation.clips import shapes
 from arc_suite.animation.clips.shapes import Mesh
-from arc_suite.animation.scenery import ground
+from arc_suite.animation.scenery import describe_ground
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.figure import Figure, rgb
 from arc_suite.markers import Marker
@@ -123,7 +123,7 @@ class View:
         found: dict = {"planes": [0.0], "fields": [], "solids": []}
         if not self._endless:
             reach, middle = _AROUND * self._unit, self._unit * self._middle
-            found = ground(environment, middle - reach, middle + reach)
+            found = describe_ground(environment, middle - reach, middle + reach)
         self._server.scene.remove_by_name("/world/ground")
         self._server.scene.add_frame("/world/ground", show_axes=False)
         for index, height in enumerate(found["planes"]):
@@ -137,12 +137,12 @@ class View:
             self._server.scene.add_line_segments(f"/world/ground/tiles{index}", lines, _LINES, **_THIN)
         solids: dict[tuple[int, int, int], list[Mesh]] = {}
         for solid in found["solids"]:
-            mesh = shapes.shape(solid["kind"], solid["size"], _TOLERANCE * self._unit)
+            mesh = shapes.shape_mesh(solid["kind"], solid["size"], _TOLERANCE * self._unit)
             shaded = [solid["shade"] * part for part in _STEPS]
             color = rgb([part / 255.0 for part in shaded] if solid["color"] is None else solid["color"])
-            solids.setdefault(color, []).append(mesh.moved(solid["place"], np.eye(3)))
+            solids.setdefault(color, []).append(mesh.transform(solid["place"], np.eye(3)))
         for index, (color, meshes) in enumerate(solids.items()):
-            self._add(f"/world/ground/solid{index}", shapes.joined(meshes), color)
+            self._add(f"/world/ground/solid{index}", shapes.join_meshes(meshes), color)
 
     def _mark(self, markers: list[Marker], anchor: np.ndarray) -> None:
         """Move arrows and cylinders, or draw them anew where there are others.

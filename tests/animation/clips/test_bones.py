@@ -7,7 +7,7 @@ import pytest
 from arc_suite import rotations
 from arc_suite.animation.clips import bones
 from arc_suite.animation.clips.root_motion import Pose
-from arc_suite.animation.parts import frames, parts
+from arc_suite.animation.parts import describe_body, part_frames
 from arc_suite.bodies.generator import random_body
 from arc_suite.robots import ROBOTS, spec_files
 
@@ -18,7 +18,7 @@ def shown(found, pose):
     """Return the places and rotation matrices of all shapes in a pose."""
     return [
         (place + turn @ shape.place, turn @ rotations.matrix(shape.quaternion))
-        for part, place, turn in zip(found, *frames(bones.posed(found, pose)), strict=True)
+        for part, place, turn in zip(found, *part_frames(bones.pose_parts(found, pose)), strict=True)
         for shape in part.shapes
     ]
 
@@ -26,10 +26,10 @@ def shown(found, pose):
 @pytest.mark.parametrize("name", BODIES)
 def test_bones_move_what_parts_move(name):
     body = BODIES[name]
-    found, random = parts(body)[0], np.random.default_rng(0)
+    found, random = describe_body(body)[0], np.random.default_rng(0)
     angles = random.uniform(-1.0, 1.0, len(body.joint_names))
     pose = Pose(np.array((1.0, 2.0, 3.0)), np.array((0.5, -0.5, 0.5, 0.5)), angles)
-    for one, other in zip(shown(found, pose), shown(bones.limbs(found), pose), strict=True):
+    for one, other in zip(shown(found, pose), shown(bones.align_bones(found), pose), strict=True):
         np.testing.assert_allclose(one[0], other[0], atol=1e-12)
         np.testing.assert_allclose(one[1], other[1], atol=1e-12)
 
@@ -37,7 +37,7 @@ def test_bones_move_what_parts_move(name):
 @pytest.mark.parametrize("name", BODIES)
 def test_a_hinge_is_an_axis_and_a_bone_points_along_its_link(name):
     """In glTF's axes, x is the hinge and y as near to the link as it can be; or y is the hinge that is nearer to it."""
-    found = bones.limbs(parts(BODIES[name])[0])
+    found = bones.align_bones(describe_body(BODIES[name])[0])
     for part, child in zip(found, found[1:], strict=False):
         if part.axis is None:
             continue
@@ -52,5 +52,5 @@ def test_a_hinge_is_an_axis_and_a_bone_points_along_its_link(name):
 
 
 def test_a_foot_goes_on_as_its_link():
-    (foot,) = [part for part in bones.limbs(parts(ROBOTS["queen"])[0]) if part.name == "l1_foot"]
+    (foot,) = [part for part in bones.align_bones(describe_body(ROBOTS["queen"])[0]) if part.name == "l1_foot"]
     np.testing.assert_allclose(foot.quaternion, (1.0, 0.0, 0.0, 0.0), atol=1e-12)

@@ -17,7 +17,7 @@ from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import drafts, foot_contacts, loops, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
-from arc_suite.animation.clips.gestures import HITS
+from arc_suite.animation.clips.gestures import HIT_DIRECTIONS
 from arc_suite.bodies.generator import random_body
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
@@ -247,9 +247,9 @@ def test_presets_return(robot, preset):
     recording = recordings.record(environment, policy("cpg", body, preset), 200, 700)
     # Of the torso, whose sway is taken out by a mean over a gait cycle.
     period = loops.period(recording)
-    samples, sums = round(period / recording.step), recording.poses[:, :2].cumsum(axis=0)
+    samples, sums = round(period / recording.time_step), recording.poses[:, :2].cumsum(axis=0)
     path = (sums[samples:] - sums[:-samples]) / samples
-    speed = np.hypot(*np.diff(path, axis=0).T).mean() / recording.step
+    speed = np.hypot(*np.diff(path, axis=0).T).mean() / recording.time_step
     # A stride, as time is stretched to whole frames: by less than one.
     cycle = clip.motion.seconds / clip.cycles
     assert np.hypot(*clip.motion.twist[:2]) * cycle == pytest.approx(speed * period, rel=0.01)
@@ -389,9 +389,9 @@ def test_idle_breathes_on_its_feet(robot):
 
 @pytest.mark.slow
 def test_a_blow_tilts_the_torso_over_planted_feet():
-    body, clips = ROBOTS["tick"], made("tick", "idle", *(f"hit_{side}" for side in HITS))
+    body, clips = ROBOTS["tick"], made("tick", "idle", *(f"hit_{side}" for side in HIT_DIRECTIONS))
     height, rest = body.torso.standing_height, clips["idle"].motion.pose(0)
-    for side, way in HITS.items():
+    for side, way in HIT_DIRECTIONS.items():
         motion = clips[f"hit_{side}"].motion
         tilts = (rotations.matrix(motion.quaternions) - rotations.matrix(rest.quaternion))[:, :2, 2] @ way
         assert np.degrees(np.arcsin(tilts.max())) == pytest.approx(11.0, abs=1.5)
@@ -416,7 +416,7 @@ def test_variants_of_idle_look_around_and_set_feet_anew():
 @pytest.mark.parametrize("robot", EACH)
 def test_a_stop_walks_and_then_stands(robot):
     motion = made(robot)["stop"].motion
-    speeds = np.hypot(*np.diff(motion.root[:, :2], axis=0).T) / motion.step
+    speeds = np.hypot(*np.diff(motion.root[:, :2], axis=0).T) / motion.time_step
     asked = arc_suite.load(robot, "steer").task.definition.context.units[0]
     assert speeds[0] > 0.5 * asked
     assert speeds[-5:].mean() < 0.1 * asked

@@ -8,7 +8,7 @@ import arc_suite
 from arc_suite import registry
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import gestures
-from arc_suite.animation.clips.catalog import Acted, Difference, Showcase, Turn, WalkLoop, names
+from arc_suite.animation.clips.catalog import Acted, Difference, Showcase, Turn, WalkLoop, clip_names
 from arc_suite.envs.setup import Setup
 
 TICK = Setup.of("tick", "steer")
@@ -54,7 +54,7 @@ def test_a_name_may_have_its_module(monkeypatch, register):
     register(creep=WalkLoop((0.35, 0.0, 0.0)))
     monkeypatch.setitem(registry.MODULE_OF_NAME, ("clip", "creep"), __name__)
     (creep,) = export.clips(TICK, [f"{__name__}:creep"], fps=30)
-    assert creep.name == "creep" and names()[-1] == "creep"
+    assert creep.name == "creep" and clip_names()[-1] == "creep"
     with refused("clips: expected each once, got creep, creep"):
         export.clips(TICK, ["creep", f"{__name__}:creep"])
 

@@ -19,7 +19,7 @@ def idle():
 
 @pytest.mark.slow
 def test_a_sheet_has_a_row_for_each_direction(idle):
-    sheet = filming.sheet(BODY, idle, SIZE, 4, transparent=True)
+    sheet = filming.sprite_sheet(BODY, idle, SIZE, 4, transparent=True)
     columns = len(idle.times) - 1
     assert sheet.shape == (4 * SIZE, columns * SIZE, 4) and sheet.dtype == np.uint8
     rows = [row[:, :SIZE] for row in np.split(sheet, 4)]
@@ -32,10 +32,10 @@ def test_a_sheet_has_a_row_for_each_direction(idle):
 
 @pytest.mark.slow
 def test_a_film_is_as_long_as_its_loop(idle):
-    plain = list(filming.loop(BODY, idle, SIZE))
+    plain = list(filming.film_pictures(BODY, idle, SIZE))
     assert len(plain) == len(idle.times) - 1
     assert plain[0].shape == (SIZE, SIZE, 3) and plain[0].std() > 10.0
-    turning = list(filming.loop(BODY, idle, SIZE, turntable=True))
+    turning = list(filming.film_pictures(BODY, idle, SIZE, turntable=True))
     assert len(turning) == len(plain) * round(6.0 / idle.motion.seconds)
     np.testing.assert_array_equal(turning[0], plain[0])
     assert (turning[-1] != plain[-1]).any()

@@ -8,7 +8,7 @@ import pytest
 from refusals import refused
 
 from arc_suite.animation.clips.meshes import body_meshes
-from arc_suite.animation.parts import parts
+from arc_suite.animation.parts import describe_body
 from arc_suite.bodies.generator import generate
 from arc_suite.robots import ROBOTS, spec_files
 
@@ -19,7 +19,7 @@ BODIES["an arm"] = imports.with_arm()
 @functools.cache
 def meshes(name, **options):
     body = BODIES[name]
-    found = body_meshes(parts(body)[0], body.torso.standing_height, **options)
+    found = body_meshes(describe_body(body)[0], body.torso.standing_height, **options)
     return [mesh for own in found for mesh in own.values()]
 
 

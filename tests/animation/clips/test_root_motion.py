@@ -18,10 +18,10 @@ def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
     """Two joints and a torso that sway once a cycle on a path of constant twist."""
     times = STEP * np.arange(round(seconds / STEP) + 1)
     phase = 2.0 * np.pi * times / cycle
-    root = root_motion.along(np.array(twist), times)
+    root = root_motion.integrate_twist(np.array(twist), times)
     sway = np.stack([0.02 * np.sin(2.0 * phase), 0.03 * np.cos(phase), 0.1 * np.sin(phase)], axis=-1)
     place = np.stack(
-        [root_motion.after(root_motion.after(np.array(start), a), b) for a, b in zip(root, sway, strict=True)]
+        [root_motion.compose(root_motion.compose(np.array(start), a), b) for a, b in zip(root, sway, strict=True)]
     )
     roll = 0.05 * np.sin(phase) + drift * times
     tilt = np.stack([np.cos(0.5 * roll), np.sin(0.5 * roll), 0.0 * roll, 0.0 * roll], axis=-1)
@@ -33,19 +33,19 @@ def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
 
 @pytest.mark.parametrize("twist", TWISTS)
 def test_logarithm_undoes_along(twist):
-    place = root_motion.along(np.array(twist), np.array([0.0, 1.0]))
+    place = root_motion.integrate_twist(np.array(twist), np.array([0.0, 1.0]))
     np.testing.assert_allclose(place[0], 0.0)
-    np.testing.assert_allclose(root_motion.logarithm(place[1]), twist, atol=1e-12)
+    np.testing.assert_allclose(root_motion.twist_to(place[1]), twist, atol=1e-12)
 
 
 def test_along_adds_small_steps_and_relative_undoes_after():
     twist, place = np.array((0.4, -0.1, 0.8)), np.zeros(3)
-    small = root_motion.along(twist, np.array([1e-3]))[0]
+    small = root_motion.integrate_twist(twist, np.array([1e-3]))[0]
     for _ in range(1000):
-        place = root_motion.after(place, small)
-    np.testing.assert_allclose(root_motion.along(twist, np.array([1.0]))[0], place, atol=1e-12)
+        place = root_motion.compose(place, small)
+    np.testing.assert_allclose(root_motion.integrate_twist(twist, np.array([1.0]))[0], place, atol=1e-12)
     first, second = np.array((1.0, 2.0, 0.7)), np.array((-0.5, 0.2, 2.0))
-    np.testing.assert_allclose(root_motion.relative(first, root_motion.after(first, second)), second)
+    np.testing.assert_allclose(root_motion.relative_pose(first, root_motion.compose(first, second)), second)
 
 
 def test_the_period_is_the_cycle_if_the_pose_returns():
@@ -58,9 +58,9 @@ def test_the_period_is_the_cycle_if_the_pose_returns():
 @pytest.mark.parametrize("twist", TWISTS)
 def test_a_loop(twist):
     recording = walk(twist)
-    closing = loops.closings(recording, CYCLE, 4)[1]
+    closing = loops.find_closings(recording, CYCLE, 4)[1]
     assert closing.samples == 275 and closing.seam < 1e-9
-    loop = loops.loop(recording, 137, closing.samples)
+    loop = loops.cut_loop(recording, 137, closing.samples)
     assert loop.seconds == pytest.approx(CYCLE)
     np.testing.assert_allclose(loop.twist[2], twist[2], atol=1e-9)
     assert np.hypot(*loop.twist[:2]) == pytest.approx(np.hypot(*twist[:2]), rel=0.02)
@@ -73,7 +73,7 @@ def test_a_loop(twist):
     poses = loop.poses()
     there = np.concatenate([recording.poses[:, :2], rotations.yaw(recording.poses[:, 3:7])[:, None]], axis=-1)[137:413]
     here = np.concatenate([poses[:, :2], rotations.yaw(poses[:, 3:7])[:, None]], axis=-1)
-    difference = root_motion.relative(here[0], here) - root_motion.relative(there[0], there)
+    difference = root_motion.relative_pose(here[0], here) - root_motion.relative_pose(there[0], there)
     np.testing.assert_allclose(difference[:, :2], 0.0, atol=1e-9)
     np.testing.assert_allclose(rotations.wrap_angle(difference[:, 2]), 0.0, atol=1e-9)
     np.testing.assert_allclose(poses[:, 7:], recording.poses[137:413, 7:], atol=1e-9)
@@ -81,9 +81,9 @@ def test_a_loop(twist):
 
 def test_a_seam_is_spread():
     recording = walk(TWISTS[1], drift=0.02)
-    loop = loops.loop(recording, 10, 275)
+    loop = loops.cut_loop(recording, 10, 275)
     assert loop.seam == pytest.approx(0.02 * CYCLE, rel=0.01)
-    assert loops.closings(recording, CYCLE, 4)[1] == pytest.approx((loop.seam, 275))
+    assert loops.find_closings(recording, CYCLE, 4)[1] == pytest.approx((loop.seam, 275))
     assert (loop.joints[0] == loop.joints[-1]).all() and (loop.quaternions[0] == loop.quaternions[-1]).all()
     correction = loop.joints[:, 1] - recording.poses[10:286, 8]
     np.testing.assert_allclose(np.diff(correction)[:-1], -0.02 * STEP, atol=1e-12)
@@ -97,9 +97,9 @@ def test_of_the_loops_that_close_the_usual_one_is_taken(twist):
     recording = walk(twist, seconds=4 * CYCLE)
     poses = recording.poses.copy()
     poses[825:, :2] += np.outer(np.arange(276) / 275.0, 0.3 * (poses[-1, :2] - poses[825, :2]))
-    first = loops.usual(Recording(STEP, 25, poses), 275)
+    first = loops.choose_start(Recording(STEP, 25, poses), 275)
     assert first < 600
-    speed = np.hypot(*loops.loop(Recording(STEP, 25, poses), first, 275).twist[:2])
+    speed = np.hypot(*loops.cut_loop(Recording(STEP, 25, poses), first, 275).twist[:2])
     mean = np.hypot(*twist[:2])
     assert mean < speed < 1.3 * mean
 
@@ -111,8 +111,8 @@ def test_a_loop_that_closes_goes_before_a_usual_one():
     poses[:275, 8] += 0.1 * (1.0 - np.arange(275) / 275.0)
     poses[275:, 0] += 0.05 * np.cos(2.5) * np.arange(276) / 275.0
     poses[275:, 1] += 0.05 * np.sin(2.5) * np.arange(276) / 275.0
-    first = loops.usual(Recording(STEP, 25, poses), 275)
-    assert loops.loop(Recording(STEP, 25, poses), first, 275).seam <= loops.CLOSED
+    first = loops.choose_start(Recording(STEP, 25, poses), 275)
+    assert loops.cut_loop(Recording(STEP, 25, poses), first, 275).seam <= loops.GOOD_SEAM
 
 
 def test_no_loop_is_taken_whose_seam_is_over_the_bound():
@@ -121,8 +121,8 @@ def test_no_loop_is_taken_whose_seam_is_over_the_bound():
     poses = recording.poses[:-1].copy()
     poses[:275, 8] += np.radians(np.where(np.arange(275) < 11, 1.9, 2.2))
     poses[:11, :2] += 0.05  # a longer way than that of the others
-    first = loops.usual(Recording(STEP, 25, poses), 275)
-    assert np.radians(1.8) < loops.loop(Recording(STEP, 25, poses), first, 275).seam <= loops.OPEN
+    first = loops.choose_start(Recording(STEP, 25, poses), 275)
+    assert np.radians(1.8) < loops.cut_loop(Recording(STEP, 25, poses), first, 275).seam <= loops.MAX_SEAM
 
 
 def test_the_least_number_of_cycles_that_refuses_the_fewest():
@@ -132,52 +132,52 @@ def test_the_least_number_of_cycles_that_refuses_the_fewest():
         return {cycles: loops.Closing(seam * degree, 275 * cycles) for cycles, seam in enumerate(seams, start=1)}
 
     walks = {"walk": closings(0.9, 0.1, 0.1), "back": closings(3.0, 2.5, 1.9)}
-    assert loops.best(walks, loops.OPEN) == 3
-    assert loops.best({"walk": walks["walk"]}, loops.OPEN) == 1
-    assert loops.best({"walk": walks["walk"]}, loops.CLOSED) == 2
-    assert loops.best({"back": closings(3.0, 4.0, 5.0)}, loops.OPEN) == 1
+    assert loops.choose_cycles(walks, loops.MAX_SEAM) == 3
+    assert loops.choose_cycles({"walk": walks["walk"]}, loops.MAX_SEAM) == 1
+    assert loops.choose_cycles({"walk": walks["walk"]}, loops.GOOD_SEAM) == 2
+    assert loops.choose_cycles({"back": closings(3.0, 4.0, 5.0)}, loops.MAX_SEAM) == 1
 
 
 @pytest.mark.parametrize("end", [0, -1])
 def test_an_end_meets_a_pose_and_feet_stay_where_they_are(end):
-    passage = root_motion.passage(walk((0.5, 0.1, 0.3)), 500, 600, 275)
-    pose = loops.loop(walk((0.4, 0.0, 0.0)), 10, 275).pose(100)
-    met = passage.meeting(pose, end, 200)
+    passage = root_motion.follow_mean_path(walk((0.5, 0.1, 0.3)), 500, 600, 275)
+    pose = loops.cut_loop(walk((0.4, 0.0, 0.0)), 10, 275).pose(100)
+    met = passage.meet(pose, end, 200)
     for one, other in zip(met.pose(end), pose, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
     np.testing.assert_allclose(met.root[0], 0.0, atol=1e-12)
-    assert met.seam == pytest.approx(root_motion.seam(pose.relative(passage.pose(end))), rel=0.2)
+    assert met.seam == pytest.approx(root_motion.seam_size(pose.relative(passage.pose(end))), rel=0.2)
     # Beyond the samples over which the pose fades, the motion in the world is as it was.
     rows = slice(220, 580) if end == 0 else slice(20, 380)
-    before, after = (root_motion.places(motion.poses()[rows]) for motion in (passage, met))
+    before, after = (root_motion.ground_poses(motion.poses()[rows]) for motion in (passage, met))
     np.testing.assert_allclose(
-        root_motion.relative(after[0], after), root_motion.relative(before[0], before), atol=1e-9
+        root_motion.relative_pose(after[0], after), root_motion.relative_pose(before[0], before), atol=1e-9
     )
     np.testing.assert_allclose(met.joints[rows], passage.joints[rows], atol=1e-12)
 
 
 def test_a_straight_loop_goes_where_it_is_to():
-    loop = loops.loop(walk((0.4, -0.1, 0.05)), 10, 275)
-    straight = loops.straightened(loop, 0.0)
+    loop = loops.cut_loop(walk((0.4, -0.1, 0.05)), 10, 275)
+    straight = loops.straighten_loop(loop, 0.0)
     np.testing.assert_allclose(straight.twist, (np.hypot(*loop.twist[:2]), 0.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(straight.root[:, 1:], 0.0, atol=1e-12)
     # In the first moment the torso moves over the ground in the direction that it had, seen from itself.
-    ways = [np.diff(root_motion.places(motion.poses())[:2], axis=0)[0] for motion in (loop, straight)]
+    ways = [np.diff(root_motion.ground_poses(motion.poses())[:2], axis=0)[0] for motion in (loop, straight)]
     headings = [rotations.yaw(motion.poses()[0, 3:7]) for motion in (loop, straight)]
     seen = [rotations.to_heading_frame(way[:2], heading) for way, heading in zip(ways, headings, strict=True)]
     np.testing.assert_allclose(seen[0], seen[1], atol=1e-5)
 
 
 def test_beginning_elsewhere_is_the_same_loop():
-    loop = loops.loop(walk(TWISTS[1]), 10, 275)
-    begun = loop.begun(100)
+    loop = loops.cut_loop(walk(TWISTS[1]), 10, 275)
+    begun = loop.start_at(100)
     assert (begun.joints[0] == loop.joints[100]).all() and (begun.joints[-1] == begun.joints[0]).all()
     np.testing.assert_array_equal(np.sort(begun.joints[:-1], axis=0), np.sort(loop.joints[:-1], axis=0))
 
 
 def test_frames_lie_between_samples():
-    loop = loops.loop(walk(TWISTS[1]), 10, 275)
-    frames = loop.at(np.linspace(0.0, loop.seconds, 34))
+    loop = loops.cut_loop(walk(TWISTS[1]), 10, 275)
+    frames = loop.sample_at(np.linspace(0.0, loop.seconds, 34))
     assert (frames.joints[0] == loop.joints[0]).all() and (frames.joints[-1] == loop.joints[-1]).all()
     place = loop.seconds / 33.0 / STEP
     low = int(place)
@@ -185,12 +185,12 @@ def test_frames_lie_between_samples():
         frames.joints[1], loop.joints[low] + (place - low) * (loop.joints[low + 1] - loop.joints[low]), atol=1e-12
     )
     np.testing.assert_allclose(np.linalg.norm(frames.quaternions, axis=-1), 1.0)
-    assert (loop.at(STEP * np.arange(276)).joints == loop.joints).all()
+    assert (loop.sample_at(STEP * np.arange(276)).joints == loop.joints).all()
 
 
 def test_a_passage_keeps_the_way():
     recording = walk((0.5, 0.0, 0.3))
-    passage = root_motion.passage(recording, 500, 600, 275)
+    passage = root_motion.follow_mean_path(recording, 500, 600, 275)
     there = recording.poses[500:1101]
     poses = passage.poses()
     turn = rotations.yaw(poses[:1, 3:7])[0] - rotations.yaw(there[:1, 3:7])[0]

@@ -166,7 +166,7 @@ def test_the_command_is_followed(served, tab):
 def test_pose_and_gait_are_followed(served, tab):
     open_tab(tab, "Command")
     press(tab, "Height", "Home")
-    low = player_controls.room(served.session.creature.setup.body)[0, 0]
+    low = player_controls.pose_room(served.session.creature.setup.body)[0, 0]
     served.until(lambda: served.session.pose[0] == pytest.approx(low))
     choose(tab, "Gait now", "ripple")
     ripple = gaits.gait(served.session.creature.setup.body, "ripple")

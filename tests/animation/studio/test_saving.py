@@ -53,7 +53,7 @@ def test_a_picture(creature):
 
 
 def test_a_page_plays_the_walk_under_the_command(creature, monkeypatch):
-    monkeypatch.setattr(pages, "viewer", lambda: "")
+    monkeypatch.setattr(pages, "viewer_script", lambda: "")
     monkeypatch.setattr(saving, "_PAGE_STEPS", 40)
     tracks = []
     monkeypatch.setattr(saving.pages, "page", lambda given: tracks.append(given) or "<html>")

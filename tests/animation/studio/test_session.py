@@ -83,7 +83,7 @@ def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
         session.direct((-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple", 1.3)
         observed = lambda name: session.episodes.timestep.observation[name]  # noqa: E731
         shown.until(lambda: observed("gait")[-2] == pytest.approx(0.75))
-        low = player_controls.room(session.creature.setup.body)[0, 0]
+        low = player_controls.pose_room(session.creature.setup.body)[0, 0]
         shown.until(lambda: observed("pose")[0] == pytest.approx(low))
         assert session.commands["pose"] == pytest.approx([low, 0.0, 0.0, 0.0, 0.0, 0.0])
         session.ask(Sketch(legs=4, links=3))  # whose legs do not ripple
@@ -193,7 +193,7 @@ def test_history_and_states_of_a_walk():
         history = session.history
         assert len(history) == session.episodes.steps == len(history.times)
         total = sum(terms.sum() for terms in history.terms().values())
-        assert total == pytest.approx(session.episodes.earned)
+        assert total == pytest.approx(session.episodes.episode_return)
         stance, schedule = history.contacts()
         assert stance.shape == schedule.shape == (len(history), 6) and 0.0 < stance.mean() < 1.0
     shares = {share for *_, share, _ in shown.states}  # between control steps
