@@ -25,7 +25,7 @@ from arc_suite.models.outline import outline
 from arc_suite.simulation import films
 
 ROOT = Path(__file__).parents[1]
-TOTAL = 6_400_000  # bytes of all
+MAX_TOTAL_BYTES = 6_400_000  # of all pictures and films
 
 
 class View(NamedTuple):
@@ -36,8 +36,8 @@ class View(NamedTuple):
         task: its name.
         seed: of the episode.
         start: control steps before the first picture.
-        moment: control steps from there to the still.
-        command: set live all along; None for that of the task.
+        moment: control steps from there to the still picture.
+        command: set live throughout; None for that of the task.
         azimuth: of the camera from where the torso heads in the middle of the view, degrees, positive to the left.
         elevation: of the camera, degrees.
         distance: of the camera, in distances of the farthest foot from the torso.
@@ -60,10 +60,11 @@ class View(NamedTuple):
 
 _CLOSE = {"distance": 3.7, "azimuth": -42.0}
 _SIDE = {"azimuth": -90.0, "elevation": 14.0, "distance": 6.0, "drives": False}
-ROBOTS = {robot: View(robot, **_CLOSE) for robot in ("queen", "bastion", "tick", "leaper")}
-IN_PLACE = {robot: view._replace(task="steer") for robot, view in ROBOTS.items()}
-IN_PLACE["leaper"] = IN_PLACE["leaper"]._replace(settings={"gait_frequency": 1.5})  # that of the others: one loop
-TASKS = {
+ROBOT_VIEWS = {robot: View(robot, **_CLOSE) for robot in ("queen", "bastion", "tick", "leaper")}
+IN_PLACE_VIEWS = {robot: view._replace(task="steer") for robot, view in ROBOT_VIEWS.items()}
+# All four loop together at one frequency.
+IN_PLACE_VIEWS["leaper"] = IN_PLACE_VIEWS["leaper"]._replace(settings={"gait_frequency": 1.5})
+TASK_VIEWS = {
     "walk": View("queen", azimuth=-60.0, distance=4.0),
     "steer": View("bastion", "steer", 39, 105, 60, azimuth=-25.0, elevation=32.0, distance=6.2),
     "directed": View("queen", "directed", 4, 65, 50, (0.7, 0.0, 0.4), azimuth=-60.0, elevation=14.0, distance=4.5),
@@ -87,13 +88,13 @@ TASKS = {
     "roam": View("queen", "roam", 0, 40, 31, elevation=20.0, distance=6.0, drives=False),
     "navigate": View("bastion", "navigate", 0, 40, 62, azimuth=155.0, elevation=38.0, distance=9.0),
 }
-_FPS = 30.0  # of clips
-_ABOVE = 0.82  # share of what is cut from a square, where it is empty, that is cut above
-_CAPTION = 22  # height of a caption, pixels: legible where a page shows a picture at half its width
-_FRAMES = 67  # control steps of a view, on whose path the camera is fitted
+_CLIP_FPS = 30.0
+_CUT_ABOVE = 0.82  # share of the rows cut from a square picture that are cut above, where it is empty
+_CAPTION_HEIGHT = 22  # pixels: legible where a page shows a picture at half its width
+_FILM_STEPS = 67  # control steps of a view; the camera is fitted to the torso's path in them
 
 
-def played(view: View, environment, steps: int) -> Iterator[int]:
+def play(view: View, environment, steps: int) -> Iterator[int]:
     """Play a view, and yield the number of each of its control steps."""
     definition = environment.task.definition
     policy = policies.policy("cpg", view.robot, suited_preset(definition), task=definition)
@@ -104,8 +105,8 @@ def played(view: View, environment, steps: int) -> Iterator[int]:
             yield step - view.start - 1
 
 
-def opened(view: View):
-    """The environment of a view."""
+def open_environment(view: View):
+    """Return the environment of a view."""
     return arc_suite.load(view.robot, view.task, dict(view.settings))
 
 
@@ -114,32 +115,40 @@ class Camera:
 
     def __init__(self, view: View, environment):
         """Fit the line to the torso's path."""
-        poses = [environment.physics.data.qpos[:7].copy() for _ in played(view, environment, _FRAMES)]
-        path = np.array(poses)
-        self._line = np.polynomial.polynomial.polyfit(np.arange(len(path)), path[:, :3], int(view.drives))
-        azimuth = rotations.yaw(path[len(path) // 2, 3:7]) + math.radians(view.azimuth)
+        poses = np.array([environment.physics.data.qpos[:7].copy() for _ in play(view, environment, _FILM_STEPS)])
+        positions = poses[:, :3]
+        quaternion_in_the_middle = poses[len(poses) // 2, 3:7]
+        degree = 1 if view.drives else 0
+        self._line = np.polynomial.polynomial.polyfit(np.arange(len(poses)), positions, degree)
+        azimuth = rotations.yaw(quaternion_in_the_middle) + math.radians(view.azimuth)
         elevation = math.radians(view.elevation)
-        reach = abs(outline(environment.task.body)[..., :2]).max()
-        level = np.array((math.cos(azimuth), math.sin(azimuth), 0.0))
-        above = np.array((0.0, 0.0, 1.0))
-        self._back = view.distance * reach * (math.cos(elevation) * level + math.sin(elevation) * above)
-        self._up = math.cos(elevation) * above - math.sin(elevation) * level
-        self._lower = np.array((0.0, 0.0, 0.35 * environment.task.body.torso.standing_height))
+        reach = abs(outline(environment.task.body)[..., :2]).max()  # m, of the farthest foot
+        horizontal = np.array((math.cos(azimuth), math.sin(azimuth), 0.0))
+        vertical = np.array((0.0, 0.0, 1.0))
+        direction = math.cos(elevation) * horizontal + math.sin(elevation) * vertical
+        self._offset = view.distance * reach * direction  # m, of the camera from what it looks at
+        self._up = math.cos(elevation) * vertical - math.sin(elevation) * horizontal
+        height = environment.task.body.torso.standing_height
+        self._below_torso = np.array((0.0, 0.0, 0.35 * height))  # the camera looks lower than at the torso
 
     def aim(self, scene, step: int) -> None:
         """Aim the cameras of a scene at a step of the view."""
-        target = np.polynomial.polynomial.polyval(step, self._line) - self._lower
+        target = np.polynomial.polynomial.polyval(step, self._line) - self._below_torso
         for camera in scene.camera:
-            camera.pos, camera.up = target + self._back, self._up
-            camera.forward = -self._back / np.linalg.norm(self._back)
+            camera.pos = target + self._offset
+            camera.up = self._up
+            camera.forward = -self._offset / np.linalg.norm(self._offset)
 
 
 def pictures(view: View, size: tuple[int, int], steps: int) -> Iterator[np.ndarray]:
-    """Yield the pictures (height, width, 3) of a view: of each of its steps, or of its moment where there are none."""
-    (width, height), environment = size, opened(view)
-    camera, quality = Camera(view, environment), "film" if steps else "still"
-    for step in played(view, environment, steps or view.moment + 1):
-        if steps or step == view.moment:
+    """Yield the pictures (height, width, 3) of a view: of so many steps, or, where that is 0, of its moment alone."""
+    width, height = size
+    environment = open_environment(view)
+    camera = Camera(view, environment)
+    is_film = steps > 0
+    quality = "film" if is_film else "still"
+    for step in play(view, environment, steps if is_film else view.moment + 1):
+        if is_film or step == view.moment:
             yield environment.physics.render(
                 height,
                 width,
@@ -154,10 +163,10 @@ def in_place(view: View, size: tuple[int, int], steps: int) -> Iterator[np.ndarr
     """Yield the pictures (height, width, 3) of one gait cycle in place, 30 a second, on plain ground."""
     width, height = size
     setup = Setup.of(view.robot, view.task, dict(view.settings))
-    (clip,) = clips.clips(setup, ["walk"], fps=_FPS)
-    above = round(_ABOVE * (width - height))
+    (clip,) = clips.clips(setup, ["walk"], fps=_CLIP_FPS)
+    top = round(_CUT_ABOVE * (width - height))
     for square in filming.film_pictures(setup.body, clip, width, heading=math.radians(-90.0 - view.azimuth)):
-        yield square[above : above + height]
+        yield square[top : top + height]
 
 
 class Media(NamedTuple):
@@ -181,7 +190,7 @@ class Media(NamedTuple):
     views: Mapping[str, View]
     columns: int = 1
     size: tuple[int, int] = (448, 252)
-    steps: int = _FRAMES  # five cycles of a gait of 1.5 Hz, four of 1.2 Hz: the loop goes on where it began
+    steps: int = _FILM_STEPS  # five cycles of a gait of 1.5 Hz, four of 1.2 Hz: the film loops without a jump
     captions: bool = False
     large: bool = False
     limit: int = 400_000
@@ -191,31 +200,54 @@ class Media(NamedTuple):
 
 
 MEDIA = (
-    Media("docs/films/robots.webp", IN_PLACE, 2, (600, 400), 20, limit=950_000, source=in_place, quality=75, fps=_FPS),
-    Media("docs/robots.png", ROBOTS, 2, (640, 400), 0, True, limit=700_000),
-    Media("docs/tasks.png", TASKS, 4, (360, 216), 0, True, True, 800_000),
-    *(Media(f"docs/films/{name}.webp", {name: view}) for name, view in {**ROBOTS, **TASKS}.items()),
+    Media(
+        "docs/films/robots.webp",
+        IN_PLACE_VIEWS,
+        columns=2,
+        size=(600, 400),
+        steps=20,
+        limit=950_000,
+        source=in_place,
+        quality=75,
+        fps=_CLIP_FPS,
+    ),
+    Media("docs/robots.png", ROBOT_VIEWS, columns=2, size=(640, 400), steps=0, captions=True, limit=700_000),
+    Media(
+        "docs/tasks.png",
+        TASK_VIEWS,
+        columns=4,
+        size=(360, 216),
+        steps=0,
+        captions=True,
+        large=True,
+        limit=800_000,
+    ),
+    *(Media(f"docs/films/{name}.webp", {name: view}) for name, view in {**ROBOT_VIEWS, **TASK_VIEWS}.items()),
 )
 
 
-def arranged(views: list[np.ndarray], media: Media) -> np.ndarray:
-    """Return pictures in a grid, the first of them in four cells where it is large."""
+def arrange(views: list[np.ndarray], media: Media) -> np.ndarray:
+    """Return pictures in a grid, the first one in four cells if it is large."""
     columns = media.columns
     if not media.large:
         return films.grid(views, columns)
-    near = 1 + 2 * (columns - 2)
-    top = [views[0], films.grid(views[1:near], columns - 2)]
-    return np.concatenate([np.concatenate(top, axis=1), films.grid(views[near:], columns)])
+    views_at_the_top = 1 + 2 * (columns - 2)  # the large one, and two rows to its right
+    top = [views[0], films.grid(views[1:views_at_the_top], columns - 2)]
+    return np.concatenate([np.concatenate(top, axis=1), films.grid(views[views_at_the_top:], columns)])
 
 
 def draw(media: Media) -> None:
     """Draw a picture or film, and write it."""
-    views = []
+    pictures_of_views = []
     for number, (name, view) in enumerate(media.views.items()):
-        size = tuple(pixels * (1 + (media.large and number == 0)) for pixels in media.size)
-        drawn = media.source(view, size, media.steps)
-        views.append([films.captioned(picture, name, _CAPTION) if media.captions else picture for picture in drawn])
-    frames = [arranged(list(row), media) for row in zip(*views, strict=True)]
+        width, height = media.size
+        is_large = media.large and number == 0
+        size = (2 * width, 2 * height) if is_large else (width, height)
+        view_pictures = list(media.source(view, size, media.steps))
+        if media.captions:
+            view_pictures = [films.captioned(picture, name, _CAPTION_HEIGHT) for picture in view_pictures]
+        pictures_of_views.append(view_pictures)
+    frames = [arrange(list(views), media) for views in zip(*pictures_of_views, strict=True)]
     path = ROOT / media.path
     path.parent.mkdir(exist_ok=True)
     with files.writing(path) as temporary:
@@ -223,17 +255,18 @@ def draw(media: Media) -> None:
             films.write_webp(temporary, frames, 1.0 / media.fps, media.quality)
         else:
             films.write_png(temporary, frames, 0.0)
-    size = path.stat().st_size
-    if size > media.limit:
-        raise ValueError(f"{media.path}: {size} bytes, at most {media.limit}")
-    print(f"{media.path}: {size} bytes")
+    num_bytes = path.stat().st_size
+    if num_bytes > media.limit:
+        raise ValueError(f"{media.path}: {num_bytes} bytes, at most {media.limit}")
+    print(f"{media.path}: {num_bytes} bytes")
 
 
 def main(path: str | None = None) -> None:
     """Draw the row of `MEDIA` with a path, or all of them."""
     rows = {media.path: media for media in MEDIA}
-    for each in rows if path is None else [checks.name(path, rows, "picture")]:
-        draw(rows[each])
+    paths = rows if path is None else [checks.name(path, rows, "picture")]
+    for media_path in paths:
+        draw(rows[media_path])
 
 
 if __name__ == "__main__":

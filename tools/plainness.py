@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 _VAGUE_LOCALS = """
-asked both done drawn each found given gone held here inner kept known left made named new old one other others outer own
-place places ready rest said seen taken there told wanted way whole
+asked both done drawn each found given gone held here inner kept known left made named new old one other others outer
+own place places ready rest said seen taken there told wanted way whole
 """
 _IRREGULAR_PARTICIPLES = """
 bent broken built chosen drawn flown found frozen given grown held hidden kept known laid lost made sent shown sought

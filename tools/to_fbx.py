@@ -19,7 +19,7 @@ import pathlib
 import re
 import sys
 import tempfile
-from typing import Any
+from typing import Any, NamedTuple
 
 try:
     import bpy
@@ -28,15 +28,14 @@ except ImportError as error:
 import numpy as np
 
 FPS = 60  # clips last whole frames at this rate
-LARGEST = 64 * 2**20  # bytes of a .clips.json
-NUDGE = 1e-7  # m
-ROUNDED = 1e-3  # frames, by which times that the file rounds may miss a frame
-HINGED = 1e-4  # by which a quaternion may turn about other axes than that of a hinge
-ARMATURE = "Armature"  # a name that importers of engines leave out of the skeleton
+MAX_METADATA_BYTES = 64 * 2**20  # of a .clips.json
+TORSO_SHIFT = 1e-7  # m
+MAX_ROUNDING_ERROR = 1e-3  # frames, of a time that the file rounds
+MAX_OFF_AXIS = 1e-4  # components of a hinge's quaternion about other axes
+ARMATURE_NAME = "Armature"  # importers of engines leave a bone of this name out of the skeleton
+CONTACTS_PROPERTY = "foot_contacts"  # of the armature
 
-CONTACTS = "foot_contacts"  # the property of the armature
-
-_ROTATION = re.compile(r'pose\.bones\["(.+)"\]\.rotation_quaternion')
+_ROTATION_PATH = re.compile(r'pose\.bones\["(.+)"\]\.rotation_quaternion')
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -44,9 +43,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("glb", type=pathlib.Path)
     parser.add_argument("output", type=pathlib.Path)
-    given = parser.parse_args(arguments)
+    parsed = parser.parse_args(arguments)
     try:
-        for path in converted(given.glb, given.output):
+        for path in convert(parsed.glb, parsed.output):
             print(f"wrote {path}")
     except OSError as error:
         sys.exit(f"to_fbx: {error.filename}: {(error.strerror or 'cannot be read').lower()}")
@@ -54,8 +53,8 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(f"to_fbx: {error}")
 
 
-def converted(glb: pathlib.Path, output: pathlib.Path) -> list[pathlib.Path]:
-    """Convert a file, and return what was written.
+def convert(glb: pathlib.Path, output: pathlib.Path) -> list[pathlib.Path]:
+    """Convert a file, and return the paths of the files that it wrote.
 
     Raises:
         OSError: a file cannot be read or written.
@@ -68,34 +67,34 @@ def converted(glb: pathlib.Path, output: pathlib.Path) -> list[pathlib.Path]:
         raise ValueError(f"cannot write {output}: no such folder")
     if glb.suffix.lower() != ".glb":
         raise ValueError(f"{glb}: expected a .glb of arc-suite animate")
-    glb.open("rb").close()  # the error of a missing file is that of the file that was named
-    clips = sidecar(glb.with_suffix(".clips.json"))
+    glb.open("rb").close()  # raises an error with the name of this file, if it is missing
+    clips = read_metadata(glb.with_suffix(".clips.json"))
     with tempfile.TemporaryDirectory(dir=output.absolute().parent) as folder:
-        silent = io.StringIO()
-        try:  # Blender's importers and exporters tell their progress, and the tracebacks of what they cannot read
-            with contextlib.redirect_stdout(silent), contextlib.redirect_stderr(silent):
-                armature = opened(glb)
+        hidden_output = io.StringIO()  # Blender prints its progress, and tracebacks of what it cannot read
+        try:
+            with contextlib.redirect_stdout(hidden_output), contextlib.redirect_stderr(hidden_output):
+                armature = import_armature(glb)
                 put_on_frames(armature)
                 annotate(armature, clips)
-                one_curve_a_joint(armature)
+                join_rotation_curves(armature)
                 write(armature, pathlib.Path(folder) / output.name)
         except (RuntimeError, LookupError, TypeError):
             raise ValueError(f"{glb}: Blender cannot convert it") from None
         return [path.replace(output.parent / path.name) for path in sorted(pathlib.Path(folder).iterdir())]
 
 
-def sidecar(path: pathlib.Path) -> dict[str, dict[str, Any]]:
+def read_metadata(path: pathlib.Path) -> dict[str, dict[str, Any]]:
     """Return the metadata of clips by name of the animation.
 
     Raises:
         OSError: the file cannot be read.
         ValueError: it is not what `arc-suite animate` writes.
     """
-    if path.stat().st_size > LARGEST:
-        raise ValueError(f"{path}: expected at most {LARGEST} bytes")
+    if path.stat().st_size > MAX_METADATA_BYTES:
+        raise ValueError(f"{path}: expected at most {MAX_METADATA_BYTES} bytes")
     try:
         clips = json.loads(path.read_text(encoding="utf-8"))["clips"]
-        for clip in clips.values():
+        for clip in clips.values():  # raises an error if a field is missing or has another type
             bool(clip["loops"])
             for contact in clip["foot_contacts"]:
                 _marker(contact)
@@ -104,8 +103,8 @@ def sidecar(path: pathlib.Path) -> dict[str, dict[str, Any]]:
     return clips
 
 
-def opened(path: pathlib.Path) -> bpy.types.Object:
-    """Return the armature of a file, in a scene of its own at 60 frames a second.
+def import_armature(path: pathlib.Path) -> bpy.types.Object:
+    """Import a file into a new scene at 60 frames a second, and return its armature.
 
     Raises:
         RuntimeError: Blender cannot import it.
@@ -117,23 +116,19 @@ def opened(path: pathlib.Path) -> bpy.types.Object:
     armatures = [thing for thing in bpy.data.objects if thing.type == "ARMATURE"]
     if len(armatures) != 1:
         raise ValueError(f"{path}: expected one skeleton, got {len(armatures)}; export with --rig=skin")
-    armatures[0].name = ARMATURE
-    for mesh in armatures[0].children:  # the armature had its name
+    armatures[0].name = ARMATURE_NAME
+    for mesh in armatures[0].children:  # its name was taken until now
         mesh.name = mesh.data.name
     _shorten_feet(armatures[0])
     return armatures[0]
 
 
 def put_on_frames(armature: bpy.types.Object) -> None:
-    """Put keys and ends of clips on the frames that they miss: what ends a little early would lose its last frame."""
+    """Round keys and ends of clips to whole frames; a clip that ends a little early would lose its last frame."""
     for action in bpy.data.actions:
-        for curve in (curve for bag in _bags(action) for curve in bag.fcurves):
-            points = np.empty((len(curve.keyframe_points), 2), np.float32)
-            curve.keyframe_points.foreach_get("co", points.ravel())
-            near = abs(points[:, 0] - points[:, 0].round()) < ROUNDED
-            points[near, 0] = points[near, 0].round()
-            curve.keyframe_points.foreach_set("co", points.ravel())
-            curve.update()
+        for bag in _curve_bags(action):
+            for curve in bag.fcurves:
+                _round_keys(curve)
     for track in armature.animation_data.nla_tracks:
         for strip in track.strips:
             strip.action_frame_start, strip.action_frame_end = strip.action.curve_frame_range
@@ -144,10 +139,10 @@ def put_on_frames(armature: bpy.types.Object) -> None:
 def annotate(armature: bpy.types.Object, clips: dict[str, dict[str, Any]]) -> None:
     """Give actions what Blender's importer drops: whether they repeat, their frames, and markers at foot contacts.
 
-    Takes of FBX have no markers: there, a property of the armature has them as JSON, pairs of a name and a frame.
+    Takes of FBX have no markers. A property of the armature holds them as JSON: pairs of a name and a frame by clip.
     """
     markers = {name: [_marker(contact) for contact in clip["foot_contacts"]] for name, clip in clips.items()}
-    armature[CONTACTS] = json.dumps(markers)
+    armature[CONTACTS_PROPERTY] = json.dumps(markers)
     for action in bpy.data.actions:
         if action.name not in clips:
             continue
@@ -158,50 +153,69 @@ def annotate(armature: bpy.types.Object, clips: dict[str, dict[str, Any]]) -> No
             action.pose_markers.new(name).frame = frame
 
 
-def one_curve_a_joint(armature: bpy.types.Object) -> None:
-    """Make one Euler angle of the four curves of each hinge, and lock what the joint does not turn about."""
-    for bone, actions in _rotations().items():
-        keys = [_keys(four) for _, four in actions]
-        largest = np.max([abs(quaternions[:, 1:]).max(axis=0) for _, quaternions in keys], axis=0)
-        axis = int(largest.argmax())
-        if np.delete(largest, axis).max() > HINGED:
+def join_rotation_curves(armature: bpy.types.Object) -> None:
+    """Replace the four curves of each hinge's quaternion by one of its angle, and lock its other axes."""
+    for bone, rotations in _find_rotations().items():
+        keys = [_read_keys(rotation.curves) for rotation in rotations]
+        sizes = np.max([abs(quaternions[:, 1:]).max(axis=0) for _, quaternions in keys], axis=0)
+        axis = int(sizes.argmax())
+        if np.delete(sizes, axis).max() > MAX_OFF_AXIS:
             continue
-        pose = armature.pose.bones[bone]
-        pose.rotation_mode = "XYZ"
-        pose.lock_rotation = [other != axis for other in range(3)]
-        pose.lock_location = pose.lock_scale = (True,) * 3
-        for (bag, four), (frames, quaternions) in zip(actions, keys, strict=True):
-            half = np.unwrap(np.arctan2(quaternions[:, 1 + axis], quaternions[:, 0]), period=np.pi)
-            for curve in four:
-                bag.fcurves.remove(curve)
-            _curve(bag, bone, axis, frames, 2.0 * half)
+        pose_bone = armature.pose.bones[bone]
+        pose_bone.rotation_mode = "XYZ"
+        pose_bone.lock_rotation = [number != axis for number in range(3)]
+        pose_bone.lock_location = (True, True, True)
+        pose_bone.lock_scale = (True, True, True)
+        for rotation, (frames, quaternions) in zip(rotations, keys, strict=True):
+            half_angles = np.unwrap(np.arctan2(quaternions[:, 1 + axis], quaternions[:, 0]), period=np.pi)
+            for curve in rotation.curves:
+                rotation.bag.fcurves.remove(curve)
+            _add_curve(rotation.bag, bone, axis, frames, 2.0 * half_angles)
 
 
-def _bags(action: bpy.types.Action) -> list:
+class Rotation(NamedTuple):
+    """The rotation of a bone in an action."""
+
+    bag: Any  # that holds the curves of the action
+    curves: list  # the four curves of the quaternion, w first
+
+
+def _curve_bags(action: bpy.types.Action) -> list:
     """Return the bags of an action's curves."""
     return [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
 
 
-def _rotations() -> dict[str, list[tuple[Any, list]]]:
-    """Return by bones that only turn, for each action, the bag of its curves and the four curves of the quaternion."""
-    found: dict[str, list[tuple[Any, list]]] = {}
-    moving = set()
+def _round_keys(curve) -> None:
+    """Put keys of a curve that nearly are on a frame exactly there."""
+    points = np.empty((len(curve.keyframe_points), 2), np.float32)
+    curve.keyframe_points.foreach_get("co", points.ravel())
+    is_near = abs(points[:, 0] - points[:, 0].round()) < MAX_ROUNDING_ERROR
+    points[is_near, 0] = points[is_near, 0].round()
+    curve.keyframe_points.foreach_set("co", points.ravel())
+    curve.update()
+
+
+def _find_rotations() -> dict[str, list[Rotation]]:
+    """Return the rotations in all actions, by name of the bone, of bones that only turn."""
+    rotations: dict[str, list[Rotation]] = {}
+    bones_that_move = set()
     for action in bpy.data.actions:
-        for bag in _bags(action):
-            own: dict[str, list] = {}
+        for bag in _curve_bags(action):
+            curves_by_bone: dict[str, list] = {}
             for curve in bag.fcurves:
                 if curve.data_path.endswith("].location"):
-                    moving.add(curve.data_path.split('"')[1])
-                elif match := _ROTATION.fullmatch(curve.data_path):
-                    own.setdefault(match[1], []).append(curve)
-            for bone, four in own.items():
-                found.setdefault(bone, []).append((bag, sorted(four, key=lambda curve: curve.array_index)))
-    return {bone: actions for bone, actions in found.items() if bone not in moving}
+                    bones_that_move.add(curve.data_path.split('"')[1])
+                elif match := _ROTATION_PATH.fullmatch(curve.data_path):
+                    curves_by_bone.setdefault(match[1], []).append(curve)
+            for bone, curves in curves_by_bone.items():
+                rotation = Rotation(bag, sorted(curves, key=lambda curve: curve.array_index))
+                rotations.setdefault(bone, []).append(rotation)
+    return {bone: of_bone for bone, of_bone in rotations.items() if bone not in bones_that_move}
 
 
 def write_fbx(armature: bpy.types.Object, path: pathlib.Path) -> None:
     """Write all clips as takes of one FBX file."""
-    _part(armature)
+    _shift_torso(armature)
     armature.animation_data.action = None
     for track in armature.animation_data.nla_tracks:
         track.mute = False
@@ -229,9 +243,10 @@ def write_bvh(armature: bpy.types.Object, path: pathlib.Path) -> None:
         armature.animation_data.action = action
         armature.animation_data.action_slot = action.slots[0]
         first, last = (int(frame) for frame in action.frame_range)
-        bpy.context.scene.frame_start, bpy.context.scene.frame_end = first, last
-        own = path.with_name(f"{path.stem}_{action.name}.bvh")
-        bpy.ops.export_anim.bvh(filepath=str(own), frame_start=first, frame_end=last)
+        bpy.context.scene.frame_start = first
+        bpy.context.scene.frame_end = last
+        clip_path = path.with_name(f"{path.stem}_{action.name}.bvh")
+        bpy.ops.export_anim.bvh(filepath=str(clip_path), frame_start=first, frame_end=last)
 
 
 def write_blend(armature: bpy.types.Object, path: pathlib.Path) -> None:
@@ -243,12 +258,12 @@ WRITERS = {".fbx": write_fbx, ".bvh": write_bvh, ".blend": write_blend}
 
 
 def _marker(contact: dict[str, Any]) -> tuple[str, int]:
-    """Return the name and the frame of a marker."""
+    """Return the name and the frame of the marker of a foot contact."""
     return f"{contact['foot']} {contact['event']}", round(FPS * float(contact["time"]))
 
 
 def _shorten_feet(armature: bpy.types.Object) -> None:
-    """Let the bones of feet end near the sole; Blender's importer makes them as long as the link above."""
+    """Let the bones of feet end at the sole; Blender's importer makes them as long as the link above."""
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     for bone in armature.data.edit_bones:
@@ -257,26 +272,30 @@ def _shorten_feet(armature: bpy.types.Object) -> None:
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def _part(armature: bpy.types.Object) -> None:
-    """Move the torso off the end of the root's bone: Blender's importer would tie it to there and drop its path."""
+def _shift_torso(armature: bpy.types.Object) -> None:
+    """Move the torso off the end of the root's bone; Blender's importer would attach it there and drop its path."""
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     for bone in armature.data.edit_bones:
         if bone.parent is not None and bone.parent.parent is None:
-            bone.head.x, bone.tail.x = bone.head.x + NUDGE, bone.tail.x + NUDGE
+            bone.head.x += TORSO_SHIFT
+            bone.tail.x += TORSO_SHIFT
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def _keys(four: list) -> tuple[np.ndarray, np.ndarray]:
+def _read_keys(curves: list) -> tuple[np.ndarray, np.ndarray]:
     """Return the frames (keys,) and the quaternions (keys, 4), w first, of four curves."""
-    values = np.empty((4, 2 * len(four[0].keyframe_points)), np.float32)
-    for curve, row in zip(four, values, strict=True):
+    # Frame and value of each key in turn, as Blender writes them.
+    coordinates = np.empty((4, 2 * len(curves[0].keyframe_points)), np.float32)
+    for curve, row in zip(curves, coordinates, strict=True):
         curve.keyframe_points.foreach_get("co", row)
-    return values[0, ::2].astype(float), values[:, 1::2].T.astype(float)
+    frames = coordinates[0, ::2].astype(float)
+    quaternions = coordinates[:, 1::2].T.astype(float)
+    return frames, quaternions
 
 
-def _curve(bag, bone: str, axis: int, frames: np.ndarray, angles: np.ndarray) -> None:
-    """Add a curve with straight lines between its keys."""
+def _add_curve(bag, bone: str, axis: int, frames: np.ndarray, angles: np.ndarray) -> None:
+    """Add a curve of an Euler angle, rad, with straight lines between its keys."""
     curve = bag.fcurves.new(f'pose.bones["{bone}"].rotation_euler', index=axis, group_name=bone)
     curve.keyframe_points.add(len(frames))
     curve.keyframe_points.foreach_set("co", np.stack([frames, angles], axis=-1).astype(np.float32).ravel())

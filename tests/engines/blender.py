@@ -51,7 +51,7 @@ def refusals(path: pathlib.Path) -> None:
     )
     for glb, output, message in wrong:
         try:
-            to_fbx.converted(pathlib.Path(glb), pathlib.Path(output))
+            to_fbx.convert(pathlib.Path(glb), pathlib.Path(output))
         except (ValueError, OSError) as error:
             assert message in str(error), error
         else:
@@ -127,7 +127,7 @@ def converted(path: pathlib.Path, truth, parts, wholly: bool) -> str:
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for kind in to_fbx.WRITERS if wholly else (".fbx",):
-            to_fbx.converted(path, folder / f"body{kind}")
+            to_fbx.convert(path, folder / f"body{kind}")
         markers = {
             name: [[f"{each['foot']} {each['event']}", round(60.0 * each["time"])] for each in clip["foot_contacts"]]
             for name, clip in clips.items()
@@ -170,7 +170,7 @@ def marked(clips, markers) -> None:
         assert action.use_frame_range and action.frame_end - action.frame_start == round(60.0 * clip["seconds"])
         assert sorted([each.name, each.frame] for each in action.pose_markers) == sorted(markers[action.name])
         curves = [curve.data_path for curve in action.layers[0].strips[0].channelbags[0].fcurves]
-        for pose in bpy.data.objects[to_fbx.ARMATURE].pose.bones:
+        for pose in bpy.data.objects[to_fbx.ARMATURE_NAME].pose.bones:
             if pose.rotation_mode == "XYZ":
                 own = [curve for curve in curves if curve.startswith(f'pose.bones["{pose.name}"]')]
                 assert own == [f'pose.bones["{pose.name}"].rotation_euler'], own

@@ -42,7 +42,7 @@ def test_pictures_that_pages_name_are_there_and_small():
 def test_every_row_is_drawn_and_within_its_limit():
     sizes = {path: path.stat().st_size for path in ROWS}
     assert {path.name: size for path, size in sizes.items() if size > ROWS[path].limit} == {}
-    assert sum(sizes.values()) <= make_media.TOTAL
+    assert sum(sizes.values()) <= make_media.MAX_TOTAL_BYTES
     assert {path.stem for path in (ROOT / "docs" / "films").iterdir()} == {*ROBOTS, *TASKS, "robots"}
     for path, media in ROWS.items():
         with Image.open(path) as picture:
@@ -53,9 +53,9 @@ def test_every_row_is_drawn_and_within_its_limit():
 
 def steps_of(name):
     """The markers, whether a leg hangs limp, and the progress at each step of the film of a task."""
-    view = make_media.TASKS[name]
-    environment, run = make_media.opened(view), []
-    for _ in make_media.played(view, environment, 67):
+    view = make_media.TASK_VIEWS[name]
+    environment, run = make_media.open_environment(view), []
+    for _ in make_media.play(view, environment, 67):
         task = environment.task
         run.append((task.markers(environment.physics), task.failed_legs(), task.progress))
     environment.close()
@@ -67,7 +67,7 @@ def test_a_film_of_a_task_shows_what_the_task_is_about(name):
     run = steps_of(name)
     assert len(run) == 67 and not run[-1][2]["fell"]
     reds = [any(mark.color[1] < 0.2 for mark in marks) for marks, *_ in run]
-    moment = make_media.TASKS[name].moment
+    moment = make_media.TASK_VIEWS[name].moment
     assert all(len(marks) >= 2 for marks, *_ in run) or name == "navigate"
     assert (any(reds), reds[moment]) == 2 * (name in ("shoved", "roam"),)
     if name == "navigate":
@@ -81,7 +81,7 @@ def test_the_film_of_limp_shows_a_dark_leg_and_that_of_walk_no_markers():
 
 def test_a_row_is_drawn_from_its_views(tmp_path, monkeypatch):
     monkeypatch.setattr(make_media, "ROOT", tmp_path)
-    view = make_media.TASKS["limp"]._replace(start=2, moment=1)
+    view = make_media.TASK_VIEWS["limp"]._replace(start=2, moment=1)
     film = make_media.Media("films/a.webp", {"a": view, "b": view._replace(azimuth=0.0)}, 2, (64, 48), 3)
     make_media.draw(film)
     with Image.open(tmp_path / film.path) as picture:
@@ -94,8 +94,8 @@ def test_a_row_is_drawn_from_its_views(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("drives", "least", "most"), [(False, 0.0, 0.0), (True, 0.8, 2.5)])  # at 0.5 m/s, for 3.35 s
 def test_a_camera_stands_or_goes_along(drives, least, most):
-    view = make_media.TASKS["walk"]._replace(start=2, drives=drives)
-    environment, scene = make_media.opened(view), types.SimpleNamespace(camera=[types.SimpleNamespace()])
+    view = make_media.TASK_VIEWS["walk"]._replace(start=2, drives=drives)
+    environment, scene = make_media.open_environment(view), types.SimpleNamespace(camera=[types.SimpleNamespace()])
     camera, places = make_media.Camera(view, environment), []
     for step in (0, 66):
         camera.aim(scene, step)

@@ -14,18 +14,18 @@ from arc_suite.learning.studies import tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.learning.studies.tables import Prior, Run, Study, run
 
-_SIX = ("sac", "sacfd", "speq", "speq_o2o", "sope_eo", "sope")
-_PRIOR = ("sacfd", "speq_o2o", "sope")
+_PAPERS_ALGORITHMS = ("sac", "sacfd", "speq", "speq_o2o", "sope_eo", "sope")
+_WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
 
 
-def six(
+def runs_of_the_paper(
     robots: Iterable[str],
     steps: int,
     seeds: int,
     prior: Prior,
     phases: Mapping[str, Any] | None = None,
-    names=_SIX,
-    **fields,
+    names: Iterable[str] = _PAPERS_ALGORITHMS,
+    **fields: Any,
 ) -> tuple[Run, ...]:
     """Return runs of the paper's six algorithms, those of one seed before those of the next.
 
@@ -38,15 +38,19 @@ def six(
         names: of the algorithms, for fewer than six.
         **fields: others of `run`.
     """
-    own = {name: {"prior": prior if name in _PRIOR else None} for name in names}
-    for name in names:
-        own[name]["hyperparameters"] = phases if algorithms.ALGORITHMS[name].hyperparameters.phase_updates else None
-    each = itertools.product(range(seeds), robots, names)
-    return tuple(run(robot, name, steps, seed, **own[name], **fields) for seed, robot, name in each)
+    runs = []
+    for seed, robot, name in itertools.product(range(seeds), robots, names):
+        has_phases = algorithms.ALGORITHMS[name].hyperparameters.phase_updates > 0
+        fields_of_algorithm = {
+            "prior": prior if name in _WITH_PRIOR else None,
+            "hyperparameters": phases if has_phases else None,
+        }
+        runs.append(run(robot, name, steps, seed, **fields_of_algorithm, **fields))
+    return tuple(runs)
 
 
 # A tenth of the published phases, of the interval of their checks, and of the patience.
-_SHORT = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
+_SHORT_PHASES = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
 
 # `sac_parallel` with all parts, then without one of them.
 _PARTS = {
@@ -59,53 +63,53 @@ _PARTS = {
 }
 
 
-def _seeing_forces(robot, steps, seed=0, task="walk", label="ppo-forces", **fields) -> Run:
-    """A run of `ppo` as it was once: a perceptron of 256 units, which sees contact forces."""
-    own = {"exclude_blocks": [], "network": "perceptron", "hidden": 256, "minibatch": 1024}
-    return run(robot, "ppo", steps, seed, task, hyperparameters=own, label=label, **fields)
+def _run_with_forces(robot: str, steps: int, seed=0, task="walk", label="ppo-forces", **fields: Any) -> Run:
+    """Return a run of `ppo` as it was once: a perceptron of 256 units, which sees contact forces."""
+    hyperparameters = {"exclude_blocks": [], "network": "perceptron", "hidden": 256, "minibatch": 1024}
+    return run(robot, "ppo", steps, seed, task, hyperparameters=hyperparameters, label=label, **fields)
 
 
-# `sac_parallel` with prior data, or with phases.
-_ADDED = (
+# `sac_parallel` with prior data, or with phases: label, changed hyperparameters, prior data.
+_WITH_ADDITIONS = (
     ("sac_parallel", {}, None),
     ("sac_parallel-medium", {"prior": "symmetric_sampling"}, Prior("medium", 100)),
     ("sac_parallel-refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
-    ("sac_parallel-phases", _SHORT, None),
+    ("sac_parallel-phases", _SHORT_PHASES, None),
 )
-_UNEVEN = ("rough", "slopes", "stairs", "navigate")  # tasks of uneven ground or pillars, without trenches
-# Of the study from nothing; `walk` has studies of its own.
-_FROM_NOTHING = ("steer", "rough", "slopes", "stairs", "gaps", "course", "shoved", "limp", "roam", "navigate")
+_UNEVEN_TASKS = ("rough", "slopes", "stairs", "navigate")  # tasks of uneven ground or pillars, without trenches
+# Tasks of the study from nothing; `walk` has studies of its own.
+_TASKS_FROM_NOTHING = ("steer", "rough", "slopes", "stairs", "gaps", "course", "shoved", "limp", "roam", "navigate")
 _ROBOTS = ("queen", "bastion", "tick", "leaper")
 _TICK_FIRST = ("tick", "leaper", "queen", "bastion")
 
 # The paper's own study is `paper`: 3,000 hours of a core. The others fit fewer hours.
 STUDIES = {
-    "paper": Study("the paper's six algorithms as published", six(_ROBOTS, 1_000_000, 5, Prior())),
-    "exact-tick": Study("phases as published, 100,000 steps", six(("tick",), 100_000, 1, Prior())),
+    "paper": Study("the paper's six algorithms as published", runs_of_the_paper(_ROBOTS, 1_000_000, 5, Prior())),
+    "exact-tick": Study("phases as published, 100,000 steps", runs_of_the_paper(("tick",), 100_000, 1, Prior())),
     # SAC and SACfD have no phases: they are as published, and run on all four robots. Second seeds come last.
     "short": Study(
         "short phases: 7,500 updates in place of 75,000",
         tuple(
             sorted(
                 (
-                    *six(("tick", "leaper"), 100_000, 2, Prior(), _SHORT),
-                    *six(("queen", "bastion"), 100_000, 1, Prior(), names=("sac", "sacfd")),
+                    *runs_of_the_paper(("tick", "leaper"), 100_000, 2, Prior(), _SHORT_PHASES),
+                    *runs_of_the_paper(("queen", "bastion"), 100_000, 1, Prior(), names=("sac", "sacfd")),
                 ),
-                key=lambda each: each.configuration.seed,
+                key=lambda paper_run: paper_run.configuration.seed,
             )
         ),
     ),
     # A quarter to half an hour of a core a run.
     "first-steps": Study(
         "the first 50,000 steps, short phases: 7,500 updates in place of 75,000, prior data of 100 episodes",
-        six(("tick",), 50_000, 1, Prior(episodes=100), _SHORT, evaluate_every=5000),
+        runs_of_the_paper(("tick",), 50_000, 1, Prior(episodes=100), _SHORT_PHASES, evaluate_every=5000),
     ),
     # Demonstrators that the paper did not have.
     "refined-prior": Study(
         "prior data of the demonstrators with refined numbers in place of medium, short phases: 7,500 updates",
         tuple(
-            each._replace(label=f"{each.kind}-refined")
-            for each in six(("tick",), 100_000, 1, Prior("refined"), _SHORT, _PRIOR)
+            paper_run._replace(label=f"{paper_run.kind}-refined")
+            for paper_run in runs_of_the_paper(("tick",), 100_000, 1, Prior("refined"), _SHORT_PHASES, _WITH_PRIOR)
         ),
     ),
     # Half a minute of a core a run, two on `gaps`.
@@ -114,7 +118,7 @@ STUDIES = {
         (
             *(run(robot, "dagger", 25_600) for robot in _ROBOTS),
             *(run(robot, "dagger", 38_400, task="steer", evaluate_every=38_400) for robot in _ROBOTS),
-            *(run("tick", "dagger", 38_400, task=task, evaluate_every=38_400) for task in _UNEVEN),
+            *(run("tick", "dagger", 38_400, task=task, evaluate_every=38_400) for task in _UNEVEN_TASKS),
             # A foot misses a trench in a few steps of an episode alone: that takes more episodes.
             run("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
         ),
@@ -134,9 +138,9 @@ STUDIES = {
                 label="ppo-undisturbed",
                 training={"actuator_failure": False},
             ),
-            *(_seeing_forces("tick", DIVISIONS["top"].steps_in(task), task=task) for task in _FROM_NOTHING),
+            *(_run_with_forces("tick", DIVISIONS["top"].steps_in(task), task=task) for task in _TASKS_FROM_NOTHING),
             # Without a curriculum it learns to stand at the first trench.
-            _seeing_forces(
+            _run_with_forces(
                 *("tick", DIVISIONS["top"].far_steps, 0, "gaps"),
                 label="ppo-curriculum-forces",
                 training={"curriculum": True},
@@ -164,13 +168,13 @@ STUDIES = {
         "SAC in parallel environments with prior data of 100 episodes, or short phases, 60,000 steps",
         tuple(
             run(robot, "sac_parallel", 60_000, hyperparameters=changes, prior=prior, label=label)
-            for robot, (label, changes, prior) in itertools.product(("tick", "leaper"), _ADDED)
+            for robot, (label, changes, prior) in itertools.product(("tick", "leaper"), _WITH_ADDITIONS)
         ),
     ),
     "ppo-forces": Study(
         "division top of the benchmark: PPO with contact forces and 256 units",
         tuple(
-            _seeing_forces(robot, DIVISIONS["top"].steps_in(task), seed, task)
+            _run_with_forces(robot, DIVISIONS["top"].steps_in(task), seed, task)
             for seed, (robot, task) in itertools.product(range(SEEDS), PLACES)
         ),
     ),

@@ -17,15 +17,16 @@ from arc_suite.learning.studies.tables import Run
 from arc_suite.learning.studies.text_tables import table
 from studies import catalog
 
-PAGE, TABLE = "README.md", "leaderboard.csv"
-STYLE = {
+PAGE = "README.md"
+TABLE = "leaderboard.csv"
+STYLE_METRICS = {  # by the heading of their column
     "gait compliance": "gait_compliance",
     "heading error, rad": "heading_error",
     "torso pitch, rad": "torso_pitch",
 }
 HEADS = (
     *("robot, task", "algorithm", "phases, updates", "prior data, episodes", "seeds", "return", "score", "IQM [95 %]"),
-    *("metric", *STYLE, "steps", "CPU min", "notes", "study", "command of seed 0", "configuration"),
+    *("metric", *STYLE_METRICS, "steps", "CPU min", "notes", "study", "command of seed 0", "configuration"),
 )
 _TEXT = (
     "All committed studies, written by `python tools/study.py NAME --report`. "
@@ -51,8 +52,11 @@ def write(studies: Path) -> None:
     rows = [row for name in names for row in study_rows(name, studies / name)]
     csv_files.write(studies / TABLE, HEADS, rows)
     heads = HEADS[:-1]  # the configuration only tells rows apart
-    page = table(heads, [[(row | {"study": link(row)})[head] for head in heads] for row in ranked(rows)])
-    files.write(studies / PAGE, f"# Leaderboard\n\n{_TEXT}\n\n{page}\n")
+    lines = []
+    for row in rank_configurations(rows):
+        linked_row = row | {"study": link(row)}
+        lines.append([linked_row[head] for head in heads])
+    files.write(studies / PAGE, f"# Leaderboard\n\n{_TEXT}\n\n{table(heads, lines)}\n")
 
 
 def study_rows(name: str, published: Path) -> list[dict[str, str]]:
@@ -70,7 +74,8 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
     demonstrators = results.demonstrators(published)
     rows = []
     for _, _, seeds in report.by_kind(groups):
-        run, values = seeds[0].run, results.scores(seeds)
+        run = seeds[0].run
+        scores = results.scores(seeds)
         phase_updates = getattr(run.configuration.hyperparameters, "phase_updates", 0)
         metric = next(iter(seeds[0].progress))
         cells = {
@@ -79,13 +84,13 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
             "phases, updates": f"{phase_updates:,}" if phase_updates else "-",
             "prior data, episodes": f"{run.prior.preset}, {run.prior.episodes:,}" if run.prior else "-",
             "seeds": str(len(seeds)),
-            "return": f"{values.mean():.1f}",
-            "score": report.score_text(values, run.place, demonstrators),
-            "IQM [95 %]": report.iqm_text(values),
-            "metric": f"{metric} {np.mean([np.mean(each.progress[metric]) for each in seeds]):.3f}",
-            **{head: report.style_text(name_of_metric, seeds) for head, name_of_metric in STYLE.items()},
-            "steps": f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}",
-            "CPU min": f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}",
+            "return": f"{scores.mean():.1f}",
+            "score": report.score_text(scores, run.place, demonstrators),
+            "IQM [95 %]": report.iqm_text(scores),
+            "metric": f"{metric} {np.mean([np.mean(result.progress[metric]) for result in seeds]):.3f}",
+            **{head: report.style_text(name, seeds) for head, name in STYLE_METRICS.items()},
+            "steps": f"{min(result.steps[-1] for result in seeds):,} of {run.configuration.steps:,}",
+            "CPU min": f"{np.mean([result.cpu[-1] for result in seeds]) / 60.0:.1f}",
             "notes": results.notes(seeds),
             "study": name,
             "command of seed 0": f"`{run.configuration.command}`",
@@ -101,14 +106,14 @@ def _hash_without_seed(run: Run) -> str:
     return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def ranked(rows: Iterable[dict[str, str]]) -> list[dict[str, str]]:
-    """Return each configuration once, with the most seeds, by robot and task, and then by return."""
-    once: dict[str, dict[str, str]] = {}
+def rank_configurations(rows: Iterable[dict[str, str]]) -> list[dict[str, str]]:
+    """Return the row with the most seeds of each configuration, sorted by robot and task, and then by return."""
+    row_of_configuration: dict[str, dict[str, str]] = {}
     for row in rows:
-        known = once.get(row["configuration"])
-        if known is None or int(row["seeds"]) > int(known["seeds"]):
-            once[row["configuration"]] = row
-    return sorted(once.values(), key=lambda row: (row["robot, task"], -float(row["return"])))
+        earlier_row = row_of_configuration.get(row["configuration"])
+        if earlier_row is None or int(row["seeds"]) > int(earlier_row["seeds"]):
+            row_of_configuration[row["configuration"]] = row
+    return sorted(row_of_configuration.values(), key=lambda row: (row["robot, task"], -float(row["return"])))
 
 
 def link(row: Mapping[str, str], studies: str = "") -> str:

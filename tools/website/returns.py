@@ -35,7 +35,7 @@ def _anchors(setup: Setup, known: anchors.Returns) -> tuple[str, str, str, str]:
 def learners(robots=tuple(ROBOTS), tasks=tuple(TASKS), studies: str = "../../studies/") -> str:
     """Return the table of learners in committed studies, `studies` away; empty where there are none."""
     places = {str(Setup.of(robot, task)) for task in tasks for robot in robots}
-    rows = leaderboard.ranked(csv_files.read(ROOT / "studies" / leaderboard.TABLE, leaderboard.HEADS))
+    rows = leaderboard.rank_configurations(csv_files.read(ROOT / "studies" / leaderboard.TABLE, leaderboard.HEADS))
     lines = [row | {"study": leaderboard.link(row, studies)} for row in rows if row["robot, task"] in places]
     return table(_LEARNER_HEADS, ([line[head] for head in _LEARNER_HEADS] for line in lines)) if lines else ""
 
