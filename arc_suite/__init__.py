@@ -25,7 +25,7 @@ with versions.explain_import_errors():
     registration.register_ids()
 
 __version__ = "0.1.0"
-__all__ = ["load", "symmetry", "register", "Setup", "TASKS_BY_DOMAIN", "ALL_TASKS"]  # noqa: F822  # two are made by __getattr__
+__all__ = ["load", "symmetry", "register", "Setup", "TASKS_BY_DOMAIN", "ALL_TASKS"]  # noqa: F822  # the last two are of __getattr__
 
 
 def __getattr__(name):

@@ -8,32 +8,44 @@ import numpy as np
 
 from arc_suite import checks, files
 
-_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what NumPy writes
-# What NumPy and zipfile raise for damaged files.
-_DAMAGES = (ValueError, KeyError, TypeError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_VALID_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those that NumPy writes
+# Errors that NumPy and zipfile raise for damaged files.
+_ERRORS_OF_DAMAGE = (
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
-def read(path: str | os.PathLike, most: int, only: str | None = None) -> dict[str, np.ndarray]:
+def read(path: str | os.PathLike, max_bytes: int, only: str | None = None) -> dict[str, np.ndarray]:
     """Return the arrays of an archive by name.
 
     Args:
         path: of the file.
-        most: bytes that all arrays may have, unpacked.
-        only: name of the array to read; None for all.
+        max_bytes: the largest valid size of all arrays together, uncompressed.
+        only: name of the single array to read; None for all.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: it is larger, damaged, or holds a pickle.
+        OSError: the file cannot be read.
+        ValueError: the file is too large or damaged, or contains a pickle.
     """
     try:
         with files.plain(path).open("rb") as file:
             with zipfile.ZipFile(file) as archive:
                 entries = archive.infolist()
-            if (size := sum(entry.file_size for entry in entries)) > most:
-                raise ValueError(f"expected at most {most} bytes, got {size}")
-            if unknown := [entry.filename for entry in entries if entry.compress_type not in _COMPRESSIONS]:
-                raise ValueError(f"{unknown[0]}: expected no compression, or deflate")
-            with np.load(file, allow_pickle=False) as stored:
-                return {name: stored[name] for name in stored.files if only in (None, name)}
-    except _DAMAGES as error:
+            size = sum(entry.file_size for entry in entries)
+            if size > max_bytes:
+                raise ValueError(f"expected at most {max_bytes} bytes, got {size}")
+            for entry in entries:
+                if entry.compress_type not in _VALID_COMPRESSIONS:
+                    raise ValueError(f"{entry.filename}: expected no compression, or deflate")
+            with np.load(file, allow_pickle=False) as arrays:
+                names = [name for name in arrays.files if only is None or name == only]
+                return {name: arrays[name] for name in names}
+    except _ERRORS_OF_DAMAGE as error:
         raise ValueError(checks.quote(error)) from None

@@ -1,4 +1,4 @@
-"""Checks of names, seeds and numbers, with one wording of errors."""
+"""Checks of names, seeds and numbers. Each returns the checked value, or raises an error in the same wording."""
 
 import difflib
 import json
@@ -12,52 +12,57 @@ from typing import Any
 
 import numpy as np
 
-MAX_SEED = 2**32 - 1  # that a RandomState takes
-_SMALL = 1e-6  # least number that errors name as a bound; a smaller one keeps out 0
-_LONGEST_QUOTE = 300  # characters
+MAX_SEED = 2**32 - 1  # the largest seed of a NumPy `RandomState`
+
+# Lower bounds between 0 and this number only exclude 0, so errors say "above 0" in place of the bound.
+_MIN_NAMED_BOUND = 1e-6
+_MAX_QUOTE = 300  # characters
+_MAX_PATH = 80  # characters of a path `module:name` in an error
 
 
-def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> str:
+def name(value, valid: Iterable[str], kind: str, suggestions: Iterable[str] = ()) -> str:
     """Return the value if it is a valid name.
 
     Args:
         value: the name.
-        valid: all names there are.
-        kind: what they name, with which an error begins.
-        near: names that are valid in its place but are taken out before; an error may mean them too.
+        valid: all names that pass this check.
+        kind: what the names stand for, such as "robot"; errors contain it.
+        suggestions: names that the caller has already handled; errors list them as valid, too.
 
     Raises:
-        ValueError: it is not; the message names it, a valid name that is near, and all there are.
+        ValueError: the name is not valid. The message suggests a similar valid name and lists all of them.
     """
-    valid = list(valid)
-    if value in valid:
+    valid_names = list(valid)
+    if value in valid_names:
         return value
-    valid += near
-    raise ValueError(f"unknown {kind} {preview(value)}{hint(value, valid)} (there are: {', '.join(valid)})")
+    listed_names = [*valid_names, *suggestions]
+    raise ValueError(
+        f"unknown {kind} {preview(value)}{hint(value, listed_names)} (there are: {', '.join(listed_names)})"
+    )
 
 
 def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
-    """Return the value as valid names; one name stands for a list of it.
+    """Return the value as a tuple of valid names; a single name becomes a tuple of one.
 
     Args:
-        what: name of the value, with which an error about all of it begins.
+        what: the value's own name; errors begin with it.
         value: a name, or a list or tuple of names.
-        valid: all names there are.
-        kind: what they name.
+        valid: all valid names.
+        kind: what the names stand for, such as "robot"; errors contain it.
 
     Raises:
-        ValueError: it is neither, or one of them is not valid; see `name`.
+        ValueError: the value is no name and no list of names, or one of the names is not valid; see `name`.
     """
-    given = (value,) if isinstance(value, str) else value
-    if not isinstance(given, tuple | list):
+    items = (value,) if isinstance(value, str) else value
+    if not isinstance(items, tuple | list):
         raise ValueError(f"{what}: expected names of {kind}s, got {preview(value)}")
-    return tuple(name(each, valid, kind) for each in given)
+    return tuple(name(item, valid, kind) for item in items)
 
 
 def hint(value, valid: Iterable[str]) -> str:
-    """Return how an error goes on that names an unknown value: with a valid one that is near, if there is any."""
-    close = difflib.get_close_matches(preview(value).strip("'"), valid, n=1)
-    return f"; did you mean {close[0]!r}?" if close else ""
+    """Return the part of an error that suggests the valid name most similar to a value; empty if none is similar."""
+    similar_names = difflib.get_close_matches(preview(value).strip("'"), valid, n=1)
+    return f"; did you mean {similar_names[0]!r}?" if similar_names else ""
 
 
 def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
@@ -65,10 +70,10 @@ def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
 
     Args:
         path: of the file.
-        valid: extensions there are, with their dots.
+        valid: the valid extensions, each with its dot.
 
     Raises:
-        ValueError: it is none of them.
+        ValueError: the file has another extension.
     """
     return name(Path(path).suffix.lower(), valid, "extension")
 
@@ -77,7 +82,7 @@ def seed(value) -> int:
     """Return the seed as a Python integer.
 
     Raises:
-        ValueError: it is not an integer from 0 to 2**32 - 1.
+        ValueError: the value is not an integer from 0 to 2**32 - 1.
     """
     return integer("seed", value, 0, MAX_SEED)
 
@@ -86,55 +91,55 @@ def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
     """Return the value as a Python integer.
 
     Args:
-        what: name of the value, with which an error begins.
+        what: the value's own name; errors begin with it.
         value: a Python or NumPy integer.
-        low: least that it may be.
-        high: most that it may be; None for no bound.
+        low: the smallest valid value.
+        high: the largest valid value; None for no bound.
 
     Raises:
-        ValueError: it is no integer, or out of range.
+        ValueError: the value is no integer (a boolean is none), or out of range.
     """
     try:
-        number = low - 1 if isinstance(value, bool) else operator.index(value)
+        result = None if isinstance(value, bool) else operator.index(value)
     except TypeError:
-        number = low - 1
-    if number < low or (high is not None and number > high):
+        result = None
+    if result is None or result < low or (high is not None and result > high):
         bounds = f"from {low}" if high is None else f"from {low} to {high}"
         raise ValueError(f"{what}: expected an integer {bounds}, got {preview(value)}")
-    return number
+    return result
 
 
 def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
     """Return the value as a float.
 
     Args:
-        what: name of the value, with which an error begins.
+        what: the value's own name; errors begin with it.
         value: a Python or NumPy number.
-        low: least that it may be.
-        high: most that it may be.
+        low: the smallest valid value.
+        high: the largest valid value.
 
     Raises:
-        ValueError: it is no finite number, or out of range.
+        ValueError: the value is no finite number (a boolean is none), or out of range.
     """
-    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    is_real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     try:
-        found = float(value) if real else math.nan
-    except OverflowError:  # of a large integer
-        found = math.inf
-    if not math.isfinite(found) or not low <= found <= high:
-        raise ValueError(f"{what}: expected a {_numbers(low, high)}, got {preview(value)}")
-    return found
+        result = float(value) if is_real else math.nan
+    except OverflowError:  # the value is an integer above the largest float
+        result = math.inf
+    if not math.isfinite(result) or not low <= result <= high:
+        raise ValueError(f"{what}: expected a {_describe_range(low, high)}, got {preview(value)}")
+    return result
 
 
 def boolean(what: str, value: Any) -> bool:
     """Return the value as a Python boolean.
 
     Args:
-        what: name of the value, with which an error begins.
+        what: the value's own name; errors begin with it.
         value: True or False, of Python or NumPy.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: the value is neither.
     """
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{what}: expected true or false, got {preview(value)}")
@@ -142,64 +147,70 @@ def boolean(what: str, value: Any) -> bool:
 
 
 def span(what: str, value: Any, low: float, high: float) -> tuple[float, float]:
-    """Return two numbers, the lower first, between which something is drawn; one number stands for both.
+    """Return the lower and the upper end of a range; a single number becomes both ends.
 
     Args:
-        what: name of the value, with which an error begins.
-        value: a number, or a list or tuple of two.
-        low: least that they may be.
-        high: most that they may be.
+        what: the value's own name; errors begin with it.
+        value: a number, or a list or tuple of two numbers, the lower first.
+        low: the smallest valid value of either end.
+        high: the largest valid value of either end.
 
     Raises:
-        ValueError: it is neither, or out of range.
+        ValueError: the value is neither, or an end is out of range.
     """
     try:
         first, last = value if isinstance(value, tuple | list) else (value, value)
-        first = number(what, first, low, high)
-        return first, number(what, last, first, high)
+        lower_end = number(what, first, low, high)
+        upper_end = number(what, last, lower_end, high)
     except ValueError:
         raise ValueError(
-            f"{what}: expected a {_numbers(low, high)}, or two of them, the lower first, got {preview(value)}"
+            f"{what}: expected a {_describe_range(low, high)}, or two of them, the lower first, got {preview(value)}"
         ) from None
-
-
-def _numbers(low: float, high: float) -> str:
-    """Return in words which numbers lie in a range."""
-    if low == -math.inf:
-        return "finite number"
-    if 0.0 < low < _SMALL:
-        return "finite number above 0" if high == math.inf else f"number above 0, at most {high:g}"
-    return f"finite number of at least {low:g}" if high == math.inf else f"number from {low:g} to {high:g}"
+    return lower_end, upper_end
 
 
 def array(what: str, value: Any, size: int, low: float = -math.inf, high: float = math.inf) -> np.ndarray:
-    """Return the value as (size,) floats; a single number stands for all of them.
+    """Return the value as (size,) floats; a single number is repeated.
 
     Args:
-        what: name of the value, with which an error begins.
-        value: a number, or a list or array of them.
-        size: how many.
-        low: least that they may be.
-        high: most that they may be.
+        what: the value's own name; errors begin with it.
+        value: a number, or a list or array of `size` numbers.
+        size: length of the result.
+        low: the smallest valid number.
+        high: the largest valid number.
 
     Raises:
-        ValueError: it is neither one finite number nor so many of them, or out of range.
+        ValueError: the value has another shape, or one of its numbers is not finite or out of range.
     """
     try:
-        numbers = np.asarray(value)
-    except (ValueError, RecursionError):  # of unequal lengths, or nested too deeply
-        numbers = np.asarray(None)
-    fits = numbers.dtype.kind in "if" and numbers.shape in ((), (size,)) and np.isfinite(numbers).all()
-    if not (fits and ((low <= numbers) & (numbers <= high)).all()):
-        raise ValueError(f"{what}: expected one {_numbers(low, high)} or {size} of them, got {preview(value)}")
-    return np.broadcast_to(numbers, size).astype(float)
+        values = np.asarray(value)
+    except (ValueError, RecursionError):  # its parts have unequal lengths, or it is nested too deeply
+        values = np.asarray(None)
+    has_real_type = values.dtype.kind in "if"  # integers or floats
+    has_valid_shape = values.shape in ((), (size,))
+    is_valid = (
+        has_real_type and has_valid_shape and np.isfinite(values).all() and ((low <= values) & (values <= high)).all()
+    )
+    if not is_valid:
+        raise ValueError(f"{what}: expected one {_describe_range(low, high)} or {size} of them, got {preview(value)}")
+    return np.broadcast_to(values, size).astype(float)
+
+
+def _describe_range(low: float, high: float) -> str:
+    """Return a phrase for the numbers from `low` to `high`, such as "number from 0 to 1"."""
+    if low == -math.inf:
+        return "finite number"
+    excludes_only_zero = 0.0 < low < _MIN_NAMED_BOUND
+    if high == math.inf:
+        return "finite number above 0" if excludes_only_zero else f"finite number of at least {low:g}"
+    return f"number above 0, at most {high:g}" if excludes_only_zero else f"number from {low:g} to {high:g}"
 
 
 def mapping(what: str, value: Any) -> Mapping[str, Any]:
-    """Return the value if it is a mapping, and an empty one for None.
+    """Return the value if it is a mapping, or an empty mapping for None.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: the value is neither.
     """
     if value is None:
         return {}
@@ -209,10 +220,10 @@ def mapping(what: str, value: Any) -> Mapping[str, Any]:
 
 
 def json_text(what: str, value: Any) -> str:
-    """Return the value as JSON, with the keys of mappings in order.
+    """Return the value as JSON text, with the keys of mappings sorted.
 
     Raises:
-        ValueError: it holds something that JSON cannot.
+        ValueError: the value contains something that JSON cannot represent.
     """
     try:
         return json.dumps(value, sort_keys=True)
@@ -221,31 +232,31 @@ def json_text(what: str, value: Any) -> str:
 
 
 def quote(value: Any) -> str:
-    """Return the beginning of a foreign text, such as another library's error, without line breaks."""
-    return " ".join(str(value).split())[:_LONGEST_QUOTE]
+    """Return the beginning of a value's text, in one line; for texts of unknown length, such as foreign errors."""
+    return " ".join(str(value).split())[:_MAX_QUOTE]
 
 
 def preview(value: Any) -> str:
-    """Return how errors write a value of any origin, such as of a file: the beginning of its text, in one line."""
+    """Return the beginning of a value's `repr`, in one line, as errors show it. The value may be of any type."""
     try:
         return quote(repr(value))
-    except Exception:  # nested too deeply, or broken
+    except Exception:  # the value is nested too deeply, or its `repr` is broken
         return f"a {type(value).__name__} that cannot be shown"
 
 
 def import_object(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:
-    """Return what `module:name` stands for; its module is imported.
+    """Import the module in `module:name`, and return the object of that name in it.
 
     Args:
-        path: the module and the name in it.
-        kind: of what is wanted, with which an error begins.
-        resolve: returns it.
+        path: the text `module:name`.
+        kind: what the object is for, such as "policy"; errors begin with it.
+        resolve: function from the path to the object.
 
     Raises:
-        ValueError: there is none.
+        ValueError: the module cannot be imported, or has no such name.
     """
     try:
         return resolve(path)
     except (ImportError, ValueError, AttributeError) as error:
-        near = hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
-        raise ValueError(f"{kind} {path[:80]!r}: {quote(error)}{near}") from None
+        suggestion = hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
+        raise ValueError(f"{kind} {path[:_MAX_PATH]!r}: {quote(error)}{suggestion}") from None

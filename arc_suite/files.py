@@ -1,4 +1,4 @@
-"""Files that are whole or not there, folders made where need be, and locks."""
+"""Files that are written completely or not at all, folders that are made where needed, and locks."""
 
 import contextlib
 import errno
@@ -19,15 +19,16 @@ except ImportError:  # Windows
     import msvcrt
 
 MAX_JSON = 1 << 24  # bytes
-_FAR = 1 << 30  # the byte that is locked on Windows, where nobody else can read or write a locked one
-_PAUSE = 0.1  # s between two attempts at a lock
+_LOCKED_BYTE = 1 << 30  # position in the file, on Windows; far behind all content, as others cannot read a locked byte
+_LOCK_RETRY_INTERVAL = 0.1  # s
+_MAX_STEM = 32  # characters of a target's name in the names of its temporary files
 
 
 def folder(path: str | os.PathLike) -> Path:
-    """Make a folder where there is none, and return it.
+    """Make a folder if there is none yet, and return its path.
 
     Raises:
-        OSError: it cannot be made.
+        OSError: the folder cannot be made.
     """
     path = Path(path)
     try:
@@ -41,13 +42,13 @@ def folder(path: str | os.PathLike) -> Path:
 def writing(path: str | os.PathLike) -> Iterator[Path]:
     """Write a file atomically: `with writing("a.png") as temporary: save(temporary)`.
 
-    The temporary file lies in the target's folder and has its extension; it takes the target's place
-    when the block ends, unless the block has deleted it, and is deleted if the block raises. Temporary
-    files that killed processes of this machine left for the target are deleted. Open the block before
-    any long work: what cannot be written is found out at once.
+    The temporary file lies in the target's folder and has its extension. When the block ends, the temporary file
+    replaces the target, unless the block has deleted it. If the block raises, the temporary file is deleted.
+    Temporary files that killed processes of this machine left for the target are deleted, too. Open the block
+    before any long work: a target that cannot be written raises at once.
 
     Args:
-        path: the target; a file that is there is replaced.
+        path: the target; an existing file is replaced.
 
     Yields:
         The path to write to.
@@ -56,14 +57,14 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         OSError: the target cannot be written.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f"{_prefix(target)}{os.getpid()}{target.suffix}")
+    temporary = target.with_name(f"{_temporary_prefix(target)}{os.getpid()}{target.suffix}")
     try:
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         temporary.touch()
-        _delete_abandoned(target)
+        _delete_old_temporaries(target)
     except OSError as error:
         raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
     try:
@@ -89,11 +90,81 @@ def write(path: str | os.PathLike, text: str) -> None:
 
 
 @contextlib.contextmanager
-def reading(path: str | os.PathLike) -> Iterator[None]:
-    """Read a file or folder, with errors of one wording: `with reading("a.md"): text = page.read_text()`.
+def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
+    """Write a JSON file as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.
+
+    Args:
+        path: the target; with None nothing is written.
+
+    Yields:
+        An empty dictionary for the block to fill. NaN and infinities in it become null, as JSON has none.
 
     Raises:
-        OSError: it cannot be read, or is no text where text is read.
+        OSError: the target cannot be written.
+    """
+    report = {}
+    if path is None:
+        yield report
+        return
+    with writing(path) as temporary:
+        yield report
+        text = json.dumps(_to_json_values(report), indent=2, allow_nan=False) + "\n"
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _to_json_values(value):
+    """Return a value with NamedTuples as dictionaries, other tuples as lists, and None for NaN and infinities."""
+    if isinstance(value, dict):
+        return {key: _to_json_values(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        if hasattr(value, "_asdict"):  # a NamedTuple
+            return _to_json_values(value._asdict())
+        return [_to_json_values(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def delete_temporaries(path: str | os.PathLike) -> None:
+    """Delete all temporary files of `writing` for a target; the caller knows that no process is writing it."""
+    target = Path(path)
+    for temporary in target.parent.glob(f".{target.stem[:_MAX_STEM]}.*{target.suffix}"):
+        temporary.unlink()
+
+
+def _temporary_prefix(target: Path) -> str:
+    """Return the beginning of the names of this machine's temporary files; other machines may share the folder."""
+    return f".{target.stem[:_MAX_STEM]}.{platform.node()}."
+
+
+def _delete_old_temporaries(target: Path) -> None:
+    """Delete temporary files for a target whose processes on this machine no longer run."""
+    prefix = _temporary_prefix(target)
+    for temporary in target.parent.glob(f"{glob.escape(prefix)}*{glob.escape(target.suffix)}"):
+        process_id = temporary.name.removeprefix(prefix).removesuffix(target.suffix)
+        if process_id.isdecimal() and not _may_run(int(process_id)):
+            temporary.unlink(missing_ok=True)
+
+
+def _may_run(process_id: int) -> bool:
+    """Return whether a process may be running; on Windows, where the signal 0 would end it, always True."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process_id, 0)  # the signal 0 only checks that the process exists
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # the process runs for another user
+        pass
+    return True
+
+
+@contextlib.contextmanager
+def reading(path: str | os.PathLike) -> Iterator[None]:
+    """Give errors of reading a file or folder one wording: `with reading("a.md"): text = page.read_text()`.
+
+    Raises:
+        OSError: the path cannot be read, or the block reads text from a file that is no text.
     """
     try:
         yield
@@ -104,11 +175,11 @@ def reading(path: str | os.PathLike) -> Iterator[None]:
 
 
 def plain(path: str | os.PathLike) -> Path:
-    """Return the path of a file; reading a pipe would block.
+    """Return the path of a plain file, after a check that it is one: reading a pipe, for example, would block.
 
     Raises:
-        OSError: there is none.
-        ValueError: it is no file.
+        OSError: there is no such path.
+        ValueError: the path is no plain file.
     """
     path = Path(path)
     if not path.exists():
@@ -118,92 +189,38 @@ def plain(path: str | os.PathLike) -> Path:
     return path
 
 
-def read_json(path: str | os.PathLike, most: int = MAX_JSON) -> Any:
-    """Return the content of a file of JSON that others may have written.
+def read_json(path: str | os.PathLike, max_bytes: int = MAX_JSON) -> Any:
+    """Return the content of a JSON file that others may have written.
 
     Args:
         path: of the file.
-        most: bytes that it may have.
+        max_bytes: the largest valid size of the file.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: it is no file, longer, or no JSON.
+        OSError: the file cannot be read.
+        ValueError: the path is no file, or the file is too large or no JSON.
     """
     path = plain(path)
-    if path.stat().st_size > most:
-        raise ValueError(f"expected at most {most} bytes")
+    if path.stat().st_size > max_bytes:
+        raise ValueError(f"expected at most {max_bytes} bytes")
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
         raise ValueError("expected JSON that is not nested so deeply") from None
 
 
-def _prefix(target: Path) -> str:
-    """Return the beginning of the names of temporary files; other machines may write to the same folder."""
-    return f".{target.stem[:32]}.{platform.node()}."
-
-
-def _delete_abandoned(target: Path) -> None:
-    """Delete temporary files of a target whose processes are gone."""
-    prefix = _prefix(target)
-    for temporary in target.parent.glob(f"{glob.escape(prefix)}*{glob.escape(target.suffix)}"):
-        process = temporary.name.removeprefix(prefix).removesuffix(target.suffix)
-        if process.isdecimal() and not _runs(int(process)):
-            temporary.unlink(missing_ok=True)
-
-
-def _runs(process: int) -> bool:
-    """Return whether a process may be running; on Windows, where a signal 0 would end it, always."""
-    if os.name == "nt":
-        return True
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:  # another user's
-        pass
-    return True
-
-
-def delete_temporaries(path: str | os.PathLike) -> None:
-    """Delete temporary files that killed processes left in `writing` a file; no process may be writing it."""
-    target = Path(path)
-    for temporary in target.parent.glob(f".{target.stem[:32]}.*{target.suffix}"):
-        temporary.unlink()
-
-
-@contextlib.contextmanager
-def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
-    """Write a file of JSON as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.
-
-    Args:
-        path: the target; with None nothing is written.
-
-    Yields:
-        A dictionary to fill. NaN and infinities in it become null, as JSON has none.
-
-    Raises:
-        OSError: the target cannot be written.
-    """
-    report = {}
-    with contextlib.nullcontext() if path is None else writing(path) as temporary:
-        yield report
-        if temporary:
-            temporary.write_text(json.dumps(_plain(report), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-
-
 def lock(file: IO) -> bool:
-    """Lock an open file until it is closed; return False where another process has locked it."""
+    """Lock an open file until it is closed; return False if another process has locked it."""
     try:
         if fcntl:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         else:
-            here = file.tell()
-            file.seek(_FAR)
+            position = file.tell()
+            file.seek(_LOCKED_BYTE)
             try:
-                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]  # of Windows
+                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]  # only on Windows
             finally:
-                file.seek(here)
+                file.seek(position)
     except (BlockingIOError, PermissionError):
         return False
     return True
@@ -211,14 +228,14 @@ def lock(file: IO) -> bool:
 
 @contextlib.contextmanager
 def hold_lock(path: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
-    """Hold a lock against other processes: a file that is there while the lock is held.
+    """Hold a lock against other processes during the block. The lock is a file that exists while it is held.
 
     Args:
-        path: of the file, in a folder that is there.
-        refusal: the error where another process holds the lock; with None, wait for it.
+        path: of the lock's file, in a folder that exists.
+        refusal: message of the error if another process holds the lock; with None, wait for that process.
 
     Raises:
-        ValueError: another process holds the lock; the refusal.
+        ValueError: another process holds the lock, and there is a refusal.
         OSError: the file cannot be written.
     """
     while True:
@@ -230,22 +247,14 @@ def hold_lock(path: str | os.PathLike, refusal: str | None = None) -> Iterator[N
             while not lock(file):
                 if refusal is not None:
                     raise ValueError(refusal)
-                time.sleep(_PAUSE)
-            # The process that held the lock may have deleted the file since it was opened here.
-            if not (os.path.exists(path) and os.path.samestat(os.stat(path), os.fstat(file.fileno()))):
+                time.sleep(_LOCK_RETRY_INTERVAL)
+            # A process that held the lock may have deleted the file after it was opened here: then open a new one.
+            is_current = os.path.exists(path) and os.path.samestat(os.stat(path), os.fstat(file.fileno()))
+            if not is_current:
                 continue
             try:
                 yield
             finally:
-                with contextlib.suppress(PermissionError):  # Windows deletes no open file
+                with contextlib.suppress(PermissionError):  # on Windows, which does not delete open files
                     os.unlink(path)
             return
-
-
-def _plain(value):
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        fields = getattr(value, "_asdict", None)  # of a NamedTuple
-        return _plain(fields()) if fields else [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,4 +1,4 @@
-"""Journals: what a search has found so far, in a file of JSON lines that survives being broken off."""
+"""Journals: what a search has found so far, in a file of JSON lines that survives interruptions."""
 
 import json
 import os
@@ -10,46 +10,43 @@ from arc_suite import checks, files
 
 
 class Journal:
-    """A file whose first line holds what determines a search, and each further line a generation.
+    """A file whose first line contains the settings of a search, and each further line a generation.
 
     Attributes:
         generations: those in the file, NamedTuples.
     """
 
     def __init__(self, path: str | os.PathLike, settings: Mapping[str, Any], generation: Callable[..., Any]):
-        """Open the file, or starts one.
+        """Open the file, or start one.
 
         Args:
-            path: of the file, in a folder that is there.
+            path: of the file, in a folder that exists.
             settings: what determines the search; plain values.
-            generation: makes a generation from the fields of a line.
+            generation: NamedTuple class of a generation, or another function of the fields of a line.
 
         Raises:
             ValueError: the file belongs to another search, or is no journal, or another process
                 writes to it.
             OSError: the file cannot be read or written.
         """
-        path, header = Path(path), _line(settings)
+        path = Path(path)
+        header = _to_line(settings)
         try:
             self._file = path.open("a+b")
         except OSError as error:
             raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
         if not files.lock(self._file):
             raise ValueError(f"{path}: another process goes on with this search")
-        text = path.read_bytes()
-        # What has no end was being written when the search was broken off.
-        if not header.startswith(text):
-            text = text[: text.rfind(b"\n") + 1] or text
-        elif text != header:
-            text = b""
-        self.generations = _generations(path, text, header, generation) if text else []
+
+        text = _complete_lines(path.read_bytes(), header)
+        self.generations = _read_generations(path, text, header, generation) if text else []
         self._file.truncate(len(text))
         if not text:
             self._write(header)
 
     def append(self, generation: Any) -> None:
-        """Add a generation, which is in the file from then on."""
-        self._write(_line(generation._asdict()))
+        """Add a generation, and write it to the file at once."""
+        self._write(_to_line(generation._asdict()))
         self.generations.append(generation)
 
     def close(self) -> None:
@@ -61,21 +58,38 @@ class Journal:
         self._file.flush()
 
 
-def _line(value: Mapping[str, Any]) -> bytes:
-    return json.dumps(value).encode() + b"\n"
+def _to_line(fields: Mapping[str, Any]) -> bytes:
+    return json.dumps(fields).encode() + b"\n"
 
 
-def _generations(path: Path, text: bytes, header: bytes, generation: Callable[..., Any]) -> list[Any]:
-    """Return the generations of a journal's text, if its header is that one."""
+def _complete_lines(text: bytes, header: bytes) -> bytes:
+    """Return a journal's text without a last line that an interruption has cut off."""
+    header_is_cut_off = header.startswith(text) and text != header
+    if header_is_cut_off:
+        return b""
+    end_of_last_line = text.rfind(b"\n") + 1
+    if end_of_last_line == 0:
+        return text  # one line that is not the header: no journal, which `_read_generations` says
+    return text[:end_of_last_line]
+
+
+def _read_generations(path: Path, text: bytes, header: bytes, generation: Callable[..., Any]) -> list[Any]:
+    """Return the generations in a journal's text.
+
+    Raises:
+        ValueError: the text is no journal, or has another header.
+    """
     advice = "delete it or write to another folder"
     try:
-        found, *lines = map(json.loads, text.splitlines())
-        wanted = json.loads(header)
-        differing = [name for name in wanted if found[name] != wanted[name]]
-        generations = [generation(**line) for line in lines]
+        stored_settings, *lines = map(json.loads, text.splitlines())
+        settings = json.loads(header)
+        different_names = [name for name in settings if stored_settings[name] != settings[name]]
+        generations = [generation(**fields) for fields in lines]
     except (ValueError, LookupError, TypeError, RecursionError):
         raise ValueError(f"{path}: no journal of a search; {advice}") from None
-    for name in differing:
-        there, asked = checks.quote(found[name]), checks.quote(wanted[name])
-        raise ValueError(f"{path}: of a search with {name} {there}, not {asked}; {advice}")
+    if different_names:
+        name = different_names[0]
+        stored_value = checks.quote(stored_settings[name])
+        value = checks.quote(settings[name])
+        raise ValueError(f"{path}: of a search with {name} {stored_value}, not {value}; {advice}")
     return generations

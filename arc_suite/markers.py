@@ -1,4 +1,4 @@
-"""Debug markers: arrows and cylinders that show a task's command in pictures."""
+"""Debug markers: arrows and cylinders in pictures that show a task's command, for example."""
 
 from typing import NamedTuple
 
@@ -6,13 +6,13 @@ import numpy as np
 
 
 class Marker(NamedTuple):
-    """A solid in pictures, absent from the simulation.
+    """A shape that only pictures contain, not the simulation.
 
     Attributes:
         shape: "arrow" or "cylinder".
-        start: (3,) of its axis in the world, m.
-        end: (3,) of its axis, or of an arrow's tip, in the world, m.
-        radius: m; of an arrow's shaft.
+        start: (3,) position in the world where its axis starts, m.
+        end: (3,) position in the world where its axis ends, m; an arrow's tip.
+        radius: of a cylinder or of an arrow's shaft, m.
         color: red, green, blue and opacity, 0 to 1.
     """
 

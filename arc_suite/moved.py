@@ -1,6 +1,6 @@
 """Former paths of modules: saved specs of environments, notebooks and other packages import them.
 
-An alias is the module itself.
+An import by a former path gives the module of today itself, not a copy of it.
 """
 
 import importlib
@@ -8,7 +8,7 @@ import importlib.abc
 import importlib.machinery
 import sys
 
-# Of packages, their modules too.
+# Former paths -> paths of today. A package's entry is also for the modules in it.
 MOVED = {
     "arc_suite.envs.bodies": "arc_suite.bodies",
     "arc_suite.envs.worlds": "arc_suite.learning.worlds",
@@ -23,19 +23,21 @@ MOVED = {
 
 
 class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Imports a module by its former path."""
+    """Finder and loader of the import system that imports modules by their former paths."""
 
     def find_spec(self, fullname: str, path=None, target=None) -> importlib.machinery.ModuleSpec | None:
-        """Return a spec of a former path; None for other names."""
-        return None if find_path(fullname) is None else importlib.machinery.ModuleSpec(fullname, self)
+        """Return the spec of a module with a former path; None for other modules."""
+        if find_path(fullname) is None:
+            return None
+        return importlib.machinery.ModuleSpec(fullname, self)
 
     def exec_module(self, module) -> None:
-        """Put the module of today in the place of the empty one that the import system has made."""
+        """Replace the empty module that the import system has made by the module of today."""
         sys.modules[module.__name__] = importlib.import_module(find_path(module.__name__))
 
 
 def find_path(name: str) -> str | None:
-    """Return the path of today of a module, or of a module in a package, that has moved; None for others."""
+    """Return the path of today, given a former path; None for other paths."""
     for former, path in MOVED.items():
         if name == former or name.startswith(f"{former}."):
             return path + name.removeprefix(former)
@@ -45,6 +47,7 @@ def find_path(name: str) -> str | None:
 def install_finder() -> None:
     """Let imports of former paths find the modules of today.
 
-    The finder comes first: an empty folder of a former path, as checkouts leave them, would be a namespace package.
+    This finder must be the first: the usual one would import an empty folder of a former path as a namespace package.
+    Checkouts leave such folders.
     """
     sys.meta_path.insert(0, Finder())

@@ -1,4 +1,4 @@
-"""Parts of other packages: robots, tasks, laws, learners and others; and Gymnasium's ids for all robots and tasks."""
+"""Registration of other packages' robots, tasks, laws, learners and other parts, and of ids with Gymnasium."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -21,8 +21,9 @@ from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.modifiers import MODIFIERS, Modifier
 from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
 
-BODIES = "bodies"  # in place of a robot in ids of environments of different bodies
+BODIES = "bodies"  # stands in place of a robot's name in ids of environments of different bodies
 
+# Tables of the registered parts by kind.
 _TABLES: dict[str, dict[str, Any]] = {
     "task": TASKS,
     "arena": ARENAS,
@@ -31,7 +32,7 @@ _TABLES: dict[str, dict[str, Any]] = {
     **ADDITIONS,
 }
 
-_OF_ALL_TASKS = ("time_limit", "arena", "random", "on_divergence")  # settings that no modifier has
+_SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")
 
 
 def register(
@@ -57,79 +58,85 @@ def register(
     Queen. Callers name a part of any kind as `name`, or as `module:name`, which imports the module.
 
     Args:
-        module: whose import makes this call, `__name__` there; processes that do not share this
-            one's memory import it to know the names too. None where nobody else needs them.
-        body: of the robot; its name becomes a domain.
-        parameters: of the robot in tasks, by name of the task: for walk all keys of
+        module: the module that makes this call, its `__name__`. Other processes import it to register the same names.
+            None if no other process needs them.
+        body: the robot's body; its name becomes a domain.
+        parameters: the robot's parameters by name of the task: for walk all keys of
             `tasks.parameters.PARAMETERS["walk"]["queen"]`, in the same units; for other tasks those that differ from
             walk's. Noise that walk does not set, and all parameters without walk's, are fitted to the body.
-        presets: of the robot's demonstrators by name: a `cpg.prescribed.Preset`, or parameters of
-            another law, see `cpg.selection.LAWS`; those that every body has are fitted where not given.
+        presets: the robot's demonstrators by name: a `cpg.prescribed.Preset`, or parameters of
+            another law, see `cpg.selection.LAWS`. The presets that every body has are fitted if not given.
         visuals: decorations and colors; None for those that suit any body.
         tasks: classes by the contract of `tasks.contract`, each with its name.
-        arenas: functions by name, from a body to the `Arena` that suits it.
-        families: functions by name, from a seed to a body, always the same for the same seed; see
-            `bodies.families.sound`. `name:seed` then stands for the body wherever a domain does, and comes before
-            a module of that name.
+        arenas: by name, functions from a body to the `Arena` that suits it.
+        families: by name, functions from a seed to a body, always the same for the same seed; see
+            `bodies.families.sound`. `name:seed` then stands for the body wherever a domain does. It takes precedence
+            over a module of that name.
         modifiers: classes of `tasks.modifiers.Modifier`. Their settings become settings of every task; a task has the
-            modifier where one of them is given.
-        laws: classes of demonstrators' laws by name; see `cpg.law.Law`. Presets of their class have the law,
-            and `name` stands for the class's own `preset` on every body.
-        networks: functions by name that make an architecture for a task, for `--hp network=`; see
+            modifier if one of them is given.
+        laws: classes of demonstrators' laws by name; see `cpg.law.Law`. A preset of the class of `law.preset` has this
+            law, and the law's name is also the name of that preset on every body.
+        networks: by name, functions from a task to an architecture, for `--hp network=`; see
             `learning.agents.architectures.of`.
-        algorithms: values by name of `learning.agents.algorithms.Algorithm`.
-        clips: values by name of `animation.clips.catalog`, such as `Acted`.
-        programs: modules by name, as texts, that `arc-suite` runs: each has a docstring and a function `main`.
+        algorithms: values of `learning.agents.algorithms.Algorithm` by name.
+        clips: values of classes of `animation.clips.catalog`, such as `Acted`, by name.
+        programs: names of modules that `arc-suite` runs, by name of the program. Each module has a docstring and a
+            function `main`.
 
-    A network, an algorithm or a clip may be a text `module:attribute` that says where it is: it is imported when it is
-    used. It is checked then, too.
+    A network, an algorithm or a clip may also be a text `module:attribute`: it is then imported and checked at its
+    first use.
 
     Raises:
         ValueError: a name that is taken, a task or a law that lacks methods, or parameters or a preset that do not fit
-            the body; nothing has been registered.
+            the body. Nothing has been registered then.
     """
-    module = None if module == "__main__" else module
-    parts = {
+    if module == "__main__":  # other processes cannot import it
+        module = None
+    all_additions = {
         "task": {_task_name(task): task for task in tasks},
         "arena": arenas,
         "family": families,
-        "modifier": {name: kind for kind in modifiers for name in _modifier_settings(kind)},
+        "modifier": {name: modifier for modifier in modifiers for name in _modifier_settings(modifier)},
         "law": laws,
         "network": networks,
         "algorithm": algorithms,
         "clip": clips,
         "program": programs,
     }
-    parts = {kind: dict(additions) for kind, additions in parts.items() if additions}
-    for kind, additions in parts.items():
+    additions_by_kind = {kind: dict(additions) for kind, additions in all_additions.items() if additions}
+    for kind, additions in additions_by_kind.items():
         _check_names(kind, additions, module)
-    for name, path in parts.get("program", {}).items():
+    for name, path in additions_by_kind.get("program", {}).items():
         _check_program(name, path)
-    law_by_preset = {_preset_class(name, added): added for name, added in parts.get("law", {}).items()}
-    if body is None:
-        if (parameters, presets, visuals) != (None, None, None):
-            raise ValueError("parameters, presets and visuals belong to a body, and none is given")
-        if not parts:
-            kinds = "a body, tasks, arenas, families, modifiers, laws, networks, algorithms, clips or programs"
-            raise ValueError(f"nothing to register: give {kinds}")
-    else:
-        _register_body(body, parameters or {}, presets, visuals, {**LAWS, **law_by_preset})
+    law_by_preset_class = {
+        _preset_class(name, law_class): law_class for name, law_class in additions_by_kind.get("law", {}).items()
+    }
+
+    if body is not None:
+        _register_body(body, parameters or {}, presets, visuals, {**LAWS, **law_by_preset_class})
         MODULE_OF_NAME["robot", body.name] = module
-    LAWS.update(law_by_preset)
-    for kind, additions in parts.items():
+    elif not (parameters is None and presets is None and visuals is None):
+        raise ValueError("parameters, presets and visuals belong to a body, and none is given")
+    elif not additions_by_kind:
+        kinds = "a body, tasks, arenas, families, modifiers, laws, networks, algorithms, clips or programs"
+        raise ValueError(f"nothing to register: give {kinds}")
+
+    LAWS.update(law_by_preset_class)
+    for kind, additions in additions_by_kind.items():
         _TABLES[kind].update(additions)
         MODULE_OF_NAME.update({(kind, name): module for name in additions})
     register_ids()
 
 
 def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) -> None:
-    """Raise ValueError for a name that nobody can write, or that something else has."""
+    """Raise ValueError for a name that is no identifier, or that something else has."""
     table = _TABLES[kind]
     for name, value in additions.items():
         if not (isinstance(name, str) and name.isidentifier()):
             raise ValueError(f"{kind} {checks.preview(name)}: expected a name of letters, digits and underscores")
-        is_again = table.get(name) is value or (module is not None and MODULE_OF_NAME.get((kind, name)) == module)
-        if name in table and not is_again:
+        is_same_value = table.get(name) is value
+        is_of_same_module = module is not None and MODULE_OF_NAME.get((kind, name)) == module
+        if name in table and not (is_same_value or is_of_same_module):  # registering a part again is fine
             raise ValueError(f"{kind} {checks.preview(name)} is already registered; choose another name")
 
 
@@ -138,81 +145,118 @@ def _check_program(name: str, path) -> None:
         raise ValueError(f"program {name!r}: expected the name of a module, got {checks.preview(path)}")
 
 
-def _preset_class(name: str, law) -> type:
-    """Return the class of the presets that a law of another package has.
+def _preset_class(name: str, law_class) -> type:
+    """Return the class of the presets of another package's law, after checks of the law.
 
     Raises:
-        ValueError: it is no law, or the name or the class are those of another law.
+        ValueError: the class is no law, or its name or the class of its presets belongs to another law.
     """
-    attributes = {attribute for base in getattr(law, "__mro__", ()) for attribute in vars(base)}
-    if missing := [part for part in ("preset", "reads", "initial", "__call__") if part not in attributes]:
+    attributes = {attribute for base in getattr(law_class, "__mro__", ()) for attribute in vars(base)}
+    missing = [attribute for attribute in ("preset", "reads", "initial", "__call__") if attribute not in attributes]
+    if missing:
         raise ValueError(f"law {name!r}: has no {' and no '.join(missing)}, which arc_suite.cpg.law.Law requires")
-    if not {"posture", "velocities"} <= set(law.reads):
-        raise ValueError(
-            f"law {name!r}: reads: expected posture, velocities and others, got {checks.preview(law.reads)}"
-        )
+    if not {"posture", "velocities"} <= set(law_class.reads):
+        reads = checks.preview(law_class.reads)
+        raise ValueError(f"law {name!r}: reads: expected posture, velocities and others, got {reads}")
     if name in SUITE_PRESETS:
         raise ValueError(f"law {name!r}: the suite has presets of this name; choose another name")
-    preset_class = type(law.preset)
-    if LAWS.get(preset_class, law) is not law:
+    preset_class = type(law_class.preset)
+    if LAWS.get(preset_class, law_class) is not law_class:
         raise ValueError(f"law {name!r}: presets of {preset_class.__name__} are those of {LAWS[preset_class].__name__}")
     return preset_class
 
 
 def _task_name(task) -> str:
+    """Return the name of a task, after a check of its class.
+
+    Raises:
+        ValueError: the task is no class by the contract, or lacks methods.
+    """
     name = getattr(task, "name", None)
     if not (isinstance(task, type) and issubclass(task, Task)):
         raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {checks.preview(task)}")
-    if missing := sorted(task.__abstractmethods__):
-        lacks = " and no ".join(missing)
-        raise ValueError(f"task {checks.preview(name)}: has no {lacks}, which arc_suite.tasks.Task requires")
+    missing = sorted(task.__abstractmethods__)
+    if missing:
+        methods = " and no ".join(missing)
+        raise ValueError(f"task {checks.preview(name)}: has no {methods}, which arc_suite.tasks.Task requires")
     return name
 
 
-def _modifier_settings(kind) -> Mapping[str, Any]:
-    """Return the default values of a modifier's settings by name.
+def _modifier_settings(modifier) -> Mapping[str, Any]:
+    """Return the default values of a modifier's settings by name, after checks of its class.
 
     Raises:
-        ValueError: it is no modifier, has no settings, or one that tasks have.
+        ValueError: the class is no modifier, has no settings, or has one of a task's settings.
     """
-    if not (isinstance(kind, type) and issubclass(kind, Modifier) and issubclass(kind, tuple)):
+    if not (isinstance(modifier, type) and issubclass(modifier, Modifier) and issubclass(modifier, tuple)):
         expected = "NamedTuples that inherit from arc_suite.tasks.modifiers.Modifier"
-        raise ValueError(f"modifiers: expected {expected}, got {checks.preview(kind)}")
-    if not kind.defaults:
-        raise ValueError(f"modifier {kind.__name__}: expected settings in its `defaults`, got none")
-    of_tasks = {name for task in TASKS.values() for name in getattr(task, "names", tuple)()}
-    if taken := sorted(kind.defaults.keys() & {*of_tasks, *_OF_ALL_TASKS}):
-        raise ValueError(f"modifier {kind.__name__}: {taken[0]} is a setting of tasks; choose another name")
-    return kind.defaults
+        raise ValueError(f"modifiers: expected {expected}, got {checks.preview(modifier)}")
+    if not modifier.defaults:
+        raise ValueError(f"modifier {modifier.__name__}: expected settings in its `defaults`, got none")
+    task_settings = set(_SETTINGS_OF_EVERY_TASK)
+    for task in TASKS.values():
+        names_of_settings = getattr(task, "names", tuple)  # a method; tasks of other packages may lack it
+        task_settings.update(names_of_settings())
+    shared_names = sorted(modifier.defaults.keys() & task_settings)
+    if shared_names:
+        raise ValueError(f"modifier {modifier.__name__}: {shared_names[0]} is a setting of tasks; choose another name")
+    return modifier.defaults
 
 
-def _register_body(body, parameters, presets, visuals, laws) -> None:
+def _register_body(
+    body: Body,
+    parameters: Mapping[str, Mapping[str, Any]],
+    presets: Mapping[str, Any] | None,
+    visuals: Visuals | None,
+    laws: Mapping[type, Any],
+) -> None:
+    """Check a robot and all that belongs to it, then put it into the tables.
+
+    Args:
+        body: see `register`.
+        parameters: see `register`.
+        presets: see `register`.
+        visuals: see `register`.
+        laws: all laws by class of their presets, those of the same registration included.
+
+    Raises:
+        ValueError: something does not fit the body. Nothing has been registered then.
+    """
     if not isinstance(body, Body):
         raise ValueError(f"body: expected a spec.Body, got {checks.preview(body)}")
     if body.name == BODIES:
         raise ValueError(f"robot {BODIES!r}: ids of environments of different bodies have this name; choose another")
     if ROBOTS.get(body.name, body) != body:
         raise ValueError(f"robot {body.name!r} is already registered")
-    for task, given in parameters.items():
-        _check_parameters(body, checks.name(task, TASKS, "task of parameters"), given)
+    for task, task_parameters in parameters.items():
+        _check_parameters(body, checks.name(task, TASKS, "task of parameters"), task_parameters)
     if presets is not None:
         _check_presets(body, parameters.get("walk", {}), presets, laws)
+
     ROBOTS[body.name] = body
-    tables: list[tuple[dict, Any]] = [(PARAMETERS.setdefault(task, {}), given) for task, given in parameters.items()]
-    for table, value in (*tables, (PRESETS, presets), (VISUALS, visuals)):
-        if value is not None:
-            table[body.name] = value
+    for task, task_parameters in parameters.items():
+        if task_parameters is not None:
+            PARAMETERS.setdefault(task, {})[body.name] = task_parameters
+    if presets is not None:
+        PRESETS[body.name] = presets
+    if visuals is not None:
+        VISUALS[body.name] = visuals
 
 
-def _check_parameters(body: Body, task: str, given: Mapping[str, Any]) -> None:
-    needed = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
-    if task == "walk" and (missing := sorted(needed - given.keys())):
+def _check_parameters(body: Body, task: str, parameters: Mapping[str, Any]) -> None:
+    """Raise ValueError for a robot's parameters of a task that are incomplete or do not fit the body."""
+    required_names = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
+    missing = sorted(required_names - parameters.keys()) if task == "walk" else []
+    if missing:
         raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}")
-    TASKS[task].settings_for(body, given)
+    TASKS[task].settings_for(body, parameters)
 
 
-def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, Any], laws: Mapping[type, Any]) -> None:
-    task, _ = prepare_task(body, "walk", walk)
+def _check_presets(
+    body: Body, walk_parameters: Mapping[str, Any], presets: Mapping[str, Any], laws: Mapping[type, Any]
+) -> None:
+    """Raise ValueError for a preset that has no law, or does not fit the body's walk."""
+    task, _ = prepare_task(body, "walk", walk_parameters)
     for name, preset in presets.items():
         try:
             law(task, preset, laws)
@@ -223,8 +267,8 @@ def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, An
 def register_ids() -> None:
     """Register `arc_suite/<robot>-<task>-v<version>` with Gymnasium for every pair that has no id yet.
 
-    `bodies` in place of a robot is for `gymnasium.make_vec` alone: environments of different bodies. The adapters
-    are imported when an environment is made.
+    Ids with `bodies` in place of a robot make vector environments of different bodies, by `gymnasium.make_vec` alone.
+    Gymnasium imports the classes of the entry points when an environment is made.
     """
     for domain_name, task_name in registry.all_tasks():
         env_id = registry.env_id(domain_name, TASKS[task_name])

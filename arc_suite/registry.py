@@ -1,6 +1,7 @@
 """Tables of names: robots, families of bodies, tasks and arenas, including those of other packages.
 
-Of what only demonstrators, wings and the command `arc-suite` know, the tables here hold what other packages add.
+Other packages also register laws, networks, algorithms, clips and programs. The tables here contain only those
+additions: the suite's own entries of these kinds stand in the modules that use them.
 """
 
 import collections
@@ -22,7 +23,8 @@ from arc_suite.robots.spec_files import EXAMPLES, body_from_json, load_body
 from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.modifiers import MODIFIERS
 
-# Functions from a seed to a body, by name, or where they are; `registration.register` adds those of other packages.
+# Functions from a seed to a body, by name, or texts `module:name` for `resolve`; `registration.register` adds those of
+# other packages.
 FAMILIES: dict[str, Callable[[int], Body] | str] = {
     "random": "arc_suite.bodies.families:sound_body",
     "varied": "arc_suite.bodies.families:varied_body",
@@ -30,22 +32,24 @@ FAMILIES: dict[str, Callable[[int], Body] | str] = {
     "few_links": "arc_suite.bodies.families:few_links",
 }
 
-# Functions from a path to a body, by extension of the file: robots of others.
+# Functions from the path of a foreign file to a body, by the file's extension, as texts for `resolve`.
 READERS = {".xml": "arc_suite.importing:body_of", ".urdf": "arc_suite.importing:body_of"}
 
-# The vector environment of different bodies.
+# The class of vector environments of different bodies, as a text for `resolve`.
 BODIES_ENV = "arc_suite.bodies:BodiesEnv"
 
-# What other packages register, or where it is, by kind and name. What uses it has a table of the suite's own, and
-# checks values when it uses them; see `find`.
+# Values that other packages register, or texts `module:attribute` for `resolve`, by kind and name. The module that uses
+# a kind has a table of the suite's own values, and checks all values when it uses them; see `find`.
 ADDITIONS: dict[str, dict[str, Any]] = {"law": {}, "network": {}, "algorithm": {}, "clip": {}, "program": {}}
 
-MODULE_OF_NAME = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
+# (kind, name) of what other packages register -> the module whose import registers it.
+MODULE_OF_NAME = {}
 
-MAX_BODIES = 1 << 16  # that one name stands for
+MAX_BODIES = 1 << 16  # the most bodies that one text may name
 
-_SEEDS = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")
-_SEVERAL = re.compile(r",|:\d+-\d+$")
+_MAX_QUOTE = 80  # characters of a name in an error
+_SEED_OR_RANGE = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")  # "7" or "0-9"
+_MARK_OF_SEVERAL_BODIES = re.compile(r",|:\d+-\d+$")  # a comma, or a range of seeds at the end
 
 
 class NotImported(ValueError):
@@ -53,72 +57,75 @@ class NotImported(ValueError):
 
 
 def resolve(entry: Any) -> Any:
-    """Return what an entry of a table stands for: itself, or what `module:name` has where it is imported.
+    """Return the value of a table's entry: the object that a text `module:name` stands for, or the entry itself.
 
-    Tables of the core name what only some users need, which is imported when it is asked for.
+    Tables contain texts for objects that only some users need. Their modules are imported here, at the first use.
     """
     return pkgutil.resolve_name(entry) if isinstance(entry, str) else entry
 
 
 def tasks_by_domain() -> dict[str, tuple[str, ...]]:
-    """Return the names of the tasks by name of the robot, as they are now."""
+    """Return the names of all present tasks by name of the robot."""
     return {domain: tuple(TASKS) for domain in ROBOTS}
 
 
 def all_tasks() -> tuple[tuple[str, str], ...]:
-    """Return the names of robot and task, of all pairs there are now."""
+    """Return all present pairs of a robot's and a task's name."""
     return tuple((domain, task) for domain in ROBOTS for task in TASKS)
 
 
-def body_of(robot, near: Iterable[str] = ()) -> Body:
+def body_of(robot, suggestions: Iterable[str] = ()) -> Body:
     """Return the body that a word stands for.
 
     Args:
         robot: name of a robot, `module:name` for one of another package, `family:seed`, name of a packaged spec (such
-            as spider), path of a file that holds a body or a robot in MJCF or URDF, text of a body's file, or the body
+            as spider), path of a file with a body or a robot in MJCF or URDF, text of a body's file, or the body
             itself.
-        near: other words that are valid in its place, for the error.
+        suggestions: further words that the caller accepts; the error of an unknown name lists them, too.
 
     Raises:
-        ValueError: an unknown name, a file that holds no body, or several bodies.
+        ValueError: an unknown name, a file that contains no body, or several bodies.
         OSError: the file cannot be read.
     """
-    body, *others = itertools.islice(_bodies(robot, near), 2)
-    if others:
+    bodies = list(itertools.islice(_generate_bodies(robot, suggestions), 2))  # a second one is an error
+    if len(bodies) > 1:
         raise ValueError(f"robot {checks.preview(robot)}: expected one body, got several")
-    return body
+    return bodies[0]
 
 
-def bodies_of(robot, near: Iterable[str] = ()) -> tuple[Body, ...]:
-    """Return the bodies of `family:first-last`, or of names with commas; else that of `body_of`.
+def bodies_of(robot, suggestions: Iterable[str] = ()) -> tuple[Body, ...]:
+    """Return the bodies of `family:first-last`, or of names with commas between; else the one body of `body_of`.
 
     Raises:
         ValueError: as `body_of`, or a range of more than 65536 bodies.
         OSError: as `body_of`.
     """
-    return tuple(_bodies(robot, near))
+    return tuple(_generate_bodies(robot, suggestions))
 
 
 def robot_words() -> list[str]:
-    """Return words for bodies: names of robots, and of packaged specs, and a body of each family."""
-    return [*ROBOTS, *EXAMPLES, *(f"{family}:7" for family in FAMILIES)]
+    """Return words for bodies: names of all robots and packaged specs, and for each family one of its bodies."""
+    return [*ROBOTS, *EXAMPLES, *_family_words()]
 
 
 def names_several_bodies(robot) -> bool:
-    """Return whether a text names several bodies: `family:first-last`, or names with commas."""
-    return isinstance(robot, str) and not (robot.startswith("{") or _is_path(robot)) and bool(_SEVERAL.search(robot))
+    """Return whether a text names several bodies: `family:first-last`, or names with commas between."""
+    if not isinstance(robot, str) or _is_json(robot) or _is_path(robot):
+        return False
+    return _MARK_OF_SEVERAL_BODIES.search(robot) is not None
 
 
 def check_stored_robot(robot: str) -> str:
-    """Return what a file names bodies by, if looking it up imports nothing and opens no file but packaged ones.
+    """Return the text by which a file names bodies, after a check that it cannot import modules or open other files.
 
     Raises:
         ValueError: an unknown name, or the path of a file.
         NotImported: the module of a name has not been imported yet.
     """
-    for part in [] if robot.startswith("{") else robot.split(","):
-        if not part.rpartition(":")[0] or _is_path(part):
-            checks.name(part, (*ROBOTS, *EXAMPLES), "robot", robot_words()[-len(FAMILIES) :])
+    for part in _split_names(robot):
+        module_or_family, _, _ = part.rpartition(":")
+        if not module_or_family or _is_path(part):
+            checks.name(part, (*ROBOTS, *EXAMPLES), "robot", suggestions=_family_words())
     for name in names_in_robot(robot):
         refuse_import("robot", name)
     return robot
@@ -126,65 +133,102 @@ def check_stored_robot(robot: str) -> str:
 
 def names_in_robot(robot: str) -> list[str]:
     """Return the names of robots and families, without seeds, in a text that names bodies."""
-    parts = [] if robot.startswith("{") else robot.split(",")
-    families = [part.rpartition(":") for part in parts]
-    return [family if _SEEDS.fullmatch(seeds) else f"{family}{colon}{seeds}" for family, colon, seeds in families]
+    names = []
+    for part in _split_names(robot):
+        family, _, seeds = part.rpartition(":")
+        names.append(family if _SEED_OR_RANGE.fullmatch(seeds) else part)
+    return names
 
 
 def family_of(name: str) -> Callable[[int], Body]:
-    """Return the function from a seed to a body of a family, by name or `module:name`.
+    """Return a family's function from a seed to a body, by `name` or `module:name`.
 
     Raises:
         ValueError: an unknown name.
     """
-    return resolve(_find(name, FAMILIES, "family"))
+    return resolve(_look_up(name, FAMILIES, "family"))
 
 
-def _bodies(robot, near: Iterable[str]) -> Iterator[Body]:
+def _generate_bodies(robot, suggestions: Iterable[str]) -> Iterator[Body]:
+    """Yield the bodies that a word of `body_of`, or names with commas between, stand for."""
     text = robot if isinstance(robot, str) else ""
     family, _, seeds = text.rpartition(":")
+    is_example = text in EXAMPLES and text not in ROBOTS
+    names_family = family in FAMILIES or ":" in family  # the latter as module:family
     if isinstance(robot, Body):
         yield robot
-    elif text.startswith("{"):
+    elif _is_json(text):
         yield body_from_json(text)
-    elif (text in EXAMPLES and text not in ROBOTS) or _is_path(robot):
-        yield _read(EXAMPLES.get(text, Path(robot)))
+    elif is_example:
+        yield load_body(EXAMPLES[text])
+    elif _is_path(robot):
+        yield _read_file(Path(robot))
     elif "," in text:
-        yield from itertools.chain.from_iterable(_bodies(part, near) for part in text.split(","))
-    elif family in FAMILIES or ":" in family or (family and _SEEDS.fullmatch(seeds)):  # seeds are no name of a robot
-        yield from (_member(family, seed) for seed in _range(family, seeds))
+        for part in text.split(","):
+            yield from _generate_bodies(part, suggestions)
+    elif names_family or (family and _SEED_OR_RANGE.fullmatch(seeds)):  # a robot's name has no seeds
+        for seed in _parse_seeds(family, seeds):
+            yield _draw_body(family, seed)
     else:
-        yield _find(robot, ROBOTS, "robot", (*robot_words()[len(ROBOTS) :], *near))
+        yield _look_up(robot, ROBOTS, "robot", (*EXAMPLES, *_family_words(), *suggestions))
 
 
-def _read(path: Path) -> Body:
-    reader = READERS.get(path.suffix.lower())
-    return load_body(path) if reader is None else resolve(reader)(path)
+def _family_words() -> list[str]:
+    """Return one body of each family as `family:seed`, such as errors suggest."""
+    return [f"{family}:7" for family in FAMILIES]
+
+
+def _split_names(robot: str) -> list[str]:
+    """Return the names in a text that names bodies; a body's JSON contains none."""
+    return [] if _is_json(robot) else robot.split(",")
+
+
+def _is_json(text: str) -> bool:
+    return text.startswith("{")
 
 
 def _is_path(robot) -> bool:
-    if isinstance(robot, str):
-        path = Path(robot)
-        return path.suffix.lower() in (".json", *READERS) or (
-            ":" not in robot and bool(path.suffix or path.name != robot)
-        )
-    return isinstance(robot, os.PathLike)
+    """Return whether a word stands for a file: by its type, its extension, or a separator of folders."""
+    if not isinstance(robot, str):
+        return isinstance(robot, os.PathLike)
+    path = Path(robot)
+    if path.suffix.lower() in (".json", *READERS):
+        return True
+    has_folder = path.name != robot
+    return ":" not in robot and (path.suffix != "" or has_folder)
 
 
-def _range(family: str, seeds: str) -> range:
-    """The seeds of `seed` or `first-last`."""
-    found = _SEEDS.fullmatch(seeds)
-    if not found:
+def _read_file(path: Path) -> Body:
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        return load_body(path)
+    return resolve(reader)(path)
+
+
+def _parse_seeds(family: str, seeds: str) -> range:
+    """Return the seeds in a text `seed` or `first-last`.
+
+    Raises:
+        ValueError: another text, or seeds that are too many or not in ascending order.
+    """
+    match = _SEED_OR_RANGE.fullmatch(seeds)
+    if match is None:
         raise ValueError(
             f"robot '{family}:{seeds}': expected {family}:seed or {family}:first-last, such as {family}:0-9"
         )
-    first, last = int(found[1]), int(found[2] or found[1])
+    first = int(match[1])
+    last = first if match[2] is None else int(match[2])
     if not first <= last < first + MAX_BODIES:
         raise ValueError(f"robot '{family}:{seeds}': expected seeds in ascending order, at most {MAX_BODIES}")
     return range(first, last + 1)
 
 
-def _member(family: str, seed: int) -> Body:
+def _draw_body(family: str, seed: int) -> Body:
+    """Return the body of a seed in a family.
+
+    Raises:
+        ValueError: the family is unknown, has no body of this seed, or its function returns no body.
+    """
     make = family_of(family)
     try:
         body = make(seed)
@@ -196,16 +240,16 @@ def _member(family: str, seed: int) -> Body:
 
 
 def task_of(name: str) -> type[Task]:
-    """Return the task of a name; see `arc_suite.load`.
+    """Return the class of a task, by `name` or `module:name`.
 
     Raises:
         ValueError: an unknown name.
     """
-    return _find(name, TASKS, "task")
+    return _look_up(name, TASKS, "task")
 
 
 def arena_of(arena: str | Arena, body: Body) -> Arena:
-    """Return the arena of a name, made to suit a body, or the arena itself.
+    """Return the arena of a name in a size that suits a body; an `Arena` is returned as it is.
 
     Raises:
         ValueError: an unknown name.
@@ -214,30 +258,30 @@ def arena_of(arena: str | Arena, body: Body) -> Arena:
 
 
 def arena_maker(name: str) -> Callable[[Body], Arena]:
-    """Return the function that makes the arena of a name suit a body.
+    """Return the function from a body to the arena of a name that suits it.
 
     Raises:
         ValueError: an unknown name.
     """
-    return _find(name, ARENAS, "arena")
+    return _look_up(name, ARENAS, "arena")
 
 
 def modifier_setting(name: str) -> str | None:
-    """Return the setting of a modifier that a name of a setting stands for, `name` or `module:name`.
+    """Return the bare name of a modifier's setting, given `name` or `module:name`.
 
-    None for settings that are no modifier's.
+    None for the name of a setting that belongs to no modifier.
 
     Raises:
-        ValueError: as of other parts of a module.
+        ValueError: the module cannot be imported, or registers no such setting.
     """
     if ":" in name:
-        _find(name, MODIFIERS, "modifier")
+        _look_up(name, MODIFIERS, "modifier")
         return bare_name(name)
     return name if name in MODIFIERS else None
 
 
 def check_stored_settings(settings: Mapping[str, Any]) -> None:
-    """Check that settings of a task, as a file gives them, import nothing.
+    """Check that settings of a task which come from a file cannot import modules.
 
     Raises:
         NotImported: the module of a modifier or of an arena has not been imported yet.
@@ -248,12 +292,12 @@ def check_stored_settings(settings: Mapping[str, Any]) -> None:
 
 
 def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
-    """Return what a name of a kind in `ADDITIONS` stands for.
+    """Return the value of a name, such as the algorithm of a name.
 
     Args:
-        kind: such as "algorithm".
+        kind: one of `ADDITIONS`, such as "algorithm".
         name: see `find_entry`.
-        suite: the suite's own values, or where they are, by name.
+        suite: the suite's own values of the kind by name, or texts `module:attribute` for `resolve`.
 
     Raises:
         ValueError: as `find_entry`, or a value that cannot be imported.
@@ -266,30 +310,32 @@ def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
 
 
 def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
-    """Return the value of a name of a kind in `ADDITIONS`, or the text `module:attribute` that says where it is.
+    """Return the table's entry for a name: the value itself, or the text `module:attribute` that `resolve` imports.
 
     Args:
-        kind: such as "algorithm".
-        name: of the suite, or of another package as `name` or `module:name`, whose module is imported.
+        kind: one of `ADDITIONS`, such as "algorithm".
+        name: a name of the suite, or one of another package as `name` or `module:name`; that module is imported.
         suite: the suite's own entries by name.
 
     Raises:
         ValueError: an unknown name, or one that the suite has and another package registers.
     """
-    entry = _find(name, collections.ChainMap(ADDITIONS[kind], dict(suite)), kind)
-    if bare_name(name) in suite and bare_name(name) in ADDITIONS[kind]:
-        module = MODULE_OF_NAME.get((kind, bare_name(name))) or "__main__"
-        raise ValueError(f"{kind} {bare_name(name)!r}: the suite has one of this name, and {module} registers another")
+    additions = ADDITIONS[kind]
+    entry = _look_up(name, collections.ChainMap(additions, dict(suite)), kind)
+    key = bare_name(name)
+    if key in suite and key in additions:
+        module = MODULE_OF_NAME.get((kind, key)) or "__main__"
+        raise ValueError(f"{kind} {key!r}: the suite has one of this name, and {module} registers another")
     return entry
 
 
 def bare_name(name: str) -> str:
-    """Return the name in `module:name`, or the name itself."""
+    """Return the part after the module in `module:name`; a name without a module is returned as it is."""
     return name.rpartition(":")[2]
 
 
 def refuse_import(kind: str, name: str) -> str:
-    """Return a name that a file gives, `name` or `module:name`, if looking it up imports nothing new.
+    """Return `name` or `module:name` from a file, after a check that the module has already been imported.
 
     Files are data: their names are looked up among the registered ones, and only callers choose what to import.
 
@@ -298,18 +344,18 @@ def refuse_import(kind: str, name: str) -> str:
     """
     module, colon, _ = name.rpartition(":")
     if colon and module not in sys.modules:
-        raise NotImported(f"{kind} {checks.preview(name)}: files import nothing; import {module[:80]!r} first")
+        raise NotImported(f"{kind} {checks.preview(name)}: files import nothing; import {module[:_MAX_QUOTE]!r} first")
     return name
 
 
 def importable_name(kind: str, name: str) -> str:
-    """Return a name as another process can look it up: `module:name` where another package registered it."""
+    """Return a name in the form that other processes can look up: `module:name` where another package registers it."""
     module = MODULE_OF_NAME.get((kind, name))
     return name if module is None else f"{module}:{name}"
 
 
 def env_id(domain_name: str, task: type[Task]) -> str:
-    """Return Gymnasium's id of a robot's task."""
+    """Return Gymnasium's id of a robot and a task, such as "arc_suite/queen-walk-v0"."""
     return f"arc_suite/{domain_name}-{task.name}-v{task.version}"
 
 
@@ -317,8 +363,8 @@ def import_module(module: str, subject: str) -> None:
     """Import a module that a caller names.
 
     Args:
-        module: its name.
-        subject: with which an error begins.
+        module: dotted name of the module.
+        subject: what needs the module, such as "task 'leap'"; errors begin with it.
 
     Raises:
         ValueError: it cannot be imported.
@@ -326,21 +372,31 @@ def import_module(module: str, subject: str) -> None:
     try:
         importlib.import_module(module)
     except ImportError as error:
-        cause = f"cannot import {module[:80]}: {checks.quote(error)}"
-        remedy = f"; start in the folder of {module[:80]}.py, or put it on Python's path"
-        raise ValueError(f"{subject}: {cause}{remedy if error.name == module else ''}") from None
+        shown_module = module[:_MAX_QUOTE]
+        message = f"{subject}: cannot import {shown_module}: {checks.quote(error)}"
+        if error.name == module:  # the module itself was not found, rather than one that it imports
+            message += f"; start in the folder of {shown_module}.py, or put it on Python's path"
+        raise ValueError(message) from None
 
 
-def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
-    if isinstance(name, str) and ":" in name:
-        module, _, name = name.rpartition(":")
-        if not all(part.isidentifier() for part in module.split(".")):
-            given = checks.preview(f"{module}:{name}")
-            raise ValueError(f"{kind} {given}: expected module:name, with a module that can be imported")
-        import_module(module, f"{kind} {name[:80]!r}")
-        if name not in table:
-            hint = checks.hint(name, [own for own in table if MODULE_OF_NAME.get((kind, own)) == module])
-            raise ValueError(f"{kind} {name[:80]!r}: {module} registers no such {kind} by arc_suite.register{hint}")
-        if (kind, name) not in MODULE_OF_NAME:
-            raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
-    return table[checks.name(name, table, kind, near)]
+def _look_up(name, table: Mapping, kind: str, suggestions: Iterable[str] = ()):
+    """Return the entry of `name`, or of `module:name` after an import of the module, in a table of a kind.
+
+    Raises:
+        ValueError: an unknown name, a module that cannot be imported, or a module that does not register the name.
+    """
+    if not (isinstance(name, str) and ":" in name):
+        return table[checks.name(name, table, kind, suggestions)]
+
+    module, _, key = name.rpartition(":")
+    if not all(part.isidentifier() for part in module.split(".")):
+        raise ValueError(f"{kind} {checks.preview(name)}: expected module:name, with a module that can be imported")
+    shown_key = repr(key[:_MAX_QUOTE])
+    import_module(module, f"{kind} {shown_key}")
+    if key not in table:
+        names_of_module = [entry for entry in table if MODULE_OF_NAME.get((kind, entry)) == module]
+        hint = checks.hint(key, names_of_module)
+        raise ValueError(f"{kind} {shown_key}: {module} registers no such {kind} by arc_suite.register{hint}")
+    if (kind, key) not in MODULE_OF_NAME:
+        raise ValueError(f"{kind} '{module}:{key}': {key} is the suite's own, expected without a module")
+    return table[key]

@@ -1,4 +1,4 @@
-"""Seeds of episodes by purpose, so that no policy is judged on episodes that it learned from.
+"""Seeds of episodes by purpose, so that no policy is evaluated on episodes that it learned from.
 
 0 to 9,999          evaluation
 10,000 to 99,999    collecting of datasets
@@ -12,29 +12,36 @@ COLLECTING = range(10_000, 100_000)
 LEARNING = range(100_000, 1 << 32)
 
 Ranges = tuple[range, ...]
-_OF_ONE = 100_000  # seeds of a run or a search
+_SEEDS_OF_A_RUN = 100_000  # of a search, too
 
 
 def of_run(seed: int) -> range:
-    """Return the seeds of the episodes of a run or a search, apart from those of its other seeds."""
-    return range(_OF_ONE * (1 + seed), _OF_ONE * (2 + seed))
+    """Return the seeds of the episodes of a run or a search; runs of different seeds share none."""
+    return range(_SEEDS_OF_A_RUN * (1 + seed), _SEEDS_OF_A_RUN * (2 + seed))
 
 
-def common_seeds(ranges: Iterable[range], played: range) -> range:
-    """Return the seeds that the first range to have any of those played has in common with them; empty for none."""
-    shared = (range(max(each.start, played.start), min(each.stop, played.stop)) for each in ranges)
-    return next(filter(None, shared), range(0))
+def common_seeds(ranges: Iterable[range], seeds: range) -> range:
+    """Return the seeds that are in both `seeds` and the first of the ranges to overlap it; empty if none does."""
+    for candidate in ranges:
+        overlap = range(max(candidate.start, seeds.start), min(candidate.stop, seeds.stop))
+        if overlap:
+            return overlap
+    return range(0)
 
 
 def to_json(ranges: Ranges | None) -> list[list[int]] | None:
-    """Return the first and the last seed of each range; None for unknown ones."""
-    return None if ranges is None else [[each.start, each.stop - 1] for each in ranges]
+    """Return the first and the last seed of each range; None for unknown ranges, which are None."""
+    if ranges is None:
+        return None
+    return [[seeds.start, seeds.stop - 1] for seeds in ranges]
 
 
 def from_json(pairs: Iterable[Sequence[int]] | None) -> Ranges | None:
-    """Return the ranges of `to_json`.
+    """Return the ranges of the first and last seeds that `to_json` has returned.
 
     Raises:
-        TypeError, ValueError: none.
+        TypeError, ValueError: `pairs` is something else.
     """
-    return None if pairs is None else tuple(range(first, last + 1) for first, last in pairs)
+    if pairs is None:
+        return None
+    return tuple(range(first, last + 1) for first, last in pairs)

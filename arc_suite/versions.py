@@ -4,12 +4,14 @@ import contextlib
 import sys
 from pathlib import Path
 
-# As in setup.cfg. MuJoCo and dm_control move together.
+# As in setup.cfg. A new MuJoCo needs a new dm_control.
 REQUIREMENTS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
+
+_RECORDED_PACKAGES = ("arc_suite", "mujoco", "dm_control", "numpy")
 
 
 def clone_folder() -> Path | None:
-    """Return the folder of the clone that this package lies in; None for an installed package."""
+    """Return the folder of the repository's clone that contains this package; None for an installed package."""
     folder = Path(__file__).parents[1]
     return folder if (folder / "setup.cfg").exists() else None
 
@@ -18,29 +20,28 @@ class MissingExtra(ImportError, ValueError):
     """An extra of the suite is not installed; in a clone the message gives the command that installs it."""
 
     def __init__(self, need: str, extra: str, error: ImportError):
-        """Name the extra.
+        """Word the message.
 
         Args:
             need: what needs which package, such as "ONNX needs onnx".
-            extra: of setup.cfg.
+            extra: name of the extra in setup.cfg.
             error: of the import that failed.
         """
-        # Outside a clone nobody knows where the package came from: no index has it.
-        remedy = (
-            f"pip install -e '{clone_folder()}[{extra}]'"
-            if clone_folder()
-            else f"install arc_suite with the extra {extra!r}"
-        )
+        folder = clone_folder()
+        if folder is None:  # the package may come from anywhere: no package index has it
+            remedy = f"install arc_suite with the extra {extra!r}"
+        else:
+            remedy = f"pip install -e '{folder}[{extra}]'"
         super().__init__(f"{need}: {remedy} ({error})")
 
 
 @contextlib.contextmanager
 def require_extra(need: str, extra: str):
-    """Name the extra that is missing where imports in this context fail.
+    """Turn an ImportError in this context into an error that names the missing extra.
 
     Args:
         need: what needs which package, such as "ONNX needs onnx".
-        extra: of setup.cfg.
+        extra: name of the extra in setup.cfg.
 
     Raises:
         MissingExtra: in place of another ImportError.
@@ -53,7 +54,7 @@ def require_extra(need: str, extra: str):
 
 def version_of(package: str) -> str | None:
     """Return the version of an installed package; None for one that is not installed."""
-    from importlib import metadata  # slow to import, and seldom needed
+    from importlib import metadata  # imported here, as it is slow to import and seldom needed
 
     try:
         return metadata.version(package)
@@ -62,35 +63,37 @@ def version_of(package: str) -> str | None:
 
 
 def dependency_versions() -> dict[str, str | None]:
-    """Return the versions of what results depend on, by package; None for one that is not installed."""
-    return {name: version_of(name) for name in ("arc_suite", "mujoco", "dm_control", "numpy")}
+    """Return the versions of the suite and of what its results depend on, by package; None if not installed."""
+    return {package: version_of(package) for package in _RECORDED_PACKAGES}
 
 
 def problems() -> list[str]:
-    """Return a line with the remedy for every package that is missing or has a version that does not fit."""
+    """Return a line for every required package that is missing or has a wrong version; it contains the remedy."""
     from packaging.specifiers import SpecifierSet
 
     lines = []
-    for package, needed in REQUIREMENTS.items():
+    for package, requirement in REQUIREMENTS.items():
         version = version_of(package)
-        if version is None or not SpecifierSet(needed).contains(version, prereleases=True):
-            wrong = f"{package} is {version or 'not installed'} and should be {needed}"
-            # From Python 3.13 on a package that dm_control asks for cannot be installed; nothing here uses it.
-            alone = "--no-deps " if package == "dm-control" and sys.version_info >= (3, 13) else ""
-            lines.append(f"{wrong}: pip install {alone}'{package}{needed}'")
+        if version is not None and SpecifierSet(requirement).contains(version, prereleases=True):
+            continue
+        problem = f"{package} is {version or 'not installed'} and should be {requirement}"
+        # From Python 3.13 on, one dependency of dm_control cannot be installed; the suite does not use it.
+        option = "--no-deps " if package == "dm-control" and sys.version_info >= (3, 13) else ""
+        lines.append(f"{problem}: pip install {option}'{package}{requirement}'")
     return lines
 
 
 @contextlib.contextmanager
 def explain_import_errors():
-    """Name the package that is to blame, in one line, where imports in this context fail.
+    """Turn an error in this context into one line that names the packages which are missing or have a wrong version.
 
     Raises:
-        ImportError: instead of what was raised, if a package is missing or has another version.
+        ImportError: in place of the error, if there is such a package.
     """
     try:
         yield
     except Exception as error:
-        if wrong := problems():
-            raise ImportError(f"cannot import arc_suite: {'; '.join(wrong)}") from error
+        lines = problems()
+        if lines:
+            raise ImportError(f"cannot import arc_suite: {'; '.join(lines)}") from error
         raise

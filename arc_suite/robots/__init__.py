@@ -10,30 +10,32 @@ ROBOTS = {module.BODY.name: module.BODY for module in (queen, bastion, tick, lea
 
 
 def is_robot(body: Body) -> bool:
-    """Return whether a body is one of the robots, registered ones included, and no variation of one."""
+    """Return whether a body is one of the suite's or the registered robots, without any changes."""
     return ROBOTS.get(body.name) == body
 
 
 def parameters(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
-    """Return the entry of a robot in a table, by the body's name; None where there is none.
+    """Return the entry of a body's robot in a table, by the body's name; None if the table has none.
 
-    A body of a robot's name has the robot's numbers whatever its density or sizes are, as long as
-    it has the robot's joints.
+    A body with a robot's name may differ from the robot in density and sizes, but must have the robot's joints.
 
     Args:
-        table: by name of a robot.
+        table: entries by name of the robot.
         body: any body.
-        what: the numbers are for, with which an error begins.
+        what: what the table contains, such as "preset"; errors begin with it.
 
     Raises:
-        ValueError: a body of a robot's name that has other joints.
+        ValueError: the body has a robot's name but other joints.
     """
     if body.name not in table:
         return None
-    if body.name in ROBOTS and body.joint_names != ROBOTS[body.name].joint_names:
-        wanted, got = len(ROBOTS[body.name].joint_names), len(body.joint_names)
+    robot = ROBOTS.get(body.name)
+    if robot is not None and body.joint_names != robot.joint_names:
+        expected_count = len(robot.joint_names)
+        count = len(body.joint_names)
+        other_names = " with other names" if count == expected_count else ""
         raise ValueError(
-            f"{what}: expected a body named {body.name!r} to have the {wanted} joints of {body.name}, "
-            f"got {got}{' with other names' if got == wanted else ''}; give it another name"
+            f"{what}: expected a body named {body.name!r} to have the {expected_count} joints of {body.name}, "
+            f"got {count}{other_names}; give it another name"
         )
     return table[body.name]

@@ -42,6 +42,7 @@ LEFT_LEGS = (
         foot=Foot(radius=0.05),
     ),
 )
+RIGHT_LEGS = tuple(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)
 
 BODY = Body(
     name="bastion",
@@ -60,7 +61,7 @@ BODY = Body(
             mass=3.0,
         ),
     ),
-    legs=(*LEFT_LEGS, *(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)),
+    legs=(*LEFT_LEGS, *RIGHT_LEGS),
     simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -5.0, 2.0)),
 )

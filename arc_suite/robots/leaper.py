@@ -13,35 +13,35 @@ HIP = Joint(
 KNEE = HIP.replace(name="knee", axis=(-1.0, 1.0, 0.0), range_deg=(-80.0, 0.0), armature=2.0, damping=10.0)
 ANKLE = KNEE.replace(name="ankle", range_deg=(0.0, 100.0))
 
-LEFT_LEGS = (
-    Leg(
-        name="fl",
-        mount=(0.0, 0.0, 0.1),
-        links=(
-            Link(name="aux", end=(0.05, 0.15, 0.0), radius=0.05),
-            Link(name="upper", end=(0.15, 0.15, 0.0), radius=0.05, joint=HIP),
-            Link(name="middle", end=(0.12, 0.12, -0.25), radius=0.045, joint=KNEE),
-            Link(name="lower", end=(0.06, 0.06, -0.18), radius=0.035, joint=ANKLE),
-        ),
-        foot=Foot(radius=0.045),
+FRONT_LEFT_LEG = Leg(
+    name="fl",
+    mount=(0.0, 0.0, 0.1),
+    links=(
+        Link(name="aux", end=(0.05, 0.15, 0.0), radius=0.05),
+        Link(name="upper", end=(0.15, 0.15, 0.0), radius=0.05, joint=HIP),
+        Link(name="middle", end=(0.12, 0.12, -0.25), radius=0.045, joint=KNEE),
+        Link(name="lower", end=(0.06, 0.06, -0.18), radius=0.035, joint=ANKLE),
     ),
-    Leg(
-        name="rl",
-        mount=(0.0, 0.0, 0.1),
-        links=(
-            Link(name="aux", end=(-0.05, 0.15, 0.0), radius=0.05),
-            Link(name="upper", end=(-0.15, 0.15, 0.0), radius=0.05, joint=HIP),
-            Link(name="middle", end=(-0.12, 0.12, -0.25), radius=0.045, joint=KNEE.replace(axis=(1.0, 1.0, 0.0))),
-            Link(
-                name="lower",
-                end=(-0.06, 0.06, -0.18),
-                radius=0.035,
-                joint=ANKLE.replace(axis=(1.0, 1.0, 0.0), range_deg=(-100.0, 0.0)),
-            ),
-        ),
-        foot=Foot(radius=0.045),
-    ),
+    foot=Foot(radius=0.045),
 )
+REAR_LEFT_LEG = Leg(
+    name="rl",
+    mount=(0.0, 0.0, 0.1),
+    links=(
+        Link(name="aux", end=(-0.05, 0.15, 0.0), radius=0.05),
+        Link(name="upper", end=(-0.15, 0.15, 0.0), radius=0.05, joint=HIP),
+        Link(name="middle", end=(-0.12, 0.12, -0.25), radius=0.045, joint=KNEE.replace(axis=(1.0, 1.0, 0.0))),
+        Link(
+            name="lower",
+            end=(-0.06, 0.06, -0.18),
+            radius=0.035,
+            joint=ANKLE.replace(axis=(1.0, 1.0, 0.0), range_deg=(-100.0, 0.0)),
+        ),
+    ),
+    foot=Foot(radius=0.045),
+)
+FRONT_RIGHT_LEG = FRONT_LEFT_LEG.mirrored("fr")
+REAR_RIGHT_LEG = REAR_LEFT_LEG.mirrored("rr")
 
 BODY = Body(
     name="leaper",
@@ -50,7 +50,7 @@ BODY = Body(
         standing_height=0.5,
         solids=(Solid(name="torso_geom", shape="sphere", size=(0.15,), position=(0.0, 0.0, 0.0)),),
     ),
-    legs=tuple(leg for left in LEFT_LEGS for leg in (left, left.mirrored(left.name[0] + "r"))),
+    legs=(FRONT_LEFT_LEG, FRONT_RIGHT_LEG, REAR_LEFT_LEG, REAR_RIGHT_LEG),
     simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -4.0, 1.5)),
 )

@@ -60,6 +60,7 @@ LEFT_LEGS = (
         foot=Foot(radius=0.05),
     ),
 )
+RIGHT_LEGS = tuple(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)
 
 BODY = Body(
     name="queen",
@@ -71,7 +72,7 @@ BODY = Body(
     ballast=(
         Ballast(name="carapace_main", shape="ellipsoid", size=(0.55, 0.65, 0.15), position=(0.0, 0.0, 0.25), mass=10.0),
     ),
-    legs=(*LEFT_LEGS, *(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)),
+    legs=(*LEFT_LEGS, *RIGHT_LEGS),
     simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -7.0, 3.0)),
 )

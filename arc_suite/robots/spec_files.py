@@ -38,7 +38,7 @@ def load_body(path: str | os.PathLike) -> Body:
         OSError: the file cannot be read.
     """
     if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
-        path = EXAMPLES[checks.name(path, EXAMPLES, "spec", near=("FILE.json",))]
+        path = EXAMPLES[checks.name(path, EXAMPLES, "spec", suggestions=("FILE.json",))]
     with files.reading(path), Path(path).open("rb") as file:
         data = file.read(MAX_IMPORTED + 1)
     try:

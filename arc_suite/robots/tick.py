@@ -28,6 +28,7 @@ LEFT_LEGS = (
     MIDDLE_LEG,
     MIDDLE_LEG.replace(name="l3", mount=(-0.13, 0.09, 0.02), yaw_deg=35.0),
 )
+RIGHT_LEGS = tuple(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)
 
 BODY = Body(
     name="tick",
@@ -36,7 +37,7 @@ BODY = Body(
         standing_height=0.18,
         solids=(Solid(name="chassis", shape="ellipsoid", size=(0.18, 0.115, 0.055), position=(0.0, 0.0, -0.005)),),
     ),
-    legs=(*LEFT_LEGS, *(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)),
+    legs=(*LEFT_LEGS, *RIGHT_LEGS),
     simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -3.0, 1.2)),
 )

@@ -175,7 +175,7 @@ def values(body: Body, overrides: Mapping[str, Any], task: str, names: Iterable[
         ValueError: an unknown name, or a gait that does not fit the body.
     """
     for name in overrides:
-        checks.name(name, names, f"setting of {task}", near=("time_limit", *elsewhere, *modifiers.MODIFIERS))
+        checks.name(name, names, f"setting of {task}", suggestions=("time_limit", *elsewhere, *modifiers.MODIFIERS))
     own = robots.parameters(PARAMETERS["walk"], body, "walk")
     table = COMMON | (fitted_parameters(body) if own is None else own)
     table |= robots.parameters(PARAMETERS.get(task, {}), body, task) or {}

@@ -93,7 +93,7 @@ def _source_body(source: str, legs: int, links: int, layout: str | None, seed: i
         return families.sound_body(seed)
     if source == FILE:
         return body_from_json(file)
-    return registry.body_of(checks.name(source, sources(), "source", near=(FILE,)))
+    return registry.body_of(checks.name(source, sources(), "source", suggestions=(FILE,)))
 
 
 def make_body(sketch: Sketch) -> Body:
