@@ -21,14 +21,13 @@ ROOT = pathlib.Path(__file__).parents[1]
 # By mistake: a text that the package holds once, in which «right→wrong» marks the right code and the wrong code.
 MUTANTS = {
     # Bodies.
-    "swapped leg": 'leg.«mirrored(→replace(name=»leg.name.replace("l", "r")) for leg in LEFT_LEGS)),\n'
-    "    simulation=Simulation(),\n"
-    "    camera=TrackingCamera(position=(0.0, -7.0, 3.0)",
+    "swapped leg": 'leg.«mirrored(→replace(name=»leg.name.replace("l", "r")) for leg in LEFT_LEGS)\n\n'
+    'BODY = Body(\n    name="queen"',
     "mirrored axis keeps its sign": "axis=(«-→»a, b, -c)",
-    "leg order": '(«left, →»left.mirrored(left.name[0] + "r")«→, left»)',
+    "leg order": "legs=(«FRONT_LEFT_LEG, FRONT_RIGHT_LEG→FRONT_RIGHT_LEG, FRONT_LEFT_LEG», REAR_LEFT_LEG, REAR_RIGHT_LEG)",
     "armature of the hip": "-40.0, 40.0),\n    armature=«1.0→2.0»",
     "sign of zero kept": "float(value)« + 0.0→»",
-    "a body's joints not looked at": "«body.joint_names != ROBOTS[body.name].joint_names→False»",
+    "a body's joints not looked at": "«body.joint_names != robot.joint_names→False»",
     "both sides of a body in step": '«0.5→0.0» * (side == "right")',
     "feet of a random body above the floor": "«(p.height - foot_radius)→p.height * 0.9» /",
     "a scaled robot keeps its name": 'name=«f"{stem}_{how}"→body.name»',
