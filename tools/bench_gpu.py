@@ -1,7 +1,7 @@
 """Measures worlds of `arc_suite.learning.worlds.mjx` on this machine's accelerator, and writes tables into docs/gpu.md.
 
-Prints control steps a second, memory and compile time, whole episodes against a processor's, and the minutes in which
-PPO earns what the demonstrator `medium` does. Needs the extras `learn` and `gpu`.
+Prints control steps a second, memory and compile time, whole episodes against a processor's, and the minutes until
+PPO has the return of the demonstrator `medium`. Needs the extras `learn` and `gpu`.
 
 Example:
   python tools/bench_gpu.py --document docs/gpu.md
@@ -42,114 +42,131 @@ flags.DEFINE_integer("episodes", 256, "Episodes that are compared with a process
 flags.DEFINE_list("learn", ["warp"], "Simulations in which PPO learns: mjx, warp, or none.")
 flags.DEFINE_string("document", None, "A Markdown file between whose <!-- gpu --> marks to put the tables.")
 
-_MARKED = re.compile(r"(<!-- gpu -->\n).*?(<!-- end of gpu -->)", re.DOTALL)
-# Of PPO in thousands of worlds.
-LEARNING = {"num_envs": 4096, "horizon": 16, "minibatch": 16_384}
+_MARKED_TEXT = re.compile(r"(<!-- gpu -->\n).*?(<!-- end of gpu -->)", re.DOTALL)
+# Hyperparameters of PPO in thousands of worlds.
+HYPERPARAMETERS = {"num_envs": 4096, "horizon": 16, "minibatch": 16_384}
 
 
-class Reached(Exception):
-    """A learner has earned what was asked."""
+class GoalReached(Exception):
+    """A learner has reached a return."""
 
 
-def walk(env, preset, steps):
-    """A compiled walk from a state and a demonstrator's mind, and these.
+def prepare_walk(env, preset, steps):
+    """Return a compiled walk of so many steps, and the state from which it starts.
 
-    It returns both after the steps, and rewards (steps, worlds), overflows (steps,) and done (steps, worlds).
+    The state is that of the worlds and that of the demonstrator. The walk returns the state after the steps, and
+    rewards (steps, worlds), overflows (steps,) and ends of episodes (steps, worlds).
     """
-    made = law(env.task, presets_of(env.task.scene.body)[preset])
+    demonstrator = law(env.task, presets_of(env.task.scene.body)[preset])
 
-    def step(carry, _):
-        state, mind = carry
-        mind, action = made(mind, env.task.split(state.obs))
+    def step(states, _):
+        state, demonstrator_state = states
+        demonstrator_state, action = demonstrator(demonstrator_state, env.task.split(state.obs))
         state = jax.vmap(env.step)(state, action)
-        return (state, mind), (state.reward, state.metrics["overflow"].sum(), state.done)
+        return (state, demonstrator_state), (state.reward, state.metrics["overflow"].sum(), state.done)
 
-    walked = jax.jit(lambda carry: jax.lax.scan(step, carry, length=steps))
+    walk = jax.jit(lambda states: jax.lax.scan(step, states, length=steps))
     state = jax.jit(jax.vmap(env.start))(jnp.arange(env.num_envs))
-    return walked, (state, jax.tree.map(jnp.asarray, made.initial(env.num_envs)))
+    demonstrator_state = jax.tree.map(jnp.asarray, demonstrator.initial(env.num_envs))
+    return walk, (state, demonstrator_state)
 
 
-def speed(robot, impl, worlds, steps):
-    """Row of a table: worlds, control steps a second, s of compiling, peak memory of the device, overflows."""
-    walked, carry = walk(mjx.load(robot, "walk", impl=impl, num_envs=worlds), "medium", steps)
-    began = time.perf_counter()
-    walked = walked.lower(carry).compile()
-    compiling = time.perf_counter() - began
-    carry, _ = jax.block_until_ready(walked(carry))  # Warp compiles its kernels
-    began = time.perf_counter()
-    _, (_, overflows, _) = jax.block_until_ready(walked(carry))
-    rate = worlds * steps / (time.perf_counter() - began)
-    peak = (jax.local_devices()[0].memory_stats() or {}).get("peak_bytes_in_use")
-    memory = f"{peak / 2**30:.1f} GiB" if peak else "not measured"
-    return [robot, impl, f"{worlds}", f"{rate:,.0f}", f"{compiling:.0f} s", memory, f"{int(overflows.sum())}"]
+def speed_row(robot, impl, worlds, steps):
+    """Return a row of cells: worlds, control steps a second, compile time, peak memory of the device, overflows."""
+    env = mjx.load(robot, "walk", impl=impl, num_envs=worlds)
+    walk, states = prepare_walk(env, "medium", steps)
+    start = time.perf_counter()
+    compiled_walk = walk.lower(states).compile()
+    compile_seconds = time.perf_counter() - start
+    states, _ = jax.block_until_ready(compiled_walk(states))  # the first run also compiles Warp's kernels
+    start = time.perf_counter()
+    _, (_, overflows, _) = jax.block_until_ready(compiled_walk(states))
+    steps_per_second = worlds * steps / (time.perf_counter() - start)
+    memory_stats = jax.local_devices()[0].memory_stats() or {}
+    peak_bytes = memory_stats.get("peak_bytes_in_use")
+    return [
+        robot,
+        impl,
+        f"{worlds}",
+        f"{steps_per_second:,.0f}",
+        f"{compile_seconds:.0f} s",
+        f"{peak_bytes / 2**30:.1f} GiB" if peak_bytes else "not measured",
+        f"{int(overflows.sum())}",
+    ]
 
 
-def episodes(robot, impl, count):
-    """Row of a table: mean returns of whole `tuned` episodes there and on a processor, and their falls."""
+def return_row(robot, impl, count):
+    """Return a row of cells: mean returns of whole `tuned` episodes in worlds and on a processor, and falls."""
     env = mjx.load(robot, "walk", impl=impl, num_starts=count, num_envs=count)
-    walked, carry = walk(env, "tuned", int(env.episode_length))
-    (_, _), (rewards, _, done) = walked(carry)
-    total, falls = np.asarray(rewards).sum(axis=0), int(np.asarray(done).any(axis=0).sum())
+    walk, states = prepare_walk(env, "tuned", int(env.episode_length))
+    _, (rewards, _, done) = walk(states)
+    mean_return = np.asarray(rewards).sum(axis=0).mean()
+    falls = int(np.asarray(done).any(axis=0).sum())
     with contextlib.closing(Setup.of(robot).make_vec(count, autoreset_mode="Disabled")) as environment:
         policy = Demonstrator(environment, "tuned")
-        found = evaluation.episodes_in_batch(environment, policy, range(count))
-    theirs = np.array([episode.total for episode in found])
-    apart = 100.0 * (total.mean() / theirs.mean() - 1.0)
-    return [robot, impl, f"{total.mean():.1f}", f"{theirs.mean():.1f}", f"{apart:+.2f} %", f"{falls}"]
+        episodes = evaluation.episodes_in_batch(environment, policy, range(count))
+    processor_return = np.mean([episode.total for episode in episodes])
+    difference = 100.0 * (mean_return / processor_return - 1.0)
+    return [robot, impl, f"{mean_return:.1f}", f"{processor_return:.1f}", f"{difference:+.2f} %", f"{falls}"]
 
 
-def minutes(robot, simulation):
-    """Row of a table: minutes and control steps after which PPO earns what `medium` does, evaluations counted."""
+def learning_row(robot, simulation):
+    """Return a row of cells: control steps and minutes until PPO has the return of `medium`, with evaluations."""
     setup = Setup.of(robot)
     with contextlib.closing(setup.make_vec(evaluation.CURVE_EPISODES, autoreset_mode="Disabled")) as environment:
         medium = Demonstrator(environment, "medium")
         goal = np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, medium)])
-    run = Configuration.of(setup, "ppo", {"simulation": simulation, **LEARNING}, steps=50_000_000, evaluate_every=10**6)
-    reached, began = [], time.perf_counter()
+    hyperparameters = {"simulation": simulation, **HYPERPARAMETERS}
+    run = Configuration.of(setup, "ppo", hyperparameters, steps=50_000_000, evaluate_every=10**6)
+    start = time.perf_counter()
+    steps = run.steps
+    minutes = "not reached"
 
     def on_metrics(step, metrics):
+        nonlocal steps, minutes
         if metrics.get("return", -np.inf) >= goal:
-            reached.append((step, (time.perf_counter() - began) / 60.0))
-            raise Reached
+            steps = step
+            minutes = f"{(time.perf_counter() - start) / 60.0:.1f}"
+            raise GoalReached
 
     with tempfile.TemporaryDirectory() as folder:
-        with contextlib.suppress(Reached):
+        with contextlib.suppress(GoalReached):
             train(run, pathlib.Path(folder), progress=program.progress, on_metrics=on_metrics)
         latest = run_folder.latest_returns(run_folder.table(folder, "evaluations")).mean()
-    step, took = reached[0] if reached else (run.steps, None)
-    spent = "not reached" if took is None else f"{took:.1f}"
-    return [robot, simulation, f"{goal:.0f}", f"{latest:.0f}", f"{step / 1e6:.1f} M", spent]
+    return [robot, simulation, f"{goal:.0f}", f"{latest:.0f}", f"{steps / 1e6:.1f} M", minutes]
 
 
-def table(header, rows):
-    """A Markdown table."""
+def markdown_table(header, rows):
+    """Return a Markdown table."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def main():
-    """Measures, prints and writes."""
+    """Measure, print and write the tables."""
     robots = [checks.name(robot, ROBOTS, "robot") for robot in FLAGS.robots]
     impls = [device.implementation(impl) for impl in FLAGS.impl]
     if FLAGS.document and jax.default_backend() != "gpu":
         raise ValueError(f"--document: JAX finds no GPU here, and tables of a {jax.default_backend()} are not written")
     packages = ("mujoco", "mujoco-mjx", "warp-lang", "jax")
-    found = ", ".join(f"{name} {versions.version_of(name)}" for name in packages)
-    rows = [speed(robot, impl, int(count), FLAGS.steps) for robot in robots for impl in impls for count in FLAGS.worlds]
+    package_versions = ", ".join(f"{name} {versions.version_of(name)}" for name in packages)
+    worlds = [int(count) for count in FLAGS.worlds]
+    rows = [speed_row(robot, impl, count, FLAGS.steps) for robot in robots for impl in impls for count in worlds]
     header = ["robot", "impl", "worlds", "control steps/s", "compiling", "peak memory", "overflows"]
-    parts = [f"{jax.devices()[0].device_kind}; {found}.", "<!-- table -->", table(header, rows)]
+    parts = [f"{jax.devices()[0].device_kind}; {package_versions}.", "<!-- table -->", markdown_table(header, rows)]
     if FLAGS.episodes:
-        rows = [episodes(robot, impl, FLAGS.episodes) for robot in robots for impl in impls]
-        parts.append(table(["robot", "impl", "return", "on a processor", "apart", "falls"], rows))
-    if learners := [name for name in FLAGS.learn if name]:
-        rows = [minutes(robot, simulation) for robot in robots for simulation in learners]
-        parts.append(table(["robot", "simulation", "`medium`", "PPO", "control steps", "minutes"], rows))
+        rows = [return_row(robot, impl, FLAGS.episodes) for robot in robots for impl in impls]
+        parts.append(markdown_table(["robot", "impl", "return", "on a processor", "apart", "falls"], rows))
+    simulations = [name for name in FLAGS.learn if name]
+    if simulations:
+        rows = [learning_row(robot, simulation) for robot in robots for simulation in simulations]
+        parts.append(markdown_table(["robot", "simulation", "`medium`", "PPO", "control steps", "minutes"], rows))
     text = "\n\n".join([*parts, "<!-- end -->"])
     print(text)
     if FLAGS.document:
         path = pathlib.Path(FLAGS.document)
         page = path.read_text(encoding="utf-8")
-        files.write(path, _MARKED.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
+        files.write(path, _MARKED_TEXT.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
 
 
 if __name__ == "__main__":

@@ -43,37 +43,41 @@ MODIFIERS = [
 
 
 def modifiers(body) -> list[dict]:
-    """Settings of the rows of a table: those of every body, and each leg of its left side limp."""
+    """Return the settings of the rows of a table: those of every body, and a failure of each leg on the left."""
     legs = [index for index, leg in enumerate(body.legs) if leg.foot_position[1] > 0.0]
     return [*MODIFIERS, *({"actuator_failure": leg} for leg in legs)]
 
 
-def episodes(task: str, body, settings: dict, policy: str, preset: str, command=None) -> dict[str, np.ndarray]:
-    """Figures of episodes, (episodes,) each: return, the task's own at the end, and the distance ahead."""
+def measure(body, settings: dict, preset: str) -> dict[str, np.ndarray]:
+    """Return the distance ahead, as a share, and the task's figures at the end of episodes, (episodes,) each."""
     count = FLAGS.episodes
-    rows = VectorEnv(body, task, count, autoreset_mode="Disabled", max_episode_steps=FLAGS.steps, task_kwargs=settings)
-    acting = policies.policy(policy, body, preset, count, task=rows.task.definition)
+    steps = FLAGS.steps
+    environment = VectorEnv(
+        body, "steer", count, autoreset_mode="Disabled", max_episode_steps=steps, task_kwargs=settings
+    )
+    policy = policies.policy("cpg", body, preset, count, task=environment.task.definition)
     seeds = range(FLAGS.seed, FLAGS.seed + count)
-    places = []  # (7,) of all torsos, after the reset and every step
+    poses = []  # (episodes, 7) of torsos, after the reset and after each step
 
-    def watch(playing, terminated):
-        if not places and command is not None:
-            rows.command("command", command)
-        places.append(rows.batch.data.qpos[:, :7].copy())
+    def record_pose(playing, terminated):
+        is_reset = not poses
+        if is_reset:
+            environment.command("command", AHEAD)
+        poses.append(environment.batch.data.qpos[:, :7].copy())
 
-    with contextlib.closing(rows):
-        played = evaluation.episodes_in_batch(rows, acting, seeds, watch)
-    first, last = places[0], places[-1]
-    way = rotations.to_heading_frame(last[:, :2] - first[:, :2], rotations.yaw(first[:, 3:]))
-    asked = rows.task.definition.parameters.target_velocity * rows.task.scene.control_timestep * FLAGS.steps
-    totals = np.array([episode.total for episode in played])
-    figures = {name: np.array([episode.progress[name] for episode in played]) for name in played[0].progress}
-    return {"return": totals, "distance": way[:, 0] / asked, **figures}
+    with contextlib.closing(environment):
+        episodes = evaluation.episodes_in_batch(environment, policy, seeds, record_pose)
+    displacement = poses[-1][:, :2] - poses[0][:, :2]
+    distance = rotations.to_heading_frame(displacement, rotations.yaw(poses[0][:, 3:]))[:, 0]  # m
+    task = environment.task
+    distance_at_target_velocity = task.definition.parameters.target_velocity * task.scene.control_timestep * steps
+    figures = {name: np.array([episode.progress[name] for episode in episodes]) for name in episodes[0].progress}
+    return {"distance": distance / distance_at_target_velocity, **figures}
 
 
-def line(first: str, cells) -> str:
-    """A row of a Markdown table."""
-    return f"| {first} | {' | '.join(cells)} |"
+def table_row(head: str, cells) -> str:
+    """Return a row of a Markdown table."""
+    return f"| {head} | {' | '.join(cells)} |"
 
 
 def main() -> None:
@@ -82,12 +86,15 @@ def main() -> None:
     for body, preset in itertools.product(robots.values(), FLAGS.presets):
         checks.name(preset, presets_of(body), "preset")
     for name, body in robots.items():
-        print(line(name, FLAGS.presets), line("---", ["---"] * len(FLAGS.presets)), sep="\n")
+        print(table_row(name, FLAGS.presets))
+        print(table_row("---", ["---"] * len(FLAGS.presets)))
         for settings in program.progress(modifiers(body), desc=name, leave=False):
-            played = [episodes("steer", body, settings, "cpg", preset, AHEAD) for preset in FLAGS.presets]
-            cells = [f"{p['distance'].mean():.2f} ({p['fell'].mean():.0%})" for p in played]
-            words = ", ".join(f"{key} {value}" for key, value in settings.items()) or "none"
-            print(line(words, cells), flush=True)
+            figures_of_presets = [measure(body, settings, preset) for preset in FLAGS.presets]
+            cells = [
+                f"{figures['distance'].mean():.2f} ({figures['fell'].mean():.0%})" for figures in figures_of_presets
+            ]
+            settings_text = ", ".join(f"{key} {value}" for key, value in settings.items()) or "none"
+            print(table_row(settings_text, cells), flush=True)
         print()
 
 

@@ -59,18 +59,18 @@ flags.DEFINE_boolean("anchors", False, "Measure anchors in place of tables, and 
 
 
 def cell(task: str, robot: str, preset: str, settings: dict) -> str:
-    """Return what a table says of a preset; "-" where the robot has none of that name."""
-    return (
-        summary(played(task, robot, preset, settings))
-        if preset in ("zero", *presets_of(registry.body_of(robot)))
-        else "-"
-    )
+    """Return the cell of a preset in a table; "-" where the robot has no preset of that name."""
+    if preset not in ("zero", *presets_of(registry.body_of(robot))):
+        return "-"
+    return summary(play(task, robot, preset, settings))
 
 
-def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluation.EpisodeResult]:
+def play(task: str, robot: str, preset: str, settings: dict) -> list[evaluation.EpisodeResult]:
     """Play the episodes of one cell, all at once."""
     environment = VectorEnv(robot, task, FLAGS.episodes, FLAGS.threads, "Disabled", task_kwargs=settings)
-    name, presets = ("zero", ()) if preset == "zero" else ("cpg", (preset,))
+    stands_still = preset == "zero"
+    name = "zero" if stands_still else "cpg"
+    presets = () if stands_still else (preset,)
     with contextlib.closing(environment):
         policy = policies.policy(name, robot, presets, FLAGS.episodes, task=environment.task.definition)
         return evaluation.episodes_in_batch(environment, policy, range(FLAGS.episodes))
@@ -78,11 +78,13 @@ def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluatio
 
 def summary(episodes: list[evaluation.EpisodeResult]) -> str:
     """Return the return, the metric and the failures of episodes as text."""
-    means = {name: np.mean([e.progress[name] for e in episodes]) for name in episodes[0].progress}
+    means = {name: np.mean([episode.progress[name] for episode in episodes]) for name in episodes[0].progress}
     metric = next(means[name] for name in METRICS if name in means)
-    total = np.mean([episode.total for episode in episodes])
-    notes = [f"{means[name]:.0%} {name}" for name in ("fell", "sank") if means.get(name)]
-    return f"{total:.0f}, {round(metric, 2) + 0.0:.2f}" + (f" ({', '.join(notes)})" if notes else "")
+    metric = round(metric, 2) + 0.0  # without the sign of -0.0
+    mean_return = np.mean([episode.total for episode in episodes])
+    failures = [f"{means[name]:.0%} {name}" for name in ("fell", "sank") if means.get(name)]
+    note = f" ({', '.join(failures)})" if failures else ""
+    return f"{mean_return:.0f}, {metric:.2f}{note}"
 
 
 def rows(task: str) -> Iterator[tuple[str, str, dict]]:
@@ -106,10 +108,10 @@ def table(task: str) -> Iterator[str]:
         yield f"| {robot}{difficulty} | {' | '.join(cell(task, robot, preset, settings) for preset in bar)} |"
 
 
-def written(page: str, task: str, lines: list[str]) -> str:
+def replace_table(page: str, task: str, lines: list[str]) -> str:
     """Return a page with the table between the marks of a task replaced."""
-    found = re.compile(f"(?<=<!-- {task} -->\n).*?(?=<!-- end -->)", re.DOTALL)
-    return found.sub("\n" + "\n".join(lines) + "\n\n", page, count=1)
+    old_table = re.compile(f"(?<=<!-- {task} -->\n).*?(?=<!-- end -->)", re.DOTALL)
+    return old_table.sub("\n" + "\n".join(lines) + "\n\n", page, count=1)
 
 
 def anchor(robot: str, task: str) -> anchors.Returns:
@@ -117,18 +119,18 @@ def anchor(robot: str, task: str) -> anchors.Returns:
     setup = Setup.of(robot, task)
     names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets_of(setup.body))]
     bar = program.progress(names, desc=f"{task} {robot}", leave=False)
-    found = {name: anchors.played(setup, name, range(evaluation.EPISODES)) for name in bar}
-    return {name: found[name] for name in (anchors.ZERO, anchors.of_returns(found).preset)}
+    returns = {name: anchors.played(setup, name, range(evaluation.EPISODES)) for name in bar}
+    return {name: returns[name] for name in (anchors.ZERO, anchors.of_returns(returns).preset)}
 
 
 def write_anchors(tasks: list[str]) -> None:
     """Measure anchors, and write each into the package; those of other places stay."""
     order = [str(Setup.of(robot, task)) for task in TASKS for robot in ROBOTS]
     for task, robot in itertools.product(tasks, FLAGS.robots):
-        known = anchors.read(anchors.TABLE) if anchors.TABLE.exists() else {}
-        known[str(Setup.of(robot, task))] = anchor(robot, task)
+        table_of_anchors = anchors.read(anchors.TABLE) if anchors.TABLE.exists() else {}
+        table_of_anchors[str(Setup.of(robot, task))] = anchor(robot, task)
         with files.writing(anchors.TABLE) as temporary:
-            anchors.write(temporary, {place: known[place] for place in order if place in known})
+            anchors.write(temporary, {name: table_of_anchors[name] for name in order if name in table_of_anchors})
 
 
 def _number(text: str):
@@ -155,7 +157,8 @@ def main() -> None:
             lines.append(line)
         print()
         if FLAGS.write:
-            PAGE.write_text(written(PAGE.read_text(encoding="utf-8"), task, lines), encoding="utf-8")
+            page = replace_table(PAGE.read_text(encoding="utf-8"), task, lines)
+            PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -32,14 +32,14 @@ flags.DEFINE_string("robot", "queen", f"One of {', '.join(PRESETS)}.")
 flags.DEFINE_string(
     "space", "law", "law: parameters of the paper's law, around `medium`; torques: added to it, around `tuned`."
 )
-for name, least, most, what in (
+for name, low, high, help_text in (
     ("generations", 1, MAX_COUNT, "Generations of the search, more make a finished one go on"),
     ("episodes", 1, MAX_COUNT, "Episodes by which a candidate is evaluated"),
     ("steps", 1, STEPS, "Control steps of these episodes"),
     ("starts", 0, MAX_COUNT, f"Starts; candidates are judged in the {HARD} hardest of them; 0 for none"),
 ):
-    usual = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
-    flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)
+    defaults = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
+    flags.DEFINE_integer(name, None, f"{help_text}; {defaults} if not given.", low, high)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", 1, MAX_COUNT)
 flags.DEFINE_string(
@@ -47,7 +47,7 @@ flags.DEFINE_string(
 )
 
 
-def given(name: str) -> int:
+def flag_or_default(name: str) -> int:
     """Return the value of a flag, or the default of the space."""
     value = FLAGS[name].value
     return getattr(SPACES[FLAGS.space], name) if value is None else value
@@ -56,17 +56,17 @@ def given(name: str) -> int:
 def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
     settings = {name: FLAGS[name].value for name in ("space", "seed")}
-    settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
-    known = setup.to_dict() | settings | {"versions": versions.dependency_versions()}
-    with contextlib.closing(Journal(folder / "journal.jsonl", known, Generation)) as journal:
+    settings |= {name: flag_or_default(name) for name in ("episodes", "steps", "starts")}
+    record = setup.to_dict() | settings | {"versions": versions.dependency_versions()}
+    with contextlib.closing(Journal(folder / "journal.jsonl", record, Generation)) as journal:
         course = Search(setup, **settings)
         for generation in journal.generations:
             course.step(generation.fitness)
-        done = len(journal.generations)
-        wanted = given("generations")
-        program.say(f"{folder}: {wanted} generations")
-        with program.progress(total=max(wanted, done), initial=done, desc=setup.name, unit="generation") as bar:
-            for _ in range(done, wanted):
+        first = len(journal.generations)
+        count = flag_or_default("generations")
+        program.say(f"{folder}: {count} generations")
+        with program.progress(total=max(count, first), initial=first, desc=setup.name, unit="generation") as bar:
+            for _ in range(first, count):
                 journal.append(course.step())
                 bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}", refresh=False)
                 bar.update()
@@ -75,21 +75,32 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
 
 def evaluate(setup: Setup, preset: Preset) -> dict:
     """Return returns, falls and style over the resets: of the result, of the preset it started from, and of medium."""
-    there = PRESETS[setup.name]
-    presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.space].preset, "medium")}
-    score = Evaluator(setup, len(presets), FLAGS.resets, STEPS)(list(presets.values()), range(FLAGS.resets))
-    return {
-        name: {"return": evaluation.summary(STEPS * score.rewards[row]), "falls": int(score.falls[row].sum())}
-        | {cost: float(values[row].mean()) for cost, values in score.style.items()}
-        for row, name in enumerate(presets)
-    }
+    presets = {"found": preset}
+    for name in (SPACES[FLAGS.space].preset, "medium"):
+        presets[name] = PRESETS[setup.name][name]
+    evaluator = Evaluator(setup, len(presets), FLAGS.resets, STEPS)
+    score = evaluator(list(presets.values()), range(FLAGS.resets))
+    metrics = {}
+    for row, name in enumerate(presets):
+        metrics[name] = {
+            "return": evaluation.summary(STEPS * score.rewards[row]),
+            "falls": int(score.falls[row].sum()),
+            **{cost: float(values[row].mean()) for cost, values in score.style.items()},
+        }
+    return metrics
 
 
 def violations(metrics: dict) -> list[str]:
     """Return the constraints that the result violates, a text for each."""
-    found, medium = metrics["found"], metrics["medium"]
-    worse = [f"{name} {found[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if found[name] > medium[name]]
-    return worse + [f"{found['falls']} falls"] * bool(found["falls"])
+    result = metrics["found"]
+    medium = metrics["medium"]
+    texts = []
+    for name in STYLE:
+        if result[name] > medium[name]:
+            texts.append(f"{name} {result[name]:.3f}, medium's {medium[name]:.3f}")
+    if result["falls"] > 0:
+        texts.append(f"{result['falls']} falls")
+    return texts
 
 
 def main() -> None:
@@ -109,8 +120,8 @@ def main() -> None:
         preset = course.result()
         plots.course(setup.name, course.reward, journal.generations, STEPS).savefig(picture)
         metrics = evaluate(setup, preset)
-        counts = {"generations": len(journal.generations), "resets": FLAGS.resets}
-        file.update(setup.to_dict() | {"space": FLAGS.space, "seed": FLAGS.seed} | counts)
+        file.update(setup.to_dict(), space=FLAGS.space, seed=FLAGS.seed)
+        file.update(generations=len(journal.generations), resets=FLAGS.resets)
         file.update(preset=preset, metrics=metrics, versions=versions.dependency_versions())
     columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
     header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
@@ -119,8 +130,9 @@ def main() -> None:
         total = f"{row['return'].mean:.1f} +- {row['return'].deviation:.1f}"
         print(columns.format(name, total, row["falls"], *(f"{row[cost]:.3f}" for cost in STYLE)))
     print(f"\n{preset}")
-    if broken := violations(metrics):
-        raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")
+    texts = violations(metrics)
+    if texts:
+        raise ValueError(f"the result breaks its constraints: {'; '.join(texts)}")
 
 
 if __name__ == "__main__":
