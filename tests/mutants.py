@@ -23,12 +23,12 @@ MUTANTS = {
     # Bodies.
     "swapped leg": 'leg.«mirrored(→replace(name=»leg.name.replace("l", "r")) for leg in LEFT_LEGS)\n\n'
     'BODY = Body(\n    name="queen"',
-    "mirrored axis keeps its sign": "axis=(«-→»a, b, -c)",
-    "leg order": "legs=(«FRONT_LEFT_LEG, FRONT_RIGHT_LEG→FRONT_RIGHT_LEG, FRONT_LEFT_LEG», REAR_LEFT_LEG, REAR_RIGHT_LEG)",
+    "mirrored axis keeps its sign": "axis=(«-→»x, y, -z)",
+    "leg order": "legs=(«FRONT_LEFT_LEG, FRONT_RIGHT_LEG→FRONT_RIGHT_LEG, FRONT_LEFT_LEG»,",
     "armature of the hip": "-40.0, 40.0),\n    armature=«1.0→2.0»",
     "sign of zero kept": "float(value)« + 0.0→»",
     "a body's joints not looked at": "«body.joint_names != robot.joint_names→False»",
-    "both sides of a body in step": '«0.5→0.0» * (side == "right")',
+    "both sides of a body in step": 'side_offset = «0.5→0.0» if leg.side == "right"',
     "feet of a random body above the floor": "«(p.height - foot_radius)→p.height * 0.9» /",
     "a scaled robot keeps its name": 'name=«f"{stem}_{how}"→body.name»',
     # Models.

@@ -1,7 +1,7 @@
 """Gaits as data: stance and swing of each leg.
 
 A gait is a duty factor, the share of a cycle that a foot spends on the ground, and a phase offset
-for each leg. A leg of offset p stands while (t + p) mod 1 < duty factor, t being cycles.
+for each leg. A leg with phase offset p is in stance while (t + p) mod 1 < duty factor, with the time t in cycles.
 """
 
 from collections.abc import Callable
@@ -10,8 +10,9 @@ from typing import NamedTuple
 from arc_suite import checks
 from arc_suite.robots.spec import Body
 
-TRIPOD = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0)  # offsets of l1 l2 l3 r1 r2 r3, cycles
-TROT = (0.0, 0.5, 0.5, 0.0)  # of fl fr rl rr
+# Phase offsets, cycles.
+TRIPOD = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0)  # of the legs l1 l2 l3 r1 r2 r3
+TROT = (0.0, 0.5, 0.5, 0.0)  # of the legs fl fr rl rr
 
 
 class Gait(NamedTuple):
@@ -19,11 +20,33 @@ class Gait(NamedTuple):
 
     Attributes:
         duty_factor: share of a cycle in stance.
-        offsets: of the legs, cycles in [0, 1).
+        offsets: phase offsets of the legs, cycles in [0, 1).
     """
 
     duty_factor: float
     offsets: tuple[float, ...]
+
+
+def gait(body: Body, name: str) -> Gait:
+    """Return the gait of a body by name.
+
+    Raises:
+        ValueError: an unknown gait, or one that does not fit the legs.
+    """
+    checks.name(name, NAMES, "gait")
+    valid_names = fitting_gaits(body)
+    if name not in valid_names:
+        raise ValueError(
+            f"gait {name!r} does not fit {body.name} with its {len(body.legs)} legs (fit: {', '.join(valid_names)})"
+        )
+    return _GAIT_KINDS[name].make(body)
+
+
+def fitting_gaits(body: Body) -> tuple[str, ...]:
+    """Return the names of the gaits that fit the legs of a body."""
+    sides = [leg.side for leg in body.legs]
+    has_equal_sides = sides.count("left") == sides.count("right")
+    return tuple(name for name, kind in _GAIT_KINDS.items() if kind.fits(len(sides), has_equal_sides))
 
 
 def metachronal(body: Body, duty_factor: float) -> Gait:
@@ -34,69 +57,70 @@ def metachronal(body: Body, duty_factor: float) -> Gait:
     "Insect walking", 1966). Six legs make a tripod gait at 1/2, a tetrapod at 2/3, a ripple at 3/4
     and a wave at 5/6.
     """
-    places = [(leg.side, rank) for leg, rank in zip(body.legs, body.ranks, strict=True)]
-    rearmost = {side: max(rank for other, rank in places if other == side) for side, _ in places}
-    offsets = [(0.5 * (side == "right") - (rearmost[side] - rank) * (1.0 - duty_factor)) % 1.0 for side, rank in places]
+    rear_ranks = {}  # rank of the rearmost leg, by side
+    for leg, rank in zip(body.legs, body.ranks, strict=True):
+        rear_ranks[leg.side] = max(rank, rear_ranks.get(leg.side, 0))
+
+    offsets = []
+    for leg, rank in zip(body.legs, body.ranks, strict=True):
+        side_offset = 0.5 if leg.side == "right" else 0.0
+        legs_behind = rear_ranks[leg.side] - rank
+        offsets.append((side_offset - legs_behind * (1.0 - duty_factor)) % 1.0)
     return Gait(duty_factor, tuple(offsets))
 
 
-def _alternating(body: Body, duty_factor: float) -> Gait:
-    """Return the gait in which every leg is half a cycle from its neighbors, in front, behind and across."""
-    return _of_groups(body, duty_factor, lambda rank, right: 0.5 * ((rank + right) % 2))
-
-
-def _of_groups(body: Body, duty_factor: float, offset: Callable[[int, bool], float]) -> Gait:
-    pairs = zip(body.legs, body.ranks, strict=True)
-    return Gait(duty_factor, tuple(offset(rank, leg.side == "right") for leg, rank in pairs))
-
-
 def _wave(body: Body) -> Gait:
-    longest = max(body.ranks) + 1
-    return metachronal(body, 1.0 - 0.5 / longest)
+    """Return the metachronal gait in which the legs of a side swing one after the other."""
+    legs_of_longer_side = max(body.ranks) + 1
+    return metachronal(body, 1.0 - 0.5 / legs_of_longer_side)
 
 
-class _Named(NamedTuple):
-    fits: Callable[[int, bool], bool]  # number of legs, whether both sides have as many
+def _alternating(body: Body, duty_factor: float) -> Gait:
+    """Return the gait in which every leg is half a cycle from its neighbors in front, behind and across."""
+    return _in_two_groups(body, duty_factor, lambda rank, is_right: (rank + is_right) % 2 == 1)
+
+
+def _in_two_groups(body: Body, duty_factor: float, is_late: Callable[[int, bool], bool]) -> Gait:
+    """Return the gait of two groups of legs that are half a cycle apart.
+
+    Args:
+        body: any body.
+        duty_factor: share of a cycle in stance.
+        is_late: whether a leg belongs to the second group, given its rank (0 in front) and whether it is a right leg.
+    """
+    offsets = []
+    for leg, rank in zip(body.legs, body.ranks, strict=True):
+        offsets.append(0.5 if is_late(rank, leg.side == "right") else 0.0)
+    return Gait(duty_factor, tuple(offsets))
+
+
+class _GaitKind(NamedTuple):
+    """A gait with a name.
+
+    Attributes:
+        fits: whether a body can have the gait, given its number of legs and whether both sides have equally many.
+        make: function from a body to its gait.
+    """
+
+    fits: Callable[[int, bool], bool]
     make: Callable[[Body], Gait]
 
 
-# By name. Duty factors are the classical ones, a little above where the legs of two groups would
-# swap at the same instant.
-_GAITS = {
-    "trot": _Named(lambda legs, even: even and legs == 4, lambda body: _alternating(body, 0.6)),
-    "pace": _Named(
-        lambda legs, even: even and legs == 4, lambda body: _of_groups(body, 0.6, lambda rank, right: 0.5 * right)
-    ),
-    "bound": _Named(
-        lambda legs, even: even and legs == 4, lambda body: _of_groups(body, 0.6, lambda rank, right: 0.5 * (rank % 2))
-    ),
-    "walk": _Named(lambda legs, even: even and legs == 4, lambda body: metachronal(body, 0.75)),
-    "tripod": _Named(lambda legs, even: even and legs >= 6, lambda body: _alternating(body, 0.6)),
-    "tetrapod": _Named(lambda legs, even: legs >= 6, lambda body: metachronal(body, 2.0 / 3.0)),
-    "ripple": _Named(lambda legs, even: legs >= 5, lambda body: metachronal(body, 0.75)),
-    "wave": _Named(lambda legs, even: True, _wave),
+def _is_quadruped(legs: int, has_equal_sides: bool) -> bool:
+    return has_equal_sides and legs == 4
+
+
+# By name. Duty factors are the classical ones. Where two groups of legs alternate, they are a little above 1/2, so that
+# the groups do not swap at the same instant.
+_GAIT_KINDS = {
+    "trot": _GaitKind(_is_quadruped, lambda body: _alternating(body, 0.6)),
+    "pace": _GaitKind(_is_quadruped, lambda body: _in_two_groups(body, 0.6, lambda rank, is_right: is_right)),
+    "bound": _GaitKind(_is_quadruped, lambda body: _in_two_groups(body, 0.6, lambda rank, is_right: rank % 2 == 1)),
+    "walk": _GaitKind(_is_quadruped, lambda body: metachronal(body, 0.75)),
+    "tripod": _GaitKind(lambda legs, equal_sides: equal_sides and legs >= 6, lambda body: _alternating(body, 0.6)),
+    "tetrapod": _GaitKind(lambda legs, equal_sides: legs >= 6, lambda body: metachronal(body, 2.0 / 3.0)),
+    "ripple": _GaitKind(lambda legs, equal_sides: legs >= 5, lambda body: metachronal(body, 0.75)),
+    "wave": _GaitKind(lambda legs, equal_sides: True, _wave),
 }
 
-NAMES = tuple(_GAITS)
-
-
-def fitting_gaits(body: Body) -> tuple[str, ...]:
-    """Return the names of the gaits that fit the legs of a body."""
-    sides = [leg.side for leg in body.legs]
-    even = sides.count("left") == sides.count("right")
-    return tuple(name for name, gait in _GAITS.items() if gait.fits(len(sides), even))
-
-
-def gait(body: Body, name: str) -> Gait:
-    """Return the gait of a body by name.
-
-    Raises:
-        ValueError: an unknown gait, or one that does not fit the legs.
-    """
-    checks.name(name, NAMES, "gait")
-    valid = fitting_gaits(body)
-    if name not in valid:
-        raise ValueError(
-            f"gait {name!r} does not fit {body.name} with its {len(body.legs)} legs (fit: {', '.join(valid)})"
-        )
-    return _GAITS[name].make(body)
+NAMES = tuple(_GAIT_KINDS)

@@ -4,33 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.robots.spec import Body, Joint, Leg, Solid
+from arc_suite.robots.spec import Body, Joint, Leg, Link, Solid
 
-_ROUNDING = 1e-9  # of the standing height for lengths, and of a number for numbers
-_ROUNDING_OF_FILES = 1e-3  # the same of imported bodies, whose files have few digits
+# Relative differences up to which two numbers count as equal; of lengths, relative to the standing height.
+_TOLERANCE = 1e-9
+_TOLERANCE_OF_IMPORTED_BODIES = 1e-3  # their files have few digits
 
-_REFLECTION = np.array((1.0, -1.0, 1.0))  # of a point, and of a velocity
-_TURNED = -_REFLECTION  # of the axis of a rotation
-
-
-class _Rounding:
-    """Comparisons of numbers up to rounding."""
-
-    def __init__(self, body: Body):
-        self.share = _ROUNDING_OF_FILES if body.source else _ROUNDING
-        self.length = self.share * body.torso.standing_height
-
-    def equal(self, number: float | None, other: float | None) -> bool:
-        """Return whether two numbers are equal, or neither is there."""
-        return number == other if None in (number, other) else bool(np.isclose(number, other, self.share, 0.0))
-
-    def near(self, points, others) -> bool:
-        """Return whether points are the same."""
-        return bool(np.allclose(points, others, rtol=0.0, atol=self.length))
-
-    def along(self, cosine) -> bool:
-        """Return whether directions with these cosines of their angles are parallel."""
-        return bool((abs(cosine) > 1.0 - self.share).all())
+_POINT_REFLECTION = np.array((1.0, -1.0, 1.0))  # factors on a point
+_AXIS_REFLECTION = -_POINT_REFLECTION  # factors on the axis of a rotation
 
 
 class Image(NamedTuple):
@@ -57,85 +38,147 @@ def image(body: Body) -> Image:
     Raises:
         ValueError: the body has no left-right symmetry; the message names a part without a counterpart.
     """
-    rounding = _Rounding(body)
+    tolerance = _Tolerance(body)
     for kind, solids in (("solid", body.torso.solids), ("ballast", body.ballast)):
         for solid in solids:
-            if not any(_solids_match(solid, other, rounding) for other in solids):
+            if not any(_solids_match(solid, candidate, tolerance) for candidate in solids):
                 raise ValueError(f"{body.name} is not left-right symmetric: no {kind} is across from {solid.name}")
-    legs, signs = [], []
+
+    leg_indices = []
+    signs = []
     for leg in body.legs:
-        matches = [(across, found) for across, other in enumerate(body.legs) if (found := _signs(leg, other, rounding))]
-        if not matches:
-            raise ValueError(f"{body.name} is not left-right symmetric: no leg is across from {leg.name}")
-        across, found = matches[0]
-        legs.append(across)
-        signs += found
-    joints, parts = {name: i for i, name in enumerate(body.joint_names)}, {n: i for i, n in enumerate(body.part_names)}
-    across = [(leg, body.legs[other]) for leg, other in zip(body.legs, legs, strict=True)]
+        counterpart_index, joint_signs = _find_counterpart(leg, body, tolerance)
+        leg_indices.append(counterpart_index)
+        signs += joint_signs
+
+    joint_index = {name: index for index, name in enumerate(body.joint_names)}
+    part_index = {name: index for index, name in enumerate(body.part_names)}
+    joint_indices = []
+    part_indices = [0]  # the torso is its own counterpart
+    for counterpart_index in leg_indices:
+        counterpart = body.legs[counterpart_index]
+        joint_indices += [joint_index[counterpart.full_name(joint)] for joint in counterpart.joints]
+        part_indices += [part_index[counterpart.full_name(part)] for part in counterpart.parts]
     return Image(
-        legs=np.array(legs),
-        joints=np.array([joints[other.full_name(joint)] for _, other in across for joint in other.joints]),
+        legs=np.array(leg_indices),
+        joints=np.array(joint_indices),
         signs=np.array(signs),
-        parts=np.array([0, *(parts[other.full_name(p)] for _, other in across for p in other.parts)]),
+        parts=np.array(part_indices),
     )
 
 
-def _signs(leg: Leg, other: Leg, rounding: _Rounding) -> list[int] | None:
+class _Tolerance:
+    """Comparisons of numbers up to rounding."""
+
+    def __init__(self, body: Body):
+        self.relative = _TOLERANCE_OF_IMPORTED_BODIES if body.source else _TOLERANCE
+        self.length = self.relative * body.torso.standing_height  # m
+
+    def numbers_match(self, first: float | None, second: float | None) -> bool:
+        """Return whether two numbers are equal, or both are None."""
+        if first is None or second is None:
+            return first is second
+        return bool(np.isclose(first, second, self.relative, 0.0))
+
+    def points_match(self, first, second) -> bool:
+        """Return whether two arrays of points are the same."""
+        return bool(np.allclose(first, second, rtol=0.0, atol=self.length))
+
+    def are_parallel(self, cosines) -> bool:
+        """Return whether directions with angles of these cosines between them are all parallel or antiparallel."""
+        return bool((abs(cosines) > 1.0 - self.relative).all())
+
+
+def _find_counterpart(leg: Leg, body: Body, tolerance: _Tolerance) -> tuple[int, list[int]]:
+    """Return the index of the leg on the other side, and the signs of the joints; see `Image`.
+
+    Raises:
+        ValueError: there is none.
+    """
+    for index, candidate in enumerate(body.legs):
+        signs = _match_legs(leg, candidate, tolerance)
+        if signs is not None:
+            return index, signs
+    raise ValueError(f"{body.name} is not left-right symmetric: no leg is across from {leg.name}")
+
+
+def _match_legs(leg: Leg, candidate: Leg, tolerance: _Tolerance) -> list[int] | None:
     """Return the signs of the joints of two legs that are reflections of each other, else None."""
-    if len(leg.links) != len(other.links) or not rounding.equal(leg.foot.radius, other.foot.radius):
+    if len(leg.links) != len(candidate.links):
         return None
-    if not rounding.near(np.array(leg.points) * _REFLECTION, other.points):
+    if not tolerance.numbers_match(leg.foot.radius, candidate.foot.radius):
         return None
+    if not tolerance.points_match(np.array(leg.points) * _POINT_REFLECTION, candidate.points):
+        return None
+
     signs = []
-    for link, across in zip(leg.links, other.links, strict=True):
-        if not rounding.equal(link.radius, across.radius) or (link.joint is None) != (across.joint is None):
+    for link, other_link in zip(leg.links, candidate.links, strict=True):
+        if not tolerance.numbers_match(link.radius, other_link.radius):
+            return None
+        if (link.joint is None) != (other_link.joint is None):
             return None
         if link.joint is None:
             continue
-        cosine = (_axis(leg, link) * _TURNED) @ _axis(other, across)
+        cosine = (_joint_axis(leg, link) * _AXIS_REFLECTION) @ _joint_axis(candidate, other_link)
         sign = 1 if cosine > 0.0 else -1
-        bounds = tuple(sorted(sign * bound for bound in link.joint.range_deg))
-        pairs = zip([*bounds, *_drive(link.joint)], [*across.joint.range_deg, *_drive(across.joint)], strict=True)
-        if not (rounding.along(cosine) and all(rounding.equal(a, b) for a, b in pairs)):
+        reflected_range = sorted(sign * limit for limit in link.joint.range_deg)
+        numbers = [*reflected_range, *_drive_numbers(link.joint)]
+        other_numbers = [*other_link.joint.range_deg, *_drive_numbers(other_link.joint)]
+        pairs = zip(numbers, other_numbers, strict=True)
+        if not (
+            tolerance.are_parallel(cosine) and all(tolerance.numbers_match(first, second) for first, second in pairs)
+        ):
             return None
         signs.append(sign)
     return signs
 
 
-def _axis(leg: Leg, link) -> np.ndarray:
-    """Return the direction of a link's joint in the torso's frame."""
-    yaw, axis = np.radians(leg.yaw_deg), np.array(link.joint.axis)
+def _joint_axis(leg: Leg, link: Link) -> np.ndarray:
+    """Return the unit direction (3,) of a link's joint in the torso's frame."""
+    yaw = np.radians(leg.yaw_deg)
+    axis = np.array(link.joint.axis)
     x = np.cos(yaw) * axis[0] - np.sin(yaw) * axis[1]
     y = np.sin(yaw) * axis[0] + np.cos(yaw) * axis[1]
     return np.array((x, y, axis[2])) / np.linalg.norm(axis)
 
 
-def _drive(joint: Joint) -> tuple[float | None, ...]:
-    """Return the numbers by which a joint is driven."""
-    servo = joint.servo
-    return (joint.armature, joint.damping, joint.torque, *((servo.stiffness, servo.damping) if servo else ()))
+def _drive_numbers(joint: Joint) -> list[float | None]:
+    """Return the numbers of a joint's drive: armature, damping and torque, and of a servo its own two."""
+    numbers = [joint.armature, joint.damping, joint.torque]
+    if joint.servo:
+        numbers += [joint.servo.stiffness, joint.servo.damping]
+    return numbers
 
 
-def _solids_match(solid: Solid, other: Solid, rounding: _Rounding) -> bool:
+def _solids_match(solid: Solid, candidate: Solid, tolerance: _Tolerance) -> bool:
     """Return whether a shape is the reflection of another."""
-    if solid.shape != other.shape or not all(map(rounding.equal, solid.size, other.size)):
+    if solid.shape != candidate.shape or not all(map(tolerance.numbers_match, solid.size, candidate.size)):
         return False
-    if not rounding.equal(getattr(solid, "mass", None), getattr(other, "mass", None)):
+    if not tolerance.numbers_match(getattr(solid, "mass", None), getattr(candidate, "mass", None)):
         return False
-    if not rounding.near(np.array(solid.position) * _REFLECTION, other.position):
+    if not tolerance.points_match(np.array(solid.position) * _POINT_REFLECTION, candidate.position):
         return False
-    # Shapes are symmetric about their own axes: a sphere about any, a round one about any across its z.
-    axes = {"sphere": [], "capsule": [2], "cylinder": [2]}.get(solid.shape, [0, 1, 2])
-    cosines = ((_REFLECTION[:, None] * _turned(solid)) * _turned(other)).sum(axis=0)
-    return rounding.along(cosines[axes])
+    if solid.shape == "sphere":
+        compared_axes = []  # it looks the same in every orientation
+    elif solid.shape in ("capsule", "cylinder"):
+        compared_axes = [2]  # they look the same after any turn about their z axis
+    else:
+        compared_axes = [0, 1, 2]
+    reflected_axes = _POINT_REFLECTION[:, None] * _shape_axes(solid)
+    cosines = (reflected_axes * _shape_axes(candidate)).sum(axis=0)
+    return tolerance.are_parallel(cosines[compared_axes])
 
 
-def _turned(solid: Solid) -> np.ndarray:
+def _shape_axes(solid: Solid) -> np.ndarray:
     """Return the axes (3, 3) of a shape, in columns, in the torso's frame."""
     axes = np.eye(3)
     for i, angle in enumerate(np.radians(solid.euler_deg)):
-        turn, (j, k) = np.eye(3), ((i + 1) % 3, (i + 2) % 3)
-        turn[j, j] = turn[k, k] = np.cos(angle)
-        turn[k, j], turn[j, k] = np.sin(angle), -np.sin(angle)
+        j = (i + 1) % 3
+        k = (i + 2) % 3
+        turn = np.eye(3)
+        turn[j, j] = np.cos(angle)
+        turn[k, k] = np.cos(angle)
+        turn[k, j] = np.sin(angle)
+        turn[j, k] = -np.sin(angle)
         axes = axes @ turn
     return axes

@@ -5,10 +5,11 @@ import random
 
 from arc_suite.robots.spec import PALETTES
 
-Color = tuple[float, float, float]
+Color = tuple[float, float, float]  # sRGB, 0 to 1
 
 _MATERIALS = ("shell", "trim", "frame", "limb", "glow")
-_NAMED = (  # in the order of `PALETTES`; sRGB, 0 to 1
+# In the order of `PALETTES`; in each the colors in the order of `_MATERIALS`.
+_COLORS_OF_PALETTES = (
     ((0.42, 0.52, 0.28), (0.24, 0.30, 0.16), (0.12, 0.13, 0.10), (0.30, 0.29, 0.22), (0.85, 0.90, 0.15)),
     ((0.62, 0.32, 0.18), (0.36, 0.20, 0.14), (0.14, 0.12, 0.11), (0.34, 0.28, 0.25), (0.10, 0.80, 0.85)),
     ((0.86, 0.82, 0.72), (0.55, 0.48, 0.38), (0.20, 0.18, 0.16), (0.46, 0.42, 0.36), (0.90, 0.25, 0.10)),
@@ -18,14 +19,16 @@ _NAMED = (  # in the order of `PALETTES`; sRGB, 0 to 1
 
 
 def colors(palette: str | int) -> dict[str, Color]:
-    """Return the colors of the materials, sRGB from 0 to 1.
+    """Return the colors of the materials by name.
 
     Args:
-        palette: of `spec.PALETTES`, or a seed: a hue of the shell, and an opposite one of what glows.
+        palette: one of `spec.PALETTES`, or a seed: the shell gets a random hue, the glow a nearly opposite one.
     """
-    return dict(
-        zip(_MATERIALS, _NAMED[PALETTES.index(palette)] if isinstance(palette, str) else _drawn(palette), strict=True)
-    )
+    if isinstance(palette, str):
+        colors_of_materials = _COLORS_OF_PALETTES[PALETTES.index(palette)]
+    else:
+        colors_of_materials = _draw_colors(palette)
+    return dict(zip(_MATERIALS, colors_of_materials, strict=True))
 
 
 def parse(text: str) -> str | int:
@@ -33,14 +36,18 @@ def parse(text: str) -> str | int:
     return int(text) if text.isdecimal() else text
 
 
-def _drawn(seed: int) -> tuple[Color, ...]:
-    draw = random.Random(seed)
-    hue, rich, bright = draw.random(), draw.uniform(0.15, 0.65), draw.uniform(0.4, 0.9)
-    opposite = hue + 0.5 + draw.uniform(-0.15, 0.15)
+def _draw_colors(seed: int) -> tuple[Color, ...]:
+    """Return the colors of a seed in the order of `_MATERIALS`."""
+    generator = random.Random(seed)
+    hue = generator.random()
+    saturation = generator.uniform(0.15, 0.65)
+    brightness = generator.uniform(0.4, 0.9)
+    glow_hue = hue + 0.5 + generator.uniform(-0.15, 0.15)
+    glow_saturation = generator.uniform(0.7, 0.95)
     return (
-        colorsys.hsv_to_rgb(hue, rich, bright),
-        colorsys.hsv_to_rgb(hue, rich, 0.55 * bright),
-        colorsys.hsv_to_rgb(hue, 0.3 * rich, 0.15),
-        colorsys.hsv_to_rgb(hue, 0.4 * rich, 0.45 * bright),
-        colorsys.hsv_to_rgb(opposite % 1.0, draw.uniform(0.7, 0.95), 0.95),
+        colorsys.hsv_to_rgb(hue, saturation, brightness),
+        colorsys.hsv_to_rgb(hue, saturation, 0.55 * brightness),
+        colorsys.hsv_to_rgb(hue, 0.3 * saturation, 0.15),
+        colorsys.hsv_to_rgb(hue, 0.4 * saturation, 0.45 * brightness),
+        colorsys.hsv_to_rgb(glow_hue % 1.0, glow_saturation, 0.95),
     )

@@ -1,86 +1,120 @@
-"""What the source of an imported body may hold: named parts, their numbers, and nothing that names a file.
+"""Checks of the source, the MJCF of an imported body: only known elements, and nothing that names a file.
 
-A source comes from a file that anybody may have written, and MuJoCo reads it. Tags, attributes and what they hold are
-therefore those of a list; `arc_suite.importing` writes no others.
+A source comes from a file that anybody may have written, and MuJoCo reads it. So only listed tags, attributes and
+values are valid; `arc_suite.importing` writes no others.
 """
 
 import collections
 import re
 import xml.etree.ElementTree as ElementTree
-from typing import Any, NoReturn
+from collections.abc import Iterable
+from typing import Any, NamedTuple, NoReturn
 
 from arc_suite import checks
 from arc_suite.robots.spec import Body, SpecError
 
-MAX_DEPTH = 200  # of bodies within bodies, and so on
-_LARGEST = 1e15  # of numbers: above what any robot has, below what overflows in products
-_MOST_STEPS = 10_000  # of a solver
+MAX_DEPTH = 200  # of elements within elements
+_MAX_NUMBER = 1e15  # above what any robot has, below what overflows in products
+_MAX_SOLVER_ITERATIONS = 10_000
+_MAX_QUOTE = 40  # characters of a name or value in an error
 
-_NAME, _NUMBERS, _STEPS = "a name", "numbers", f"an integer up to {_MOST_STEPS}"
-_ON = ("enable", "disable")
-_BOOL = ("true", "false")
-_SOFT = {"solref": _NUMBERS, "solimp": _NUMBERS}
-_PLACE = {"name": _NAME, "pos": _NUMBERS, "quat": _NUMBERS}
+# What an attribute may contain: one of these, or a tuple of the valid texts. Errors contain them.
+_NAME = "a name"
+_NUMBERS = "numbers"
+_INTEGER = f"an integer up to {_MAX_SOLVER_ITERATIONS}"
+_SWITCH = ("enable", "disable")
+_BOOLEAN = ("true", "false")
+
+# Attributes that several elements have.
+_SOLVER_PARAMETERS = {"solref": _NUMBERS, "solimp": _NUMBERS}
+_NAME_AND_POSE = {"name": _NAME, "pos": _NUMBERS, "quat": _NUMBERS}
 
 OPTIONS = {
     **dict.fromkeys(("timestep", "impratio", "tolerance", "ls_tolerance", "noslip_tolerance"), _NUMBERS),
     **dict.fromkeys(("ccd_tolerance", "gravity", "wind", "magnetic", "density", "viscosity"), _NUMBERS),
-    **dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"), _STEPS),
+    **dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"), _INTEGER),
     "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
     "cone": ("pyramidal", "elliptic"),
     "jacobian": ("dense", "sparse", "auto"),
     "solver": ("PGS", "CG", "Newton"),
 }
-# Flags of the physics; others would keep motors, contacts or sensors from working.
+# Flags of MuJoCo that a source may set; others would disable motors, contacts or sensors.
 FLAGS = (
-    *("frictionloss", "limit", "spring", "damper", "gravity", "warmstart", "filterparent", "refsafe", "midphase"),
-    *("eulerdamp", "nativeccd", "island", "multiccd"),
+    "frictionloss",
+    "limit",
+    "spring",
+    "damper",
+    "gravity",
+    "warmstart",
+    "filterparent",
+    "refsafe",
+    "midphase",
+    "eulerdamp",
+    "nativeccd",
+    "island",
+    "multiccd",
 )
 
-# By tag: where it stands, how many there may be, and its attributes with what they hold.
-_TAGS: dict[str, tuple[tuple[str | None, ...], int, dict[str, Any]]] = {
-    "mujoco": ((None,), 1, {"model": _NAME}),
-    "compiler": (
+
+class _Element(NamedTuple):
+    """The valid elements of a tag.
+
+    Attributes:
+        parents: tags of the elements that may contain it; None for the file.
+        max_count: the most that a source may have.
+        attributes: valid contents of the attributes by name; see `_NAME`.
+    """
+
+    parents: tuple[str | None, ...]
+    max_count: int
+    attributes: dict[str, Any]
+
+
+_ELEMENTS = {
+    "mujoco": _Element((None,), 1, {"model": _NAME}),
+    "compiler": _Element(
         ("mujoco",),
         1,
         {"angle": ("radian",), "autolimits": ("false",), "inertiafromgeom": ("false",)},
     ),
-    "option": (("mujoco",), 1, OPTIONS),
-    "flag": (("option",), 1, dict.fromkeys(FLAGS, _ON)),
-    "asset": (("mujoco",), 1, {}),
-    "mesh": (
+    "option": _Element(("mujoco",), 1, OPTIONS),
+    "flag": _Element(("option",), 1, dict.fromkeys(FLAGS, _SWITCH)),
+    "asset": _Element(("mujoco",), 1, {}),
+    "mesh": _Element(
         ("asset",),
         256,
         {
             "name": _NAME,
             "inertia": ("convex", "exact", "legacy", "shell"),
-            "maxhullvert": _STEPS,
+            "maxhullvert": _INTEGER,
             **dict.fromkeys(("vertex", "face", "scale", "refpos", "refquat"), _NUMBERS),
         },
     ),
-    "worldbody": (("mujoco",), 1, {}),
-    "body": (("worldbody", "body"), 2048, {**_PLACE, "gravcomp": _NUMBERS}),
-    "inertial": (("body",), 2048, {"pos": _NUMBERS, "quat": _NUMBERS, "mass": _NUMBERS, "diaginertia": _NUMBERS}),
-    "joint": (
+    "worldbody": _Element(("mujoco",), 1, {}),
+    "body": _Element(("worldbody", "body"), 2048, {**_NAME_AND_POSE, "gravcomp": _NUMBERS}),
+    "inertial": _Element(
+        ("body",), 2048, {"pos": _NUMBERS, "quat": _NUMBERS, "mass": _NUMBERS, "diaginertia": _NUMBERS}
+    ),
+    "joint": _Element(
         ("body",),
         1024,
         {
             "name": _NAME,
             "type": ("free", "hinge", "slide"),
-            "limited": _BOOL,
-            "actuatorfrclimited": _BOOL,
-            "actuatorgravcomp": _BOOL,
+            "limited": _BOOLEAN,
+            "actuatorfrclimited": _BOOLEAN,
+            "actuatorgravcomp": _BOOLEAN,
             **dict.fromkeys(("pos", "axis", "range", "actuatorfrcrange", "margin", "ref", "springref"), _NUMBERS),
             **dict.fromkeys(("armature", "frictionloss", "stiffness", "damping"), _NUMBERS),
-            **{f"{name}{what}": _NUMBERS for name in _SOFT for what in ("limit", "friction")},
+            **{f"{name}{what}": _NUMBERS for name in _SOLVER_PARAMETERS for what in ("limit", "friction")},
         },
     ),
-    "geom": (
+    "geom": _Element(
         ("body",),
         4096,
         {
-            **_PLACE,
-            **_SOFT,
+            **_NAME_AND_POSE,
+            **_SOLVER_PARAMETERS,
             "type": ("sphere", "capsule", "cylinder", "ellipsoid", "box", "mesh"),
             "mesh": _NAME,
             "contype": ("1",),
@@ -89,23 +123,23 @@ _TAGS: dict[str, tuple[tuple[str | None, ...], int, dict[str, Any]]] = {
             **dict.fromkeys(("adhesion", "surfacevel"), _NUMBERS),
         },
     ),
-    "site": (("body",), 1024, {"name": _NAME, "size": _NUMBERS, "group": ("4",)}),
-    "keyframe": (("mujoco",), 1, {}),
-    "key": (("keyframe",), 1, {"name": ("home",), "qpos": _NUMBERS}),
+    "site": _Element(("body",), 1024, {"name": _NAME, "size": _NUMBERS, "group": ("4",)}),
+    "keyframe": _Element(("mujoco",), 1, {}),
+    "key": _Element(("keyframe",), 1, {"name": ("home",), "qpos": _NUMBERS}),
 }
 
 ENTITY = re.compile(r"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
-_NAMED = re.compile(r"[a-z0-9_]{1,64}")
+_VALID_NAME = re.compile(r"[a-z0-9_]{1,64}")
 
 
 def check(body: Body) -> Body:
-    """Return a body whose source holds what a source may hold, and the body's own parts.
+    """Return a body after a check of its source: only valid elements, and all parts of the body.
 
     Raises:
-        SpecError: it holds something else; the message begins with `source: `.
+        SpecError: the source is not valid; the message begins with `source: `.
     """
     if body.source is not None:
-        root = _parsed(body.source)
+        root = _parse(body.source)
         _check_elements(root)
         _check_parts(root, body)
     return body
@@ -115,7 +149,7 @@ def _fail(reason: str) -> NoReturn:
     raise SpecError(reason, "source")
 
 
-def _parsed(text: str) -> ElementTree.Element:
+def _parse(text: str) -> ElementTree.Element:
     if ENTITY.search(text):
         _fail("expected XML without a document type and entities")
     try:
@@ -125,76 +159,86 @@ def _parsed(text: str) -> ElementTree.Element:
 
 
 def _check_elements(root: ElementTree.Element) -> None:
-    """Refuse tags, places, attributes and values that no source has."""
+    """Raise SpecError for a tag, a nesting, an attribute or a value that is not valid."""
     counts = collections.Counter()
-    waiting: list[tuple[ElementTree.Element, str | None, int]] = [(root, None, 0)]
-    while waiting:
-        element, parent, depth = waiting.pop()
+    unchecked: list[tuple[ElementTree.Element, str | None, int]] = [(root, None, 0)]  # element, parent's tag, depth
+    while unchecked:
+        element, parent, depth = unchecked.pop()
         tag = element.tag
-        if tag not in _TAGS or parent not in _TAGS[tag][0]:
-            _fail(f"expected no element {str(tag)[:40]!r} in {parent or 'a file'!r}")
+        if tag not in _ELEMENTS or parent not in _ELEMENTS[tag].parents:
+            _fail(f"expected no element {str(tag)[:_MAX_QUOTE]!r} in {parent or 'a file'!r}")
         counts[tag] += 1
-        if counts[tag] > _TAGS[tag][1] or depth > MAX_DEPTH:
-            _fail(f"expected at most {_TAGS[tag][1]} elements {tag!r}, at most {MAX_DEPTH} within each other")
+        max_count = _ELEMENTS[tag].max_count
+        if counts[tag] > max_count or depth > MAX_DEPTH:
+            _fail(f"expected at most {max_count} elements {tag!r}, at most {MAX_DEPTH} within each other")
         for name, value in element.attrib.items():
             _check_attribute(element, name, value)
-        waiting += [(child, tag, depth + 1) for child in element]
+        unchecked += [(child, tag, depth + 1) for child in element]
 
 
 def _check_attribute(element: ElementTree.Element, name: str, value: str) -> None:
-    kinds = _TAGS[element.tag][2]
-    place = f"{element.tag} {element.get('name', '')[:40]!r}"
-    if name not in kinds:
-        _fail(f"{place}: expected no attribute {name[:40]!r}")
-    kind = kinds[name]
-    if isinstance(kind, tuple):
-        fits, kind = value in kind, f"one of {', '.join(kind)}"
-    elif kind == _NAME:
-        fits = _NAMED.fullmatch(value)
-    elif kind == _STEPS:
-        fits = value.isascii() and value.isdecimal() and len(value) <= 5 and int(value) <= _MOST_STEPS
-    else:
-        fits = _are_numbers(value)
-    if not fits:
-        _fail(f"{place}: {name}: expected {kind}, got {value[:40]!r}")
+    """Raise SpecError for an attribute that the element may not have, or a value that is not valid."""
+    contents = _ELEMENTS[element.tag].attributes
+    label = f"{element.tag} {element.get('name', '')[:_MAX_QUOTE]!r}"
+    if name not in contents:
+        _fail(f"{label}: expected no attribute {name[:_MAX_QUOTE]!r}")
+    content = contents[name]
+    expected = f"one of {', '.join(content)}" if isinstance(content, tuple) else content
+    if not _is_valid(value, content):
+        _fail(f"{label}: {name}: expected {expected}, got {value[:_MAX_QUOTE]!r}")
+
+
+def _is_valid(value: str, content: str | tuple[str, ...]) -> bool:
+    """Return whether an attribute's value is valid content; see `_NAME`."""
+    if isinstance(content, tuple):
+        return value in content
+    if content == _NAME:
+        return _VALID_NAME.fullmatch(value) is not None
+    if content == _INTEGER:
+        is_short_integer = value.isascii() and value.isdecimal() and len(value) <= 5
+        return is_short_integer and int(value) <= _MAX_SOLVER_ITERATIONS
+    return _are_numbers(value)
 
 
 def _are_numbers(text: str) -> bool:
     try:
-        return all(abs(float(word)) <= _LARGEST for word in text.split())  # false for NaN
+        return all(abs(float(word)) <= _MAX_NUMBER for word in text.split())  # a comparison with NaN is false
     except ValueError:
         return False
 
 
 def _check_parts(root: ElementTree.Element, body: Body) -> None:
-    """Refuse a source without the body's parts: one free torso, its joints, links, feet and standing pose."""
+    """Raise SpecError for a source without the body's parts.
+
+    These are one free torso, and the joints, links, feet and standing pose of the body.
+    """
     world = root.find("worldbody")
-    torso = None if world is None or len(world) != 1 else world[0]
-    free = [joint.get("name") for joint in root.iter("joint") if joint.get("type") == "free"]
-    first = None if torso is None else torso.find("joint")
-    if torso is None or torso.get("name") != "torso" or free != ["root"] or first.get("type") != "free":
+    torso = world[0] if world is not None and len(world) == 1 else None
+    first_joint = None if torso is None else torso.find("joint")
+    free_joints = [joint.get("name") for joint in root.iter("joint") if joint.get("type") == "free"]
+    if torso is None or torso.get("name") != "torso" or free_joints != ["root"] or first_joint.get("type") != "free":
         _fail("expected one body in the world, named 'torso', whose first joint 'root' is the one that is free")
-    hinges = [joint.get("name") for joint in root.iter("joint") if joint.get("name") != "root"]
-    held = [joint.name for joint in body.held]
-    for kind, found, wanted, alone in (
-        ("joint", hinges, (*body.joint_names, *held), True),
-        ("body", [part.get("name") for part in root.iter("body")], body.part_names, False),
-        ("site", [site.get("name") for site in root.iter("site")], ("torso", *body.foot_names), False),
-    ):
-        _check_names(kind, found, wanted, alone)
-    keys = [key.get("qpos", "").split() for key in root.iter("key")]
-    if [len(qpos) for qpos in keys] != [7 + len(hinges)]:
-        _fail(f"expected a keyframe 'home' of {7 + len(hinges)} numbers")
+
+    hinge_names = [joint.get("name") for joint in root.iter("joint") if joint.get("name") != "root"]
+    joint_names = [*body.joint_names, *(joint.name for joint in body.held)]
+    _check_names("joint", hinge_names, joint_names)
+    for name in hinge_names:
+        if name not in joint_names:
+            _fail(f"expected no joint {name!r}, which the body has not")
+    _check_names("body", [part.get("name") for part in root.iter("body")], body.part_names)
+    _check_names("site", [site.get("name") for site in root.iter("site")], ("torso", *body.foot_names))
+
+    keyframe_sizes = [len(key.get("qpos", "").split()) for key in root.iter("key")]
+    position_count = 7 + len(hinge_names)  # the free joint has 7
+    if keyframe_sizes != [position_count]:
+        _fail(f"expected a keyframe 'home' of {position_count} numbers")
 
 
-def _check_names(kind: str, found: list[str], wanted: tuple[str, ...], alone: bool) -> None:
-    """Refuse names that occur twice, lack, or, if those wanted stand alone, are too many."""
-    twice = next((name for name, count in collections.Counter(found).items() if count > 1), None)
-    if twice is not None:
-        _fail(f"the {kind} {twice!r} occurs twice")
-    lacking = next((name for name in wanted if name not in found), None)
-    if lacking is not None:
-        _fail(f"expected a {kind} {lacking!r}")
-    other = next((name for name in found if name not in wanted), None)
-    if alone and other is not None:
-        _fail(f"expected no {kind} {other!r}, which the body has not")
+def _check_names(kind: str, names: list[str], required_names: Iterable[str]) -> None:
+    """Raise SpecError for a name that occurs twice, or a required name that is missing."""
+    for name, count in collections.Counter(names).items():
+        if count > 1:
+            _fail(f"the {kind} {name!r} occurs twice")
+    for name in required_names:
+        if name not in names:
+            _fail(f"expected a {kind} {name!r}")

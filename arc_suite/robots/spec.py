@@ -25,117 +25,148 @@ from typing import Any, NoReturn
 
 Vector = tuple[float, float, float]
 
-MAX_LENGTH = 100.0  # meters; far above any creature, far below what upsets MuJoCo
-MAX_DISTANCE = 1e4  # meters, of a camera: more than it takes to see any body
-_DENSEST = 1e9  # kg/m^3
-
-# Of a motor and of a joint, in SI units: beyond what sizing asks for of any body that the other bounds admit, so that
-# no error names a number that sizing found.
-_GEARS = (1e-20, 1e30)
-_LARGEST = 1e35
-_LEAST_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
-MAX_NAME = 32  # characters
 DENSITY = 10.0  # kg/m^3, of the published robots
-MAX_ALIAS = 100  # characters of a name in a file of others
-MAX_SOURCE = 1 << 21  # bytes of the MJCF of an imported body; of 38 files the largest has 430,000
 PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colors`
-_NAME = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
-_SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
+
+MAX_LENGTH = 100.0  # m; far above any creature, far below lengths at which MuJoCo becomes unstable
+MAX_DISTANCE = 1e4  # m, of a camera; more than enough to see any body
+MAX_NAME = 32  # characters
+MAX_ALIAS = 100  # characters of a name in a foreign file
+MAX_SOURCE = 1 << 21  # bytes of the MJCF of an imported body; of 38 files the largest has 430,000
+_MIN_LENGTH = 1e-6  # m
+_MAX_DENSITY = 1e9  # kg/m^3
+_MIN_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
+
+# Bounds of motors and joints, in SI units. They lie beyond the results of sizing for all bodies within the other
+# bounds, so that no error is about a number that sizing has computed.
+_MIN_GEAR = 1e-20
+_MAX_GEAR = 1e30
+_MAX_JOINT_CONSTANT = 1e35  # of armature and damping
+
+_NAME_PATTERN = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
+_SIZE_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}  # numbers in `Solid.size`
+_MAX_PREVIEW = 60  # characters of a value in an error
 
 
 class SpecError(ValueError):
-    """A spec that no body can be built from; the message names the field.
+    """A spec that describes no valid body; the message names the field.
 
     Attributes:
         reason: what is wrong, without the field.
-        field: name of the field; None where the reason stands alone.
+        field: name of the field; None if the reason is about no single field.
     """
 
     def __init__(self, reason: str, field: str | None = None, owner: str | None = None):
-        """Word the error; `owner` tells whose field it is."""
-        super().__init__(": ".join(part for part in (".".join(filter(None, (owner, field))), reason) if part))
+        """Word the message, `owner.field: reason`.
+
+        Args:
+            reason: see the class.
+            field: see the class.
+            owner: the spec that has the field, as a label or a path; None if unknown.
+        """
+        place = ".".join(part for part in (owner, field) if part)
+        super().__init__(": ".join(part for part in (place, reason) if part))
         self.reason = reason
         self.field = field
 
 
+# Checks of values. Each returns the value as specs store it, or raises SpecError.
+
+
 def _check_name(value: Any) -> str:
-    if not isinstance(value, str) or not _NAME.fullmatch(value):
-        raise SpecError(f"expected 1 to {MAX_NAME} characters out of [a-z0-9_], got {_shown(value)}")
+    if not isinstance(value, str) or not _NAME_PATTERN.fullmatch(value):
+        raise SpecError(f"expected 1 to {MAX_NAME} characters out of [a-z0-9_], got {_preview(value)}")
     return value
 
 
 def _check_number(value: Any, low: float, high: float) -> float:
-    real = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not real or not low <= value <= high:  # also false for NaN
-        raise SpecError(f"expected a number from {low:g} to {high:g}, got {_shown(value)}")
-    return float(value) + 0.0  # -0.0 becomes 0.0: equal specs are to give equal texts
+    is_real = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not is_real or not low <= value <= high:  # a comparison with NaN is false
+        raise SpecError(f"expected a number from {low:g} to {high:g}, got {_preview(value)}")
+    return float(value) + 0.0  # turns -0.0 into 0.0, so that equal specs give equal texts
 
 
 def _check_vector(value: Any, size: int, low: float, high: float) -> tuple[float, ...]:
     if not isinstance(value, (tuple, list)) or len(value) != size:
-        raise SpecError(f"expected {size} numbers, got {_shown(value)}")
-    return tuple(map(functools.partial(_check_number, low=low, high=high), value))
+        raise SpecError(f"expected {size} numbers, got {_preview(value)}")
+    return tuple([_check_number(number, low, high) for number in value])
 
 
 def _check_lengths(value: Any) -> tuple[float, ...]:
     if not isinstance(value, (tuple, list)) or not 1 <= len(value) <= 3:
-        raise SpecError(f"expected 1 to 3 lengths, got {_shown(value)}")
-    return tuple(_check_number(number, 1e-6, MAX_LENGTH) for number in value)
+        raise SpecError(f"expected 1 to 3 lengths, got {_preview(value)}")
+    return tuple([_check_number(number, _MIN_LENGTH, MAX_LENGTH) for number in value])
 
 
 def _check_choice(value: Any, choices: Iterable[str]) -> str:
     if value not in tuple(choices):
-        raise SpecError(f"expected one of {', '.join(choices)}, got {_shown(value)}")
+        raise SpecError(f"expected one of {', '.join(choices)}, got {_preview(value)}")
     return value
 
 
 def _check_palette(value: Any) -> str | int:
-    seed = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**31
-    if not seed and not (isinstance(value, str) and value in PALETTES):
-        raise SpecError(f"expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got {_shown(value)}")
+    is_seed = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**31
+    is_palette = isinstance(value, str) and value in PALETTES
+    if not is_seed and not is_palette:
+        raise SpecError(f"expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got {_preview(value)}")
     return value
 
 
 def _check_instance(value: Any, kind: type) -> Any:
     if not isinstance(value, kind):
-        raise SpecError(f"expected a {kind.__name__}, got {_shown(value)}")
+        raise SpecError(f"expected a {kind.__name__}, got {_preview(value)}")
     return value
 
 
 def _check_items(value: Any, kind: type, low: int, high: int) -> tuple:
     if not isinstance(value, (tuple, list)):
-        raise SpecError(f"expected a sequence of {kind.__name__}s, got {_shown(value)}")
+        raise SpecError(f"expected a sequence of {kind.__name__}s, got {_preview(value)}")
     if not low <= len(value) <= high:
         raise SpecError(f"expected {low} to {high} {kind.__name__}s, got {len(value)}")
-    return tuple(map(functools.partial(_check_instance, kind=kind), value))
+    return tuple([_check_instance(item, kind) for item in value])
 
 
 def _check_text(value: Any, low: int, high: int) -> str:
     if not isinstance(value, str) or not low <= len(value) <= high:
-        raise SpecError(f"expected a text of {low} to {high} characters, got {_shown(value)}")
+        raise SpecError(f"expected a text of {low} to {high} characters, got {_preview(value)}")
     return value
 
 
 def _check_texts(value: Any, high: int) -> tuple[str, ...]:
     if not isinstance(value, (tuple, list)) or len(value) > high:
-        raise SpecError(f"expected a sequence of at most {high} texts, got {_shown(value)}")
+        raise SpecError(f"expected a sequence of at most {high} texts, got {_preview(value)}")
     return tuple(_check_text(text, 1, MAX_ALIAS) for text in value)
 
 
 def _check_integer(value: Any, low: int, high: int) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise SpecError(f"expected an integer from {low} to {high}, got {_shown(value)}")
+        raise SpecError(f"expected an integer from {low} to {high}, got {_preview(value)}")
     return value
 
 
-def _shown(value: Any) -> str:
-    plain = value is None or isinstance(value, (str, int, float, tuple, list))
-    text = repr(value) if plain else f"a {type(value).__name__}"
-    return text if len(text) <= 60 else text[:57] + "..."
+def _preview(value: Any) -> str:
+    """Return how errors show a value: the beginning of its `repr`, or its type."""
+    has_short_repr = value is None or isinstance(value, (str, int, float, tuple, list))
+    text = repr(value) if has_short_repr else f"a {type(value).__name__}"
+    if len(text) <= _MAX_PREVIEW:
+        return text
+    return text[: _MAX_PREVIEW - 3] + "..."
+
+
+# Fields of the dataclasses below.
 
 
 def _field(check, *args, default=dataclasses.MISSING, optional=False):
-    """Return a dataclass field whose value passes through `check(value, *args)`; None may pass if optional."""
+    """Return a dataclass field whose value is `check(value, *args)`.
+
+    Its metadata also say which spec the value is or contains: `kind`, and whether there are `many` in a tuple.
+
+    Args:
+        check: one of the checks above.
+        *args: of the check, after the value.
+        default: of the field.
+        optional: whether None is valid without a check.
+    """
     metadata = {"check": check, "args": args, "optional": optional}
     if check in (_check_instance, _check_items):
         metadata["kind"] = args[0]
@@ -143,32 +174,28 @@ def _field(check, *args, default=dataclasses.MISSING, optional=False):
     return dataclasses.field(default=default, metadata=metadata)
 
 
-def _name(**kwargs):
+def _name_field(**kwargs):
     return _field(_check_name, **kwargs)
 
 
-def _number(low, high, **kwargs):
+def _number_field(low, high, **kwargs):
     return _field(_check_number, low, high, **kwargs)
 
 
-def _length(**kwargs):
-    return _number(1e-6, MAX_LENGTH, **kwargs)
+def _length_field(**kwargs):
+    return _number_field(_MIN_LENGTH, MAX_LENGTH, **kwargs)
 
 
-def _angle(**kwargs):
-    return _number(-360.0, 360.0, **kwargs)
-
-
-def _position(**kwargs):
+def _position_field(**kwargs):
     return _field(_check_vector, 3, -MAX_LENGTH, MAX_LENGTH, **kwargs)
 
 
 class _Spec:
-    """Base of all specs: checks every field, then conditions on several fields."""
+    """Base class of all specs: checks every field, then the conditions on several fields."""
 
     def __post_init__(self):
         self._check_fields(dataclasses.fields(self))
-        self._check_whole()
+        self._check_conditions()
 
     def _check_fields(self, fields: Iterable[dataclasses.Field]) -> None:
         for field in fields:
@@ -181,27 +208,29 @@ class _Spec:
                 raise SpecError(error.reason, field.name, self._label()) from None
             object.__setattr__(self, field.name, value)
 
-    def _check_whole(self) -> None:
-        """Check conditions on several fields; subclasses with such conditions override this."""
+    def _check_conditions(self) -> None:
+        """Raise SpecError if fields do not fit each other; subclasses with such conditions override this."""
 
     def _fail(self, field: str, message: str) -> NoReturn:
         raise SpecError(message, field, self._label())
 
     def _label(self) -> str:
+        """Return how errors call the spec: `Joint(hip)`, or its class alone if it has no valid name."""
         name = getattr(self, "name", None)
         kind = type(self).__name__
-        return f"{kind}({name})" if isinstance(name, str) and _NAME.fullmatch(name) else kind
+        return f"{kind}({name})" if isinstance(name, str) and _NAME_PATTERN.fullmatch(name) else kind
 
     def replace(self, **changes):
-        """Return a copy with some fields changed, checked like any other."""
+        """Return a copy with some fields changed. The changed fields and all conditions are checked."""
         fields = {field.name: field for field in dataclasses.fields(self)}
         if not changes.keys() <= fields.keys():
             return dataclasses.replace(self, **changes)  # raises the error of an unknown field
         copy = object.__new__(type(self))
         for name in fields:
-            object.__setattr__(copy, name, changes[name] if name in changes else getattr(self, name))
-        copy._check_fields([fields[name] for name in changes])  # the others were checked before
-        copy._check_whole()
+            value = changes[name] if name in changes else getattr(self, name)
+            object.__setattr__(copy, name, value)
+        copy._check_fields([fields[name] for name in changes])  # `self` has checked the other fields
+        copy._check_conditions()
         return copy
 
 
@@ -209,7 +238,7 @@ class _Spec:
 class Motor(_Spec):
     """A torque motor: control in [-1, 1], torque = gear (N m) x control."""
 
-    gear: float = _number(*_GEARS)
+    gear: float = _number_field(_MIN_GEAR, _MAX_GEAR)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -217,14 +246,14 @@ class Servo(_Spec):
     """A motor that holds its joint at an angle in every substep; a control of 0 is the standing pose.
 
     Attributes:
-        stiffness: torque by the joint's distance from the wanted angle, N m/rad.
-        damping: torque against its velocity, N m s/rad.
+        stiffness: torque per distance of the joint from the angle at which it is held, N m/rad.
+        damping: torque per velocity, against it, N m s/rad.
         limit: the largest torque, N m.
     """
 
-    stiffness: float = _number(*_GEARS)
-    damping: float = _number(0.0, _LARGEST)
-    limit: float = _number(*_GEARS)
+    stiffness: float = _number_field(_MIN_GEAR, _MAX_GEAR)
+    damping: float = _number_field(0.0, _MAX_JOINT_CONSTANT)
+    limit: float = _number_field(_MIN_GEAR, _MAX_GEAR)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -233,77 +262,88 @@ class Joint(_Spec):
 
     Attributes:
         name: `<leg>_<name>` is the joint's and its motor's name in the model.
-        axis: direction in the link's frame, any length but zero.
-        range_deg: lower and upper limit; zero, the standing pose, lies within.
+        axis: direction in the link's frame, of any length except zero.
+        range_deg: lower and upper limit; zero, the standing pose, lies between them.
         armature: rotor inertia seen at the joint, kg m^2; None: sized to the body.
-        damping: viscous torque, N m s/rad; None: sized to the body.
-        motor: None: sized to the body, unless it has a servo.
-        servo: of an imported body.
-        alias: its name in the file that it was imported from.
+        damping: viscous torque per velocity, N m s/rad; None: sized to the body.
+        motor: the torque motor; None: a motor is sized to the body, unless the joint has a servo.
+        servo: the servo of an imported body's joint.
+        alias: name of the joint in the file that it was imported from.
     """
 
-    name: str = _name()
+    name: str = _name_field()
     axis: Vector = _field(_check_vector, 3, -1e3, 1e3)
     range_deg: tuple[float, float] = _field(_check_vector, 2, -180.0, 180.0)
-    armature: float | None = _number(0.0, _LARGEST, default=None, optional=True)
-    damping: float | None = _number(0.0, _LARGEST, default=None, optional=True)
+    armature: float | None = _number_field(0.0, _MAX_JOINT_CONSTANT, default=None, optional=True)
+    damping: float | None = _number_field(0.0, _MAX_JOINT_CONSTANT, default=None, optional=True)
     motor: Motor | None = _field(_check_instance, Motor, default=None, optional=True)
     servo: Servo | None = _field(_check_instance, Servo, default=None, optional=True)
     alias: str | None = _field(_check_text, 1, MAX_ALIAS, default=None, optional=True)
 
-    def _check_whole(self):
+    def _check_conditions(self):
         if math.hypot(*self.axis) < 1e-6:
             self._fail("axis", "expected a direction, got one of no length")
         if self.motor and self.servo:
             self._fail("servo", "expected a motor or a servo, got both")
         low, high = self.range_deg
         if not (low <= 0.0 <= high and low < high):
-            self._fail("range_deg", f"expected low <= 0 <= high and low < high, got {_shown(self.range_deg)}")
+            self._fail("range_deg", f"expected low <= 0 <= high and low < high, got {_preview(self.range_deg)}")
 
     @property
     def torque(self) -> float | None:
-        """Return the largest torque of its motor or servo, N m; None for one that is to be sized."""
+        """Return the largest torque of the motor or servo, N m; None if the motor has not been sized yet."""
         if self.servo:
             return self.servo.limit
-        return self.motor.gear if self.motor else None
+        if self.motor:
+            return self.motor.gear
+        return None
 
     def mirrored(self) -> Joint:
         """Return the joint of the leg across the x-z plane, so that equal angles give mirrored poses.
 
-        A reflection at y -> -y turns an axis (a, b, c) into (-a, b, -c). A vertical axis stays
-        instead, by the convention of the published robots, and its range changes sign.
+        The reflection y -> -y turns an axis (x, y, z) into (-x, y, -z). A vertical axis does not change,
+        by the convention of the published robots; its range changes sign instead.
         """
-        a, b, c = self.axis
-        if a == b == 0.0:
+        x, y, z = self.axis
+        is_vertical = x == 0.0 and y == 0.0
+        if is_vertical:
             low, high = self.range_deg
             return self.replace(range_deg=(-high, -low))
-        return self.replace(axis=(-a, b, -c))
+        return self.replace(axis=(-x, y, -z))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Link(_Spec):
-    """A capsule from the link's origin to `end`, rigid on its parent or turning about `joint`."""
+    """A capsule from the link's origin to `end`.
 
-    name: str = _name()
-    end: Vector = _position()
-    radius: float = _length()
+    Attributes:
+        name: `<leg>_<name>` is the name of the link's body in the model.
+        end: of the capsule's axis in the link's frame.
+        radius: of the capsule.
+        joint: about which the link turns at its origin; None: it is rigidly fixed to the part before it.
+    """
+
+    name: str = _name_field()
+    end: Vector = _position_field()
+    radius: float = _length_field()
     joint: Joint | None = _field(_check_instance, Joint, default=None, optional=True)
 
-    def _check_whole(self):
+    def _check_conditions(self):
         if math.hypot(*self.end) < 1e-6:
             self._fail("end", "expected a point away from the link's origin")
 
     def mirrored(self) -> Link:
         """Return the link of the leg across the x-z plane."""
-        return self.replace(end=_reflected(self.end), joint=self.joint and self.joint.mirrored())
+        joint = None if self.joint is None else self.joint.mirrored()
+        return self.replace(end=_reflect(self.end), joint=joint)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Foot(_Spec):
-    """A sphere, rigid at the end of the last link; its height decides between stance and swing."""
+    """A sphere, rigidly fixed to the end of the last link; its height decides between stance and swing."""
 
-    radius: float = _length()
-    name: str = _name(default="foot")
+    radius: float = _length_field()
+    name: str = _name_field(default="foot")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -311,20 +351,20 @@ class Leg(_Spec):
     """A chain of links from a mount on the torso down to a foot.
 
     Attributes:
-        name: prefix of all names in the leg.
+        name: prefix of the names of its parts and joints in the model.
         mount: origin of the first link in the torso's frame.
         links: from the torso outwards.
-        foot: the end of the chain.
-        yaw_deg: turn of the first link's frame about z.
+        foot: at the end of the last link.
+        yaw_deg: angle about z by which the first link's frame is turned.
     """
 
-    name: str = _name()
-    mount: Vector = _position()
+    name: str = _name_field()
+    mount: Vector = _position_field()
     links: tuple[Link, ...] = _field(_check_items, Link, 1, 16)
     foot: Foot = _field(_check_instance, Foot)
-    yaw_deg: float = _angle(default=0.0)
+    yaw_deg: float = _number_field(-360.0, 360.0, default=0.0)
 
-    def _check_whole(self):
+    def _check_conditions(self):
         _check_unique(self, "links", [link.name for link in self.links] + [self.foot.name])
         _check_unique(self, "links", [joint.name for joint in self.joints])
         if not self.joints:
@@ -343,7 +383,8 @@ class Leg(_Spec):
     @property
     def side(self) -> str:
         """Return 'left' or 'right', the side of the foot; 'left' on the midline."""
-        return "right" if self.foot_position[1] < -1e-9 else "left"  # rounding must not tell sides
+        _, y, _ = self.foot_position
+        return "right" if y < -1e-9 else "left"  # a bound below 0, so that rounding does not decide
 
     @functools.cached_property
     def foot_position(self) -> Vector:
@@ -353,16 +394,18 @@ class Leg(_Spec):
     @functools.cached_property
     def points(self) -> tuple[Vector, ...]:
         """Return the origin of every link, and last of the foot, in the torso's frame with all joints at zero."""
-        cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
+        cosine = math.cos(math.radians(self.yaw_deg))
+        sine = math.sin(math.radians(self.yaw_deg))
         points = [self.mount]
         for link in self.links:
-            (x, y, z), (a, b, c) = points[-1], link.end
-            points.append((x + (cos * a - sin * b), y + (sin * a + cos * b), z + c))
+            x, y, z = points[-1]
+            end_x, end_y, end_z = link.end
+            points.append((x + (cosine * end_x - sine * end_y), y + (sine * end_x + cosine * end_y), z + end_z))
         return tuple(points)
 
     @functools.cached_property
     def parts(self) -> tuple[Link | Foot, ...]:
-        """Return the rigid parts, from the torso outwards."""
+        """Return the rigid parts, from the torso outwards: the links, then the foot."""
         return (*self.links, self.foot)
 
     @functools.cached_property
@@ -378,7 +421,7 @@ class Leg(_Spec):
         """Return the leg across the x-z plane, under another name."""
         return self.replace(
             name=name,
-            mount=_reflected(self.mount),
+            mount=_reflect(self.mount),
             yaw_deg=-self.yaw_deg,
             links=tuple(link.mirrored() for link in self.links),
         )
@@ -391,34 +434,34 @@ class Solid(_Spec):
     Attributes:
         name: name of the geom.
         shape: sphere, capsule, cylinder, ellipsoid or box.
-        size: half-extents as MuJoCo takes them for the shape.
-        position: center in the torso's frame.
-        euler_deg: turns about the x, y and z axes of the turning frame, in that order.
+        size: radius or half-extents, as MuJoCo takes them for the shape.
+        position: of its center in the torso's frame.
+        euler_deg: angles of turns about the x, then the y, then the z axis of the frame that turns.
     """
 
-    name: str = _name()
-    shape: str = _field(_check_choice, _SIZES)
+    name: str = _name_field()
+    shape: str = _field(_check_choice, _SIZE_COUNTS)
     size: tuple[float, ...] = _field(_check_lengths)
-    position: Vector = _position(default=(0.0, 0.0, 0.0))
+    position: Vector = _position_field(default=(0.0, 0.0, 0.0))
     euler_deg: Vector = _field(_check_vector, 3, -360.0, 360.0, default=(0.0, 0.0, 0.0))
 
-    def _check_whole(self):
-        if len(self.size) != _SIZES[self.shape]:
-            self._fail("size", f"expected {_SIZES[self.shape]} lengths for a {self.shape}, got {len(self.size)}")
+    def _check_conditions(self):
+        if len(self.size) != _SIZE_COUNTS[self.shape]:
+            self._fail("size", f"expected {_SIZE_COUNTS[self.shape]} lengths for a {self.shape}, got {len(self.size)}")
         if self.name == "floor":
             self._fail("name", "'floor' is what the body stands on")
 
     def mirrored(self):
         """Return the shape across the x-z plane."""
         x, y, z = self.euler_deg
-        return self.replace(position=_reflected(self.position), euler_deg=(-x, y, -z))
+        return self.replace(position=_reflect(self.position), euler_deg=(-x, y, -z))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Ballast(Solid):
     """A shape fixed to the torso that weighs `mass` and touches nothing."""
 
-    mass: float = _number(1e-9, 1e9)
+    mass: float = _number_field(1e-9, 1e9)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -426,160 +469,175 @@ class Torso(_Spec):
     """The free-floating root: solids around its origin, which stands above the floor.
 
     Attributes:
-        standing_height: of the origin above the floor, m; None: a body sets it so that its lowest foot
+        standing_height: of the origin above the floor, m; None: the body derives it, so that its lowest foot
             stands on the floor.
-        solids: its shapes.
+        solids: the torso's shapes.
     """
 
-    standing_height: float | None = _length(default=None, optional=True)
+    standing_height: float | None = _length_field(default=None, optional=True)
     solids: tuple[Solid, ...] = _field(_check_items, Solid, 1, 64)
 
-    def _check_whole(self):
+    def _check_conditions(self):
         _check_unique(self, "solids", [solid.name for solid in self.solids])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TrackingCamera(_Spec):
-    """A camera that keeps `position` relative to the body's center of mass, `xyaxes` as in MJCF."""
+    """A camera that follows the body.
+
+    Attributes:
+        position: relative to the body's center of mass.
+        xyaxes: the camera's x and y axes in the world, as in MJCF.
+    """
 
     position: Vector = _field(_check_vector, 3, -MAX_DISTANCE, MAX_DISTANCE)
     xyaxes: tuple[float, ...] = _field(_check_vector, 6, -1.0, 1.0, default=(1.0, 0.0, 0.0, 0.0, 0.5, 1.0))
 
-    def _check_whole(self):
-        (a, b, c), (d, e, f) = self.xyaxes[:3], self.xyaxes[3:]
-        if math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) < 1e-6:  # their cross product
-            self._fail("xyaxes", f"expected two directions that are not parallel, got {_shown(self.xyaxes)}")
+    def _check_conditions(self):
+        a, b, c, d, e, f = self.xyaxes
+        cross_product = (b * f - c * e, c * d - a * f, a * e - b * d)
+        if math.hypot(*cross_product) < 1e-6:
+            self._fail("xyaxes", f"expected two directions that are not parallel, got {_preview(self.xyaxes)}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Simulation(_Spec):
-    """The constants of the simulation that have a dimension.
+    """The constants of the simulation that have a physical unit.
 
     The defaults are MuJoCo's, except the margin. They are those of the published robots and suit bodies of
     about half a meter. Since MuJoCo 3.5 the margin of a contact is the sum of its geoms' margins:
-    floor and robot each carry half of the published one.
+    floor and robot each have half of the published one.
 
     Attributes:
         timestep: of one substep, s.
         contact_time: time constant of contacts and joint limits, s.
         contact_width: depth over which a contact hardens, m.
-        contact_margin: of every geom that touches, m.
-        substeps: of a control step.
+        contact_margin: distance at which contacts begin, of every geom that can touch, m.
+        substeps: number in a control step.
     """
 
-    timestep: float = _number(1e-6, 0.1, default=0.002)
-    contact_time: float = _number(2e-6, 1.0, default=0.02)
-    contact_width: float = _number(1e-9, MAX_LENGTH, default=0.001)
-    contact_margin: float = _number(0.0, MAX_LENGTH, default=0.005)
+    timestep: float = _number_field(1e-6, 0.1, default=0.002)
+    contact_time: float = _number_field(2e-6, 1.0, default=0.02)
+    contact_width: float = _number_field(1e-9, MAX_LENGTH, default=0.001)
+    contact_margin: float = _number_field(0.0, MAX_LENGTH, default=0.005)
     substeps: int = _field(_check_integer, 2, 1000, default=25)
 
-    def _check_whole(self):
+    def _check_conditions(self):
         if self.contact_time < 2.0 * self.timestep:
             self._fail("contact_time", f"expected at least two timesteps, got {self.contact_time:g}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Held(_Spec):
-    """A joint outside of the legs of an imported body, which a servo holds in the standing pose.
+    """A joint of an imported body that belongs to no leg. A servo holds it in the standing pose.
 
     Attributes:
         name: of the joint and its servo in the model.
-        servo: that holds it.
+        servo: holds the joint.
     """
 
-    name: str = _name()
+    name: str = _name_field()
     servo: Servo = _field(_check_instance, Servo)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Body(_Spec):
-    """A whole creature.
+    """A complete creature.
 
-    The legs' order is that of bodies, actions, joint angles, joint velocities and contact forces.
-    What is None is sized to the body before it is built; see `arc_suite.models.sizing`.
+    Actions, joint angles, joint velocities and contact forces are in the order of the legs.
+    Fields that are None are sized to the body before its model is built; see `arc_suite.models.sizing`.
 
     Attributes:
-        name: of the body and its model; a robot's name gives it the robot's numbers.
-        torso: the root.
-        legs: every leg, right ones included.
+        name: of the body and its model; with a robot's name it uses the robot's parameters and presets.
+        torso: the root of the kinematic tree.
+        legs: all legs, left and right ones.
         camera: the side view that follows the body; None: placed to suit the body.
-        ballast: further weight on the torso.
+        ballast: additional masses on the torso.
         density: of solids, links and feet, kg/m^3.
-        simulation: its constants; None: scaled to the body.
-        agility: factor on the motors that are sized, for bodies that leap.
-        palette: of its colors, one of `PALETTES` or a seed; None: the robot's own, or gray.
-        source: MJCF of an imported body, which names parts and joints as here and has the standing pose as the
-            keyframe `home`; see `arc_suite.models.source`.
-        held: its joints outside of the legs.
-        file_joints: names of its motors' joints in the file that it was imported from, in the order of the file.
+        simulation: constants of the simulation; None: scaled to the body.
+        agility: factor on the gear of motors that are sized; above 1 for bodies that leap.
+        palette: of the body's colors, one of `PALETTES` or a seed; None: the robot's own, or gray.
+        source: MJCF of an imported body. It has parts and joints of the same names as here, and the standing pose as
+            the keyframe `home`; see `arc_suite.models.source`.
+        held: joints of an imported body that belong to no leg.
+        file_joints: names of the motors' joints in the file that the body was imported from, in the order of the file.
     """
 
-    name: str = _name()
+    name: str = _name_field()
     torso: Torso = _field(_check_instance, Torso)
     legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, 64)
     camera: TrackingCamera | None = _field(_check_instance, TrackingCamera, default=None, optional=True)
-    density: float = _number(1e-9, _DENSEST, default=DENSITY)
+    density: float = _number_field(1e-9, _MAX_DENSITY, default=DENSITY)
     ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
-    agility: float = _number(0.1, 10.0, default=1.0)
+    agility: float = _number_field(0.1, 10.0, default=1.0)
     palette: str | int | None = _field(_check_palette, default=None, optional=True)
     source: str | None = _field(_check_text, 1, MAX_SOURCE, default=None, optional=True)
     held: tuple[Held, ...] = _field(_check_items, Held, 0, 256, default=())
     file_joints: tuple[str, ...] = _field(_check_texts, 1024, default=())
 
-    def _check_whole(self):
+    def _check_conditions(self):
         _check_unique(self, "legs", [leg.name for leg in self.legs])
-        shapes = [part.name for part in (*self.torso.solids, *self.ballast)]
-        _check_unique(self, "ballast", shapes)
+        shape_names = [shape.name for shape in (*self.torso.solids, *self.ballast)]
+        _check_unique(self, "ballast", shape_names)
         self._check_source()
         if self.source is None:
             self._check_inertia()
         if self.torso.standing_height is None:
-            object.__setattr__(self, "torso", self.torso.replace(standing_height=self._derived_height()))
-        # Names in the model: leg a's part b_c would meet leg a_b's part c.
-        _check_unique(self, "legs", [*shapes, *self.part_names[1:]])
+            torso = self.torso.replace(standing_height=self._standing_height())
+            object.__setattr__(self, "torso", torso)
+        # Unique names within legs are not enough: part b_c of leg a and part c of leg a_b are both a_b_c in the model.
+        _check_unique(self, "legs", [*shape_names, *self.part_names[1:]])
         _check_unique(self, "legs", [*self.joint_names, *(joint.name for joint in self.held)])
 
-    def _derived_height(self) -> float:
-        """Return the height of the torso's origin above its lowest foot's lowest point."""
+    def _standing_height(self) -> float:
+        """Return the height, m, of the torso's origin above the lowest point of the lowest foot."""
         height = max(leg.foot.radius - leg.foot_position[2] for leg in self.legs)
-        if not 1e-6 <= height <= MAX_LENGTH:
+        if not _MIN_LENGTH <= height <= MAX_LENGTH:
             reason = f"feet end {abs(height):.4g} m {'below' if height > 0.0 else 'above'} the torso's origin"
             self._fail("torso", f"standing_height cannot be derived: {reason}")
-        return float(f"{height:.12g}")  # sums of decimal lengths are decimal again
+        return float(f"{height:.12g}")  # rounded, as sums of decimal lengths are decimal, too
 
     def _check_source(self) -> None:
-        """Refuse servos without a source, and motors with one."""
-        servos = [joint.servo is not None for joint in self.joints]
+        """Raise SpecError for fields that only bodies with a source may have, or only bodies without one."""
+        joints_have_servos = [joint.servo is not None for joint in self.joints]
         if self.source is None:
-            for field, given in (("legs", any(servos)), ("held", self.held), ("file_joints", self.file_joints)):
-                if given:
-                    what = "servos" if field == "legs" else "values"
-                    self._fail(field, f"expected no {what} in a body without a source")
-        elif not all(servos):
+            if any(joints_have_servos):
+                self._fail("legs", "expected no servos in a body without a source")
+            for field in ("held", "file_joints"):
+                if getattr(self, field):
+                    self._fail(field, "expected no values in a body without a source")
+        elif not all(joints_have_servos):
             self._fail("legs", "expected a servo at every joint of a body with a source")
         elif self.ballast:
             self._fail("ballast", "expected none in a body with a source, which has its weights")
-        elif self.agility != 1.0 or self.density != DENSITY:
-            field = "agility" if self.agility != 1.0 else "density"
-            self._fail(field, "expected the default in a body with a source, which has its motors and weights")
+        elif self.agility != 1.0:
+            self._fail("agility", "expected the default in a body with a source, which has its motors and weights")
+        elif self.density != DENSITY:
+            self._fail("density", "expected the default in a body with a source, which has its motors and weights")
         elif self.simulation is None:
             self._fail("simulation", "missing; a body with a source needs it")
 
     def _check_inertia(self):
-        """Refuse moving parts whose inertia is too small for MuJoCo; that of a ball is 8/15 pi density radius^5."""
-        least = (_LEAST_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2
+        """Raise SpecError for a moving part whose inertia is too small for MuJoCo.
+
+        A part has at least the inertia of a ball of its smallest radius or half-extent: 8/15 pi density radius^5.
+        """
+        min_size = (_MIN_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2  # m
         sizes = [("torso", solid.name, min(solid.size)) for solid in self.torso.solids]
         for leg in self.legs:
             sizes += [("legs", name, part.radius) for name, part in zip(leg.part_names, leg.parts, strict=True)]
-        field, name, size = min(sizes, key=operator.itemgetter(2))
-        if size < least:
-            denser = float(f"{1.1 * self.density * (least / size) ** 5:.2g}")
-            fits = f" (density {denser:g} fits)" if denser <= _DENSEST else ""
-            what = "a radius" if field == "legs" else "sizes"
-            self._fail(
-                field, f"{name}: expected {what} from {least:.2g} at density {self.density:g}, got {size:g}{fits}"
-            )
+        field, name, smallest_size = min(sizes, key=operator.itemgetter(2))
+        if smallest_size >= min_size:
+            return
+
+        valid_density = float(f"{1.1 * self.density * (min_size / smallest_size) ** 5:.2g}")
+        remedy = f" (density {valid_density:g} fits)" if valid_density <= _MAX_DENSITY else ""
+        what = "a radius" if field == "legs" else "sizes"
+        self._fail(
+            field,
+            f"{name}: expected {what} from {min_size:.2g} at density {self.density:g}, got {smallest_size:g}{remedy}",
+        )
 
     @functools.cached_property
     def joints(self) -> tuple[Joint, ...]:
@@ -603,12 +661,16 @@ class Body(_Spec):
 
     @functools.cached_property
     def ranks(self) -> tuple[int, ...]:
-        """Return for each leg how many legs of its side stand in front of it: 0 is the front leg."""
-        feet = [(leg.side, leg.foot_position[0]) for leg in self.legs]
-        return tuple([sum([other == side and ahead > x for other, ahead in feet]) for side, x in feet])
+        """Return for each leg how many legs of its side stand in front of it: the front legs have rank 0."""
+        feet = [(leg.side, leg.foot_position[0]) for leg in self.legs]  # side and forward position
+        ranks = []
+        for side, x in feet:
+            feet_in_front = [other_x for other_side, other_x in feet if other_side == side and other_x > x]
+            ranks.append(len(feet_in_front))
+        return tuple(ranks)
 
     def mirrored(self) -> Body:
-        """Return the body across the x-z plane; every part keeps its name and place in the order."""
+        """Return the mirror image of the body across the x-z plane; names and order of the parts do not change."""
         solids = tuple(solid.mirrored() for solid in self.torso.solids)
         return self.replace(
             torso=self.torso.replace(solids=solids),
@@ -617,13 +679,14 @@ class Body(_Spec):
         )
 
 
-def _reflected(point: Vector) -> Vector:
+def _reflect(point: Vector) -> Vector:
     return (point[0], -point[1], point[2])
 
 
 def _check_unique(spec: _Spec, field: str, names: Iterable[str]) -> None:
-    seen = set()
+    """Raise SpecError, about a field of a spec, for a name that occurs twice."""
+    earlier_names = set()
     for name in names:
-        if name in seen:
+        if name in earlier_names:
             spec._fail(field, f"the name {name!r} occurs twice")
-        seen.add(name)
+        earlier_names.add(name)

@@ -17,12 +17,14 @@ from arc_suite.robots import sources
 from arc_suite.robots.spec import MAX_SOURCE, Body, SpecError
 
 MAX_BYTES = 1 << 18  # of a file; a body of 64 legs with 16 links each has fewer
-MAX_IMPORTED = MAX_BYTES + 2 * MAX_SOURCE  # of a file with a source, in which line breaks and quotes take two bytes
+MAX_IMPORTED = MAX_BYTES + 2 * MAX_SOURCE  # bytes of a file with a source; its line breaks and quotes take two bytes
 
-# Paths of the creatures that come with the suite, by name.
+# Paths of the bodies that the package contains, by name.
 EXAMPLES = {path.stem: path for path in sorted(Path(__file__).with_name("examples").glob("*.json"))}
 
-_NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
+_MAX_QUOTE = 40  # characters of a key in an error
+_MAX_DIGITS = 20  # of an integer that is read as such; longer ones are read as floats
+_LIST_OF_NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
 def load_body(path: str | os.PathLike) -> Body:
@@ -32,26 +34,26 @@ def load_body(path: str | os.PathLike) -> Body:
         path: of the file, or the name of an example, such as "spider".
 
     Raises:
-        SpecError: not JSON, or no body; the message names the file and the field by its path,
-            `legs[2].links[0].radius`.
-        ValueError: neither a file nor an example.
+        SpecError: the file is no JSON, or describes no valid body; the message names the file and the field by its
+            path, `legs[2].links[0].radius`.
+        ValueError: there is neither a file nor an example of this name.
         OSError: the file cannot be read.
     """
     if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
         path = EXAMPLES[checks.name(path, EXAMPLES, "spec", suggestions=("FILE.json",))]
     with files.reading(path), Path(path).open("rb") as file:
         data = file.read(MAX_IMPORTED + 1)
+    max_bytes = MAX_IMPORTED if b'"source"' in data else MAX_BYTES
     try:
-        most = MAX_IMPORTED if b'"source"' in data else MAX_BYTES
-        if len(data) > most:
-            raise SpecError(f"expected at most {most} bytes")
+        if len(data) > max_bytes:
+            raise SpecError(f"expected at most {max_bytes} bytes")
         return body_from_json(data)
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
 
 
 def save_body(body: Body, path: str | os.PathLike) -> None:
-    """Write a body to a file; fields that are left open stay open.
+    """Write a body to a file; fields that are None stay None.
 
     Raises:
         OSError: the file cannot be written.
@@ -61,85 +63,111 @@ def save_body(body: Body, path: str | os.PathLike) -> None:
 
 def body_to_json(body: Body) -> str:
     """Return a body as the text of a file, ending in a newline; equal bodies give equal texts."""
-    text = json.dumps(_plain(body), indent=2, allow_nan=False)
-    return _NUMBERS.sub(lambda match: f"[{' '.join(match[1].split())}]", text) + "\n"
+    text = json.dumps(_to_json_value(body), indent=2, allow_nan=False)
+    return _LIST_OF_NUMBERS.sub(_put_on_one_line, text) + "\n"
 
 
 def body_from_json(text: str | bytes) -> Body:
     """Return the body that a text describes.
 
     Raises:
-        SpecError: not JSON, or no body.
+        SpecError: the text is no JSON, or describes no valid body.
     """
     if text.lstrip()[:1] in ("<", b"<"):
         raise SpecError(
             "expected a body in JSON, got XML; the name of an MJCF file ends in .xml, that of a URDF file in .urdf"
         )
     try:
-        # Integers of any length become floats, which the field's range then refuses.
-        value = json.loads(text, object_pairs_hook=_object, parse_int=_integer)
+        fields = json.loads(text, object_pairs_hook=_object_of_pairs, parse_int=_parse_integer)
     except SpecError:
         raise
     except RecursionError:
         raise SpecError("expected a body in JSON, got too many brackets within brackets") from None
     except ValueError as error:
         raise SpecError(f"expected a body in JSON: {error}") from None
-    return sources.check(_spec(Body, value, ""))
+    return sources.check(_make_spec(Body, fields, path=""))
 
 
-def _object(pairs: list[tuple[str, Any]]) -> dict:
-    result = dict(pairs)
-    if len(result) < len(pairs):
-        counts = collections.Counter(key for key, _ in pairs)
-        twice = next(key for key, count in counts.items() if count > 1)
-        raise SpecError(f"the key {twice[:40]!r} occurs twice in one object")
-    return result
-
-
-def _integer(digits: str) -> int | float:
-    return int(digits) if len(digits) < 20 else float(digits)
-
-
-def _plain(value: Any) -> Any:
+def _to_json_value(value: Any) -> Any:
+    """Return a spec as a dictionary of the fields that differ from their defaults, and tuples as lists."""
     if isinstance(value, tuple):
-        return [_plain(item) for item in value]
-    if dataclasses.is_dataclass(value):
-        fields = {field.name: (getattr(value, field.name), field.default) for field in dataclasses.fields(value)}
-        return {name: _plain(item) for name, (item, default) in fields.items() if item != default}
-    return value
+        return [_to_json_value(item) for item in value]
+    if not dataclasses.is_dataclass(value):
+        return value
+    fields = {}
+    for field in dataclasses.fields(value):
+        field_value = getattr(value, field.name)
+        if field_value != field.default:
+            fields[field.name] = _to_json_value(field_value)
+    return fields
 
 
-def _spec(kind: type, value: Any, path: str) -> Any:
-    """Return the spec of a kind that an object describes; `path` leads to it from the top."""
+def _put_on_one_line(match: re.Match) -> str:
+    """Return the text of a list of numbers, which `json.dumps` has spread over lines, in one line."""
+    numbers = match[1].split()
+    return f"[{' '.join(numbers)}]"
+
+
+def _object_of_pairs(pairs: list[tuple[str, Any]]) -> dict:
+    """Return a JSON object; a key that occurs twice raises SpecError, where `json` would take the last value."""
+    counts = collections.Counter(key for key, _ in pairs)
+    for key, count in counts.items():
+        if count > 1:
+            raise SpecError(f"the key {key[:_MAX_QUOTE]!r} occurs twice in one object")
+    return dict(pairs)
+
+
+def _parse_integer(digits: str) -> int | float:
+    """Return an integer; one of many digits as a float, which the range of its field then refuses."""
+    return int(digits) if len(digits) < _MAX_DIGITS else float(digits)
+
+
+def _make_spec(kind: type, value: Any, path: str) -> Any:
+    """Return the spec that a JSON object describes.
+
+    Args:
+        kind: class of the spec.
+        value: the object, or another value, which is an error.
+        path: from the body to the spec, for errors; empty for the body itself.
+
+    Raises:
+        SpecError: the value is no object, or a field is unknown, missing or not valid.
+    """
     if not isinstance(value, dict):
-        raise SpecError(f"expected an object with the fields of a {kind.__name__}, got {_shown(value)}", None, path)
+        raise SpecError(f"expected an object with the fields of a {kind.__name__}, got {_json_type(value)}", None, path)
     fields = {field.name: field for field in dataclasses.fields(kind)}
     for name in value:
         try:
-            checks.name(name[:40], fields, "field")
+            checks.name(name[:_MAX_QUOTE], fields, "field")
         except ValueError as error:
             raise SpecError(str(error), None, path) from None
     for field in fields.values():
         if field.default is dataclasses.MISSING and field.name not in value:
             raise SpecError(f"missing; a {kind.__name__} needs it", field.name, path)
-    arguments = {name: _field(fields[name], item, f"{path}.{name}".lstrip(".")) for name, item in value.items()}
+
+    arguments = {}
+    for name, item in value.items():
+        field_path = f"{path}.{name}" if path else name
+        arguments[name] = _read_field(fields[name], item, field_path)
     try:
         return kind(**arguments)
     except SpecError as error:
         raise SpecError(error.reason, error.field, path) from None
 
 
-def _field(field: dataclasses.Field, value: Any, path: str) -> Any:
-    kind = field.metadata.get("kind")
+def _read_field(field: dataclasses.Field, value: Any, path: str) -> Any:
+    """Return the value of a spec's field: JSON objects become specs where the field contains specs."""
+    kind = field.metadata.get("kind")  # see `spec._field`
     if kind is None or (value is None and field.default is None):
         return value
     if not field.metadata["many"]:
-        return _spec(kind, value, path)
+        return _make_spec(kind, value, path)
     if not isinstance(value, list):
-        raise SpecError(f"expected a list of {kind.__name__}s, got {_shown(value)}", None, path)
-    return [_spec(kind, item, f"{path}[{i}]") for i, item in enumerate(value)]
+        raise SpecError(f"expected a list of {kind.__name__}s, got {_json_type(value)}", None, path)
+    return [_make_spec(kind, item, f"{path}[{index}]") for index, item in enumerate(value)]
 
 
-def _shown(value: Any) -> str:
-    plain = {dict: "an object", list: "a list", type(None): "null", bool: "true or false", str: "a string"}
-    return plain.get(type(value), "a number")
+def _json_type(value: Any) -> str:
+    """Return how errors call a JSON value."""
+    names = {dict: "an object", list: "a list", type(None): "null", bool: "true or false", str: "a string"}
+    return names.get(type(value), "a number")
