@@ -5,8 +5,8 @@
 
 Updates are counted per second of processor time of one thread, with the sizes of Queen. The limit is the rate of
 products of matrices 256 x 256 in float32, measured before and after in the same run, over the products that an
-update needs: those of the plain algorithm, without what is saved by computing some of them once. A plain loop in
-It times the same full update in PyTorch, where torch is installed.
+update needs: those of the plain algorithm, which computes none of them only once. Where torch is installed, it also
+times the same full update in a plain loop of PyTorch.
 """
 
 from absl import flags
@@ -27,8 +27,8 @@ def main() -> None:
     line = "{:<44} {:>12} {:>12} {:>9}"
     header = line.format("updates per second of one core", "measured", "limit", "share")
     print(header, "-" * len(header), sep="\n")
-    for name, found, limit in learning.measured(FLAGS.updates):
-        print(line.format(name, f"{found:.1f}", f"{limit:.1f}", f"{100.0 * found / limit:.0f} %"), flush=True)
+    for name, rate, limit in learning.measure(FLAGS.updates):
+        print(line.format(name, f"{rate:.1f}", f"{limit:.1f}", f"{100.0 * rate / limit:.0f} %"), flush=True)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run)
         "AsyncVectorEnv of ordinary ones, 2 processes",
         "vector env, 1 environment",
         "vector env, 4 environments",
-        *report.TARGETS,
+        *report.PROMISES,
         "memory of an environment, kB",
         "4 links a leg",
     ):
@@ -61,7 +61,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run)
         assert robot["size"]["num_envs"] == 4
         for contestant in robot["contestants"]:
             assert len(contestant["microseconds"]) == 2 and min(contestant["microseconds"]) > 0
-        assert report.ratios(robot["contestants"]).keys() == report.TARGETS.keys()
+        assert report.ratios(robot["contestants"]).keys() == report.PROMISES.keys()
     assert len(results["growth"]) == 24
     assert (folder / "performance.md").read_text() == (
         f"Before.\n<!-- benchmark -->\n{result.stdout.removesuffix(chr(10))}<!-- end of benchmark -->\nAfter.\n"
@@ -76,7 +76,7 @@ def test_robots_of_any_name_are_plotted_and_in_the_tables(small_run, tmp_path):
     report.plot(results, tmp_path / "plot.png")
     assert is_a_plot(tmp_path / "plot.png")
     assert "|  | queen | leaper | hopper | crawler |" in report.tables(results)
-    colors = [color for _, color, _ in report._colored(results)]
+    colors = [color for _, color, _ in report._robots_with_colors(results)]
     assert len(set(colors)) == 4
 
 

@@ -15,11 +15,11 @@ from arc_suite.envs.setup import Setup
 
 NUM_ENVS = 64
 POLICIES = ("cpg", "random")  # long episodes and short ones
-_ID = "arc_suite/benchmark-v0"
+_DATASET_ID = "arc_suite/benchmark-v0"
 
 
 def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
-    """Collects and steps in turn, on all cores, behind a progress bar.
+    """Collect and step in turn, on all cores, behind a progress bar.
 
     Args:
         robots: whose walks.
@@ -28,7 +28,7 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
 
     Returns:
         A table in Markdown: medians of control steps a second, collecting (from nothing to the merged
-        dataset) and bare (the same rows and threads, actions precomputed), and their ratio.
+        dataset) and bare (as many environments and threads, actions precomputed), and their ratio.
     """
     lines = ["| robot | policy | collecting, steps/s | bare, steps/s | ratio |", "|---|---|---|---|---|"]
     turns = iter(tqdm(range(len(robots) * len(POLICIES) * rounds), unit="round", disable=None))
@@ -39,48 +39,50 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
             for _ in range(rounds):
                 next(turns)
                 with _temporary_datasets():
-                    speeds.append((_collecting(settings, episodes), _bare(settings)))
+                    speeds.append((_collecting_speed(settings, episodes), _bare_speed(settings)))
             collecting, bare = np.median(speeds, axis=0)
             lines.append(f"| {robot} | {policy} | {collecting:.0f} | {bare:.0f} | {collecting / bare:.2f} |")
     next(turns, None)
     return "\n".join(lines)
 
 
-def _collecting(settings: data.DatasetSettings, episodes: int) -> float:
-    started = time.perf_counter()
-    data.collect(_ID, settings, episodes, NUM_ENVS, progress=functools.partial(tqdm, disable=True))
-    seconds = time.perf_counter() - started
-    return data.open(_ID).metadata["total_steps"] / seconds
+def _collecting_speed(settings: data.DatasetSettings, episodes: int) -> float:
+    """Return control steps a second of collecting a dataset."""
+    start = time.perf_counter()
+    data.collect(_DATASET_ID, settings, episodes, NUM_ENVS, progress=functools.partial(tqdm, disable=True))
+    seconds = time.perf_counter() - start
+    return data.open(_DATASET_ID).metadata["total_steps"] / seconds
 
 
-def _bare(settings: data.DatasetSettings) -> float:
-    """Steps the actions of the dataset's first episodes, row by row, again and again where they are over."""
+def _bare_speed(settings: data.DatasetSettings) -> float:
+    """Return control steps a second with the actions of the dataset's first episodes, repeated where they end."""
     environment = settings.environment(NUM_ENVS)
-    dataset = data.open(_ID)
-    recorded = [dataset[row % len(dataset)].actions for row in range(NUM_ENVS)]
-    actions = np.stack([np.resize(episode, (settings.steps, episode.shape[1])) for episode in recorded], axis=1)
+    dataset = data.open(_DATASET_ID)
+    episodes = [dataset[index % len(dataset)].actions for index in range(NUM_ENVS)]
+    actions = np.stack([np.resize(episode, (settings.steps, episode.shape[1])) for episode in episodes], axis=1)
     environment.reset(seed=settings.seed)
-    steps, ended = 0, np.zeros(NUM_ENVS, bool)
-    started = time.perf_counter()
-    for row in actions:
-        steps += NUM_ENVS - ended.sum()  # a row whose episode has ended starts the next one instead
-        *_, terminated, truncated, _ = environment.step(row)
-        ended = terminated | truncated
-    seconds = time.perf_counter() - started
+    steps = 0
+    has_ended = np.zeros(NUM_ENVS, bool)
+    start = time.perf_counter()
+    for step_actions in actions:
+        steps += NUM_ENVS - has_ended.sum()  # after an end, a step resets the environment and simulates nothing
+        *_, terminated, truncated, _ = environment.step(step_actions)
+        has_ended = terminated | truncated
+    seconds = time.perf_counter() - start
     environment.close()
     return steps / seconds
 
 
 @contextlib.contextmanager
 def _temporary_datasets():
-    """Lets Minari keep datasets in a folder that is deleted afterwards."""
-    before = os.environ.get("MINARI_DATASETS_PATH")
+    """Let Minari keep datasets in a folder that is deleted afterwards."""
+    earlier_path = os.environ.get("MINARI_DATASETS_PATH")
     with tempfile.TemporaryDirectory() as folder:
         os.environ["MINARI_DATASETS_PATH"] = folder
         try:
             yield
         finally:
-            if before is None:
+            if earlier_path is None:
                 del os.environ["MINARI_DATASETS_PATH"]
             else:
-                os.environ["MINARI_DATASETS_PATH"] = before
+                os.environ["MINARI_DATASETS_PATH"] = earlier_path

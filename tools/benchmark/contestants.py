@@ -27,7 +27,7 @@ ORDER = (FULL, LEAN, SILENT, DM_ENV, GYM, ORDINARY, SYNC, ASYNC, VECTOR)
 
 # No episode ends while it is measured.
 _TASK_KWARGS = {"healthy_range": (-1e3, 1e3), "time_limit": 1e6}
-_FOREVER = {"max_episode_steps": 10**7}
+_WITHOUT_END = {"max_episode_steps": 10**7}
 _SUBSTEPS = 25  # of a control step of the robots
 
 
@@ -52,59 +52,67 @@ class Contestant(NamedTuple):
 
 
 def singles(robot: str, ordinary_id: str) -> Iterator[Contestant]:
-    """Plain MuJoCo and the environments that run alone."""
-    lean, silent = compiled(ROBOTS[robot]), compiled(ROBOTS[robot])
+    """Yield plain MuJoCo and the environments that run alone."""
+    lean = compiled(ROBOTS[robot])
+    silent = compiled(ROBOTS[robot])
     silent.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
     full = mujoco.MjModel.from_xml_string(ordinary.full_model(robot).to_xml_string())
     yield _mujoco(FULL, robot, full, contextlib.nullcontext())
     yield _mujoco(LEAN, robot, lean, timers.off)
     yield _mujoco(SILENT, robot, silent, timers.off)
     yield _dm_env(robot)
-    yield _gymnasium(GYM, gymnasium.make(f"arc_suite/{robot}-walk-v0", task_kwargs=_TASK_KWARGS, **_FOREVER))
-    yield _gymnasium(ORDINARY, gymnasium.make(ordinary_id, terminate_when_unhealthy=False, **_FOREVER))
+    yield _gymnasium(GYM, gymnasium.make(f"arc_suite/{robot}-walk-v0", task_kwargs=_TASK_KWARGS, **_WITHOUT_END))
+    yield _gymnasium(ORDINARY, gymnasium.make(ordinary_id, terminate_when_unhealthy=False, **_WITHOUT_END))
 
 
 def ordinary_vectors(ordinary_id: str, workers: Sequence[int]) -> Iterator[Contestant]:
-    """Gymnasium's own vector environments of ordinary ones: as many processes as environments, or none at all."""
-    forever = {"terminate_when_unhealthy": False, **_FOREVER}
-    for rows in workers:
-        envs = gymnasium.make_vec(ordinary_id, rows, vectorization_mode="async", **forever)
-        yield _gymnasium(ASYNC, envs, rows, rows)
-    rows = min(workers)
-    yield _gymnasium(SYNC, gymnasium.make_vec(ordinary_id, rows, vectorization_mode="sync", **forever), rows)
+    """Yield Gymnasium's own vector environments of ordinary ones: a process for each environment, or none at all."""
+    options = {"terminate_when_unhealthy": False, **_WITHOUT_END}
+    for num_envs in workers:
+        envs = gymnasium.make_vec(ordinary_id, num_envs, vectorization_mode="async", **options)
+        yield _gymnasium(ASYNC, envs, num_envs, num_envs)
+    num_envs = min(workers)
+    yield _gymnasium(SYNC, gymnasium.make_vec(ordinary_id, num_envs, vectorization_mode="sync", **options), num_envs)
 
 
-def vectors(robot: str, rows: Sequence[int], threads: Sequence[int]) -> Iterator[Contestant]:
-    """The vector environment: every size on most threads, and the middle one on every number of threads."""
-    most = max(threads)
-    sizes = [(number, most) for number in rows] + [(reference(rows), few) for few in threads if few != most]
-    for number, few in sizes:
+def vectors(robot: str, env_counts: Sequence[int], threads: Sequence[int]) -> Iterator[Contestant]:
+    """Yield the vector environment: every size on most threads, and one size on every number of threads."""
+    most_threads = max(threads)
+    sizes = [(num_envs, most_threads) for num_envs in env_counts]
+    sizes += [(reference(env_counts), num_threads) for num_threads in threads if num_threads != most_threads]
+    for num_envs, num_threads in sizes:
         envs = gymnasium.make_vec(
-            f"arc_suite/{robot}-walk-v0", number, num_threads=few, task_kwargs=_TASK_KWARGS, **_FOREVER
+            f"arc_suite/{robot}-walk-v0",
+            num_envs,
+            num_threads=num_threads,
+            task_kwargs=_TASK_KWARGS,
+            **_WITHOUT_END,
         )
-        yield _gymnasium(VECTOR, envs, number, few)
+        yield _gymnasium(VECTOR, envs, num_envs, num_threads)
 
 
-def reference(rows: Sequence[int]) -> int:
-    """The number of environments at which threads are compared: 64 where it is among them."""
-    return 64 if 64 in rows else max(rows)
+def reference(env_counts: Sequence[int]) -> int:
+    """Return the number of environments at which threads are compared: 64 where it is among them."""
+    return 64 if 64 in env_counts else max(env_counts)
 
 
 def all_threads() -> list[int]:
-    """1 to the number of CPUs that this process may use, in powers of two and the last."""
-    most = len(os.sched_getaffinity(0))
-    return sorted({2**power for power in range(most.bit_length()) if 2**power <= most} | {most})
+    """Return the powers of two up to the number of CPUs that this process may use, and that number."""
+    num_cpus = len(os.sched_getaffinity(0))
+    powers = {2**exponent for exponent in range(num_cpus.bit_length())}
+    return sorted({power for power in powers if power <= num_cpus} | {num_cpus})
 
 
 def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant:
-    """25 times mj_step within a context, and nothing else."""
+    """Return 25 times mj_step within a context, and nothing else."""
     data = mujoco.MjData(model)
-    observation = {"posture": data.qpos[2:], "velocities": data.qvel}  # live
+    observation = {"posture": data.qpos[2:], "velocities": data.qvel}  # views, which follow the simulation
 
     def reset():
         environment = arc_suite.load(robot, "walk", {"random": 0})
         environment.reset()
-        data.qpos[:], data.qvel[:] = environment.physics.position(), environment.physics.velocity()
+        data.qpos[:] = environment.physics.position()
+        data.qvel[:] = environment.physics.velocity()
         return observation
 
     def step(action):
@@ -121,7 +129,12 @@ def _dm_env(robot: str) -> Contestant:
     return Contestant(DM_ENV, 1, 1, environment.reset, environment.step, environment.physics.free)
 
 
-def _gymnasium(name: str, env, rows: int = 1, workers: int = 1) -> Contestant:
+def _gymnasium(name: str, env, num_envs: int = 1, workers: int = 1) -> Contestant:
     return Contestant(
-        name, rows, workers, lambda: env.reset(seed=0)[0], lambda action: env.step(action)[0], lambda: env.close()
+        name,
+        num_envs,
+        workers,
+        reset=lambda: env.reset(seed=0)[0],
+        step=lambda action: env.step(action)[0],
+        close=lambda: env.close(),
     )

@@ -12,21 +12,21 @@ from arc_suite.simulation.model import compiled
 
 LEGS = (2, 4, 6, 8, 10, 12)
 LINKS = (1, 2, 3, 4)
-STEPS = 10  # control steps of a turn, in which the bodies still stand upright
+STEPS = 10  # control steps of a turn; bodies do not fall within so few
 _SUBSTEPS = 25  # of a control step
 SIZES = tuple((legs, links) for links in LINKS for legs in LEGS)
 
 
 def body(legs: int, links: int) -> Body:
-    """Queen's torso on any even number of legs of any number of links, each link with a joint."""
+    """Return Queen's torso on an even number of legs, with any number of links, each of which has a joint."""
     end = (0.0, 0.57 / links, -0.75 / links)  # from the mount to the foot as Queen's middle legs reach
     knee = queen.KNEE.replace(axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
     joints = [queen.HIP, *(knee.replace(name=f"knee{index}") for index in range(1, links))]
     chain = tuple(Link(name=f"link{index}", end=end, radius=0.06, joint=joint) for index, joint in enumerate(joints))
-    places = np.linspace(0.3, -0.3, legs // 2) if legs > 2 else [0.0]
+    mounts = np.linspace(0.3, -0.3, legs // 2) if legs > 2 else [0.0]  # m, along the torso
     left = [
         Leg(name=f"l{index}", mount=(float(x), 0.4, 0.0), links=chain, foot=queen.LEFT_LEGS[0].foot)
-        for index, x in enumerate(places)
+        for index, x in enumerate(mounts)
     ]
     right = [leg.mirrored(leg.name.replace("l", "r")) for leg in left]
     return queen.BODY.replace(name="grown", legs=(*left, *right))
@@ -36,22 +36,22 @@ class Bodies:
     """Bodies of all sizes, and the times of their turns."""
 
     def __init__(self):
-        """Compiles them."""
+        """Compile all bodies."""
         self._models = [compiled(body(*size)) for size in SIZES]
         self._times = [[] for _ in SIZES]
 
     def play(self) -> None:
-        """Times 25 times mj_step of each body, standing on motors that rest."""
+        """Time control steps of each body, which stands without torques."""
         for model, times in zip(self._models, self._times, strict=True):
             data = mujoco.MjData(model)
-            mujoco.mj_step(model, data, 10 * _SUBSTEPS)  # it lands
-            started = time.perf_counter()
+            mujoco.mj_step(model, data, 10 * _SUBSTEPS)  # the body lands
+            start = time.perf_counter()
             with timers.off:
                 mujoco.mj_step(model, data, STEPS * _SUBSTEPS)
-            times.append(1e6 * (time.perf_counter() - started) / STEPS)
+            times.append(1e6 * (time.perf_counter() - start) / STEPS)
 
     def results(self) -> list[dict]:
-        """Legs, links of a leg, and times in us per control step of each size."""
+        """Return, for each size, legs, links of a leg, and times of a control step, us."""
         return [
             {"legs": legs, "links": links, "microseconds": times}
             for (legs, links), times in zip(SIZES, self._times, strict=True)

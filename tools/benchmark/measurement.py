@@ -1,4 +1,4 @@
-"""Measures control steps: all contestants in turn, again and again, so that they share the machine's moods."""
+"""Measures control steps: all contestants in turn, again and again, as the machine's speed varies."""
 
 import contextlib
 import itertools
@@ -19,11 +19,11 @@ from benchmark import contestants, growth, ordinary
 from benchmark.contestants import Contestant
 
 WARM_UP = 20  # control steps, in which a robot begins to walk
-ENV_STEPS = 1500  # environments x control steps of a block beyond which blocks get shorter
+MAX_ENV_STEPS = 1500  # environments x control steps of a turn; with more environments, turns have fewer steps
 
 
 def machine() -> dict:
-    """What the figures hold for."""
+    """Return the processor, the threads and the versions that the figures hold for."""
     names = ("mujoco", "dm-control", "gymnasium", "shimmy", "numpy")
     return {
         "processor": _processor(),
@@ -42,7 +42,7 @@ def measure(
     steps: int,
     progress: Callable,
 ) -> dict:
-    """Runs the whole benchmark.
+    """Run the whole benchmark.
 
     Args:
         robots: whose walks.
@@ -64,7 +64,8 @@ def measure(
             field = _Field(robot, rows, threads, workers, stack)
             for _ in itertools.islice(turns, rounds):
                 field.play(steps)
-            results["robots"][robot] = {"contestants": field.results(), "size": _size(robot, max(rows), max(threads))}
+            cost = _cost_of_many(robot, max(rows), max(threads))
+            results["robots"][robot] = {"contestants": field.results(), "size": cost}
     bodies = growth.Bodies()
     for _ in turns:
         bodies.play()
@@ -99,64 +100,73 @@ class _Field:
             self._run(index, WARM_UP)
 
     def play(self, steps: int) -> None:
-        """One turn for each contestant, in alternating order."""
-        order = range(len(self._contestants))
-        for index in order if len(self._times[0]) % 2 == 0 else reversed(order):
-            rows = self._contestants[index].num_envs
-            few = max(1, steps // 3, min(steps, ENV_STEPS // rows))
-            self._times[index].append(1e6 * self._run(index, few) / (few * rows))
+        """Give each contestant a turn, forwards and backwards in alternation."""
+        order = list(range(len(self._contestants)))
+        rounds_before = len(self._times[0])
+        if rounds_before % 2 == 1:
+            order.reverse()
+        for index in order:
+            num_envs = self._contestants[index].num_envs
+            turn_steps = max(1, steps // 3, min(steps, MAX_ENV_STEPS // num_envs))
+            seconds = self._run(index, turn_steps)
+            self._times[index].append(1e6 * seconds / (turn_steps * num_envs))
 
     def results(self) -> list[dict]:
-        """The times of all turns."""
-        return [
-            {"name": c.name, "num_envs": c.num_envs, "workers": c.workers, "microseconds": times}
-            for c, times in zip(self._contestants, self._times, strict=True)
-        ]
+        """Return the contestants with the times of all their turns."""
+        results = []
+        for contestant, times in zip(self._contestants, self._times, strict=True):
+            fields = {name: getattr(contestant, name) for name in ("name", "num_envs", "workers")}
+            results.append({**fields, "microseconds": times})
+        return results
 
     def _blocks(self, observation) -> Mapping[str, np.ndarray]:
-        """The named blocks of whatever a contestant returns: a dm_env `TimeStep`, a vector or the blocks."""
+        """Return the blocks by name of what a contestant returns: a dm_env `TimeStep`, a vector or the blocks."""
         observation = getattr(observation, "observation", observation)
         return observation if isinstance(observation, Mapping) else self._task.split(observation)
 
     def _run(self, index: int, steps: int) -> float:
-        """Seconds spent in steps; the policy acts while the clock stands still."""
-        contestant, policy, observation = self._contestants[index], self._policies[index], self._observations[index]
+        """Return the time spent in steps, s, without that of the policy."""
+        contestant = self._contestants[index]
+        policy = self._policies[index]
+        observation = self._observations[index]
         seconds = 0.0
         for _ in range(steps):
             action = policy.act(self._blocks(observation))
-            started = time.perf_counter()
+            start = time.perf_counter()
             observation = contestant.step(action)
-            seconds += time.perf_counter() - started
+            seconds += time.perf_counter() - start
         self._observations[index] = observation
         return seconds
 
 
-def _size(robot: str, rows: int, threads: int) -> dict:
-    """What a vector environment of many environments costs in addition to its steps."""
-    memory, started = _memory(), time.perf_counter()
-    envs = gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", rows, num_threads=threads)
-    built = time.perf_counter() - started
+def _cost_of_many(robot: str, num_envs: int, threads: int) -> dict:
+    """Return what a vector environment of many environments costs in addition to its steps."""
+    bytes_before = _used_memory()
+    start = time.perf_counter()
+    envs = gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", num_envs, num_threads=threads)
+    build_seconds = time.perf_counter() - start
     envs.reset(seed=0)
     envs.step(np.zeros(envs.action_space.shape, np.float32))
-    memory = _memory() - memory
-    mask, resets = np.zeros(rows, bool), []
-    for row in range(min(rows, 100)):
-        mask[:] = np.arange(rows) == row
-        started = time.perf_counter()
+    num_bytes = _used_memory() - bytes_before
+    reset_times = []
+    for index in range(min(num_envs, 100)):
+        mask = np.arange(num_envs) == index
+        start = time.perf_counter()
         envs.reset(options={"reset_mask": mask})
-        resets.append(time.perf_counter() - started)
+        reset_times.append(time.perf_counter() - start)
     envs.close()
     return {
-        "num_envs": rows,
-        "build_seconds": built,
-        "kilobytes_per_environment": memory / rows / 1e3,
-        "masked_reset_microseconds": 1e6 * float(np.median(resets)),
+        "num_envs": num_envs,
+        "build_seconds": build_seconds,
+        "kilobytes_per_environment": num_bytes / num_envs / 1e3,
+        "masked_reset_microseconds": 1e6 * float(np.median(reset_times)),
     }
 
 
-def _memory() -> int:
-    """Bytes of the process that lie in memory."""
-    return int(pathlib.Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]) * resource.getpagesize()
+def _used_memory() -> int:
+    """Return the bytes of the process that lie in memory."""
+    pages = pathlib.Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]
+    return int(pages) * resource.getpagesize()
 
 
 def _processor() -> str:

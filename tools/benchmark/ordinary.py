@@ -11,14 +11,14 @@ from arc_suite.tasks.walk import Walk
 
 
 def full_model(robot: str):
-    """The robot's model as a file would hold it: decorated, and with MuJoCo's islands on, as they are by default."""
+    """Return the robot's model as a file would hold it: decorated, and with MuJoCo's islands on, its default."""
     root = models.assemble(ROBOTS[robot], decorated=True)
     root.option.flag.island = "enable"
     return root
 
 
 def register(robot: str, xml_file: str) -> str:
-    """Registers the robot's ordinary environment.
+    """Register the robot's ordinary environment.
 
     Args:
         robot: queen, bastion, tick or leaper.
@@ -43,7 +43,7 @@ class OrdinaryEnv(MujocoEnv):
     metadata = {"render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"], "render_fps": 20}
 
     def __init__(self, robot: str, xml_file: str, terminate_when_unhealthy: bool = True, **kwargs):
-        """Loads the model.
+        """Load the model.
 
         Args:
             robot: whose numbers to footage.
@@ -53,8 +53,11 @@ class OrdinaryEnv(MujocoEnv):
         """
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
         settings = Walk.settings_for(ROBOTS[robot], {})
-        self._settings, self._weights, self._numbers = settings, settings.weights, settings.parameters
-        self._base_noise, self._joint_noise = settings.noise.position_noise, settings.noise.joint_angle_noise
+        self._settings = settings
+        self._weights = settings.weights
+        self._gait = settings.parameters  # numbers of the gait and the standing pose
+        self._base_noise = settings.noise.position_noise
+        self._joint_noise = settings.noise.joint_angle_noise
         self._torso = self.model.body("torso").id
         self._feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
         self._terminate_when_unhealthy = terminate_when_unhealthy
@@ -80,7 +83,7 @@ class OrdinaryEnv(MujocoEnv):
         x_before = self.data.xpos[self._torso, 0]
         self.do_simulation(action, self.frame_skip)
         x_velocity = (self.data.xpos[self._torso, 0] - x_before) / self.dt
-        self._phase = (self._phase + 2 * np.pi * self._numbers.gait_frequency * self.dt) % (2 * np.pi)
+        self._phase = (self._phase + 2 * np.pi * self._gait.gait_frequency * self.dt) % (2 * np.pi)
 
         observation = self._get_obs()
         reward, terms = self._get_rew(x_velocity, action)
@@ -91,13 +94,14 @@ class OrdinaryEnv(MujocoEnv):
         return observation, reward, terminated, False, {"reward_terms": terms}
 
     def _get_rew(self, x_velocity, action):
-        numbers = self._numbers
-        stance = self.data.xpos[self._feet, 2] < numbers.stance_threshold
-        wanted = (self._phase + numbers.phase_offsets) % (2 * np.pi) < 2 * np.pi * numbers.duty_factor
-        wrong_feet = np.sum(stance != wanted)
+        gait = self._gait
+        is_stance = self.data.xpos[self._feet, 2] < gait.stance_threshold
+        leg_phases = (self._phase + gait.phase_offsets) % (2 * np.pi)
+        is_prescribed_stance = leg_phases < 2 * np.pi * gait.duty_factor
+        wrong_feet = np.sum(is_stance != is_prescribed_stance)
         angles = self.data.qpos[7:]
         terms = {
-            "forward": max(0.0, 1.0 - abs(x_velocity - numbers.target_velocity) / self._settings.velocity_band),
+            "forward": max(0.0, 1.0 - abs(x_velocity - gait.target_velocity) / self._settings.velocity_band),
             "healthy": float(self.is_healthy),
             "gait_bonus": 1.0 - wrong_feet / len(self._feet),
             "gait_cost": float(wrong_feet),
@@ -106,7 +110,7 @@ class OrdinaryEnv(MujocoEnv):
             "contact": np.sum(np.square(self.contact_forces)),
             "angular_velocity": np.sum(np.square(self.data.qvel[3:5])),
             "vertical_velocity": np.square(self.data.qvel[2]),
-            "posture": np.sum(np.square(angles - numbers.default_angles)),
+            "posture": np.sum(np.square(angles - gait.default_angles)),
         }
         return sum(self._weights[name] * term for name, term in terms.items()), terms
 
@@ -118,9 +122,9 @@ class OrdinaryEnv(MujocoEnv):
         return np.concatenate((position, velocity, contact_forces, clock))
 
     def reset_model(self):
-        base, joint = self._base_noise, self._joint_noise
-        scale = np.array([base] * 6 + [joint] * (self.model.nv - 6))
-        qpos = self.init_qpos + self.np_random.uniform(-1.0, 1.0, self.model.nq) * np.insert(scale, 0, base)
+        scale = np.array([self._base_noise] * 6 + [self._joint_noise] * (self.model.nv - 6))
+        position_scale = np.insert(scale, 0, self._base_noise)  # quaternions have four numbers
+        qpos = self.init_qpos + self.np_random.uniform(-1.0, 1.0, self.model.nq) * position_scale
         qpos[3:7] /= np.linalg.norm(qpos[3:7])
         qvel = self.init_qvel + scale * self.np_random.standard_normal(self.model.nv)
         self.set_state(qpos, qvel)

@@ -10,7 +10,7 @@ import numpy as np
 from benchmark import contestants as names
 
 # Ratio -> least value that the suite promises; None where it promises nothing.
-TARGETS = {
+PROMISES = {
     "dm_env / ordinary MujocoEnv": 1.50,
     "Gymnasium env / ordinary MujocoEnv": 1.42,
     "dm_env / lean-model limit": 0.88,
@@ -21,11 +21,11 @@ TARGETS = {
 }
 # A robot that is not here has a color of matplotlib's.
 _COLORS = {"queen": "#b8860b", "bastion": "#2a7f8e", "tick": "#7a5195", "leaper": "#c8443c"}
-_MARKED = re.compile(r"(<!-- benchmark -->\n).*?(<!-- end of benchmark -->)", re.DOTALL)
+_MARKED_TEXT = re.compile(r"(<!-- benchmark -->\n).*?(<!-- end of benchmark -->)", re.DOTALL)
 
 
 def tables(results: dict) -> str:
-    """All tables in Markdown: speeds, ratios, and what many environments cost."""
+    """Return all tables in Markdown: speeds, ratios, and the cost of many environments."""
     robots = list(results["robots"])
     parts = [
         _about(results["machine"]),
@@ -42,46 +42,52 @@ def tables(results: dict) -> str:
 
 
 def ratios(contestants: list[dict]) -> dict[str, float]:
-    """The ratios of one robot that its contestants allow, by the names of `TARGETS`."""
-    times = {(c["name"], c["num_envs"], c["workers"]): np.array(c["microseconds"]) for c in contestants}
-    single = {name: array for (name, rows, workers), array in times.items() if rows == workers == 1}
-    most = max(workers for name, _, workers in times if name == names.VECTOR)
-    rows = sorted(rows for name, rows, workers in times if name == names.VECTOR and workers == most)
-    middle, largest = (times[names.VECTOR, number, most] for number in (names.reference(rows), rows[-1]))
+    """Return the ratios of one robot, by the names of `PROMISES`."""
+    times = {
+        (contestant["name"], contestant["num_envs"], contestant["workers"]): np.array(contestant["microseconds"])
+        for contestant in contestants
+    }
+    single = {name: array for (name, num_envs, workers), array in times.items() if num_envs == workers == 1}
+    most_threads = max(workers for name, _, workers in times if name == names.VECTOR)
+    env_counts = sorted(
+        num_envs for name, num_envs, workers in times if name == names.VECTOR and workers == most_threads
+    )
+    reference = times[names.VECTOR, names.reference(env_counts), most_threads]
+    largest = times[names.VECTOR, env_counts[-1], most_threads]
     best_async = min((array for (name, *_), array in times.items() if name == names.ASYNC), key=np.median)
     pairs = {
         "dm_env / ordinary MujocoEnv": (single[names.ORDINARY], single[names.DM_ENV]),
         "Gymnasium env / ordinary MujocoEnv": (single[names.ORDINARY], single[names.GYM]),
         "dm_env / lean-model limit": (single[names.LEAN], single[names.DM_ENV]),
         "dm_env / lean-model limit without sensors": (single[names.SILENT], single[names.DM_ENV]),
-        "vector env / best AsyncVectorEnv": (best_async, middle),
-        "vector env / threads x lean-model limit": (single[names.LEAN] / most, middle),
-        "vector env, most environments / reference": (middle, largest),
+        "vector env / best AsyncVectorEnv": (best_async, reference),
+        "vector env / threads x lean-model limit": (single[names.LEAN] / most_threads, reference),
+        "vector env, most environments / reference": (reference, largest),
     }
     return {name: float(np.median(slow / fast)) for name, (slow, fast) in pairs.items()}
 
 
 def document(path: str) -> pathlib.Path:
-    """Checks that a Markdown file can take the tables.
+    """Return the path of a Markdown file that can take the tables.
 
     Raises:
         ValueError: it is not there or has no marks.
     """
     if not pathlib.Path(path).is_file():
         raise ValueError(f"--document: no file {path}")
-    if not _MARKED.search(pathlib.Path(path).read_text(encoding="utf-8")):
+    if not _MARKED_TEXT.search(pathlib.Path(path).read_text(encoding="utf-8")):
         raise ValueError(f"{path} has no <!-- benchmark --> and <!-- end of benchmark -->")
     return pathlib.Path(path)
 
 
 def into_document(path: pathlib.Path, text: str) -> None:
-    """Puts the tables between the marks of a Markdown file."""
+    """Put the tables between the marks of a Markdown file."""
     page = path.read_text(encoding="utf-8")
-    path.write_text(_MARKED.sub(lambda match: f"{match[1]}{text}{match[2]}", page), encoding="utf-8")
+    path.write_text(_MARKED_TEXT.sub(lambda match: f"{match[1]}{text}{match[2]}", page), encoding="utf-8")
 
 
 def plot(results: dict, path: pathlib.Path) -> None:
-    """Draws steps per second of single environments, over sizes and over threads, and the cost of legs and links."""
+    """Draw steps per second of single environments, over sizes and over threads, and the cost of legs and links."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -106,9 +112,10 @@ def _about(machine: dict) -> str:
 
 
 def _label(contestant: dict) -> str:
-    name, rows, workers = contestant["name"], contestant["num_envs"], contestant["workers"]
+    name = contestant["name"]
+    workers = contestant["workers"]
     if name == names.VECTOR:
-        return f"{name}, {_count(rows, 'environment')}, {_count(workers, 'thread')}"
+        return f"{name}, {_count(contestant['num_envs'], 'environment')}, {_count(workers, 'thread')}"
     if name == names.ASYNC:
         return f"{name}, {workers} processes"
     return name
@@ -119,28 +126,28 @@ def _count(number: int, noun: str) -> str:
 
 
 def _speed_rows(results: dict) -> Iterator[list[str]]:
-    fields = [robot["contestants"] for robot in results["robots"].values()]
-    for same in zip(*fields, strict=True):
+    contestants_by_robot = [robot["contestants"] for robot in results["robots"].values()]
+    for contestants in zip(*contestants_by_robot, strict=True):
         cells = []
-        for contestant in same:
+        for contestant in contestants:
             low, middle, high = np.percentile(contestant["microseconds"], (25, 50, 75))
             cells.append(f"{middle:.1f} ({low:.1f} to {high:.1f})")
-        yield [_label(same[0]), *cells]
+        yield [_label(contestants[0]), *cells]
 
 
 def _ratio_rows(results: dict) -> Iterator[list[str]]:
     columns = [ratios(robot["contestants"]) for robot in results["robots"].values()]
-    for name, target in TARGETS.items():
+    for name, target in PROMISES.items():
         yield [name, f"{target:.2f}" if target else "", *(f"{column[name]:.3f}" for column in columns)]
 
 
 def _size_rows(results: dict) -> Iterator[list[str]]:
     sizes = [robot["size"] for robot in results["robots"].values()]
-    rows = sizes[0]["num_envs"]
-    yield [f"building {rows} environments, s", *(f"{size['build_seconds']:.2f}" for size in sizes)]
+    num_envs = sizes[0]["num_envs"]
+    yield [f"building {num_envs} environments, s", *(f"{size['build_seconds']:.2f}" for size in sizes)]
     yield ["memory of an environment, kB", *(f"{size['kilobytes_per_environment']:.0f}" for size in sizes)]
     yield [
-        f"restarting one of {rows} environments, us",
+        f"restarting one of {num_envs} environments, us",
         *(f"{size['masked_reset_microseconds']:.0f}" for size in sizes),
     ]
 
@@ -166,16 +173,18 @@ def _speed(contestant: dict) -> float:
 
 def _plot_singles(panel, results: dict) -> None:
     robots = list(results["robots"])
-    first = results["robots"][robots[0]]["contestants"]
-    singles = [
-        index for index, c in enumerate(first) if c["num_envs"] == c["workers"] == 1 and c["name"] != names.VECTOR
-    ]
+    contestants_of_first = results["robots"][robots[0]]["contestants"]
+    singles = []  # indices of contestants
+    for index, contestant in enumerate(contestants_of_first):
+        is_alone = contestant["num_envs"] == contestant["workers"] == 1
+        if is_alone and contestant["name"] != names.VECTOR:
+            singles.append(index)
     width = 0.85 / len(robots)
-    for column, (robot, color, contestants) in enumerate(_colored(results)):
+    for column, (robot, color, contestants) in enumerate(_robots_with_colors(results)):
         speeds = [_speed(contestants[index]) for index in singles]
-        places = np.arange(len(singles)) + (column - (len(robots) - 1) / 2) * width
-        panel.bar(places, speeds, width, color=color, label=robot)
-    labels = [textwrap.fill(first[index]["name"], 11) for index in singles]
+        centers = np.arange(len(singles)) + (column - (len(robots) - 1) / 2) * width
+        panel.bar(centers, speeds, width, color=color, label=robot)
+    labels = [textwrap.fill(contestants_of_first[index]["name"], 11) for index in singles]
     panel.set_xticks(range(len(singles)), labels, fontsize=8)
     panel.tick_params(axis="x", length=0)
     panel.set_title("One environment")
@@ -185,32 +194,39 @@ def _plot_singles(panel, results: dict) -> None:
 
 
 def _plot_rows(panel, results: dict) -> None:
-    for robot, color, contestants in _colored(results):
-        most = max(c["workers"] for c in contestants if c["name"] == names.VECTOR)
+    for robot, color, contestants in _robots_with_colors(results):
+        vectors = _of_name(names.VECTOR, contestants)
+        most_threads = max(contestant["workers"] for contestant in vectors)
         points = sorted(
-            (c["num_envs"], _speed(c)) for c in contestants if c["name"] == names.VECTOR and c["workers"] == most
+            (contestant["num_envs"], _speed(contestant))
+            for contestant in vectors
+            if contestant["workers"] == most_threads
         )
         panel.plot(*zip(*points, strict=True), "o-", color=color, label=robot)
-        best = max(_speed(c) for c in contestants if c["name"] == names.ASYNC)
+        best = max(_speed(contestant) for contestant in _of_name(names.ASYNC, contestants))
         panel.axhline(best, color=color, linestyle=":", linewidth=1)
     panel.set_xscale("log", base=2)
-    panel.set_xticks([rows for rows, _ in points], [str(rows) for rows, _ in points])
+    env_counts = [num_envs for num_envs, _ in points]
+    panel.set_xticks(env_counts, map(str, env_counts))
     panel.set_title("Vector env over environments\n(dotted: best AsyncVectorEnv of ordinary ones)")
     panel.set_xlabel("environments")
     panel.set_ylabel("control steps / s")
 
 
 def _plot_threads(panel, results: dict) -> None:
-    for robot, color, contestants in _colored(results):
-        vectors = [c for c in contestants if c["name"] == names.VECTOR]
-        rows = names.reference([c["num_envs"] for c in vectors])
-        points = sorted((c["workers"], _speed(c)) for c in vectors if c["num_envs"] == rows)
+    for robot, color, contestants in _robots_with_colors(results):
+        vectors = _of_name(names.VECTOR, contestants)
+        num_envs = names.reference([contestant["num_envs"] for contestant in vectors])
+        points = sorted(
+            (contestant["workers"], _speed(contestant)) for contestant in vectors if contestant["num_envs"] == num_envs
+        )
         panel.plot(*zip(*points, strict=True), "o-", color=color, label=robot)
-        lean = next(_speed(c) for c in contestants if c["name"] == names.LEAN)
-        panel.plot([0, points[-1][0]], [0, lean * points[-1][0]], color=color, linestyle=":", linewidth=1)
+        lean_speed = _speed(_of_name(names.LEAN, contestants)[0])
+        most_threads, _ = points[-1]
+        panel.plot([0, most_threads], [0, lean_speed * most_threads], color=color, linestyle=":", linewidth=1)
     panel.set_xticks(sorted({point[0] for point in points}))
     panel.set_xlim(left=0)
-    panel.set_title(f"Vector env of {rows} environments over threads\n(dotted: threads x lean mj_step)")
+    panel.set_title(f"Vector env of {num_envs} environments over threads\n(dotted: threads x lean mj_step)")
     panel.set_xlabel("threads")
     panel.set_ylabel("control steps / s")
 
@@ -225,6 +241,12 @@ def _plot_growth(panel, growth: list[dict]) -> None:
     panel.legend(fontsize=8)
 
 
-def _colored(results: dict) -> Iterator[tuple[str, str, list[dict]]]:
-    for index, (robot, measured) in enumerate(results["robots"].items()):
-        yield robot, _COLORS.get(robot, f"C{index}"), measured["contestants"]
+def _of_name(name: str, contestants: list[dict]) -> list[dict]:
+    """Return the contestants of a name."""
+    return [contestant for contestant in contestants if contestant["name"] == name]
+
+
+def _robots_with_colors(results: dict) -> Iterator[tuple[str, str, list[dict]]]:
+    """Yield each robot, its color and its contestants."""
+    for index, (robot, robot_results) in enumerate(results["robots"].items()):
+        yield robot, _COLORS.get(robot, f"C{index}"), robot_results["contestants"]

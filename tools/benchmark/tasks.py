@@ -10,38 +10,40 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import TASKS
 
 NUM_ENVS = 64
-_ONSET, _STEPS = 40, 20  # control steps before those that are timed, and of one turn
+_WARM_UP_STEPS = 40  # control steps before those that are timed
+_STEPS = 20  # control steps of one turn
 
 
-def _walking(task: str, robot: str, threads: int):
-    """Rows that are under way, and the actions of their next steps, which every turn repeats."""
-    rows = VectorEnv(robot, task, NUM_ENVS, threads)
-    has_command = "command" in rows.task.sizes
-    policy = policies.policy(
-        "cpg", robot, "surefooted" if has_command else "tuned", NUM_ENVS, task=rows.task.definition
-    )
-    observations, rewards, actions = rows.reset(seed=0)[0], np.zeros(NUM_ENVS), []
+def _start_walking(task: str, robot: str, threads: int) -> tuple[VectorEnv, list[np.ndarray]]:
+    """Return a vector environment whose robots walk, and the actions of their next steps, which every turn repeats."""
+    environment = VectorEnv(robot, task, NUM_ENVS, threads)
+    has_command = "command" in environment.task.sizes
+    preset = "surefooted" if has_command else "tuned"
+    policy = policies.policy("cpg", robot, preset, NUM_ENVS, task=environment.task.definition)
+    observations, _ = environment.reset(seed=0)
+    rewards = np.zeros(NUM_ENVS)
+    actions = []
     policy.reset(range(NUM_ENVS), range(NUM_ENVS))
-    for _ in range(_ONSET + _STEPS):
-        actions.append(policy.act(rows.task.split(observations), rewards))
-        observations, rewards, *_ = rows.step(actions[-1])
-    return rows, actions[_ONSET:]
+    for _ in range(_WARM_UP_STEPS + _STEPS):
+        actions.append(policy.act(environment.task.split(observations), rewards))
+        observations, rewards, *_ = environment.step(actions[-1])
+    return environment, actions[_WARM_UP_STEPS:]
 
 
 def measure(robot: str, threads: int, rounds: int) -> str:
-    """Return a table of all tasks, measured in turn: us of a row's step, and its ratio to walk's, by medians."""
+    """Return a table of all tasks, measured in turn: us of a step, and its ratio to that of walk, by medians."""
     with contextlib.ExitStack() as stack:
-        contestants = {task: _walking(task, robot, threads) for task in TASKS}
-        for rows, _ in contestants.values():
-            stack.callback(rows.close)
+        contestants = {task: _start_walking(task, robot, threads) for task in TASKS}
+        for environment, _ in contestants.values():
+            stack.callback(environment.close)
         seconds = {task: [] for task in TASKS}
         for _ in range(rounds):
-            for task, (rows, actions) in contestants.items():
-                begin = time.perf_counter()
+            for task, (environment, actions) in contestants.items():
+                start = time.perf_counter()
                 for action in actions:
-                    rows.step(action)
-                seconds[task].append((time.perf_counter() - begin) / len(actions) / NUM_ENVS)
-        scan = _scan(contestants["rough"][0], rounds)
+                    environment.step(action)
+                seconds[task].append((time.perf_counter() - start) / len(actions) / NUM_ENVS)
+        scan = _time_scan(contestants["rough"][0], rounds)
     lines = [
         f"| {robot}, {NUM_ENVS} environments, {threads} threads | us an environment | of walk's |",
         "|---|---|---|",
@@ -53,12 +55,14 @@ def measure(robot: str, threads: int, rounds: int) -> str:
     return "\n".join(lines)
 
 
-def _scan(rows: VectorEnv, rounds: int) -> float:
-    """Seconds that the height scan takes, a row."""
-    task = rows.task.definition
-    readings, times = rows.task.definition.read(rows.batch.data), []
+def _time_scan(environment: VectorEnv, rounds: int) -> float:
+    """Return the median time of the height scan of one environment, s."""
+    task = environment.task.definition
+    readings = task.read(environment.batch.data)
+    memory = environment._memory
+    times = []
     for _ in range(10 * rounds):
-        begin = time.perf_counter()
-        task.settings.ground.observe(task.context, rows._memory.ground, rows._memory.core.place, readings)
-        times.append(time.perf_counter() - begin)
+        start = time.perf_counter()
+        task.settings.ground.observe(task.context, memory.ground, memory.core.place, readings)
+        times.append(time.perf_counter() - start)
     return float(np.median(times)) / NUM_ENVS
