@@ -145,7 +145,7 @@ def markdown_table(header, rows):
 def main():
     """Measure, print and write the tables."""
     robots = [checks.name(robot, ROBOTS, "robot") for robot in FLAGS.robots]
-    impls = [device.implementation(impl) for impl in FLAGS.impl]
+    impls = [device.choose_implementation(impl) for impl in FLAGS.impl]
     if FLAGS.document and jax.default_backend() != "gpu":
         raise ValueError(f"--document: JAX finds no GPU here, and tables of a {jax.default_backend()} are not written")
     packages = ("mujoco", "mujoco-mjx", "warp-lang", "jax")

@@ -34,7 +34,7 @@ def plot(folder: pathlib.Path, robot: str, task: str) -> None:
     lines = {"standing still": scale.zero, f"demonstrator {scale.preset}": scale.demonstrator}
     finals = published.FINALS.get(robot, {}) if task == "walk" else {}
     evaluations = {"step": steps, "return": returns}
-    plots.returns(evaluations, folder.name, f"{robot}, {task}", lines, finals).savefig(folder / "curve.png")
+    plots.plot_run(evaluations, folder.name, f"{robot}, {task}", lines, finals).savefig(folder / "curve.png")
     print(f"wrote {folder / 'curve.png'}")
 
 

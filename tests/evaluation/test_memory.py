@@ -16,7 +16,7 @@ from arc_suite import data, evaluation, policies, seed_ranges
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import provenance
 from arc_suite.learning.agents import priors
-from arc_suite.learning.agents.learner import MOST_SEEDS
+from arc_suite.learning.agents.learner import MAX_RUN_SEED
 from arc_suite.policies import network
 
 STEPS, RECORDED, PLAYED = 150, 30, 60
@@ -70,16 +70,16 @@ def test_a_replay_of_the_data_earns_on_evaluations_seeds_what_it_earns_on_others
 def test_data_with_episodes_of_evaluation_are_no_prior_data(tmp_path, monkeypatch, seed):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     collect(ID, SETTINGS, 2)
-    assert priors.seeds(ID) == range(10_005, 10_007)
+    assert priors.dataset_seeds(ID) == range(10_005, 10_007)
     edited(tmp_path, lambda metadata: metadata["arc_suite"].update(seed=seed))
     with refused(f"prior {ID!r}: expected seeds from 10000 on, got {seed}; collect it anew"):
-        priors.seeds(ID)
+        priors.dataset_seeds(ID)
 
 
 def test_every_seed_has_one_owner():
     owners = (seed_ranges.EVALUATION, seed_ranges.COLLECTING, seed_ranges.LEARNING)
     assert [owner.start for owner in owners] == [0, *(owner.stop for owner in owners[:-1])]
-    for seed in (0, 1, MOST_SEEDS):
+    for seed in (0, 1, MAX_RUN_SEED):
         run = seed_ranges.of_run(seed)
         assert run[0] in seed_ranges.LEARNING and run[-1] in seed_ranges.LEARNING
         assert run.stop == seed_ranges.of_run(seed + 1).start

@@ -30,32 +30,34 @@ def test_a_rollout_of_jax_gives_the_update_of_numpy():
     """The same transitions, once as NumPy's arrays and once as JAX's: batch, update and moments."""
     run = Configuration.of(Setup.of("leaper"), "ppo", SMALL)
     hp, context = run.hyperparameters, run.context(pathlib.Path())
-    environments = collecting.Environments(hp, context)
+    environments = collecting.EnvironmentRollouts(hp, context)
     task, architecture = environments.task, environments.architecture
     state = ppo.begin(hp, architecture, np.random.default_rng(0))
-    normalize = Moments.none(task.size).after(environments.observation).normalizer()
+    normalize = Moments.empty(task.size).with_vectors(environments.observation).normalizer()
     rollout = environments.roll_out(state.policy, normalize, 0.3, 0, 0)
     orders = np.random.default_rng(0).permutation(32)[None, :8]
     found = []
     for transitions in (rollout, {name: jnp.asarray(array) for name, array in rollout.items()}):
-        batch = on_policy.batch_of(hp, architecture, transitions, state.values, normalize, critic_blocks.symmetry(task))
+        batch = on_policy.batch_of(
+            hp, architecture, transitions, state.values, normalize, critic_blocks.mirror_maps(task)
+        )
         begun = ppo.begin(hp, architecture, np.random.default_rng(0))
         updated, *_ = ppo.update(hp, architecture, begun, batch, orders, (np.float32(0.3), np.float32(0.01)), True)
-        moments = Moments.none(task.size).after(transitions["observations"])
+        moments = Moments.empty(task.size).with_vectors(transitions["observations"])
         found.append((leaves(updated), leaves(moments)))
     assert_allclose(found[1][0], found[0][0], atol=1e-5)
     assert_allclose(found[1][1], found[0][1], rtol=1e-4, atol=1e-5)
 
 
 def test_a_new_command_cuts_the_returns(monkeypatch):
-    """As in `collecting.Environments`: the step that begins it has the observation before it as the next one."""
+    """As in `collecting.EnvironmentRollouts`: the step that begins it has the observation before it as the next one."""
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
     run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | {"horizon": 12, "simulation": "mjx"})
     hp, context = run.hyperparameters, run.context(pathlib.Path())
-    collector = world_rollouts.Worlds(hp, context)
+    collector = world_rollouts.WorldRollouts(hp, context)
     state = ppo.begin(hp, collector.architecture, np.random.default_rng(0))
-    normalize = Moments.none(collector.task.size).normalizer()
+    normalize = Moments.empty(collector.task.size).normalizer()
     rollout = jax.tree.map(np.asarray, collector.roll_out(state.policy, normalize, 0.01, 0, 0))
     here, there = (
         collector.task.split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations")

@@ -49,7 +49,7 @@ def test_one_control_step(body, frames_of_c):
             for name, term in environments.task.terms.items():
                 terms.append(abs(state.metrics[f"reward_{name}"] - term))
             # Positions of bodies stand one substep behind, as in C.
-            seen = device.fields(state.data, ("xpos",))
+            seen = device.select_fields(state.data, ("xpos",))
             assert np.median(abs(seen.xpos - theirs.xpos).max(axis=(-2, -1))) <= 1e-9
             assert np.median(abs(state.reward - reward)) <= 1e-8
             np.testing.assert_array_equal(state.data.time, (count + 1) * env.dt)

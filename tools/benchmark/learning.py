@@ -60,14 +60,14 @@ def rate(name: str, updates: int, with_policy: bool, in_phase: bool = False) -> 
     hp = ALGORITHMS[name].hyperparameters
     shapes = ((BATCH, SIZE), (BATCH, JOINTS), (BATCH,), (BATCH,), (BATCH, SIZE))
     batch = Transitions(*(random.normal(size=shape).astype(np.float32) for shape in shapes))
-    metrics = off_policy.METRICS if with_policy else off_policy.METRICS_OF_CRITICS
+    metrics = off_policy.METRICS if with_policy else off_policy.CRITIC_METRICS
     learner_state = sac.begin(hp, random, SIZE, JOINTS)
-    sums = off_policy.zeros(metrics)
+    sums = off_policy.zero_sums(metrics)
     next_actions = [np.zeros((BATCH, JOINTS), np.float32)] * 2 if in_phase else None
 
     def update(index):
         nonlocal learner_state, sums
-        noise = sac.noise(hp, generator(0, "update", index), BATCH, (JOINTS,), with_policy)
+        noise = sac.draw_noise(hp, generator(0, "update", index), BATCH, (JOINTS,), with_policy)
         learner_state, sums = off_policy.update(hp, learner_state, sums, batch, noise, next_actions)
         return sums
 

@@ -8,7 +8,13 @@ from typing import Any, NamedTuple
 from arc_suite import checks, registry, versions
 from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents.hyperparameters import UNSEEN, BehaviorCloning, DAgger, ProximalPolicy, SoftActorCritic
+from arc_suite.learning.agents.hyperparameters import (
+    BLOCKS_LEFT_OUT,
+    BehaviorCloning,
+    DAgger,
+    ProximalPolicy,
+    SoftActorCritic,
+)
 
 
 class Algorithm(NamedTuple):
@@ -85,7 +91,7 @@ _PARALLEL = SoftActorCritic(
     target_entropy=-0.6,
     symmetry_augmentation=True,
     normalize=True,
-    exclude_blocks=UNSEEN,
+    exclude_blocks=BLOCKS_LEFT_OUT,
 )
 
 

@@ -80,13 +80,13 @@ class Perceptron:
 
     def values(self, parameters, views):
         """Return the values (...) of normalized views."""
-        scale = networks.scale(self.blocks + self.privileged)
+        scale = networks.equalizing_scale(self.blocks + self.privileged)
         return networks.forward(parameters, views * scale, ACTIVATION)[..., 0]
 
     @property
     def scale(self) -> np.ndarray:
         """(size,) factors of normalized numbers; their mean square is 1, so that gains of first weights hold."""
-        return networks.scale(self.blocks)
+        return networks.equalizing_scale(self.blocks)
 
     def seen(self, views):
         """Return the vectors (..., inputs) whose moments normalize views."""
@@ -107,7 +107,7 @@ class Perceptron:
         Raises:
             ValueError: others.
         """
-        first, *others = map(networks.linear_layer, weights[::2], weights[1::2])
+        first, *others = map(networks.make_linear_layer, weights[::2], weights[1::2])
         return {**first, "weight": first["weight"] / self.scale[:, None]}, *others
 
 
@@ -146,7 +146,7 @@ def of_environment(environment: VectorEnv | BodiesEnv, *options, **more) -> Arch
     return AnyLegs() if isinstance(environment, BodiesEnv) else of(environment.task.definition, *options, **more)
 
 
-def policy(architecture: Architecture, normalize: Normalizer, parameters) -> Graph:
+def policy_graph(architecture: Architecture, normalize: Normalizer, parameters) -> Graph:
     """Return the graph of a policy: a normalizer and a network of actions."""
     mean, factor, limit = normalize
     own = Normalizer(mean[: architecture.own], factor[: architecture.own], limit)
@@ -157,8 +157,8 @@ def policy(architecture: Architecture, normalize: Normalizer, parameters) -> Gra
     return traced(actions, architecture.size)
 
 
-def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
-    """Return the normalizer and the parameters of a graph that `policy` gave.
+def read_policy_graph(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
+    """Return the normalizer and the parameters of a graph that `policy_graph` gave.
 
     Raises:
         ValueError: another graph.
@@ -168,7 +168,7 @@ def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
         normalize = Normalizer(*(graph.arrays[str(node.inputs[-1])] for node in graph.nodes[first : first + 3]))
         names = [node.inputs[1:] for node in graph.nodes if node.operator in ("Linear", "Product")]
         parameters = architecture.imported([graph.arrays[str(name)] for own in names for name in own])
-        same = policy(architecture, normalize, parameters).nodes == graph.nodes
+        same = policy_graph(architecture, normalize, parameters).nodes == graph.nodes
     except (KeyError, TypeError, ValueError):
         same = False
     if not same:

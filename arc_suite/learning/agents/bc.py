@@ -15,7 +15,7 @@ from arc_suite.learning.agents.hyperparameters import BehaviorCloning
 from arc_suite.learning.agents.learner import RunContext, Slice, generator, restoring
 from arc_suite.learning.agents.normalizer import Moments
 
-SLICE = 500  # updates
+UPDATES_PER_SLICE = 500  # updates
 
 _CHUNK = 4096  # observations that are normalized at a time
 
@@ -26,13 +26,15 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
     Raises:
         ValueError: no dataset, or one that does not fit.
     """
-    priors.check(context.prior, True)
+    priors.check_prior_is_named(context.prior, True)
     with contextlib.closing(context.environment()) as environment:
         task = environment.task.definition
-    data = priors.mapped(context, task)
-    moments = Moments.none(task.size)
+    data = priors.open_replay(context, task)
+    moments = Moments.empty(task.size)
     for first in range(0, len(data), _CHUNK):
-        moments = moments.after(data.at(np.arange(first, min(first + _CHUNK, len(data)))).observations)
+        moments = moments.with_vectors(
+            data.transitions_at(np.arange(first, min(first + _CHUNK, len(data)))).observations
+        )
     normalize = moments.normalizer()
     architecture = Perceptron.of(task)
     state = dagger.begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
@@ -40,20 +42,20 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
 
     if (saved := context.checkpoint) is not None:
         with restoring():
-            state, step = networks.restored("state", state, saved), int(saved["step"])
+            state, step = networks.restore_tree("state", state, saved), int(saved["step"])
 
     while True:
-        errors, end = [], min(context.next_evaluation(step), (step // SLICE + 1) * SLICE)
+        errors, end = [], min(context.next_evaluation(step), (step // UPDATES_PER_SLICE + 1) * UPDATES_PER_SLICE)
         while step < end:
-            updates = min(dagger.CHUNK, end - step)
+            updates = min(dagger.UPDATES_PER_CALL, end - step)
             random = generator(context.seed, "update", step)
-            batch = data.at(random.integers(len(data), size=updates * hp.batch))
+            batch = data.transitions_at(random.integers(len(data), size=updates * hp.batch))
             rates = hp.learning_rate * (1.0 - (step + np.arange(updates)) / context.steps)
             known, orders = (normalize(batch.observations), batch.actions), np.arange(updates * hp.batch)
             orders = orders.reshape(updates, hp.batch)
             state, error = dagger.fit(architecture, state, *known, orders, rates.astype(np.float32))
             errors.append(float(error))
             step += updates
-        checkpoint = {**networks.named("state", state), "step": np.array(step)}
-        graph = architectures.policy(architecture, normalize, state.layers)
+        checkpoint = {**networks.flatten_tree("state", state), "step": np.array(step)}
+        graph = architectures.policy_graph(architecture, normalize, state.layers)
         yield Slice(step, {"error": float(np.mean(errors))}, graph, checkpoint)

@@ -14,55 +14,55 @@ import numpy as np
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.replay import Transitions
 
-COUNT = 101  # of returns with a probability, as published
-LIMIT = 5.0  # of a return after `reward_scale`, as published
+RETURN_COUNT = 101  # of returns with a probability, as published
+MAX_RETURN = 5.0  # of a return after `reward_scale`, as published
 MOMENTUM = 0.99  # of the running statistics
 
 
-def draw(random: np.random.Generator, sizes: Sequence[int]) -> tuple:
+def draw_critic(random: np.random.Generator, sizes: Sequence[int]) -> tuple:
     """Draw a critic for the sizes of the input and of the hidden layers."""
-    *hidden, last = networks.mlp(random, (*sizes, COUNT), layer_norm=True)
+    *hidden, last = networks.mlp(random, (*sizes, RETURN_COUNT), layer_norm=True)
     for layer in hidden:  # the norm takes a bias away
         bias = layer.pop("bias")
         layer |= {"mean": bias, "variance": np.ones_like(bias)}
     return _projected((*hidden, last))
 
 
-def value(logits):
+def mean_return(logits):
     """Return the mean of the distribution with logits (..., COUNT), shape (...)."""
     return jax.nn.softmax(logits) @ _returns()
 
 
-def targets(hp, critics, batch: Transitions, next_actions, bonus, kept):
+def target_distribution(hp, critics, batch: Transitions, next_actions, bonus, kept):
     """Return the distribution that critics learn, (batch, COUNT): that of the least critic, a control step before."""
     both = _both(batch, next_actions)
     least = jnp.stack([_joint(hp, critic, both)[0][len(next_actions) :] for critic in critics])
-    least = jnp.take_along_axis(least, value(least).argmin(axis=0)[None, :, None], axis=0)[0]
+    least = jnp.take_along_axis(least, mean_return(least).argmin(axis=0)[None, :, None], axis=0)[0]
     ahead = (hp.discount * batch.goes_on)[:, None] * (_returns() - bonus[:, None])
-    return projection(jax.nn.softmax(least), batch.rewards[:, None] + ahead)
+    return project_distribution(jax.nn.softmax(least), batch.rewards[:, None] + ahead)
 
 
-def projection(probabilities, returns):
+def project_distribution(probabilities, returns):
     """Return probabilities (batch, COUNT) of the fixed returns, from those of returns (batch, COUNT) between them.
 
     A probability goes to the two fixed returns around its own, in proportion to their closeness.
     """
-    places = (returns.clip(-LIMIT, LIMIT) + LIMIT) * ((COUNT - 1) / (2.0 * LIMIT))
+    places = (returns.clip(-MAX_RETURN, MAX_RETURN) + MAX_RETURN) * ((RETURN_COUNT - 1) / (2.0 * MAX_RETURN))
     below = jnp.floor(places).astype(jnp.int32)
     share, rows = places - below, jnp.arange(len(places))[:, None]
     found = jnp.zeros_like(probabilities).at[rows, below].add(probabilities * (1.0 - share))
-    return found.at[rows, (below + 1).clip(max=COUNT - 1)].add(probabilities * share)
+    return found.at[rows, (below + 1).clip(max=RETURN_COUNT - 1)].add(probabilities * share)
 
 
-def loss(hp, critics, batch: Transitions, next_actions, target, kept):
+def cross_entropy_loss(hp, critics, batch: Transitions, next_actions, target, kept):
     """Return the sum over the critics of the mean cross-entropy; the mean value, and layers with statistics."""
     both, size = _both(batch, next_actions), len(next_actions)
     logits, layers = zip(*(_joint(hp, critic, both) for critic in critics), strict=True)
     losses = [-(target * jax.nn.log_softmax(each[:size])).sum(axis=-1).mean() for each in logits]
-    return sum(losses), (jnp.mean(value(jnp.stack(logits)[:, :size])), layers)
+    return sum(losses), (jnp.mean(mean_return(jnp.stack(logits)[:, :size])), layers)
 
 
-def settled(critics, layers):
+def finish_step(critics, layers):
     """Return the critics after a step: weights on the unit sphere, statistics moved towards those of the batch."""
 
     def moved(layer: Mapping, batch: Mapping) -> dict:
@@ -74,7 +74,7 @@ def settled(critics, layers):
 
 def _returns():
     """Returns with a probability, (COUNT,)."""
-    return jnp.linspace(-LIMIT, LIMIT, COUNT)
+    return jnp.linspace(-MAX_RETURN, MAX_RETURN, RETURN_COUNT)
 
 
 def _both(batch: Transitions, next_actions):
@@ -89,9 +89,9 @@ def _joint(hp, critic: Sequence[Mapping], x):
     for layer in critic[:-1]:
         x = networks.linear(layer, x)
         found.append({**layer, "mean": x.mean(axis=axes), "variance": x.var(axis=axes)})
-        x = networks.activated(found[-1], x, "relu")
-        x = networks.shared(x) if legs and len(found) == 1 else x
-    return networks.of_body(networks.linear(critic[-1], x), legs), found
+        x = networks.normalize_and_activate(found[-1], x, "relu")
+        x = networks.share_between_legs(x) if legs and len(found) == 1 else x
+    return networks.body_outputs(networks.linear(critic[-1], x), legs), found
 
 
 def _projected(critic: Sequence[Mapping]) -> tuple:

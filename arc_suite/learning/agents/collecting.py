@@ -9,19 +9,19 @@ from arc_suite.learning.agents import architectures, critic_blocks, learner
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
-from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext, generator
+from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, Diverged, RunContext, generator
 from arc_suite.learning.agents.normalizer import Normalizer
 
 # Names of the arrays of a rollout.
-TRANSITIONS = ("observations", "actions", "means", "rewards", "terminated", "ended", "next_observations")
+ROLLOUT_ARRAYS = ("observations", "actions", "means", "rewards", "terminated", "ended", "next_observations")
 
 
-def ages(num_envs: int, step_limit: float) -> np.ndarray:
+def initial_ages(num_envs: int, step_limit: float) -> np.ndarray:
     """Return the control steps (num_envs,) that environments count as taken at the start of learning."""
     return np.arange(num_envs) * (int(step_limit) if math.isfinite(step_limit) else 0) // num_envs
 
 
-def viewed(architecture: Architecture, observation, privileged, columns):
+def network_views(architecture: Architecture, observation, privileged, columns):
     """Return observations (..., size) as networks view them, with columns of privileged ones, None for none."""
     if privileged is not None:
         numpy = observation.__array_namespace__()
@@ -29,7 +29,7 @@ def viewed(architecture: Architecture, observation, privileged, columns):
     return architecture.viewed(observation)
 
 
-class Environments:
+class EnvironmentRollouts:
     """Environments in which a policy acts; they go on from horizon to horizon.
 
     Attributes:
@@ -49,7 +49,7 @@ class Environments:
             self.environment, hp.network, self._names, hp.symmetry_augmentation
         )
         self.observation = self._seen(*self.environment.reset())
-        steps = ages(hp.num_envs, self.task.step_limit)
+        steps = initial_ages(hp.num_envs, self.task.step_limit)
         self.environment.restore(self.environment.snapshot() | {"steps": steps})
 
     def roll_out(self, policy, normalize: Normalizer, std: float, iteration: int, step: int) -> dict[str, np.ndarray]:
@@ -70,10 +70,10 @@ class Environments:
             Diverged: an action is not finite.
         """
         random = generator(self._seed, "noise", iteration)
-        rollout = {name: [] for name in TRANSITIONS}
+        rollout = {name: [] for name in ROLLOUT_ARRAYS}
         for _ in range(self._hp.horizon):
             normalized = normalize(self.observation)
-            mean = np.asarray(ppo.mean_action(self.architecture, policy, normalized))
+            mean = np.asarray(ppo.predict_mean_actions(self.architecture, policy, normalized))
             if not np.isfinite(mean).all():
                 raise Diverged("an action is not finite", step)
             action = mean + np.float32(std) * random.standard_normal(mean.shape, np.float32)
@@ -93,13 +93,13 @@ class Environments:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the state of the environments as part of a checkpoint."""
-        return learner.environment_arrays(self.environment) | {f"{ENVIRONMENT}seen": self.observation}
+        return learner.environment_arrays(self.environment) | {f"{ENVIRONMENT_PREFIX}seen": self.observation}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Go on from the arrays of a checkpoint."""
         learner.restore_environment(self.environment, arrays)
-        self.observation = arrays[f"{ENVIRONMENT}seen"]
+        self.observation = arrays[f"{ENVIRONMENT_PREFIX}seen"]
 
     def _seen(self, observation: np.ndarray, info: Mapping, place: int | slice = slice(None)) -> np.ndarray:
         more = info["privileged"][place] if self._names else None
-        return viewed(self.architecture, observation, more, self._columns)
+        return network_views(self.architecture, observation, more, self._columns)

@@ -13,8 +13,8 @@ import numpy as np
 from arc_suite import checks, evaluation, files, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
-from arc_suite.learning.agents.hyperparameters import UNSEEN
-from arc_suite.learning.agents.learner import MOST_SEEDS, RunContext
+from arc_suite.learning.agents.hyperparameters import BLOCKS_LEFT_OUT
+from arc_suite.learning.agents.learner import MAX_RUN_SEED, RunContext
 from arc_suite.learning.agents.run_folder import LEG_VIEWS
 from arc_suite.policies import network
 from arc_suite.tasks import leg_views
@@ -22,14 +22,23 @@ from arc_suite.tasks.contract import CURRICULUM
 
 # Names in the file of a configuration.
 _OWN = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior", "training")
-CONFIGURATION = ("robot", "task", "task_kwargs", *_OWN)
+CONFIGURATION_FIELDS = ("robot", "task", "task_kwargs", *_OWN)
 # Names in the record of a run that follow from its configuration, the data and the installed packages; `learner` is in
 # records of earlier versions.
 PRIOR_SHA256, TRAINING_SEEDS = "prior_sha256", "training_seeds"
-OF_DATA = (PRIOR_SHA256, TRAINING_SEEDS)
+DATA_FIELDS = (PRIOR_SHA256, TRAINING_SEEDS)
 # Hyperparameters that hold names which other packages may have registered, and their kinds.
 _NAMES_IN_HYPERPARAMETERS = {"network": "network", "preset": "law"}
-PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", LEG_VIEWS, *OF_DATA, "versions")
+PROVENANCE_FIELDS = (
+    "task_version",
+    "body_sha256",
+    "model_sha256",
+    "learner",
+    "episodes",
+    LEG_VIEWS,
+    *DATA_FIELDS,
+    "versions",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,16 +94,16 @@ class Configuration:
         definition = algorithms.algorithm(algorithm).with_hyperparameters(given)
         start = getattr(definition.hyperparameters, "start", "")
         if start and not setup.several and not {"network", "hidden"} <= given.keys():
-            definition = definition.with_hyperparameters({**network_of(start), **given})
+            definition = definition.with_hyperparameters({**network_hyperparameters(start), **given})
         if setup.several and not definition.several:
             those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
             raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
         left_out = getattr(definition.hyperparameters, "exclude_blocks", ())
-        if setup.several and set(left_out) - set(UNSEEN):
+        if setup.several and set(left_out) - set(BLOCKS_LEFT_OUT):
             raise ValueError(f"exclude_blocks: expected none with several bodies, got {', '.join(left_out)}")
         steps = definition.steps_of(setup) if steps is None else steps
         evaluate_every = definition.evaluate_every if evaluate_every is None else evaluate_every
-        checks.integer("seed", seed, 0, MOST_SEEDS)
+        checks.integer("seed", seed, 0, MAX_RUN_SEED)
         checks.integer("steps", steps, 1)
         checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
@@ -199,7 +208,7 @@ class Configuration:
             OSError: the file of a body cannot be read.
         """
         for name in fields:
-            checks.name(name, (*CONFIGURATION, *PROVENANCE), "field of a configuration")
+            checks.name(name, (*CONFIGURATION_FIELDS, *PROVENANCE_FIELDS), "field of a configuration")
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
         for kind, name in _registered_names(fields):
@@ -262,7 +271,7 @@ def _with_modules(hyperparameters):
     return dataclasses.replace(hyperparameters, **changes)
 
 
-def network_of(start: str | os.PathLike) -> dict[str, Any]:
+def network_hyperparameters(start: str | os.PathLike) -> dict[str, Any]:
     """Return the hyperparameters of the network of a policy file; none if there is no file, as a run may resume."""
     try:
         graph = network.load(start).graph

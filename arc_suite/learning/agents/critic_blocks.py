@@ -10,7 +10,7 @@ from arc_suite.tasks import Task, blocks, mirrors, privileged
 from arc_suite.tasks.mirrors import Symmetry
 
 
-def symmetry(task: Task, critic_blocks: Iterable[str] = ()) -> Symmetry | None:
+def mirror_maps(task: Task, critic_blocks: Iterable[str] = ()) -> Symmetry | None:
     """Return the mirror maps of a task, with privileged blocks after its observation; None where there are none."""
     try:
         own = task.symmetry

@@ -22,7 +22,7 @@ from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.learning.teachers import Teacher
 
-CHUNK = 20  # updates of one call
+UPDATES_PER_CALL = 20  # updates of one call
 
 
 class DaggerState(NamedTuple):
@@ -46,7 +46,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
     environment = context.environment(hp.num_envs)
     architecture, teacher = architectures.of_environment(environment), Teacher(environment, hp.preset)
     state = begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
-    moments = Moments.none(architecture.inputs)
+    moments = Moments.empty(architecture.inputs)
     normalize = architecture.normalize(moments)
     length = -(-context.steps // hp.num_envs)  # control steps of each environment
     if length <= hp.left_out:
@@ -63,12 +63,12 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
 
     if (saved := context.checkpoint) is not None:
         with learner.restoring():
-            state = networks.restored("state", state, saved)
+            state = networks.restore_tree("state", state, saved)
             done, age = len(saved["labels"]), saved["age"]
             step = min(done * hp.num_envs, context.steps)
             for name, array in dataset.items():
                 array[:done] = saved[name]
-            normalize = Normalizer(*map(np.asarray, networks.restored("normalizer", tuple(normalize), saved)))
+            normalize = Normalizer(*map(np.asarray, networks.restore_tree("normalizer", tuple(normalize), saved)))
             observation = learner.restore_environment(environment, saved)
             teacher.restore(saved)
 
@@ -94,7 +94,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         observations, labels, _ = (array[:done].reshape(known.size, -1)[known] for array in dataset.values())
         error = 0.0
         if len(labels):
-            normalize = architecture.normalize(moments.after(architecture.seen(observations)))
+            normalize = architecture.normalize(moments.with_vectors(architecture.seen(observations)))
             rates = hp.learning_rate * np.ones(hp.updates)
             if done == length:
                 rates = hp.learning_rate * np.linspace(1.0, 0.0, hp.last_updates, endpoint=False)
@@ -102,21 +102,21 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             inputs, outputs = (np.zeros((most, array.shape[-1]), np.float32) for array in (observations, labels))
             inputs[: len(labels)], outputs[: len(labels)] = normalize(observations), labels
             inputs, outputs = jnp.asarray(inputs), jnp.asarray(outputs)
-            for first in range(0, len(rates), CHUNK):
-                part = rates[first : first + CHUNK].astype(np.float32)
+            for first in range(0, len(rates), UPDATES_PER_CALL):
+                part = rates[first : first + UPDATES_PER_CALL].astype(np.float32)
                 batches = random.integers(len(labels), size=(len(part), hp.batch))
                 state, error = fit(architecture, state, inputs, outputs, batches, part)
 
         metrics = {"reward": float(np.mean(rewards)), "error": float(error)}
         checkpoint = {
-            **networks.named("state", state),
+            **networks.flatten_tree("state", state),
             **{name: array[:done] for name, array in dataset.items()},
             "age": age,
-            **networks.named("normalizer", tuple(normalize)),
+            **networks.flatten_tree("normalizer", tuple(normalize)),
             **learner.environment_arrays(environment),
             **teacher.snapshot(),
         }
-        yield Slice(step, metrics, architectures.policy(architecture, normalize, state.layers), checkpoint)
+        yield Slice(step, metrics, architectures.policy_graph(architecture, normalize, state.layers), checkpoint)
 
 
 def begin(layers) -> DaggerState:

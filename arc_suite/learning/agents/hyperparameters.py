@@ -7,7 +7,7 @@ from arc_suite import checks, registry
 
 _POSITIVE = (1e-6, 1e3)
 # Contact forces are 114 to 150 numbers, without which learners that act are better: docs/algorithms.md.
-UNSEEN = ("contact_forces",)
+BLOCKS_LEFT_OUT = ("contact_forces",)
 # Functions that make an architecture for a task, see `architectures.of`; or where they are, as those need JAX.
 NETWORKS = {
     "perceptron": "arc_suite.learning.agents.architectures:Perceptron.of",
@@ -150,7 +150,7 @@ class DAgger:
     batch: int = 1024
     hidden: int = 256
     learning_rate: float = 1e-3
-    exclude_blocks: tuple[str, ...] = UNSEEN
+    exclude_blocks: tuple[str, ...] = BLOCKS_LEFT_OUT
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
@@ -235,7 +235,7 @@ class ProximalPolicy:
     normalize_until: float = 0.7
     value_warm_up: int = 0
     hidden: int = 256
-    exclude_blocks: tuple[str, ...] = UNSEEN
+    exclude_blocks: tuple[str, ...] = BLOCKS_LEFT_OUT
     critic_blocks: tuple[str, ...] = ()
 
     def __post_init__(self):

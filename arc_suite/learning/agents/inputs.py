@@ -15,7 +15,7 @@ from arc_suite.tasks import Task
 from arc_suite.tasks.mirrors import Mirror, Symmetry
 
 
-class Inputs(NamedTuple):
+class NetworkInputs(NamedTuple):
     """How networks see the observations of a task, and what they do.
 
     Attributes:
@@ -55,8 +55,8 @@ class Inputs(NamedTuple):
             if legs.joints < legs.legs * legs.views.most:
                 raise ValueError("network: expected perceptron for legs with different numbers of joints, got legs")
         mirrored = symmetry_augmentation and not (legs and legs.symmetric)
-        symmetry = critic_blocks.symmetry(task) if mirrored else None
-        return cls(task.size, size, joints, Moments.none(size) if normalize else None, symmetry, legs)
+        symmetry = critic_blocks.mirror_maps(task) if mirrored else None
+        return cls(task.size, size, joints, Moments.empty(size) if normalize else None, symmetry, legs)
 
     def __call__(self, observations: np.ndarray) -> np.ndarray:
         """Return what networks see (..., size), or (..., legs, size), of observations (..., observed)."""
@@ -64,16 +64,16 @@ class Inputs(NamedTuple):
         seen = seen if self.moments is None else self.moments.normalizer()(seen)
         return seen if self.legs is None else seen * self.legs.scale
 
-    def after(self, observations: np.ndarray) -> Self:
+    def with_observations(self, observations: np.ndarray) -> Self:
         """Return the inputs with more observations (..., observed), and their mirror images, in the moments."""
         if self.moments is None:
             return self
-        moments = self.moments.after(self._seen(observations))
+        moments = self.moments.with_vectors(self._seen(observations))
         if self.symmetry is not None:
-            moments = moments.after(self._seen(self.symmetry.observation(observations)))
+            moments = moments.with_vectors(self._seen(self.symmetry.observation(observations)))
         return self._replace(moments=moments)
 
-    def of_batch(self, batch: Transitions) -> Transitions:
+    def transform_batch(self, batch: Transitions) -> Transitions:
         """Return a batch of transitions as networks see and do them, every other transition mirrored."""
         seen = {name: getattr(batch, name) for name in ("observations", "next_observations")}
         if self.symmetry is not None:
@@ -81,18 +81,19 @@ class Inputs(NamedTuple):
             seen = {name: _every_other(mirror_observation, observations) for name, observations in seen.items()}
             batch = batch._replace(actions=_every_other(mirror_action, batch.actions))
         if self.legs is not None:
-            batch = batch._replace(actions=self.legs.done(batch.actions))
+            batch = batch._replace(actions=self.legs.leg_actions(batch.actions))
         return batch._replace(**{name: self(observations) for name, observations in seen.items()})
 
-    def applied(self, actions: np.ndarray) -> np.ndarray:
+    def body_actions(self, actions: np.ndarray) -> np.ndarray:
         """Return the actions (..., joints) of a body that are what a network does."""
-        return actions if self.legs is None else self.legs.applied(actions)
+        return actions if self.legs is None else self.legs.body_actions(actions)
 
-    def exported(self, layers: Sequence[Mapping]) -> Graph:
+    def policy_graph(self, layers: Sequence[Mapping]) -> Graph:
         """Return the policy, from the layers of an actor."""
         if self.legs is not None:
             return traced(
-                lambda x: self.applied(leg_networks.exported_halves(self(x), layers).node("Tanh")), self.observed
+                lambda x: self.body_actions(leg_networks.trace_shared_layers(self(x), layers).node("Tanh")),
+                self.observed,
             )
         return traced(lambda x: perceptron(self(x), layers).node("Tanh"), self.observed)
 

@@ -16,10 +16,10 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning import teachers
 from arc_suite.policies.graph import Graph
 
-MOST_SEEDS = 40_000
-ENVIRONMENT = "environment/"  # prefix of the names in a checkpoint
+MAX_RUN_SEED = 40_000
+ENVIRONMENT_PREFIX = "environment/"  # prefix of the names in a checkpoint
 # Prefixes of what is not learned: commands of tasks may be NaN, and ground that nobody has seen is at -inf.
-NOT_LEARNED = (ENVIRONMENT, teachers.PREFIX)
+UNLEARNED_PREFIXES = (ENVIRONMENT_PREFIX, teachers.PREFIX)
 
 
 class Diverged(ValueError):
@@ -109,11 +109,15 @@ def generator(seed: int, purpose: str, count: int) -> np.random.Generator:
 
 def environment_arrays(environment: VectorEnv | BodiesEnv) -> dict[str, np.ndarray]:
     """Return the snapshot of an environment as part of a checkpoint."""
-    return {f"{ENVIRONMENT}{name}": array for name, array in environment.snapshot().items()}
+    return {f"{ENVIRONMENT_PREFIX}{name}": array for name, array in environment.snapshot().items()}
 
 
 def restore_environment(environment: VectorEnv | BodiesEnv, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
     """Restore an environment from `environment_arrays`, and return its observations (num_envs, size)."""
-    snapshot = {name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)}
+    snapshot = {
+        name.removeprefix(ENVIRONMENT_PREFIX): array
+        for name, array in arrays.items()
+        if name.startswith(ENVIRONMENT_PREFIX)
+    }
     environment.restore(snapshot)
     return snapshot["observation"]

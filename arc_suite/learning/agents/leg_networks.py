@@ -58,7 +58,7 @@ class Legs:
             critic_blocks: names of privileged blocks for networks of values.
             symmetric: whether to treat left and right alike, if the task is symmetric.
         """
-        symmetry = behind.symmetry(task, critic_blocks) if symmetric else None
+        symmetry = behind.mirror_maps(task, critic_blocks) if symmetric else None
         privileged = {f"privileged {name}": task.privileged_blocks[name] for name in critic_blocks}
         views = leg_views(task.scene.body, {**task.blocks, **privileged}, symmetry)
         return cls(views, task.size, len(task.sizes), symmetry is not None)
@@ -80,12 +80,12 @@ class Legs:
     def actions(self, parameters, views):
         """Return the actions (..., joints) for normalized views (..., own or more)."""
         legs = self._by_leg(views)[..., : self.features] * self.scale
-        return self.applied(_of_legs(parameters, legs, np.ones(self.legs, bool)))
+        return self.body_actions(_of_legs(parameters, legs, np.ones(self.legs, bool)))
 
     def values(self, parameters, views):
         """Return the values (...) of normalized views."""
-        legs = self._by_leg(views) * networks.scale(self.views.sizes)
-        return networks.of_body(_of_legs(parameters, legs, np.ones(self.legs, bool)), legs=True)[..., 0]
+        legs = self._by_leg(views) * networks.equalizing_scale(self.views.sizes)
+        return networks.body_outputs(_of_legs(parameters, legs, np.ones(self.legs, bool)), legs=True)[..., 0]
 
     def seen(self, views):
         """Return the vectors (..., legs, inputs) whose moments normalize views."""
@@ -102,18 +102,18 @@ class Legs:
         legs = x.reshape(1, self.legs, self.features)
         (first,), head = parameters
         first = {**first, "weight": first["weight"] * self.scale[:, None]}
-        return self.applied(_exported(((first,), head), legs, _there(legs)))
+        return self.body_actions(_exported(((first,), head), legs, _there(legs)))
 
     def imported(self, weights):
         """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order."""
         (first,), head = _imported(weights)
         return ({**first, "weight": first["weight"] / self.scale[:, None]},), head
 
-    def applied(self, legs):
+    def body_actions(self, legs):
         """Return the actions (..., joints) of the body that are what its legs do (..., legs, joints of a leg)."""
         return legs.reshape(*legs.shape[:-2], -1)[..., self.views.joints] * self.views.signs
 
-    def done(self, actions: np.ndarray) -> np.ndarray:
+    def leg_actions(self, actions: np.ndarray) -> np.ndarray:
         """Return what legs do (..., legs, joints of a leg), 0 for no joint, from actions (..., joints) of the body."""
         legs = np.zeros((*actions.shape[:-1], self.legs * self.views.most), actions.dtype)
         legs[..., self.views.joints] = actions * self.views.signs
@@ -121,8 +121,8 @@ class Legs:
 
     @functools.cached_property
     def scale(self) -> np.ndarray:
-        """(features,) factors of normalized features; see `networks.scale`."""
-        return networks.scale(self.views.sizes[: 1 + self.blocks])
+        """(features,) factors of normalized features; see `networks.equalizing_scale`."""
+        return networks.equalizing_scale(self.views.sizes[: 1 + self.blocks])
 
     @functools.cached_property
     def _flat_views(self) -> list[np.ndarray]:
@@ -209,14 +209,14 @@ def _drawn(random, sizes: tuple[int, ...], outputs: int, last_gain: float = 1.0)
 def _of_legs(parameters, legs, there):
     """Return the outputs (..., legs, outputs) for what legs see (..., legs, features), given which there are."""
     features, head = parameters
-    found, there = networks.hidden(features, legs, ACTIVATION), there[..., None]
+    found, there = networks.apply_hidden_layers(features, legs, ACTIVATION), there[..., None]
     mean = jnp.where(there, found, 0.0).sum(axis=-2, keepdims=True) / there.sum(axis=-2, keepdims=True)
     both = jnp.concatenate([found, jnp.broadcast_to(mean, found.shape)], axis=-1)
     return networks.forward(head, both, ACTIVATION)
 
 
-def exported_halves(legs, layers):
-    """Write the nodes of layers that legs share for what they see (1, legs, size); see `networks.shared`."""
+def trace_shared_layers(legs, layers):
+    """Write the nodes of layers that legs share, for views (1, legs, size); see `networks.share_between_legs`."""
     first, *others = layers
     there = _there(legs)
     found = activated(linear(legs.node("Pick", there), first), first).node("Place", there)
@@ -250,5 +250,5 @@ def _exported(parameters, legs, there):
 def _imported(weights):
     """Return the parameters from the weights and biases of the nodes that `_exported` wrote, in order."""
     *features, mean, bias, own, last, last_bias = weights
-    head = networks.linear_layer(np.concatenate([own, mean]), bias), networks.linear_layer(last, last_bias)
-    return tuple(map(networks.linear_layer, features[::2], features[1::2])), head
+    head = networks.make_linear_layer(np.concatenate([own, mean]), bias), networks.make_linear_layer(last, last_bias)
+    return tuple(map(networks.make_linear_layer, features[::2], features[1::2])), head

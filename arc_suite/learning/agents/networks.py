@@ -31,22 +31,22 @@ def orthogonal(random: np.random.Generator, inputs: int, outputs: int, gain: flo
     return (gain * (q if inputs >= outputs else q.T)).astype(np.float32)
 
 
-INITIAL = {"xavier": xavier, "orthogonal": orthogonal}
+INITIALIZERS = {"xavier": xavier, "orthogonal": orthogonal}
 
 
-def layer(weight: np.ndarray, layer_norm: bool = False) -> dict[str, np.ndarray]:
+def make_layer(weight: np.ndarray, layer_norm: bool = False) -> dict[str, np.ndarray]:
     """Return a layer of a weight (inputs, outputs), with biases 0."""
     outputs = weight.shape[1]
     norm = {"scale": np.ones(outputs, np.float32), "offset": np.zeros(outputs, np.float32)} if layer_norm else {}
     return {"weight": weight, "bias": np.zeros(outputs, np.float32), **norm}
 
 
-def linear_layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:
+def make_linear_layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:
     """Return a layer of a weight (inputs, outputs) and biases (outputs,)."""
     return {"weight": weight, "bias": bias}
 
 
-def scale(sizes: Sequence[int]) -> np.ndarray:
+def equalizing_scale(sizes: Sequence[int]) -> np.ndarray:
     """Return factors of normalized numbers with which the variances of all parts have the same sum, float32.
 
     Their mean square is 1, so that gains of first weights hold.
@@ -77,10 +77,10 @@ def mlp(
         gain: of hidden layers.
         last_gain: of the output.
     """
-    draw = INITIAL[initial]
+    draw = INITIALIZERS[initial]
     *pairs, last = zip(sizes[:-1], sizes[1:], strict=True)
-    hidden = [layer(draw(random, *pair, gain), layer_norm) for pair in pairs]
-    return *hidden, layer(draw(random, *last, last_gain))
+    hidden = [make_layer(draw(random, *pair, gain), layer_norm) for pair in pairs]
+    return *hidden, make_layer(draw(random, *last, last_gain))
 
 
 def linear(layer: Mapping, x):
@@ -88,7 +88,9 @@ def linear(layer: Mapping, x):
     return x @ layer["weight"] + layer.get("bias", 0.0)
 
 
-def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0, legs: bool = False):
+def apply_hidden_layers(
+    layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0, legs: bool = False
+):
     """Return the output of hidden layers for x (..., inputs): linear, dropout, layer norm if it has one, activation.
 
     Args:
@@ -102,29 +104,29 @@ def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dr
     for index, each in enumerate(layers):
         x = linear(each, x)
         if kept is not None:
-            x = dropped(x, kept[index], dropout)
-        x = activated(each, x, activation)
-        x = shared(x) if legs and index == 0 else x
+            x = drop_units(x, kept[index], dropout)
+        x = normalize_and_activate(each, x, activation)
+        x = share_between_legs(x) if legs and index == 0 else x
     return x
 
 
-def shared(x):
+def share_between_legs(x):
     """Return units (..., legs, units) of which the second half is the mean over legs."""
     own, common = jnp.split(x, [x.shape[-1] // 2], axis=-1)
     return jnp.concatenate([own, jnp.broadcast_to(common.mean(axis=-2, keepdims=True), common.shape)], axis=-1)
 
 
-def of_body(outputs, legs: bool):
+def body_outputs(outputs, legs: bool):
     """Return the outputs (..., outputs) of a body; if they are those of its legs (..., legs, outputs), their means."""
     return outputs.mean(axis=-2) if legs else outputs
 
 
-def dropped(x, kept, dropout: float):
+def drop_units(x, kept, dropout: float):
     """Return x with 0 where units are not kept, and the others divided by 1 - dropout."""
     return jnp.where(kept, x * (1.0 / (1.0 - dropout)), 0.0)
 
 
-def activated(layer: Mapping, x, activation: str):
+def normalize_and_activate(layer: Mapping, x, activation: str):
     """Return x (..., outputs) after a layer's norm, if it has one, and an activation."""
     if "scale" in layer:
         x = x - (layer["mean"] if "mean" in layer else x.mean(axis=-1, keepdims=True))
@@ -135,17 +137,17 @@ def activated(layer: Mapping, x, activation: str):
 
 def forward(layers: Sequence[Mapping], x, activation: str = "relu"):
     """Return the output of a multilayer perceptron for x (..., inputs)."""
-    return linear(layers[-1], hidden(layers[:-1], x, activation))
+    return linear(layers[-1], apply_hidden_layers(layers[:-1], x, activation))
 
 
-def named(prefix: str, tree) -> dict[str, np.ndarray]:
+def flatten_tree(prefix: str, tree) -> dict[str, np.ndarray]:
     """Return the arrays of a pytree by name, prefix/path/to/array: part of a checkpoint."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
     return {f"{prefix}{_text(path)}": np.asarray(leaf) for path, leaf in leaves}
 
 
-def restored(prefix: str, template, arrays: Mapping[str, np.ndarray]):
-    """Return a pytree like the template with the arrays that `named` gave.
+def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
+    """Return a pytree like the template with the arrays that `flatten_tree` gave.
 
     Raises:
         KeyError, ValueError: an array is missing or has another shape.
@@ -162,3 +164,8 @@ def restored(prefix: str, template, arrays: Mapping[str, np.ndarray]):
 
 def _text(path) -> str:
     return "/" + jax.tree_util.keystr(path, simple=True, separator="/")
+
+
+# Former names, which learners of other packages may use.
+named = flatten_tree
+restored = restore_tree

@@ -40,11 +40,11 @@ class Moments(NamedTuple):
     squares: np.ndarray
 
     @classmethod
-    def none(cls, size: int) -> Self:
+    def empty(cls, size: int) -> Self:
         """Return the moments before the first vector."""
         return cls(np.zeros(()), np.zeros(size), np.zeros(size))
 
-    def after(self, vectors: np.ndarray) -> Self:
+    def with_vectors(self, vectors: np.ndarray) -> Self:
         """Return the moments with more vectors (..., size) (Chan, Golub and LeVeque, 1979)."""
         vectors = vectors.reshape(-1, vectors.shape[-1])
         mean = np.asarray(vectors.mean(axis=0, dtype=float), float)  # of NumPy or JAX

@@ -40,8 +40,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     seed, collector = context.seed, _environments(hp, context)
     task, architecture = collector.task, collector.architecture
     augmented = hp.symmetry_augmentation and not architecture.symmetric
-    symmetry = critic_blocks.symmetry(task, hp.critic_blocks) if augmented else None
-    moments, policy = Moments.none(architecture.inputs), None
+    symmetry = critic_blocks.mirror_maps(task, hp.critic_blocks) if augmented else None
+    moments, policy = Moments.empty(architecture.inputs), None
     normalize = architecture.normalize(moments)
     if hp.start and context.checkpoint is None:
         (mean, factor, limit), policy = _read(hp, context, task, architecture)
@@ -52,9 +52,9 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
     if (saved := context.checkpoint) is not None:
         with learner.restoring():
-            state = networks.restored("state", state, saved)
+            state = networks.restore_tree("state", state, saved)
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
-            normalize = Normalizer(*map(np.asarray, networks.restored("normalizer", tuple(normalize), saved)))
+            normalize = Normalizer(*map(np.asarray, networks.restore_tree("normalizer", tuple(normalize), saved)))
             iterations = int(saved["iterations"])
             collector.restore(saved)
 
@@ -81,19 +81,19 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
         # Update the normalizer.
         if not hp.start and done < hp.normalize_until:
-            moments = moments.after(architecture.seen(rollout["observations"]))
+            moments = moments.with_vectors(architecture.seen(rollout["observations"]))
             if symmetry is not None:
-                moments = moments.after(architecture.seen(symmetry.observation(rollout["observations"])))
+                moments = moments.with_vectors(architecture.seen(symmetry.observation(rollout["observations"])))
             normalize = architecture.normalize(moments)
 
         metrics = {"reward": rollout["rewards"].mean(), "falls": rollout["terminated"].sum(), "std": std}
         metrics |= {"kl": kl, "policy_rate": state.rate, "value_loss": value_loss}
         metrics = {name: float(metric) for name, metric in metrics.items()}
-        graph = architectures.policy(architecture, normalize, state.policy)
+        graph = architectures.policy_graph(architecture, normalize, state.policy)
         checkpoint = {
-            **networks.named("state", state),
-            **networks.named("moments", moments),
-            **networks.named("normalizer", tuple(normalize)),
+            **networks.flatten_tree("state", state),
+            **networks.flatten_tree("moments", moments),
+            **networks.flatten_tree("normalizer", tuple(normalize)),
             "iterations": np.array(iterations),
             **collector.arrays(),
         }
@@ -106,10 +106,10 @@ def _environments(hp: ProximalPolicy, context: RunContext):
     if hp.critic_blocks and context.setup.several:
         raise ValueError(f"critic_blocks: expected none with several bodies, got {', '.join(hp.critic_blocks)}")
     if hp.simulation == "mujoco":
-        return collecting.Environments(hp, context)
+        return collecting.EnvironmentRollouts(hp, context)
     from arc_suite.learning.agents import world_rollouts  # needs the extra `gpu`
 
-    return world_rollouts.Worlds(hp, context)
+    return world_rollouts.WorldRollouts(hp, context)
 
 
 def batch_of(
@@ -118,11 +118,11 @@ def batch_of(
     """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
     size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
     observations = normalize(rollout["observations"])
-    here = numpy.asarray(ppo.value(architecture, values, observations))
+    here = numpy.asarray(ppo.predict_values(architecture, values, observations))
     after = normalize(rollout["next_observations"])
-    there = numpy.asarray(ppo.value(architecture, values, after))
+    there = numpy.asarray(ppo.predict_values(architecture, values, after))
     rewards = (1.0 - hp.discount) * rollout["rewards"]
-    advantages = ppo.advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
+    advantages = ppo.estimate_advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
     returns = (advantages + here).ravel()
     advantages = ((advantages - advantages.mean()) / (advantages.std() + 1e-8)).ravel()
     observations = observations.reshape(-1, size)
@@ -151,7 +151,7 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
             other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
     try:
-        normalize, policy = architectures.read(architecture, found.graph)
+        normalize, policy = architectures.read_policy_graph(architecture, found.graph)
     except ValueError as error:
         raise ValueError(f"{hp.start}: expected {error}, {hp.network}") from None
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]

@@ -53,7 +53,7 @@ class Curve(NamedTuple):
     returns: np.ndarray
 
 
-def returns(
+def plot_run(
     evaluations: Mapping[str, np.ndarray],
     algorithm: str,
     title: str,
@@ -82,7 +82,7 @@ def returns(
     return figure
 
 
-def study(
+def plot_study(
     groups: Mapping[str, Mapping[str, Curve]],
     lines: Mapping[str, Mapping[str, float]],
     finals: Mapping[str, Mapping[str, float]],

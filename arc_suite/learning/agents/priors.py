@@ -17,7 +17,7 @@ from arc_suite.tasks import Task
 _COUNT = "count.json"  # written last: without it the files are incomplete
 
 
-def check(prior: str | None, needed: bool) -> None:
+def check_prior_is_named(prior: str | None, needed: bool) -> None:
     """Check that a run names prior data if its algorithm needs them, and else none.
 
     Raises:
@@ -28,7 +28,7 @@ def check(prior: str | None, needed: bool) -> None:
         raise ValueError(f"prior: the algorithm {expected}, got {checks.preview(prior)}")
 
 
-def digest(prior: str) -> str:
+def dataset_digest(prior: str) -> str:
     """Return the sha256 of the content of a dataset.
 
     Raises:
@@ -37,7 +37,7 @@ def digest(prior: str) -> str:
     return _digest(_opened(prior).summaries())
 
 
-def seeds(prior: str) -> range:
+def dataset_seeds(prior: str) -> range:
     """Return the seeds of the episodes of a dataset.
 
     Raises:
@@ -51,7 +51,7 @@ def seeds(prior: str) -> range:
     return found
 
 
-def mapped(context: RunContext, task: Task) -> Replay:
+def open_replay(context: RunContext, task: Task) -> Replay:
     """Return the prior data of a run; its files are written from the dataset first, where they are missing.
 
     Observations are those of the task, which may leave out blocks of the dataset's.

@@ -65,11 +65,11 @@ def begin(
     return jax.tree.map(jnp.asarray, PpoState(policy, values, moments, np.float32(hp.policy_rate)))
 
 
-mean_action = jax.jit(lambda architecture, policy, x: architecture.actions(policy, x), static_argnums=0)
-value = jax.jit(lambda architecture, values, x: architecture.values(values, x), static_argnums=0)
+predict_mean_actions = jax.jit(lambda architecture, policy, x: architecture.actions(policy, x), static_argnums=0)
+predict_values = jax.jit(lambda architecture, values, x: architecture.values(values, x), static_argnums=0)
 
 
-def advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, ended):
+def estimate_advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, ended):
     """Return generalized advantage estimates (steps, num_envs) (Schulman et al., 2016).
 
     Args:

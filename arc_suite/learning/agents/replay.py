@@ -103,9 +103,9 @@ class Replay:
         if self.total >= self._capacity:
             self.checksum -= int(self._checksums[(self.total - self._capacity) % self._slots])
         self.total += 1
-        self._count_in(self.total - 1, self.at(np.array([len(self) - 1])))
+        self._count_in(self.total - 1, self.transitions_at(np.array([len(self) - 1])))
 
-    def at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
+    def transitions_at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
         """Return copies of transitions by index; index 0 is the oldest.
 
         Args:
@@ -142,7 +142,7 @@ class Replay:
         self._make_room(ends)
         for first in range(0, len(self), _CHUNK):
             indices = np.arange(first, min(first + _CHUNK, len(self)))
-            self._count_in(total - len(self) + first, self.at(indices))
+            self._count_in(total - len(self) + first, self.transitions_at(indices))
         if self.checksum != checksum:
             raise Damaged(f"{self._folder} holds other transitions")
 
@@ -181,7 +181,7 @@ def _allocate(path: Path, size: int) -> None:
         raise OSError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from None
 
 
-class Protected:
+class CombinedReplay:
     """Two sources of transitions in one: prior data, which are never overwritten, and a buffer."""
 
     def __init__(self, first: Replay, second: Replay):
@@ -192,8 +192,8 @@ class Protected:
         """Return the number of transitions that can be sampled."""
         return len(self._first) + len(self._second)
 
-    def at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
-        """Return copies of transitions by index, as `Replay.at` does; those of the first source come first.
+    def transitions_at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
+        """Return copies of transitions by index, as `Replay.transitions_at` does; those of the first source come first.
 
         Args:
             indices: (batch,) from 0 to `len` - 1.
@@ -206,6 +206,9 @@ class Protected:
         count = len(self._first)
         of_first = indices < count
         steps = n_step, discount
-        parts = self._first.at(indices[of_first], *steps), self._second.at(indices[~of_first] - count, *steps)
+        parts = (
+            self._first.transitions_at(indices[of_first], *steps),
+            self._second.transitions_at(indices[~of_first] - count, *steps),
+        )
         places = np.argsort(np.concatenate([np.flatnonzero(of_first), np.flatnonzero(~of_first)]))
         return Transitions(*(np.concatenate(pair)[places] for pair in zip(*parts, strict=True)))

@@ -33,7 +33,7 @@ _MAX_BYTES = 1 << 34  # of a checkpoint, unpacked: the labels of imitation are t
 
 
 class RunFolder:
-    """An open folder of a run; `opened` opens it.
+    """An open folder of a run; `open_run` opens it.
 
     Attributes:
         path: of the folder.
@@ -93,7 +93,7 @@ class RunFolder:
 
 
 @contextlib.contextmanager
-def opened(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence[str] = ()) -> Iterator[RunFolder]:
+def open_run(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence[str] = ()) -> Iterator[RunFolder]:
     """Open the folder of a run, or make one, which is deleted if an error comes before the run has begun.
 
     Args:
@@ -116,7 +116,7 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence
         yield folder
 
 
-def config_of(path: str | os.PathLike) -> dict[str, Any]:
+def read_config(path: str | os.PathLike) -> dict[str, Any]:
     """Return the record of the configuration in a run's folder.
 
     Raises:
@@ -131,7 +131,7 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
     return config
 
 
-def progress_of(path: str | os.PathLike) -> dict[str, Any]:
+def read_progress(path: str | os.PathLike) -> dict[str, Any]:
     """Return the progress of the latest checkpoint; empty without a checkpoint.
 
     Raises:
@@ -145,7 +145,7 @@ def latest_returns(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
     return evaluations["return"][evaluations["step"] == evaluations["step"][-1]]
 
 
-def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
+def check_same_run(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
     """Compare a record with that of a folder.
 
     Args:
@@ -156,7 +156,7 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
     Raises:
         ValueError: the folder is of another run, or of none.
     """
-    for name, there, here in _differences(config_of(path), json.loads(json.dumps(config))):
+    for name, there, here in _differences(read_config(path), json.loads(json.dumps(config))):
         if name == LEG_VIEWS:
             raise ValueError(
                 f"{path}: of another version, whose legs saw some blocks as the body has them; write to another folder"
@@ -206,7 +206,7 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
         raise ValueError(f"{Path(path) / name}.csv: no table of a run: {checks.quote(error)}") from None
 
 
-def check_evaluated(path: str | os.PathLike, step: int) -> None:
+def check_latest_evaluation(path: str | os.PathLike, step: int) -> None:
     """Check the step of the latest evaluation that a checkpoint tells by the table of evaluations.
 
     Raises:
@@ -247,9 +247,9 @@ def _configure(path: Path, config: Mapping[str, Any], growing: Sequence[str]) ->
     if others and CONFIG not in others:
         raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
     if is_begun(path):
-        there = config_of(path)
+        there = read_config(path)
         grown = [name for name in growing if isinstance(there.get(name), int) and there[name] < config[name]]
-        check(path, config, grown)
+        check_same_run(path, config, grown)
         if not grown:
             return
     with files.writing_json(path / CONFIG) as file:  # maybe over that of a run that was refused

@@ -29,7 +29,7 @@ _TINY = 1e-6  # keeps the logarithm of the density finite where tanh saturates
 _LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
-def core(hp: SoftActorCritic) -> SoftActorCritic:
+def update_hyperparameters(hp: SoftActorCritic) -> SoftActorCritic:
     """Return hyperparameters that differ only where updates do, so that compiled programs are shared."""
     names = "hidden", "learning_rate", "discount", "tau", "dropout", "target_entropy", "critics", "network"
     return SoftActorCritic(**{name: getattr(hp, name) for name in names})
@@ -72,26 +72,26 @@ def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: i
     """Draw the networks for observations (size,) and actions (joints,), of a leg if legs share them."""
     hidden = [hp.hidden] * HIDDEN_LAYERS
     *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True, last_gain=hp.last_gain)
-    log_std = networks.layer(networks.xavier(random, hp.hidden, joints, hp.last_gain))
+    log_std = networks.make_layer(networks.xavier(random, hp.hidden, joints, hp.last_gain))
     log_std["bias"] += np.float32(math.log(hp.initial_std))
     policy = {"trunk": tuple(trunk), "mean": mean, "log_std": log_std}
-    critics = tuple(KINDS[hp.critics].draw(random, (size + joints, *hidden)) for _ in range(CRITICS))
+    critics = tuple(CRITIC_KINDS[hp.critics].draw(random, (size + joints, *hidden)) for _ in range(CRITICS))
     adam, log_alpha = optax.adam(hp.learning_rate), np.array(math.log(hp.initial_temperature), np.float32)
     moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
     return jax.tree.map(jnp.array, SacState(policy, critics, critics, log_alpha, moments))
 
 
-def noise(
+def draw_noise(
     hp: SoftActorCritic, random: np.random.Generator, batch: int, joints: tuple[int, ...], with_policy: bool
 ) -> Noise:
     """Draw the random inputs of an update, with the policy's loss or of critics alone."""
     next_action = random.standard_normal((batch, *joints), np.float32)
     action = random.standard_normal((batch, *joints), np.float32) if with_policy else None
     shape = (3 if with_policy else 2, CRITICS, HIDDEN_LAYERS, batch, hp.hidden)
-    return Noise(next_action, action, kept(random, shape, hp.dropout) if hp.dropout else None)
+    return Noise(next_action, action, draw_dropout_masks(random, shape, hp.dropout) if hp.dropout else None)
 
 
-def kept(random: np.random.Generator, shape: tuple[int, ...], dropout: float) -> np.ndarray:
+def draw_dropout_masks(random: np.random.Generator, shape: tuple[int, ...], dropout: float) -> np.ndarray:
     """Draw independent booleans of a shape, each False with the probability `dropout`.
 
     It draws the gaps between dropped units, which have a geometric distribution: for small `dropout` that takes a
@@ -107,13 +107,13 @@ def kept(random: np.random.Generator, shape: tuple[int, ...], dropout: float) ->
     return mask.reshape(shape)
 
 
-def distribution(hp: SoftActorCritic, policy, observations):
+def action_distribution(hp: SoftActorCritic, policy, observations):
     """Return mean and logarithm of the standard deviation, (batch, *joints) each, of the normal under the tanh."""
-    x = networks.hidden(policy["trunk"], observations, legs=hp.network == "legs")
+    x = networks.apply_hidden_layers(policy["trunk"], observations, legs=hp.network == "legs")
     return networks.linear(policy["mean"], x), jnp.clip(networks.linear(policy["log_std"], x), *LOG_STD)
 
 
-def sample(mean, log_std, noise):
+def sample_actions(mean, log_std, noise):
     """Return actions (batch, *joints) for standard normal noise, and the logarithm of their density (batch,)."""
     raw = mean + jnp.exp(log_std) * noise
     small = jnp.exp(-2.0 * jnp.abs(raw))
@@ -122,7 +122,7 @@ def sample(mean, log_std, noise):
     return jnp.tanh(raw), density.sum(axis=range(1, density.ndim))
 
 
-def values(hp: SoftActorCritic, critics, observations, actions, kept=None):
+def critic_values(hp: SoftActorCritic, critics, observations, actions, kept=None):
     """Return the values of actions, (...) of each critic.
 
     The first layer multiplies observations and actions apart, so the products with observations serve two losses
@@ -134,27 +134,29 @@ def values(hp: SoftActorCritic, critics, observations, actions, kept=None):
         masks = None if kept is None else kept[index]
         x = observations @ split[0] + actions @ split[1] + first.get("bias", 0.0)
         if masks is not None:
-            x = networks.dropped(x, masks[0], hp.dropout)
-        x = networks.activated(first, x, "relu")
-        x = networks.shared(x) if hp.network == "legs" else x
-        x = networks.hidden(others, x, "relu", None if masks is None else masks[1:], hp.dropout)
-        results.append(KINDS[hp.critics].value(networks.of_body(networks.linear(last, x), hp.network == "legs")))
+            x = networks.drop_units(x, masks[0], hp.dropout)
+        x = networks.normalize_and_activate(first, x, "relu")
+        x = networks.share_between_legs(x) if hp.network == "legs" else x
+        x = networks.apply_hidden_layers(others, x, "relu", None if masks is None else masks[1:], hp.dropout)
+        results.append(
+            CRITIC_KINDS[hp.critics].value(networks.body_outputs(networks.linear(last, x), hp.network == "legs"))
+        )
     return results
 
 
-def targets(hp: SoftActorCritic, critics, batch: Transitions, next_actions, bonus, kept):
+def target_values(hp: SoftActorCritic, critics, batch: Transitions, next_actions, bonus, kept):
     """Return what critics of values learn, (batch,), from the target networks."""
-    least = jnp.minimum(*values(hp, critics, batch.next_observations, next_actions, kept))
+    least = jnp.minimum(*critic_values(hp, critics, batch.next_observations, next_actions, kept))
     return batch.rewards + hp.discount * batch.goes_on * (least - bonus)
 
 
-def critics_loss(hp: SoftActorCritic, critics, batch: Transitions, next_actions, target, kept):
+def squared_error_loss(hp: SoftActorCritic, critics, batch: Transitions, next_actions, target, kept):
     """Return the sum over the critics of the mean squared error; the mean of their values, and nothing that settles."""
-    found = values(hp, critics, batch.observations, batch.actions, kept)
+    found = critic_values(hp, critics, batch.observations, batch.actions, kept)
     return sum(jnp.mean((value - target) ** 2) for value in found), (sum(found).mean() / CRITICS, None)
 
 
-class Kind(NamedTuple):
+class CriticKind(NamedTuple):
     """A kind of critics.
 
     Attributes:
@@ -163,7 +165,7 @@ class Kind(NamedTuple):
         targets: what critics learn, from hyperparameters, target networks, batch, the policy's next actions, the
             weighted logarithm of their density, and dropout masks.
         loss: of the critics, from hyperparameters, critics, batch, next actions, targets and dropout masks; with the
-            mean value, and what `settled` takes.
+            mean value, and what `finish_step` takes.
         settled: the critics after a step of Adam, from them and what the loss found.
     """
 
@@ -174,24 +176,28 @@ class Kind(NamedTuple):
     settled: Callable
 
 
-KINDS = {
-    "squared": Kind(
+CRITIC_KINDS = {
+    "squared": CriticKind(
         lambda random, sizes: networks.mlp(random, (*sizes, 1), layer_norm=True),
         lambda outputs: outputs[..., 0],
-        targets,
-        critics_loss,
+        target_values,
+        squared_error_loss,
         lambda critics, found: critics,
     ),
-    "categorical": Kind(
-        categorical.draw, categorical.value, categorical.targets, categorical.loss, categorical.settled
+    "categorical": CriticKind(
+        categorical.draw_critic,
+        categorical.mean_return,
+        categorical.target_distribution,
+        categorical.cross_entropy_loss,
+        categorical.finish_step,
     ),
 }
 
 
 def policy_loss(hp: SoftActorCritic, policy, state: SacState, observations, noise, kept):
     """Return the mean of alpha log pi minus the mean of the critics, and the mean of log pi."""
-    action, density = sample(*distribution(hp, policy, observations), noise)
-    value = sum(values(hp, state.critics, observations, action, kept)) / CRITICS
+    action, density = sample_actions(*action_distribution(hp, policy, observations), noise)
+    value = sum(critic_values(hp, state.critics, observations, action, kept)) / CRITICS
     return jnp.mean(jnp.exp(state.log_alpha) * density - value), density.mean()
 
 
@@ -208,9 +214,11 @@ def update(
         next_actions: the policy's `distribution` at the next observations, if it is known; else None.
     """
     masks = (None, None, None) if noise.kept is None else noise.kept
-    next_actions = distribution(hp, state.policy, batch.next_observations) if next_actions is None else next_actions
-    next_actions, density = sample(*next_actions, noise.next_action)
-    kind = KINDS[hp.critics]
+    next_actions = (
+        action_distribution(hp, state.policy, batch.next_observations) if next_actions is None else next_actions
+    )
+    next_actions, density = sample_actions(*next_actions, noise.next_action)
+    kind = CRITIC_KINDS[hp.critics]
     target = kind.targets(hp, state.targets, batch, next_actions, jnp.exp(state.log_alpha) * density, masks[0])
     critic_gradient = jax.value_and_grad(kind.loss, argnums=1, has_aux=True)
     (critic_loss, (value, found)), gradient = critic_gradient(hp, state.critics, batch, next_actions, target, masks[1])
@@ -229,7 +237,7 @@ def update(
     return state._replace(critics=critics, targets=averaged, moments=moments), metrics
 
 
-def actor(state: SacState) -> tuple[Mapping, ...]:
+def deterministic_layers(state: SacState) -> tuple[Mapping, ...]:
     """Return the layers of the deterministic policy, whose tanh is the action."""
     return *state.policy["trunk"], state.policy["mean"]
 

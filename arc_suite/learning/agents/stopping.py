@@ -25,7 +25,7 @@ class Patience(NamedTuple):
     best: float
     waited: int = 0
 
-    def checked(self, rule: str, loss: float, improvement: float, updates: int) -> "Patience":
+    def after_check(self, rule: str, loss: float, improvement: float, updates: int) -> "Patience":
         """Return the state after `updates` more updates and a validation loss."""
         if loss < threshold(rule, self.best, improvement):
             return Patience(loss)

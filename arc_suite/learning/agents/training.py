@@ -14,7 +14,7 @@ from arc_suite import checks, evaluation, files, seed_ranges
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import priors, run_folder
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
-from arc_suite.learning.agents.learner import NOT_LEARNED, Damaged, Diverged, Slice
+from arc_suite.learning.agents.learner import UNLEARNED_PREFIXES, Damaged, Diverged, Slice
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
@@ -54,15 +54,15 @@ def train(
         checks.number("minutes", minutes, 0.0)
     record, definition, setup = configuration.record(), configuration.definition, configuration.setup
     if configuration.prior is not None:  # the data under an id may change
-        record[PRIOR_SHA256] = priors.digest(configuration.prior)
+        record[PRIOR_SHA256] = priors.dataset_digest(configuration.prior)
     training_seeds = _training_seeds(configuration, Path(folder))
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
     evaluation.check_ends(setup.definition.step_limit)
     policy_setup = configuration.policy_setup
     growing = ("steps",) if definition.extends else ()
-    with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
+    with run_folder.open_run(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
-        run_folder.check_evaluated(folder, state["evaluated"])
+        run_folder.check_latest_evaluation(folder, state["evaluated"])
         context = configuration.context(folder, threads, run_files.arrays)
         slices = stack.enter_context(contextlib.closing(definition.learn(definition.hyperparameters, context)))
         options = {"num_threads": threads, "autoreset_mode": AutoresetMode.DISABLED}
@@ -109,7 +109,7 @@ def _check_finite(found: Slice) -> None:
         if not np.isfinite(metric):
             raise Diverged(f"{name} is {metric}", found.step)
     for name, array in found.checkpoint.items():
-        is_learned = array.dtype.kind == "f" and not name.startswith(NOT_LEARNED)
+        is_learned = array.dtype.kind == "f" and not name.startswith(UNLEARNED_PREFIXES)
         if is_learned and not np.isfinite(array).all():
             raise Diverged(f"{name} is not finite", found.step)
 
@@ -128,12 +128,12 @@ def _training_seeds(configuration: Configuration, folder: Path) -> seed_ranges.R
     """
     if run_folder.is_begun(folder):
         try:
-            return seed_ranges.from_json(run_folder.config_of(folder).get(TRAINING_SEEDS))
+            return seed_ranges.from_json(run_folder.read_config(folder).get(TRAINING_SEEDS))
         except (TypeError, ValueError):
             raise ValueError(f"{folder}: {TRAINING_SEEDS}: expected pairs of seeds") from None
     found = [seed_ranges.of_run(configuration.seed)]
     if configuration.prior is not None:
-        found.append(priors.seeds(configuration.prior))
+        found.append(priors.dataset_seeds(configuration.prior))
     if start := getattr(configuration.hyperparameters, "start", ""):
         before = network.load(start).training_seeds
         return None if before is None else tuple(dict.fromkeys((*before, *found)))

@@ -9,17 +9,17 @@ import numpy as np
 
 from arc_suite.learning.agents import architectures, critic_blocks, networks
 from arc_suite.learning.agents import proximal_policy as ppo
-from arc_suite.learning.agents.collecting import TRANSITIONS, ages, viewed
+from arc_suite.learning.agents.collecting import ROLLOUT_ARRAYS, initial_ages, network_views
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
-from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
+from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, Diverged, RunContext
 from arc_suite.learning.agents.normalizer import Normalizer
 from arc_suite.learning.worlds import mjx
 
 _IMPLEMENTATIONS = {"mjx": "jax", "warp": "warp"}
 
 
-class Worlds:
-    """Worlds that step together, in which a policy acts as in `collecting.Environments`.
+class WorldRollouts:
+    """Worlds that step together, in which a policy acts as in `collecting.EnvironmentRollouts`.
 
     A world whose episode has ended starts another one in the same step, one of the table of starts.
     """
@@ -36,7 +36,7 @@ class Worlds:
         self._columns = critic_blocks.privileged_columns(self.task, hp.critic_blocks)
         self._key = jax.random.key(context.seed)
         self._state = jax.jit(jax.vmap(self.env.start))(np.uint32(first) + np.arange(hp.num_envs, dtype=np.uint32))
-        self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
+        self._steps = jnp.asarray(initial_ages(hp.num_envs, self.task.step_limit), int)
         self._act = jax.jit(self._acted)
 
     def roll_out(self, policy, normalize: Normalizer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
@@ -56,7 +56,7 @@ class Worlds:
         state, steps = carry
         drawn, restart = jax.random.split(key)
         seen = self._seen(state)
-        mean = ppo.mean_action(self.architecture, policy, normalize(seen))
+        mean = ppo.predict_mean_actions(self.architecture, policy, normalize(seen))
         action = mean + std * jax.random.normal(drawn, mean.shape)
         after = jax.vmap(self.env.step)(state, action)
         steps = steps + 1
@@ -67,22 +67,22 @@ class Worlds:
         next_obs = jnp.where(resampled[:, None], seen, self._seen(after))
         values = seen, action, mean, after.reward, terminated, ended | resampled, next_obs
         fresh = jax.vmap(self.env.reset)(jax.random.split(restart, self._hp.num_envs))
-        carry = jax.vmap(mjx.restarted)(after, fresh, ended), jnp.where(ended, 0, steps)
-        return carry, dict(zip(TRANSITIONS, values, strict=True))
+        carry = jax.vmap(mjx.restart_where_ended)(after, fresh, ended), jnp.where(ended, 0, steps)
+        return carry, dict(zip(ROLLOUT_ARRAYS, values, strict=True))
 
     def _seen(self, state):
-        return viewed(self.architecture, state.obs, state.info.get("privileged"), self._columns)
+        return network_views(self.architecture, state.obs, state.info.get("privileged"), self._columns)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the state of the worlds, from which simulation goes on."""
-        return networks.named(ENVIRONMENT.rstrip("/"), self._kept())
+        return networks.flatten_tree(ENVIRONMENT_PREFIX.rstrip("/"), self._kept())
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Go on from the arrays of a checkpoint."""
-        simulation, others, self._steps = networks.restored(ENVIRONMENT.rstrip("/"), self._kept(), arrays)
+        simulation, others, self._steps = networks.restore_tree(ENVIRONMENT_PREFIX.rstrip("/"), self._kept(), arrays)
         self._state = self._state.replace(data=self._state.data.replace(**simulation), **others)
 
     def _kept(self):
         state = self._state
-        simulation = {name: getattr(state.data, name) for name in mjx.WRITTEN}
+        simulation = {name: getattr(state.data, name) for name in mjx.START_FIELDS}
         return simulation, {name: getattr(state, name) for name in ("obs", "info")}, self._steps

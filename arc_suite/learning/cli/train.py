@@ -220,7 +220,7 @@ def watched(folder: Path, bars: Mapping[str, Any]) -> None:
         with contextlib.suppress(ValueError, OSError):  # it is for its process to say what is damaged
             if lines := run_folder.lines(folder / name, "times", ("step",)):
                 bar.update(int(lines[-1]["step"]) - bar.n)
-            if "return" in (state := run_folder.progress_of(folder / name)):
+            if "return" in (state := run_folder.read_progress(folder / name)):
                 bar.set_postfix_str(f"return {state['return']:.4g}", refresh=False)
 
 
@@ -270,7 +270,7 @@ def draw(run: Configuration, folder: Path, step: int, metrics: Mapping[str, floa
         if scale.demonstrator is not None:
             lines[f"demonstrator {scale.preset}"] = scale.demonstrator
         finals = evaluation.published_returns(run.setup, [run.algorithm], run.steps)
-        figure = plots.returns(run_folder.table(folder, "evaluations"), run.algorithm, folder.name, lines, finals)
+        figure = plots.plot_run(run_folder.table(folder, "evaluations"), run.algorithm, folder.name, lines, finals)
         with files.writing(folder / "curve.png") as temporary:
             figure.savefig(temporary)
 

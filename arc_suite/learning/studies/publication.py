@@ -75,7 +75,7 @@ def _configuration(run: Run, folder: Path) -> dict[str, str]:
     """Return the row of a run in the table of runs."""
     training = run_folder.lines(folder, "training", ("step",))
     phases = {row["step"]: int(float(row["phase_updates"])) for row in training if float(row.get("phase_updates", 0))}
-    fields = {"run": run.name, "kind": run.kind, **run_folder.config_of(folder), "phases": phases or None}
+    fields = {"run": run.name, "kind": run.kind, **run_folder.read_config(folder), "phases": phases or None}
     return {name: cell(value) for name, value in fields.items()}
 
 

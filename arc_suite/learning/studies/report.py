@@ -106,7 +106,7 @@ def _curves(groups: Groups, demonstrators):
         end = max(each.steps[-1] for each in curves.values())
         drawn[place], finals[place] = curves, evaluation.published_returns(setup, [*algorithms.values()], end)
     lines = {p: {_policy(n): v.mean() for n, v in every.items()} for p, every in demonstrators.items()}
-    return plots.study(drawn, lines, finals)
+    return plots.plot_study(drawn, lines, finals)
 
 
 def by_kind(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:

@@ -10,7 +10,7 @@ import numpy as np
 from arc_suite import checks, evaluation
 from arc_suite.evaluation import anchors, provenance
 from arc_suite.evaluation.published import CURVES
-from arc_suite.learning.agents.configuration import CONFIGURATION, PROVENANCE, TRAINING_SEEDS
+from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, PROVENANCE_FIELDS, TRAINING_SEEDS
 from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
 from arc_suite.seed_ranges import EVALUATION, Ranges, common_seeds, from_json
@@ -18,7 +18,7 @@ from arc_suite.seed_ranges import EVALUATION, Ranges, common_seeds, from_json
 RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators.csv"
 
 # Columns of the table of runs: the configuration, then the updates of stabilization phases by environment step.
-RUN_COLUMNS = ("run", "kind", *CONFIGURATION, *PROVENANCE, "phases")
+RUN_COLUMNS = ("run", "kind", *CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, "phases")
 TIMES = ("wall_seconds", "cpu_seconds")  # until the end of an evaluation
 SHARED, TEN = "data share seeds with evaluation", "ten episodes"
 _FEW = evaluation.CURVE_EPISODES

@@ -9,7 +9,7 @@ from tqdm import tqdm
 from arc_suite import checks, data, files
 from arc_suite.learning import processes
 from arc_suite.learning.agents import run_folder
-from arc_suite.learning.agents.configuration import OF_DATA
+from arc_suite.learning.agents.configuration import DATA_FIELDS
 from arc_suite.learning.studies.tables import Run
 
 
@@ -57,8 +57,8 @@ def is_finished(run: Run, folder: Path) -> bool:
         ValueError: it is another run, or damaged.
     """
     if run_folder.is_begun(folder):
-        run_folder.check(folder, run.configuration.record(), left_out=("versions", *OF_DATA))
-    return run_folder.progress_of(folder).get("evaluated", 0) >= run.configuration.steps
+        run_folder.check_same_run(folder, run.configuration.record(), left_out=("versions", *DATA_FIELDS))
+    return run_folder.read_progress(folder).get("evaluated", 0) >= run.configuration.steps
 
 
 def _command(run: Run, output: Path) -> list[str]:

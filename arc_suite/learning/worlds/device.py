@@ -30,9 +30,9 @@ IMPLEMENTATIONS = ("jax", "warp")
 
 # Of the solver under `jax`, whose loops run until the slowest world is done: fewer cost return, more only time. See
 # docs/gpu.md.
-ITERATIONS, LS_ITERATIONS = 20, 8
+SOLVER_ITERATIONS, LINE_SEARCH_ITERATIONS = 20, 8
 
-MOST_CONTACTS = 2000  # that are possible in a world under `jax`, each with four dense rows of constraints
+MAX_CONTACTS = 2000  # that are possible in a world under `jax`, each with four dense rows of constraints
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 _SOLVER = 1 << 9 | 1 << 10  # bits of Warp's overflow that tell of iterations, not of tables
@@ -53,7 +53,7 @@ _LENGTHS = {
 }
 
 
-def implementation(name: str | None) -> str:
+def choose_implementation(name: str | None) -> str:
     """Return a checked name of an implementation; for None the faster one of this machine.
 
     Raises:
@@ -72,12 +72,12 @@ def _has_warp() -> bool:
     return importlib.util.find_spec("warp") is not None
 
 
-def adapted(model: mujoco.MjModel, impl: str) -> mujoco.MjModel:
+def adapt_model(model: mujoco.MjModel, impl: str) -> mujoco.MjModel:
     """Return a copy of a model with the settings of an implementation."""
     model = copy.copy(model)
     if impl == "jax":
-        model.opt.iterations, model.opt.ls_iterations = ITERATIONS, LS_ITERATIONS
-        model.opt.disableflags |= _SENSOR  # `advanced` computes contact forces
+        model.opt.iterations, model.opt.ls_iterations = SOLVER_ITERATIONS, LINE_SEARCH_ITERATIONS
+        model.opt.disableflags |= _SENSOR  # `advance` computes contact forces
         return model
     # Warp 3.17 forgets the margin in the distance to a height field, and turns the normal where geoms do not overlap.
     # Geoms that are larger by the margin overlap where contacts begin, and push as they do in C.
@@ -95,8 +95,8 @@ def adapted(model: mujoco.MjModel, impl: str) -> mujoco.MjModel:
     return model
 
 
-def put(model: mujoco.MjModel, impl: str) -> mjx.Model:
-    """Put a model, as `adapted` returns it, on the device.
+def put_model(model: mujoco.MjModel, impl: str) -> mjx.Model:
+    """Put a model, as `adapt_model` returns it, on the device.
 
     Raises:
         ValueError: the implementation cannot simulate it.
@@ -107,11 +107,11 @@ def put(model: mujoco.MjModel, impl: str) -> mjx.Model:
         raise ValueError(f"impl {impl!r}: MJX cannot simulate this model: {error}; use impl='warp'") from None
 
 
-def made(model: mujoco.MjModel, impl: str, num_envs: int) -> mjx.Data:
+def make_data(model: mujoco.MjModel, impl: str, num_envs: int) -> mjx.Data:
     """Return data of one world, as after MuJoCo's reset.
 
     Args:
-        model: of the world, as `adapted` returns it.
+        model: of the world, as `adapt_model` returns it.
         impl: the implementation.
         num_envs: worlds that step together; they share Warp's table of contacts.
 
@@ -120,8 +120,8 @@ def made(model: mujoco.MjModel, impl: str, num_envs: int) -> mjx.Data:
     """
     if impl == "jax":
         data = mjx.make_data(model, impl=impl)
-        if (contacts := data._impl.ncon) > MOST_CONTACTS:
-            need = f"place for every possible contact, here {contacts}, and has it for {MOST_CONTACTS}"
+        if (contacts := data._impl.ncon) > MAX_CONTACTS:
+            need = f"place for every possible contact, here {contacts}, and has it for {MAX_CONTACTS}"
             raise ValueError(f"impl 'jax': MJX needs {need}; use impl='warp'")
         return data
     contacts, rows = table_sizes(model)
@@ -141,7 +141,7 @@ def table_sizes(model: mujoco.MjModel) -> tuple[int, int]:
     return contacts, 4 * contacts + int(model.jnt_limited.sum())
 
 
-def advanced(model: mjx.Model, data: mjx.Data, substeps: int) -> mjx.Data:
+def advance(model: mjx.Model, data: mjx.Data, substeps: int) -> mjx.Data:
     """Return data after substeps, with derived quantities one substep behind the state, as `mj_step` leaves them."""
     if data.impl == mjx.Impl.WARP:  # which adds up overflows, and whose sensors compute contact forces
         data = data.tree_replace({"_impl.overflow": jnp.zeros_like(data._impl.overflow)})
@@ -150,19 +150,19 @@ def advanced(model: mjx.Model, data: mjx.Data, substeps: int) -> mjx.Data:
     return mjx.rne_postconstraint(model, data) if data.impl == mjx.Impl.JAX else data
 
 
-def fields(data: mjx.Data, names: Iterable[str]) -> types.SimpleNamespace:
+def select_fields(data: mjx.Data, names: Iterable[str]) -> types.SimpleNamespace:
     """Return fields of data by their names in `MjData`, among them those that MJX keeps to its implementation."""
     own = data._impl
     return types.SimpleNamespace(**{name: getattr(own if hasattr(own, name) else data, name) for name in names})
 
 
-def diverged(data: mjx.Data):
+def has_diverged(data: mjx.Data):
     """Return whether a position or velocity is no number, or beyond MuJoCo's bound."""
     state = jnp.concatenate([data.qpos, data.qvel])
     return ~(abs(state) <= _LARGEST).all()
 
 
-def overflow(data: mjx.Data):
+def has_overflow(data: mjx.Data):
     """Return whether Warp's tables had no place for a contact or constraint; MJX's own have place for all."""
     if data.impl == mjx.Impl.JAX:
         return jnp.zeros((), bool)

@@ -29,7 +29,7 @@ from arc_suite.tasks.contract import Inputs
 
 _MOST_ENVS = 1 << 20
 # Fields of the simulation that a start sets; all others follow from them in a step.
-WRITTEN = ("time", "qpos", "qvel", "qacc_warmstart", "mocap_pos")
+START_FIELDS = ("time", "qpos", "qvel", "qacc_warmstart", "mocap_pos")
 
 
 @jax.tree_util.register_dataclass
@@ -111,17 +111,20 @@ class Env:
         """Draw the starts and put the model on the device; see `load`."""
         if "random" in checks.mapping("task_kwargs", task_kwargs):
             raise ValueError("random: expected none, as `reset` takes a key, and `start` a seed")
-        self.impl, self.num_envs = device.implementation(impl), checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
+        self.impl, self.num_envs = (
+            device.choose_implementation(impl),
+            checks.integer("num_envs", num_envs, 1, _MOST_ENVS),
+        )
         self.num_starts, self.first_seed = num_starts, checks.seed(first_seed)
-        self._starts = starts.drawn(domain_name, task_name, task_kwargs, num_starts, first_seed, privileged)
+        self._starts = starts.draw_starts(domain_name, task_name, task_kwargs, num_starts, first_seed, privileged)
         settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
         self.task, self.mj_model = prepare_task(domain_name, task_name, settings)
         if self.task.adapts:
             why = "as its starts depend on the episode before"
             raise ValueError(f"task {self.task.name}: expected no curriculum, {why}")
-        model = device.adapted(self.mj_model, self.impl)
-        self._mjx_model = self._compiled = device.put(model, self.impl)
-        self._data = device.made(model, self.impl, self.num_envs)
+        model = device.adapt_model(self.mj_model, self.impl)
+        self._mjx_model = self._compiled = device.put_model(model, self.impl)
+        self._data = device.make_data(model, self.impl, self.num_envs)
         self.episode_length = self.task.step_limit
         self.observation_size, self.action_size = self.task.size, len(self.task.scene.body.joint_names)
         scene = self.task.scene
@@ -205,7 +208,7 @@ class Env:
         return [self._picture(state, index, height=height, width=width, camera_id=camera) for state in states]
 
     def _picture(self, state: WorldState, index: int | None, **options) -> np.ndarray:
-        scene, fields = self.task.scene, device.fields(state.data, ("mocap_pos", *self.task.reads))
+        scene, fields = self.task.scene, device.select_fields(state.data, ("mocap_pos", *self.task.reads))
         alone = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], vars(fields))
         memory = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], state.info["memory"])
         markers = self.task.markers(memory, self.task.read(types.SimpleNamespace(**alone)))
@@ -231,10 +234,10 @@ class Env:
             memory = task.with_command(memory, name, info[name])
         moved, inputs = task.before(memory, action)
         data = _written(before, inputs, task.scene.layout.torso)
-        data = device.advanced(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
-        diverged, overflow = device.diverged(data), device.overflow(data)
+        data = device.advance(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
+        diverged, overflow = device.has_diverged(data), device.has_overflow(data)
 
-        fields = device.fields(data, task.reads)
+        fields = device.select_fields(data, task.reads)
         readings = task.read(fields)
         after = task.after(moved, readings)
         found, reward = terms.reward(task.terms(after, readings), task.settings.weights, task.cost_limit)
@@ -275,7 +278,7 @@ def _written(data, inputs: Inputs, torso: int):
     return data
 
 
-def restarted(state: WorldState, start: WorldState, ended) -> WorldState:
+def restart_where_ended(state: WorldState, start: WorldState, ended) -> WorldState:
     """Return the state of a world whose next step is the first of another episode, where one has ended.
 
     Args:
@@ -287,7 +290,7 @@ def restarted(state: WorldState, start: WorldState, ended) -> WorldState:
     def chosen(new, old):
         return jax.tree.map(lambda new, old: jnp.where(ended, new, old), new, old)
 
-    written = {name: chosen(getattr(start.data, name), getattr(state.data, name)) for name in WRITTEN}
+    written = {name: chosen(getattr(start.data, name), getattr(state.data, name)) for name in START_FIELDS}
     data, info = state.data.replace(**written), chosen(start.info, state.info)
     return state.replace(data=data, obs=chosen(start.obs, state.obs), info=info)
 

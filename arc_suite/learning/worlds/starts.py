@@ -9,7 +9,7 @@ from arc_suite import checks
 from arc_suite.envs import trees
 from arc_suite.envs.vector import VectorEnv
 
-MOST = 16_384
+MAX_STARTS = 16_384
 _CHUNK = 256  # seeds that are drawn together: models of their own take memory
 
 # Fields of `MjModel` that `mj_setConst` derives from those that an episode changes, and that simulations read.
@@ -38,7 +38,7 @@ class Starts(NamedTuple):
     privileged: np.ndarray | None
 
 
-def drawn(
+def draw_starts(
     domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, count: int, seed: int, privileged: bool
 ) -> Starts:
     """Return the starts of a number of seeds.
@@ -54,7 +54,7 @@ def drawn(
     Raises:
         ValueError: as `arc_suite.load`, or a count out of range.
     """
-    checks.integer("num_starts", count, 1, MOST)
+    checks.integer("num_starts", count, 1, MAX_STARTS)
     environments = VectorEnv(domain_name, task_name, min(count, _CHUNK), task_kwargs=task_kwargs, privileged=privileged)
     batch = environments.batch
     parts = []

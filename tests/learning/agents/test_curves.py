@@ -41,7 +41,7 @@ def crowded():
     lines = {"standing still": 1640.0, "demonstrator medium": 1640.0, "demonstrator refined": 3886.0}
     kinds = {name: Curve(name, STEPS, np.linspace(0.0, 3000.0, 5)[None]) for name in FINALS["tick"]}
     kinds["sac-other"] = Curve("sac", STEPS, np.array([np.linspace(0.0, 2000.0, 5), np.linspace(100.0, 2500.0, 5)]))
-    figure = plots.study({"a": kinds, "b": kinds}, {"a": lines, "b": lines}, {"a": FINALS["tick"], "b": {}})
+    figure = plots.plot_study({"a": kinds, "b": kinds}, {"a": lines, "b": lines}, {"a": FINALS["tick"], "b": {}})
     FigureCanvasAgg(figure)
     return figure
 
@@ -68,7 +68,7 @@ def test_kinds_of_one_algorithm_differ_in_their_markers():
     """In the legend and in every panel; their number is that of the variants of `parallel-parts`."""
     curve = Curve("sac_parallel", STEPS, np.arange(5.0)[None])
     kinds = {f"sac_parallel-{part}": curve for part in "abcde"}
-    figure = plots.study({"a": kinds, "b": dict(reversed(kinds.items()))}, {}, {})
+    figure = plots.plot_study({"a": kinds, "b": dict(reversed(kinds.items()))}, {}, {})
     for lines in (figure.legends[0].get_lines(), *(axis.get_lines() for axis in figure.axes)):
         assert {line.get_color() for line in lines} == {plots.STYLES["sac_parallel"][0]}
         assert len({(line.get_marker(), line.get_markerfacecolor()) for line in lines}) == 5
@@ -78,7 +78,7 @@ def test_kinds_of_one_algorithm_differ_in_their_markers():
 def test_a_legend_of_long_names_lies_in_the_picture(places):
     curve = Curve("sac_parallel", STEPS, np.zeros((1, 5)))
     kinds = {f"sac_parallel-three-step-{part}-environments": curve for part in "abcde"}
-    figure = plots.study(dict.fromkeys(places, kinds), {}, {})
+    figure = plots.plot_study(dict.fromkeys(places, kinds), {}, {})
     figure.draw_without_rendering()
     box = figure.legends[0].get_window_extent()
     assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
@@ -90,7 +90,7 @@ def test_long_curves_have_few_markers_and_the_legend_shows_them(points, shown):
         place: {"ppo": Curve("ppo", np.arange(count), np.zeros((1, count)))}
         for place, count in (("short", 5), ("long", points))
     }
-    figure = plots.study(curves, {}, {})
+    figure = plots.plot_study(curves, {}, {})
     (line,) = figure.axes[1].get_lines()
     assert len(range(0, points, line.get_markevery())) == shown
     assert {each.get_marker() for each in (line, *figure.legends[0].get_lines())} == {"o"}
@@ -104,6 +104,6 @@ def test_unknown_algorithms_get_other_colors():
 
 def test_a_run_stands_over_its_anchors():
     evaluations = {"step": np.repeat([100.0, 200.0], 10), "return": np.arange(20.0)}
-    figure = plots.returns(evaluations, "ppo", "mine", {"standing still": 1640.0}, {"sope": 3610.0})
+    figure = plots.plot_run(evaluations, "ppo", "mine", {"standing still": 1640.0}, {"sope": 3610.0})
     texts = [each.get_text() for each in figure.axes[0].get_children() if isinstance(each, Annotation)]
     assert texts == ["ppo 14", "standing still 1640", "sope, paper 3610"]

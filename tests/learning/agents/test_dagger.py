@@ -70,8 +70,8 @@ def test_a_run_too_short_to_learn_from_is_refused(begun):
 
 def test_any_number_of_updates_is_made(begun):
     """Also one that no whole number of compiled calls makes."""
-    agent = begun(changes={"updates": dagger.CHUNK + 3, "last_updates": 7, "round": 15})
-    for step, count in ((120, dagger.CHUNK + 3), (240, dagger.CHUNK + 3 + 7)):
+    agent = begun(changes={"updates": dagger.UPDATES_PER_CALL + 3, "last_updates": 7, "round": 15})
+    for step, count in ((120, dagger.UPDATES_PER_CALL + 3), (240, dagger.UPDATES_PER_CALL + 3 + 7)):
         assert int(agent.until(step).checkpoint["state/moments/count"]) == count
 
 

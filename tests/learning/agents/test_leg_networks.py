@@ -32,7 +32,7 @@ def drawn(task, critic_blocks=(), count=6):
     size = task.size + sum(task.privileged_blocks[name].size for name in critic_blocks)
     vectors = random.normal(size=(count, size)).astype(np.float32)
     normalize = architecture.normalize(
-        Moments.none(architecture.inputs).after(architecture.seen(architecture.viewed(vectors)))
+        Moments.empty(architecture.inputs).with_vectors(architecture.seen(architecture.viewed(vectors)))
     )
     networks = architecture.drawn(random, 16), architecture.drawn_values(random, 16)
     return architecture, *networks, normalize, vectors
@@ -43,7 +43,7 @@ def test_left_and_right_are_treated_alike(body, critic_blocks):
     task = Setup.of(body, "steer").definition
     architecture, policy, values, normalize, vectors = drawn(task, critic_blocks)
     assert architecture.symmetric
-    mirror, mirror_action = behind.symmetry(task, critic_blocks)
+    mirror, mirror_action = behind.mirror_maps(task, critic_blocks)
     here, there = (normalize(architecture.viewed(each)) for each in (vectors, mirror(vectors)))
     acted, found = architecture.actions(policy, here), architecture.values(values, here)
     assert_allclose(architecture.actions(policy, there), mirror_action(np.asarray(acted)), atol=1e-5)
@@ -55,17 +55,17 @@ def test_left_and_right_are_treated_alike(body, critic_blocks):
 def test_a_network_is_exported_and_imported_as_it_acts(body):
     task = Setup.of(body, "steer").definition
     architecture, policy, _, normalize, vectors = drawn(task)
-    graph = architectures.policy(architecture, normalize, policy)
+    graph = architectures.policy_graph(architecture, normalize, policy)
     expected = np.asarray(architecture.actions(policy, normalize(architecture.viewed(vectors)))).clip(-1.0, 1.0)
     assert_allclose(graph(vectors), expected, atol=1e-5)
     for row, actions in zip(vectors, graph(vectors), strict=True):
         assert_array_equal(graph(row[None])[0], actions)  # whatever the number of environments
-    again, parameters = architectures.read(architecture, graph)
+    again, parameters = architectures.read_policy_graph(architecture, graph)
     assert_array_equal(again.mean, normalize.mean)
     for one, other in zip(jax.tree.leaves(policy), jax.tree.leaves(parameters), strict=True):
         assert_allclose(one, other, rtol=1e-6)
     with pytest.raises(ValueError, match="^a policy of dagger, bc or ppo, of the same network$"):
-        architectures.read(architectures.of(task), graph)
+        architectures.read_policy_graph(architectures.of(task), graph)
 
 
 @pytest.mark.parametrize("path", sorted(network.PACKAGED.glob("*.npz")), ids=lambda path: path.stem)
@@ -75,10 +75,10 @@ def test_packaged_policies_are_traced_to_the_nodes_that_they_hold(path):
     if packaged.setup.several:
         architecture = architectures.AnyLegs()
     else:
-        kind = configuration.network_of(path)["network"]
+        kind = configuration.network_hyperparameters(path)["network"]
         architecture = architectures.of(packaged.setup.definition, kind)
-    normalize, parameters = architectures.read(architecture, packaged.graph)
-    traced = architectures.policy(architecture, normalize, parameters)
+    normalize, parameters = architectures.read_policy_graph(architecture, packaged.graph)
+    traced = architectures.policy_graph(architecture, normalize, parameters)
     assert traced.nodes == packaged.graph.nodes and traced.arrays.keys() == packaged.graph.arrays.keys()
     for name, array in packaged.graph.arrays.items():  # which a file rounds to 16 bits
         assert_allclose(traced.arrays[name], array, rtol=2e-3, atol=1e-6)

@@ -40,18 +40,18 @@ def vectors():
 def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
     architecture = AnyLegs()
     parameters = architecture.drawn(np.random.default_rng(0), 16)
-    normalize = architecture.normalize(Moments.none(architecture.inputs).after(architecture.seen(vectors)))
+    normalize = architecture.normalize(Moments.empty(architecture.inputs).with_vectors(architecture.seen(vectors)))
     normalized = normalize(vectors)
     expected = np.asarray(architecture.actions(parameters, normalized))
-    graph = architectures.policy(architecture, normalize, parameters)
+    graph = architectures.policy_graph(architecture, normalize, parameters)
     assert_allclose(graph(vectors), expected.clip(-1.0, 1.0), atol=1e-5)
-    normalizer, again = architectures.read(architecture, graph)
+    normalizer, again = architectures.read_policy_graph(architecture, graph)
     for array, same in zip(normalizer, normalize, strict=True):
         assert_array_equal(array, same)
     assert_array_equal(np.asarray(architecture.actions(again, normalized)), expected)
     assert not expected[~SETUP.make_vec(2).description.mask.reshape(2, -1)].any()
     with pytest.raises(ValueError, match="^a policy of dagger, bc or ppo"):
-        architectures.read(architecture, traced(lambda x: x.clip(-1.0, 1.0), architecture.size))
+        architectures.read_policy_graph(architecture, traced(lambda x: x.clip(-1.0, 1.0), architecture.size))
 
 
 def test_the_order_of_legs_does_not_matter(vectors):
@@ -77,7 +77,7 @@ def test_the_order_of_legs_does_not_matter(vectors):
 def test_normalized_observations_keep_the_number_of_joints(vectors):
     architecture = AnyLegs()
     seen = architecture.seen(vectors)
-    normalize = architecture.normalize(Moments.none(architecture.inputs).after(seen))
+    normalize = architecture.normalize(Moments.empty(architecture.inputs).with_vectors(seen))
     inputs, mask = tokens.leg_inputs(normalize(vectors))
     assert_array_equal(mask, tokens.leg_inputs(vectors)[1])
     there = inputs[mask.any(axis=-1)]

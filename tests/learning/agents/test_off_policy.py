@@ -41,7 +41,7 @@ def set_of(observations):
 
 
 def every(source):
-    return source.at(np.arange(len(source)))
+    return source.transitions_at(np.arange(len(source)))
 
 
 def test_actions_are_uniform_while_the_buffer_is_small(learner, acted):
@@ -51,7 +51,7 @@ def test_actions_are_uniform_while_the_buffer_is_small(learner, acted):
     assert not acted
     agent.until(22)
     assert len(acted) == 1
-    actions = agent.buffer.at(np.arange(21)).actions
+    actions = agent.buffer.transitions_at(np.arange(21)).actions
     assert np.abs(actions).max() > 0.9 and abs(actions.mean()) < 0.1
 
 
@@ -112,7 +112,9 @@ def test_validation_set(name, learner, batches):
     agent.advance()
     held_out = agent.phase.held_out
     assert held_out == 20
-    parts = [source.at(order[:held_out]) for source, order in zip(agent.sources, agent.phase.orders, strict=True)]
+    parts = [
+        source.transitions_at(order[:held_out]) for source, order in zip(agent.sources, agent.phase.orders, strict=True)
+    ]
     assert len(parts) == (2 if name == "sope" else 1)
     unseen = set_of(np.concatenate([part.observations for part in parts]))
     assert len(unseen) >= 0.9 * held_out * len(parts)  # a start may occur twice
@@ -155,7 +157,7 @@ def test_the_policys_next_actions_are_cached_in_a_phase(learner):
     agent = learner("sope", small("sope"), evaluate_every=100)
     agent.advance()
     for source, (mean, log_std) in zip(agent.sources, agent.phase.next_actions, strict=True):
-        expected = sac.distribution(agent.core, agent.state.policy, every(source).next_observations)
+        expected = sac.action_distribution(agent.core, agent.state.policy, every(source).next_observations)
         assert np.allclose(mean, expected[0], atol=1e-6)
         assert np.allclose(log_std, expected[1], atol=1e-6)
 
@@ -183,7 +185,7 @@ def test_networks_begin_as_published():
 
 @pytest.mark.parametrize("dropout", [0.01, 0.3])
 def test_dropout_keeps_the_right_share_each_on_its_own(dropout):
-    kept = sac.kept(np.random.default_rng(0), (3, 2, 2, 256, 256), dropout)
+    kept = sac.draw_dropout_masks(np.random.default_rng(0), (3, 2, 2, 256, 256), dropout)
     dropped = ~kept
     error = 5.0 * np.sqrt(dropout * (1.0 - dropout) / kept.size)
     assert dropped.mean() == pytest.approx(dropout, abs=error)

@@ -70,7 +70,7 @@ def test_advantages_are_discounted_sums_of_surprises_within_an_episode():
     terminated = random.uniform(size=(12, 5)) < 0.15
     ended = terminated | (random.uniform(size=(12, 5)) < 0.15)
     assert (ended & ~terminated).any() and terminated.any()
-    found = ppo.advantages(hp, rewards, values, next_values, terminated, ended)
+    found = ppo.estimate_advantages(hp, rewards, values, next_values, terminated, ended)
     for step in range(12):
         for place in range(5):
             total, factor = 0.0, 1.0
@@ -92,16 +92,16 @@ def test_the_policy_moves_towards_what_earned_more_and_values_towards_returns():
     hp, random = dataclasses.replace(SMALL, policy_rate=1e-3), np.random.default_rng(0)
     state = ppo.begin(hp, SIZES, random)
     given = batch(random)
-    given = given._replace(means=np.asarray(ppo.mean_action(SIZES, state.policy, given.observations)))
-    before = np.asarray(ppo.value(SIZES, state.values, given.observations))
+    given = given._replace(means=np.asarray(ppo.predict_mean_actions(SIZES, state.policy, given.observations)))
+    before = np.asarray(ppo.predict_values(SIZES, state.values, given.observations))
     orders = np.tile(np.arange(64), (30, 1))
     after, divergence, _ = ppo.update(hp, SIZES, state, given, orders, (np.float32(0.5), np.float32(0.01)), True)
-    moved = np.asarray(ppo.mean_action(SIZES, after.policy, given.observations)) - given.means
+    moved = np.asarray(ppo.predict_mean_actions(SIZES, after.policy, given.observations)) - given.means
     gained = (moved * (given.actions - given.means)).sum(axis=-1) * given.advantages
     assert gained.mean() > 0.0
     acted = moved[: hp.num_envs * hp.horizon]  # what follows are images
     assert divergence == pytest.approx((acted**2).sum(axis=-1).mean() / (2 * 0.5**2), rel=1e-3)
-    values = np.asarray(ppo.value(SIZES, after.values, given.observations))
+    values = np.asarray(ppo.predict_values(SIZES, after.values, given.observations))
     assert abs(values - 1.0).mean() < 0.8 * abs(before - 1.0).mean()
 
 
@@ -110,7 +110,7 @@ def test_nothing_is_gained_beyond_the_clip():
     hp, random = dataclasses.replace(SMALL, clip=0.2), np.random.default_rng(0)
     state = ppo.begin(hp, SIZES, random)
     given = batch(random)
-    means = np.asarray(ppo.mean_action(SIZES, state.policy, given.observations))
+    means = np.asarray(ppo.predict_mean_actions(SIZES, state.policy, given.observations))
     given = given._replace(means=means + 1.0, actions=means, advantages=np.ones(64, np.float32))
     before = weights(state.policy)
     orders, numbers = np.arange(64)[None], (np.float32(0.5), np.float32(0.01))
@@ -174,11 +174,11 @@ def test_a_network_is_exported_and_imported_as_it_acts():
     random = np.random.default_rng(0)
     parameters = architecture.drawn(random, 16)
     x = random.normal(size=(5, 158)).astype(np.float32)
-    graph = architectures.policy(architecture, Moments.none(158).normalizer(), parameters)
+    graph = architectures.policy_graph(architecture, Moments.empty(158).normalizer(), parameters)
     acted = graph(x)
-    assert_allclose(acted, ppo.mean_action(architecture, parameters, x).clip(-1.0, 1.0), atol=1e-5)
-    normalize, again = architectures.read(architecture, graph)
-    assert_allclose(ppo.mean_action(architecture, again, normalize(x)).clip(-1.0, 1.0), acted, atol=1e-5)
+    assert_allclose(acted, ppo.predict_mean_actions(architecture, parameters, x).clip(-1.0, 1.0), atol=1e-5)
+    normalize, again = architectures.read_policy_graph(architecture, graph)
+    assert_allclose(ppo.predict_mean_actions(architecture, again, normalize(x)).clip(-1.0, 1.0), acted, atol=1e-5)
 
 
 def test_every_transition_has_a_mirrored_one(begun):
@@ -226,7 +226,9 @@ def test_time_limits_fall_on_different_steps_and_bootstrap(begun):
     split = agent.collector.environment.task.split
     assert_allclose(split(rollout["observations"][2, 3])["gait_clock"], (0.0, 1.0))
     assert split(last)["gait_clock"][0] > 0.1
-    value = np.asarray(ppo.value(agent.collector.architecture, agent.state.values, agent.normalize(last[None])))[0]
+    value = np.asarray(
+        ppo.predict_values(agent.collector.architecture, agent.state.values, agent.normalize(last[None]))
+    )[0]
     expected = (1.0 - agent.hp.discount) * rollout["rewards"][1, 3] + agent.hp.discount * value
     assert np.asarray(given.returns)[:32].reshape(8, 4)[1, 3] == pytest.approx(expected, rel=1e-5)
 

@@ -5,7 +5,7 @@ import pytest
 from refusals import refused
 
 from arc_suite.learning.agents.learner import Damaged
-from arc_suite.learning.agents.replay import Protected, Replay
+from arc_suite.learning.agents.replay import CombinedReplay, Replay
 
 SIZE, JOINTS = 3, 2
 
@@ -25,7 +25,7 @@ def fill(replay, episodes, start=0):
 
 
 def check(source, added):
-    batch = source.at(np.arange(len(source)))
+    batch = source.transitions_at(np.arange(len(source)))
     for index, (step, goes_on) in enumerate(added[-len(source) :]):
         assert (batch.observations[index] == step).all()
         assert (batch.next_observations[index] == step + 1).all()
@@ -114,7 +114,7 @@ def test_several_steps_of_several_environments(tmp_path, buffer_size):
     replay = Replay(tmp_path, buffer_size, SIZE, JOINTS, slack=2, num_envs=3)
     interleave(replay, streams)
     assert len(replay) == min(buffer_size, 18)
-    batch = replay.at(np.arange(len(replay)), n_step=3, discount=0.5)
+    batch = replay.transitions_at(np.arange(len(replay)), n_step=3, discount=0.5)
     for place, (step, index) in enumerate([(step, index) for step in range(6) for index in range(3)][-len(replay) :]):
         last = next((each for each in range(step, step + 3) if each in ends[index] or each == 5), step + 2)
         terminated = ends[index].get(last)
@@ -127,11 +127,11 @@ def test_several_steps_of_several_environments(tmp_path, buffer_size):
 def test_several_environments_resume(tmp_path):
     replay = Replay(tmp_path, 10, SIZE, JOINTS, slack=6, num_envs=3)
     interleave(replay, [[(1.0, True if step == 4 else None) for step in range(6)]] * 3)
-    counters, before = counters_of(replay), replay.at(np.arange(10), 2, 0.9)
+    counters, before = counters_of(replay), replay.transitions_at(np.arange(10), 2, 0.9)
     interleave(replay, [[(2.0, True), (2.0, None)]] * 3, start=6)
     again = Replay(tmp_path, 10, SIZE, JOINTS, 6, "r+", num_envs=3)
     again.restore(*counters)
-    for one, other in zip(again.at(np.arange(10), 2, 0.9), before, strict=True):
+    for one, other in zip(again.transitions_at(np.arange(10), 2, 0.9), before, strict=True):
         assert np.array_equal(one, other)
 
 
@@ -149,13 +149,13 @@ def test_a_fence(tmp_path):
     """Two sources as one: the first keeps all it has, however often the second comes round."""
     prior, online = (Replay(tmp_path / name, 4, SIZE, JOINTS) for name in ("prior", "online"))
     first, second = fill(prior, [(4, True)]), fill(online, [(30, False)], start=100)
-    both = Protected(prior, online)
+    both = CombinedReplay(prior, online)
     assert len(both) == 8
     indices = np.array([7, 0, 5, 3, 0, 4, 6])
     steps = [step for step, _ in (*first[-4:], *second[-4:])]
     expected = [10.0 * each for each in (steps[2] + steps[3], steps[7], steps[4] + steps[5])]
-    assert both.at(np.array([2, 7, 4]), n_step=2).rewards.tolist() == expected
-    batch = both.at(indices)
+    assert both.transitions_at(np.array([2, 7, 4]), n_step=2).rewards.tolist() == expected
+    batch = both.transitions_at(indices)
     assert batch.observations[:, 0].tolist() == [steps[index] for index in indices]
     assert batch.next_observations[:, 0].tolist() == [steps[index] + 1 for index in indices]
 

@@ -8,7 +8,7 @@ import pytest
 from refusals import refused
 
 from arc_suite.learning.agents import run_folder
-from arc_suite.learning.agents.run_folder import opened
+from arc_suite.learning.agents.run_folder import open_run
 
 CONFIG = {"robot": "tick", "hyperparameters": {"hidden": 4, "batch": 8}, "seed": 0, "versions": {"numpy": "2"}}
 ARRAYS = {"state/weight": np.arange(6.0, dtype=np.float32).reshape(2, 3), "count": np.array([3, 4])}
@@ -17,7 +17,7 @@ ARRAYS = {"state/weight": np.arange(6.0, dtype=np.float32).reshape(2, 3), "count
 @pytest.fixture
 def path(tmp_path):
     """A folder with a checkpoint after two lines of a table, and a third line after that."""
-    with opened(tmp_path / "run", CONFIG) as folder:
+    with open_run(tmp_path / "run", CONFIG) as folder:
         folder.append("training", {"step": 1, "loss": 0.5})
         folder.append("training", {"step": 2, "loss": np.float32(0.25)})
         folder.save(ARRAYS, {"evaluated": 2})
@@ -27,14 +27,14 @@ def path(tmp_path):
 
 def one_line(path, match, config=CONFIG, error=ValueError):
     before = {each.name: each.read_bytes() for each in path.iterdir()}
-    with pytest.raises(error, match=match) as caught, opened(path, config):
+    with pytest.raises(error, match=match) as caught, open_run(path, config):
         pass
     assert "\n" not in str(caught.value)
     assert {each.name: each.read_bytes() for each in path.iterdir()} == before, "nothing is lost"
 
 
 def test_goes_on_from_the_checkpoint(path):
-    with opened(path, CONFIG) as folder:
+    with open_run(path, CONFIG) as folder:
         assert folder.progress["evaluated"] == 2
         assert all(np.array_equal(folder.arrays[name], array) for name, array in ARRAYS.items())
         assert (path / "training.csv").read_text() == "step,loss\n1,0.5\n2,0.25\n"
@@ -44,7 +44,7 @@ def test_goes_on_from_the_checkpoint(path):
 
 def test_without_a_checkpoint_it_starts_over(path):
     (path / "checkpoint.npz").unlink()
-    with opened(path, CONFIG) as folder:
+    with open_run(path, CONFIG) as folder:
         assert folder.arrays is None
         assert (path / "training.csv").read_text() == ""
 
@@ -57,41 +57,41 @@ def test_a_run_whose_legs_saw_other_views_is_refused(path):
 
 def test_what_never_began_leaves_the_folder_to_others(tmp_path):
     """A rejected run leaves a folder that the mended command can use."""
-    with opened(tmp_path / "run", CONFIG):
+    with open_run(tmp_path / "run", CONFIG):
         pass
-    with opened(tmp_path / "run", CONFIG | {"seed": 1}) as folder:
+    with open_run(tmp_path / "run", CONFIG | {"seed": 1}) as folder:
         folder.append("training", {"step": 1, "loss": 0.5})
     one_line(tmp_path / "run", "of another run, with seed 1, not 0")
 
 
 def test_a_rejected_run_leaves_no_folder(tmp_path):
-    with pytest.raises(ValueError, match="no prior data"), opened(tmp_path / "runs" / "run", CONFIG) as folder:
+    with pytest.raises(ValueError, match="no prior data"), open_run(tmp_path / "runs" / "run", CONFIG) as folder:
         (folder.path / "replay").mkdir()
         raise ValueError("no prior data")
     assert not list(tmp_path.iterdir())
     (tmp_path / "runs" / "other").mkdir(parents=True)
     for path in (tmp_path / "runs" / "run", tmp_path / "runs" / "other"):
-        with pytest.raises(ValueError, match="no prior data"), opened(path, CONFIG):
+        with pytest.raises(ValueError, match="no prior data"), open_run(path, CONFIG):
             raise ValueError("no prior data")
     assert [path.name for path in (tmp_path / "runs").iterdir()] == ["other"], "which was there before"
 
 
 def test_an_error_after_the_first_checkpoint_loses_nothing(tmp_path):
-    with pytest.raises(ValueError, match="diverged"), opened(tmp_path / "run", CONFIG) as folder:
+    with pytest.raises(ValueError, match="diverged"), open_run(tmp_path / "run", CONFIG) as folder:
         folder.save(ARRAYS, {"evaluated": 2})
         raise ValueError("diverged")
-    with opened(tmp_path / "run", CONFIG) as folder:
+    with open_run(tmp_path / "run", CONFIG) as folder:
         assert folder.progress["evaluated"] == 2
 
 
 def test_what_a_kill_has_left_half_written_is_deleted(path):
     (path / ".checkpoint.1234.npz").write_bytes(b"half")
-    with opened(path, CONFIG):
+    with open_run(path, CONFIG):
         assert list(path.glob(".*")) == [path / ".lock"]
 
 
 def test_progress_is_read_alone(path):
-    assert run_folder.progress_of(path)["evaluated"] == 2
+    assert run_folder.read_progress(path)["evaluated"] == 2
 
 
 def test_tables_are_read_also_while_a_line_is_written(path):
@@ -118,13 +118,13 @@ def test_another_run(path, changed, named):
 
 def test_steps_may_grow(path):
     (path / "config.json").write_text(json.dumps(CONFIG | {"steps": 5}))
-    with opened(path, CONFIG | {"steps": 9}, growing=["steps"]) as folder:
+    with open_run(path, CONFIG | {"steps": 9}, growing=["steps"]) as folder:
         assert folder.progress["evaluated"] == 2
-    assert run_folder.config_of(path)["steps"] == 9
+    assert run_folder.read_config(path)["steps"] == 9
     for config, growing in (({"steps": 8}, ["steps"]), ({"steps": 10}, []), ({"steps": 10, "seed": 1}, ["steps"])):
-        with pytest.raises(ValueError, match="of another run, with"), opened(path, CONFIG | config, growing):
+        with pytest.raises(ValueError, match="of another run, with"), open_run(path, CONFIG | config, growing):
             pass
-    assert run_folder.config_of(path)["steps"] == 9
+    assert run_folder.read_config(path)["steps"] == 9
 
 
 def test_a_folder_of_something_else(tmp_path):
@@ -174,7 +174,7 @@ def test_pipes_are_not_waited_for(path):
         (path / name).unlink()
         os.mkfifo(path / name)
         with pytest.raises(ValueError, match=line):
-            run_folder.progress_of(path) if name == "checkpoint.npz" else run_folder.config_of(path)
+            run_folder.read_progress(path) if name == "checkpoint.npz" else run_folder.read_config(path)
 
 
 def test_a_table_that_has_lost_lines(path):
@@ -183,7 +183,7 @@ def test_a_table_that_has_lost_lines(path):
 
 
 def test_a_run_has_one_process(path):
-    with opened(path, CONFIG):
+    with open_run(path, CONFIG):
         one_line(path, r"run: another process goes on with this run$")
 
 
@@ -192,7 +192,7 @@ def test_a_full_disk_keeps_the_checkpoint(path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     before = (path / "checkpoint.npz").read_bytes()
-    with opened(path, CONFIG) as folder:
+    with open_run(path, CONFIG) as folder:
         monkeypatch.setattr(np, "savez", full)
         with pytest.raises(OSError, match=r"^cannot write .*checkpoint\.npz: no space left on device$"):
             folder.save({"count": np.zeros(3)}, {})
@@ -205,14 +205,14 @@ def test_a_full_disk_keeps_the_checkpoint(path, monkeypatch):
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_that_cannot_be_written(tmp_path):
     tmp_path.chmod(0o500)
-    with pytest.raises(OSError, match=r"cannot make folder"), opened(tmp_path / "run", CONFIG):
+    with pytest.raises(OSError, match=r"cannot make folder"), open_run(tmp_path / "run", CONFIG):
         pass
 
 
 def test_evaluated_is_that_of_the_table(tmp_path):
-    run_folder.check_evaluated(tmp_path, 0)
+    run_folder.check_latest_evaluation(tmp_path, 0)
     (tmp_path / "evaluations.csv").write_text("step,seed,return\n100,0,1.5\n200,0,2.5\n")
-    run_folder.check_evaluated(tmp_path, 200)
+    run_folder.check_latest_evaluation(tmp_path, 200)
     line = "evaluated: expected 200, as in evaluations.csv, got 1000000000; delete it to start the run over"
     with refused(f"{tmp_path / 'checkpoint.npz'} is damaged: {line}"):
-        run_folder.check_evaluated(tmp_path, 10**9)
+        run_folder.check_latest_evaluation(tmp_path, 10**9)

@@ -41,7 +41,7 @@ def test_learning_begins_with_little_noise_around_zero():
     hp, size, joints = algorithms.ALGORITHMS[NAME].hyperparameters, 50, 18
     state = sac.begin(hp, np.random.default_rng(0), size, joints)
     observations = np.random.default_rng(1).standard_normal((64, size), np.float32)
-    mean, log_std = sac.distribution(hp, state.policy, observations)
+    mean, log_std = sac.action_distribution(hp, state.policy, observations)
     assert np.abs(mean).max() < 0.1
     assert_allclose(np.exp(log_std), 0.3, rtol=0.1)
     assert float(np.exp(state.log_alpha)) == pytest.approx(0.003)
@@ -52,7 +52,7 @@ def test_the_policy_acts_from_the_first_step_and_updates_are_rarer_than_steps(le
     agent.until(64)
     assert agent.steps == 64 and agent.updates == len(drawn) == 24
     assert all(with_policy for _, with_policy in drawn)
-    assert 0.2 < np.arctanh(agent.buffer.at(np.arange(32)).actions).std() < 0.4
+    assert 0.2 < np.arctanh(agent.buffer.transitions_at(np.arange(32)).actions).std() < 0.4
 
 
 @pytest.mark.parametrize(("n_step", "discounts"), [(1, {1.0}), (3, {1.0, np.float32(0.97), np.float32(0.97) ** 2})])
@@ -63,7 +63,7 @@ def test_what_an_update_sees(learner, drawn, n_step, discounts):
     task, (batch, _) = agent.task, drawn[-1]
     assert batch.observations.shape == (64, task.size) and "contact_forces" not in task.sizes
     places = off_policy.generator(0, "update", agent.updates - 1).integers(0, 200, size=64)
-    raw = agent.buffer.at(places, n_step, 0.97)
+    raw = agent.buffer.transitions_at(places, n_step, 0.97)
     assert_array_equal(batch.rewards, np.float32(0.1) * raw.rewards)
     assert_array_equal(batch.goes_on, raw.goes_on)
     assert set(np.unique(raw.goes_on)) - {0.0} == discounts
@@ -82,9 +82,9 @@ def test_what_an_update_sees(learner, drawn, n_step, discounts):
 def test_its_policy_takes_whole_observations(learner, name, network):
     agent = learner(name, small(name, network=network))
     found = agent.until(50)
-    observations = agent.buffer.at(np.arange(50)).observations
-    mean, _ = sac.distribution(agent.core, agent.state.policy, agent.inputs(observations))
-    assert_allclose(found.policy(observations), agent.inputs.applied(np.tanh(mean)), atol=1e-5)
+    observations = agent.buffer.transitions_at(np.arange(50)).observations
+    mean, _ = sac.action_distribution(agent.core, agent.state.policy, agent.inputs(observations))
+    assert_allclose(found.policy(observations), agent.inputs.body_actions(np.tanh(mean)), atol=1e-5)
 
 
 @pytest.mark.parametrize("changes", [{}, {"n_step": 1}, {"symmetry_augmentation": False}])

@@ -9,7 +9,7 @@ def length(rule, losses, patience=3, first=None):
     """How many looks a phase takes."""
     state = Patience(losses[0] if first is None else first)
     for look, loss in enumerate(losses, start=1):
-        state = state.checked(rule, loss, 0.001, 1)
+        state = state.after_check(rule, loss, 0.001, 1)
         if state.waited >= patience:
             return look
     return None
@@ -42,6 +42,6 @@ def test_a_loss_that_falls(rule):
 
 
 def test_an_improvement_takes_the_waiting_back():
-    state = Patience(-100.0).checked("sign_safe", -99.0, 0.001, 1000).checked("sign_safe", -99.0, 0.001, 1000)
+    state = Patience(-100.0).after_check("sign_safe", -99.0, 0.001, 1000).after_check("sign_safe", -99.0, 0.001, 1000)
     assert state == Patience(-100.0, 2000)
-    assert state.checked("sign_safe", -101.0, 0.001, 1000) == Patience(-101.0, 0)
+    assert state.after_check("sign_safe", -101.0, 0.001, 1000) == Patience(-101.0, 0)

@@ -134,9 +134,9 @@ def test_a_run_whose_record_names_its_learner_goes_on(tiny, tmp_path):
 def test_other_prior_data_under_the_same_id_are_another_run(tiny, tmp_path, prior, monkeypatch):
     run = tiny("sacfd", steps=30)
     assert train(run, tmp_path / "run", progress=silent)
-    held = run_folder.config_of(tmp_path / "run")["prior_sha256"]
-    assert held == priors.digest(prior)
-    monkeypatch.setattr(priors, "digest", lambda prior: "0" * 64)
+    held = run_folder.read_config(tmp_path / "run")["prior_sha256"]
+    assert held == priors.dataset_digest(prior)
+    monkeypatch.setattr(priors, "dataset_digest", lambda prior: "0" * 64)
     with pytest.raises(ValueError, match=f"of another run, with prior_sha256 '{held}', not '0000"):
         train(run, tmp_path / "run", progress=silent)
 

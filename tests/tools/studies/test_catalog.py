@@ -8,7 +8,7 @@ import interpreters
 import programs
 import pytest
 
-from arc_suite.learning.agents.configuration import CONFIGURATION, Configuration
+from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, Configuration
 from arc_suite.learning.studies import csv_files, results
 from studies import catalog
 
@@ -22,7 +22,7 @@ def test_committed_configurations_are_those_of_the_studies(name):
     """Today's code reads each, and trains the same run."""
     runs = {each.name: each for each in catalog.study(name).runs}
     for row in csv_files.read(COMMITTED / name / results.RUNS, results.RUN_COLUMNS):
-        fields = {field: row[field] or None for field in CONFIGURATION}
+        fields = {field: row[field] or None for field in CONFIGURATION_FIELDS}
         fields |= {
             each: json.loads(row[each]) for each in ("task_kwargs", "hyperparameters", "training", "seed", "steps")
         }
