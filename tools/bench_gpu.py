@@ -99,9 +99,9 @@ def return_row(robot, impl, count):
     """Return a row of cells: mean returns of whole `tuned` episodes in worlds and on a processor, and falls."""
     env = mjx.load(robot, "walk", impl=impl, num_starts=count, num_envs=count)
     walk, states = prepare_walk(env, "tuned", int(env.episode_length))
-    _, (rewards, _, done) = walk(states)
+    _, (rewards, _, has_ended) = walk(states)
     mean_return = np.asarray(rewards).sum(axis=0).mean()
-    falls = int(np.asarray(done).any(axis=0).sum())
+    falls = int(np.asarray(has_ended).any(axis=0).sum())
     with contextlib.closing(Setup.of(robot).make_vec(count, autoreset_mode="Disabled")) as environment:
         policy = Demonstrator(environment, "tuned")
         episodes = evaluation.episodes_in_batch(environment, policy, range(count))

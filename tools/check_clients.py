@@ -74,27 +74,30 @@ def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path)
 
 
 def _run(command: list, surroundings: Mapping[str, str], folder: pathlib.Path) -> str:
-    """What is wrong with a command, in one line."""
-    done = subprocess.run(command, cwd=folder, env=dict(surroundings), capture_output=True, encoding="utf-8")
-    lines = done.stderr.strip().splitlines() or ["no message"]
-    return f"{' '.join(map(str, command))}: status {done.returncode}: {lines[-1]}" if done.returncode else ""
+    """Run a command, and return what is wrong, in one line; nothing if it succeeds."""
+    result = subprocess.run(command, cwd=folder, env=dict(surroundings), capture_output=True, encoding="utf-8")
+    if result.returncode == 0:
+        return ""
+    lines = result.stderr.strip().splitlines() or ["no message"]
+    return f"{' '.join(map(str, command))}: status {result.returncode}: {lines[-1]}"
 
 
 def main() -> int:
     """Print a line for each client; return the exit status."""
-    failed = False
+    has_failed = False
     for page in PAGES:
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             shutil.copytree(_ROOT / "examples", folder / "examples")
-            # Some leave caches and tokens in the user's home.
-            own = {"HOME": name, "MINARI_DATASETS_PATH": str(folder / "datasets"), "MPLBACKEND": "Agg"}
+            # Some clients leave caches and tokens in the user's home.
+            variables = {"HOME": name, "MINARI_DATASETS_PATH": str(folder / "datasets"), "MPLBACKEND": "Agg"}
             for client in clients(page.read_text(encoding="utf-8")):
                 start = time.perf_counter()
-                problem = check(client, os.environ | own, folder)
-                failed |= bool(problem)
+                problem = check(client, os.environ | variables, folder)
+                if problem:
+                    has_failed = True
                 print(f"{client.name:40}{time.perf_counter() - start:7.1f} s  {problem or 'ok'}", flush=True)
-    return int(failed)
+    return int(has_failed)
 
 
 if __name__ == "__main__":

@@ -41,38 +41,43 @@ _ONLY = flags.DEFINE_multi_enum("only", [], list(SUCCESSES), "Success to make; a
 
 def work(name: str) -> Iterator[tuple[list[str], str, str]]:
     """Yield the steps of a success: a command, its input, and the file that the input goes into instead, or ""."""
-    for page, what in SUCCESSES[name]:
-        if what.startswith("make "):
-            yield ["make", "-C", str(page_commands.ROOT), *what.split()[1:]], "", ""
+    for page, section in SUCCESSES[name]:
+        if section.startswith("make "):
+            targets = section.split()[1:]
+            yield ["make", "-C", str(page_commands.ROOT), *targets], "", ""
             continue
-        for block in page_commands.blocks(page_commands.sections(page_commands.page(page))[what]):
+        text = page_commands.sections(page_commands.page(page))[section]
+        for block in page_commands.blocks(text):
             for command in block.commands:
                 if not command.startswith(ELSEWHERE):
-                    shortened = page_commands.shortened(command) if _SHORT.value else command
-                    yield ["bash", "-c", shortened], "", ""
+                    if _SHORT.value:
+                        command = page_commands.shorten(command)
+                    yield ["bash", "-c", command], "", ""
             if block.kind == "python":
                 yield [sys.executable, "-"], block.text, block.file or ""
 
 
 def check(name: str, folder: pathlib.Path) -> str:
     """Make a success in a folder, and return what is wrong, in one line."""
-    own = {"MINARI_DATASETS_PATH": str(folder / "datasets"), "MPLBACKEND": "Agg", "PYTHONPATH": str(folder)}
+    variables = {"MINARI_DATASETS_PATH": str(folder / "datasets"), "MPLBACKEND": "Agg", "PYTHONPATH": str(folder)}
     path = f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for command, text, file in work(name):
         if file:
             (folder / file).write_text(text, encoding="utf-8")
             continue
-        environ = os.environ | own | {"PATH": path}
-        done = subprocess.run(command, cwd=folder, env=environ, input=text, capture_output=True, encoding="utf-8")
-        if done.returncode:
-            said = re.sub(r"\s+", " ", (done.stderr or done.stdout)[-300:]).strip()
-            return f"{' '.join(command[2:] or ['code of a page'])}: status {done.returncode}: {said}"
+        environ = os.environ | variables | {"PATH": path}
+        result = subprocess.run(command, cwd=folder, env=environ, input=text, capture_output=True, encoding="utf-8")
+        if result.returncode != 0:
+            output = (result.stderr or result.stdout)[-300:]
+            one_line = re.sub(r"\s+", " ", output).strip()
+            command_text = " ".join(command[2:]) or "code of a page"
+            return f"{command_text}: status {result.returncode}: {one_line}"
     return ""
 
 
 def main() -> int:
     """Print a line for each success; return the exit status."""
-    failed = False
+    has_failed = False
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for part in ("tools", "examples"):  # which pages name as in a clone
@@ -80,9 +85,10 @@ def main() -> int:
         for success in _ONLY.value or SUCCESSES:
             start = time.perf_counter()
             problem = check(success, folder)
-            failed |= bool(problem)
+            if problem:
+                has_failed = True
             print(f"{success:28}{time.perf_counter() - start:7.1f} s  {problem or 'ok'}", flush=True)
-    return int(failed)
+    return int(has_failed)
 
 
 if __name__ == "__main__":

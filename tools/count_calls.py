@@ -20,7 +20,8 @@ import arc_suite
 from arc_suite.cli import program
 
 _PACKAGE = str(pathlib.Path(arc_suite.__file__).parent)
-STEPS, _WARM = 100, 5  # control steps that are counted, after some that are not
+STEPS = 100  # control steps that are counted
+_WARM_UP_STEPS = 5  # control steps before them
 
 _BY_FUNCTION = flags.DEFINE_bool("by_function", False, "List the functions.")
 _OPEN = flags.DEFINE_string("open", None, "Robot whose walk is opened, in place of steps: a name, or family:seed.")
@@ -51,12 +52,14 @@ def calls_of_opening(robot: str) -> collections.Counter:
 
 def calls_of_steps(task: str, robot: str = "queen") -> collections.Counter:
     """Return the calls of `STEPS` control steps of random actions."""
-    environment, random = arc_suite.load(robot, task, {"random": 0}), np.random.RandomState(0)
+    environment = arc_suite.load(robot, task, {"random": 0})
+    random = np.random.RandomState(0)
     environment.reset()
-    actions = random.uniform(-0.2, 0.2, (_WARM + STEPS, *environment.action_spec().shape))
+    actions = random.uniform(-0.2, 0.2, (_WARM_UP_STEPS + STEPS, *environment.action_spec().shape))
     calls: collections.Counter = collections.Counter()
     for step, action in enumerate(actions):
-        with counting(calls) if step >= _WARM else contextlib.nullcontext():
+        is_counted = step >= _WARM_UP_STEPS
+        with counting(calls) if is_counted else contextlib.nullcontext():
             timestep = environment.step(action)
         if timestep.last():
             raise RuntimeError(f"{task}: the episode ended in step {step}")
@@ -64,7 +67,7 @@ def calls_of_steps(task: str, robot: str = "queen") -> collections.Counter:
 
 
 def main() -> None:
-    """Print the calls of opening a robot, or of a step of a plain task and of one with everything."""
+    """Print the calls of opening a robot, or of a step of a plain task and of one with all parts."""
     if _OPEN.value:
         calls = calls_of_opening(_OPEN.value)
         print(f"{_OPEN.value}: {calls.total()} calls to open it")

@@ -19,11 +19,13 @@ from absl import flags
 from arc_suite.cli import program
 
 ROOT = Path(__file__).resolve().parents[1]
-LONG = 40
-APART = ("importing", "bodies", "learning", "animation")  # from the core
+MAX_FUNCTION_LINES = 40
+OUTSIDE_CORE = ("importing", "bodies", "learning", "animation")  # folders of the package
 _LAYOUT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
-_FUNCTIONS = flags.DEFINE_bool("functions", False, f"List the package's functions of more than {LONG} lines of code.")
+_FUNCTIONS = flags.DEFINE_bool(
+    "functions", False, f"List the package's functions of more than {MAX_FUNCTION_LINES} lines of code."
+)
 
 
 def code_lines(text: str) -> set[int]:
@@ -35,7 +37,8 @@ def code_lines(text: str) -> set[int]:
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node):
             lines.difference_update(range(node.body[0].lineno, node.body[0].end_lineno + 1))
-    blank = {number for number, line in enumerate(text.splitlines(), 1) if not line.strip()}  # also inside a string
+    # A text in several lines may have empty ones.
+    blank = {number for number, line in enumerate(text.splitlines(), 1) if not line.strip()}
     return lines - blank
 
 
@@ -54,26 +57,34 @@ def sources(folder: Path) -> dict[Path, str]:
 
 def long_functions(folder: Path) -> list[str]:
     """Return a line for each function below a folder that has more than 40 lines of code."""
-    found = [(path, *each) for path, text in sources(folder).items() for each in functions(text)]
-    return [f"{path.relative_to(folder)}: {name}: {count}" for path, name, count in found if count > LONG]
+    lines = []
+    for path, text in sources(folder).items():
+        for name, count in functions(text):
+            if count > MAX_FUNCTION_LINES:
+                lines.append(f"{path.relative_to(folder)}: {name}: {count}")
+    return lines
 
 
 def counts(root: Path) -> dict[str, int]:
     """Return the lines of code of each part of a checkout."""
     sizes = {path.relative_to(root): len(code_lines(text)) for path, text in sources(root / "arc_suite").items()}
-    apart = {room: sum(size for path, size in sizes.items() if path.parts[1] == room) for room in APART}
+    size_of_folder = {
+        folder: sum(size for path, size in sizes.items() if path.parts[1] == folder) for folder in OUTSIDE_CORE
+    }
     package = sum(sizes.values())
+    core = package - sum(size_of_folder.values())
     tests = sum(len(code_lines(text)) for text in sources(root / "tests").values())
-    return {"package": package, "core": package - sum(apart.values())} | apart | {"tests": tests}
+    return {"package": package, "core": core, **size_of_folder, "tests": tests}
 
 
 def main(root: str = str(ROOT)) -> None:
+    """Print the lines of each part, and the number of long functions."""
     for name, count in counts(Path(root)).items():
         print(f"{name:10} {count:7,}")
-    found = long_functions(Path(root) / "arc_suite")
-    print(f"{len(found)} functions of more than {LONG} lines of code")
+    lines = long_functions(Path(root) / "arc_suite")
+    print(f"{len(lines)} functions of more than {MAX_FUNCTION_LINES} lines of code")
     if _FUNCTIONS.value:
-        print("\n".join(found))
+        print("\n".join(lines))
 
 
 if __name__ == "__main__":

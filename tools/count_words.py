@@ -59,11 +59,12 @@ def short(sentences: list[int]) -> float:
 
 def main() -> None:
     """Print a line for each page, and the sums."""
-    found = counts()
-    for name, page in found.items():
+    counts_of_pages = counts()
+    for name, page in counts_of_pages.items():
         print(f"{name:32}{page.words:7}{short(page.sentences):8.1%}")
-    every = [length for page in found.values() for length in page.sentences]
-    print(f"{'all':32}{sum(page.words for page in found.values()):7}{short(every):8.1%}")
+    sentences = [length for page in counts_of_pages.values() for length in page.sentences]
+    words = sum(page.words for page in counts_of_pages.values())
+    print(f"{'all':32}{words:7}{short(sentences):8.1%}")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,9 @@ INDEX = PACKAGED / "policies.json"
 def command(run: configuration.Configuration) -> str:
     """Return the command that trains a policy again, after that of the run from which it starts."""
     start = Path(getattr(run.hyperparameters, "start", ""), run_folder.CONFIG)
-    return f"{command(configuration.read(start))} -o {start.parent} && {run.command}" if start.exists() else run.command
+    if not start.exists():
+        return run.command
+    return f"{command(configuration.read(start))} -o {start.parent} && {run.command}"
 
 
 def returns(path: Path) -> list[float]:
@@ -31,7 +33,7 @@ def returns(path: Path) -> list[float]:
     packaged = network.load(path)
     setup = packaged.setup.validation(evaluation.EPISODES)
     if not setup.several:
-        setup = Setup.of(setup.body, setup.task)  # observes all
+        setup = Setup.of(setup.body, setup.task)  # without blocks that the policy leaves out itself
     environment = setup.make_vec(evaluation.EPISODES, autoreset_mode="Disabled")
     return [episode.total for episode in evaluation.episodes_in_batch(environment, packaged)]
 
@@ -40,16 +42,21 @@ def main(run: str | None = None) -> None:
     """Package the policy of a run."""
     if run is None:
         raise ValueError("expected the folder of a run, got none")
-    found, known = network.load(Path(run)), configuration.read(Path(run) / "config.json")
-    several = known.setup.several
-    kind = np.float32 if several else np.float16  # inputs of many bodies differ too much in size for 16 bits
-    arrays = {name: a.astype(kind) if a.dtype == np.float32 else a for name, a in found.graph.arrays.items()}
-    name = f"{universal.NAME if several else known.setup.body.name}-{known.setup.task}"
+    policy = network.load(Path(run))
+    run_configuration = configuration.read(Path(run) / "config.json")
+    setup = run_configuration.setup
+    arrays = dict(policy.graph.arrays)
+    if not setup.several:  # inputs of many bodies differ too much in size for 16 bits
+        for name, array in arrays.items():
+            if array.dtype == np.float32:
+                arrays[name] = array.astype(np.float16)
+    body_name = universal.NAME if setup.several else setup.body.name
+    name = f"{body_name}-{setup.task}"
     PACKAGED.mkdir(exist_ok=True)
     path = PACKAGED / f"{name}{network.EXTENSION}"
-    network.save(path, found._replace(graph=found.graph._replace(arrays=arrays)))
+    network.save(path, policy._replace(graph=policy.graph._replace(arrays=arrays)))
     entry = {
-        "command": command(known),
+        "command": command(run_configuration),
         "return": round(float(np.mean(returns(path))), 1),
         "sha256": policies.digest(str(path)),
     }

@@ -9,7 +9,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 
 _SECTION = re.compile(r"(?:\A# |^## )(?P<name>[^\n]*)\n(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 _BLOCK = re.compile(r"^```(?P<kind>sh|python)\n(?P<text>.*?)^```", re.MULTILINE | re.DOTALL)
-_SAVED = re.compile(r"[Ss]ave this as\s+`(?P<file>[^`]+)`[^`]*\Z")
+_SAVE_REQUEST = re.compile(r"[Ss]ave this as\s+`(?P<file>[^`]+)`[^`]*\Z")
 _COMMAND = re.compile(r"(?:^|`)((?:python (?:tools/|-m arc_suite)|arc-suite )[^`\n]*(?:\n[^`\n]+(?=`))?)", re.MULTILINE)
 _COMMENT = re.compile(r"\s+#.*")
 
@@ -57,8 +57,9 @@ def sections(text: str) -> dict[str, str]:
 def blocks(text: str) -> Iterator[Block]:
     """Yield the blocks of a text, in its order."""
     for block in _BLOCK.finditer(text):
-        saved = _SAVED.search(text, 0, block.start())
-        yield Block(block["kind"], block["text"], saved and saved["file"])
+        request = _SAVE_REQUEST.search(text, 0, block.start())
+        file = None if request is None else request["file"]
+        yield Block(block["kind"], block["text"], file)
 
 
 def commands(text: str) -> list[str]:
@@ -66,7 +67,8 @@ def commands(text: str) -> list[str]:
     return [" ".join(command.split()) for command in _COMMAND.findall(text)]
 
 
-def shortened(command: str) -> str:
+def shorten(command: str) -> str:
     """Return a command that does less of the same."""
-    _, program, *_ = *command.split(), "", ""
+    words = command.split()
+    program = words[1] if len(words) > 1 else ""
     return f"{command} {SHORTER.get(program, '')}".strip()

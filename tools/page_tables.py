@@ -16,9 +16,11 @@ from arc_suite.learning.studies import benchmark, results
 from studies import bodies, catalog, claims
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCS, STUDIES = ROOT / "docs", ROOT / "studies"
-STEPS = 100_000  # after which our returns stand next to the paper's
-NEXT_TO_THE_PAPER = ("exact-tick", "short")  # studies whose returns do; the first that has a robot and algorithm counts
+DOCS = ROOT / "docs"
+STUDIES = ROOT / "studies"
+STEPS = 100_000  # of a run; returns after them are compared with the paper's
+# Studies whose returns are compared; the first one that has a robot and an algorithm counts.
+COMPARED_STUDIES = ("exact-tick", "short")
 
 
 def main() -> None:
@@ -31,8 +33,8 @@ def main() -> None:
 
 def returns_next_to_the_papers() -> str:
     """Return the table of our returns and those of the paper's curves, of all its algorithms and robots."""
-    found = [results.results(catalog.study(name).runs, STUDIES / name) for name in NEXT_TO_THE_PAPER]
-    return claims.next_to_the_papers(found, STEPS)
+    results_of_studies = [results.results(catalog.study(name).runs, STUDIES / name) for name in COMPARED_STUDIES]
+    return claims.next_to_the_papers(results_of_studies, STEPS)
 
 
 # By name of a page: a function that makes its table.

@@ -67,7 +67,8 @@ def is_participle(name: str) -> bool:
 
 def is_parallel(assignment: ast.Assign) -> bool:
     """Return whether an assignment gives several names a value each, without a swap."""
-    target, value = assignment.targets[0], assignment.value
+    target = assignment.targets[0]
+    value = assignment.value
     if not (isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)):
         return False
     names = {ast.unparse(item) for item in target.elts}

@@ -85,11 +85,13 @@ def main() -> None:
         outcomes = list(walks.survey(cases, FLAGS.processes, program.progress))
         print(walks.table(outcomes))
         print(walks.summary(outcomes))
-        failed = [outcome for outcome in outcomes if outcome.failures]
-        for seed, outcome in ((each.case.seed, each) for each in failed):
-            print(f"seed {seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}")
+        failures = [outcome for outcome in outcomes if outcome.failures]
+        for outcome in failures:
+            print(
+                f"seed {outcome.case.seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}"
+            )
         if path:
-            imageio.imwrite(path, picture(failed or outcomes))
+            imageio.imwrite(path, picture(failures or outcomes))
 
 
 if __name__ == "__main__":

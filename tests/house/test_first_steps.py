@@ -65,7 +65,7 @@ def test_a_quick_command_runs(command, tmp_path, monkeypatch):
     run = tmp_path / "runs" / "tick-walk-ppo-0"  # in place of minutes of training
     run.mkdir(parents=True)
     (run / "policy.npz").write_bytes((ROOT / "arc_suite/policies/packaged/tick-walk.npz").read_bytes())
-    _, *arguments = shlex.split(page_commands.shortened(command))
+    _, *arguments = shlex.split(page_commands.shorten(command))
     done = programs.arc_suite(*arguments, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 

@@ -132,7 +132,7 @@ def test_grown_bodies_have_their_legs_and_links(legs, links):
 
 @pytest.mark.long
 def test_what_every_task_costs(monkeypatch):
-    for name, value in {"NUM_ENVS": 2, "_ONSET": 1, "_STEPS": 1}.items():
+    for name, value in {"NUM_ENVS": 2, "_WARM_UP_STEPS": 1, "_STEPS": 1}.items():
         monkeypatch.setattr(tasks, name, value)
     table = [line.strip("|").split("|") for line in tasks.measure("tick", 1, 1).splitlines()[2:]]
     assert [cells[0].strip() for cells in table] == [*TASKS, "the scan of rough"]

@@ -24,12 +24,12 @@ def body(legs: int, links: int) -> Body:
     joints = [queen.HIP, *(knee.replace(name=f"knee{index}") for index in range(1, links))]
     chain = tuple(Link(name=f"link{index}", end=end, radius=0.06, joint=joint) for index, joint in enumerate(joints))
     mounts = np.linspace(0.3, -0.3, legs // 2) if legs > 2 else [0.0]  # m, along the torso
-    left = [
+    left_legs = [
         Leg(name=f"l{index}", mount=(float(x), 0.4, 0.0), links=chain, foot=queen.LEFT_LEGS[0].foot)
         for index, x in enumerate(mounts)
     ]
-    right = [leg.mirrored(leg.name.replace("l", "r")) for leg in left]
-    return queen.BODY.replace(name="grown", legs=(*left, *right))
+    right_legs = [leg.mirrored(leg.name.replace("l", "r")) for leg in left_legs]
+    return queen.BODY.replace(name="grown", legs=(*left_legs, *right_legs))
 
 
 class Bodies:

@@ -18,11 +18,11 @@ class PresetScore(NamedTuple):
     """How presets walk: arrays (presets, episodes).
 
     Attributes:
-        rewards: mean over the steps of an episode; a robot that has fallen earns nothing any more.
-        falls: booleans.
+        rewards: mean over the steps of an episode; steps after a fall have none.
+        falls: whether the robot fell.
         style: means until the fall, by name: the reward's terms `posture` and `smoothness`, and
             `tilt`, the squared sine of the angle between the torso's axis and the vertical.
-        tipping: how far the torso was from upright at the worst: 0 for never, 1 for a fall or upside down.
+        tipping: the largest deviation of the torso from upright: 0 is upright, 1 is a fall or upside down.
     """
 
     rewards: np.ndarray
@@ -48,42 +48,50 @@ class Evaluator:
             ValueError: a task whose reward has other terms, or no steps that count.
         """
         checks.integer("steps", steps, skipped + 1)
-        self._body, self._shape, self._steps, self._skipped = setup.body, (presets, episodes), steps, skipped
+        self._body = setup.body
+        self._shape = (presets, episodes)
+        self._steps = steps
+        self._skipped = skipped
         self._environment = setup.make_vec(presets * episodes)
-        there = self._environment.task.settings.weights
-        if not set(TERMS) <= there.keys():
+        weights = self._environment.task.settings.weights
+        if not set(TERMS) <= weights.keys():
             self.close()
-            name, terms = setup.kind.name, " and ".join(TERMS)
-            raise ValueError(f"task {name}: expected a reward with terms {terms}, got {', '.join(there)}")
+            terms = " and ".join(TERMS)
+            raise ValueError(f"task {setup.kind.name}: expected a reward with terms {terms}, got {', '.join(weights)}")
 
     def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> PresetScore:
         """Play the episodes of these seeds, which are the same for all presets."""
-        count, episodes = self._shape
-        split, joints = self._environment.task.split, len(self._body.joint_names)
+        num_presets, episodes = self._shape
+        num_envs = num_presets * episodes
+        split = self._environment.task.split
+        joints = len(self._body.joint_names)
         controls = [Prescribed.fit(self._body, preset) for preset in presets]
         control = Prescribed.stacked([control for control in controls for _ in range(episodes)])
-        observations, _ = self._environment.reset(seed=[*seeds] * count)
+        observations, _ = self._environment.reset(seed=[*seeds] * num_presets)
         sensed = proprioception(checked(split(observations), Clocked.reads, joints))
-        upright = np.ones(count * episodes, bool)
-        totals, lengths, tipping = np.zeros((3, upright.size))
+        is_upright = np.ones(num_envs, bool)
+        totals = np.zeros(num_envs)
+        lengths = np.zeros(num_envs)  # steps that count
+        tipping = np.zeros(num_envs)
         style = dict.fromkeys(STYLE, 0.0)
         for step in range(self._steps):
-            actions = control(np.full(upright.size, step), *sensed)
+            actions = control(np.full(num_envs, step), *sensed)
             observations, rewards, fallen, _, info = self._environment.step(actions)
-            counted = upright & (step >= self._skipped)
-            totals += rewards * counted
-            lengths += counted
+            counts = is_upright & (step >= self._skipped)
+            totals += rewards * counts
+            lengths += counts
             sensed = proprioception(checked(split(observations), Clocked.reads, joints))
             uprightness = rotations.upright(sensed[0])
-            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all start anew
+            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # missing if all environments were reset
             costs["tilt"] = 1.0 - uprightness**2
             for name, cost in costs.items():
-                style[name] += cost * counted
-            tipping = np.where(upright, np.maximum(tipping, np.where(fallen, 1.0, 0.5 - 0.5 * uprightness)), tipping)
-            upright &= ~fallen
+                style[name] += cost * counts
+            tipping_now = np.where(fallen, 1.0, 0.5 - 0.5 * uprightness)
+            tipping = np.where(is_upright, np.maximum(tipping, tipping_now), tipping)
+            is_upright &= ~fallen
         return PresetScore(
             rewards=(totals / (self._steps - self._skipped)).reshape(self._shape),
-            falls=~upright.reshape(self._shape),
+            falls=~is_upright.reshape(self._shape),
             style={name: (total / lengths.clip(1)).reshape(self._shape) for name, total in style.items()},
             tipping=tipping.reshape(self._shape),
         )

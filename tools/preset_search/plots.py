@@ -10,7 +10,9 @@ from preset_search.evaluator import STYLE
 from preset_search.search import Generation
 
 # Okabe and Ito's colors, which color-blind readers can tell apart.
-_BLUE, _GREEN, _GRAY = "#0072B2", "#009E73", "#8C8C8C"
+_BLUE = "#0072B2"
+_GREEN = "#009E73"
+_GRAY = "#8C8C8C"
 _STYLE_COLORS = ("#D55E00", "#CC79A7", "#E69F00")
 
 

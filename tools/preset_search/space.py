@@ -18,9 +18,9 @@ class Range(NamedTuple):
     """The range of a number, in degrees or cycles.
 
     Attributes:
-        scale: how far it is moved at first.
-        low, high: the least and the most that it may be.
-        decimals: that matter.
+        scale: its deviation in the first generation.
+        low, high: its bounds.
+        decimals: to which it is rounded in a result.
     """
 
     scale: float
@@ -48,11 +48,11 @@ _BY_JOINT_AND_RANK = {
     "swing": Range(10.0, -120.0, 120.0, 1),
 }
 _DECIMALS = 4  # of all parameters of a preset
-LEADS = 20  # of all legs over the clock, from which a search about the law may set out
-HARMONICS = 3  # of torques
+LEADS = 20  # phase leads of all legs over the clock, at which a search may start
+HARMONICS = 3  # multiples of the leg's phase in torques
 _AMPLITUDE = Range(0.08, -1.0, 1.0, 3)
 _STEERING = Range(0.1, -1.0, 1.0, 3)
-_STEERED = -0.2  # from which a search for torques sets out; without it, what it finds drifts
+_INITIAL_STEERING = -0.2  # at which a search for torques starts; results of a search without it drift
 
 
 class Space(NamedTuple):
@@ -104,7 +104,10 @@ class Space(NamedTuple):
         def by_rank() -> tuple[float, ...]:
             return tuple(next(numbers) for _ in range(self.ranks))
 
-        leads, sweep, center, bends = by_rank(), by_rank(), {"hip": by_rank()}, {}
+        leads = by_rank()
+        sweep = by_rank()
+        center = {"hip": by_rank()}
+        bends = {}
         for name in self.origin.bends:
             center[name] = by_rank()
             bends[name] = Bend(by_rank(), by_rank())
@@ -146,7 +149,7 @@ class Torques(NamedTuple):
 
     def origins(self) -> list[np.ndarray]:
         """Return the vector (size,) at which a search starts: no torques except for steering."""
-        return [np.array([*[0.0] * math.prod(self._shape), _STEERED])]
+        return [np.array([*[0.0] * math.prod(self._shape), _INITIAL_STEERING])]
 
     def preset(self, vector: np.ndarray) -> Preset:
         """Return the preset of a vector (size,), within its ranges."""
@@ -157,8 +160,8 @@ class Torques(NamedTuple):
         return self.origin._replace(torques=torques, steering=float(steering))
 
 
-def rounded(vector: np.ndarray, ranges: Iterable[Range]) -> np.ndarray:
-    """Return a vector (size,) to the decimals that matter."""
+def round_vector(vector: np.ndarray, ranges: Iterable[Range]) -> np.ndarray:
+    """Return a vector (size,), each number rounded to the decimals of its range."""
     return np.array([round(value, number.decimals) for value, number in zip(vector, ranges, strict=True)])
 
 
@@ -167,13 +170,13 @@ class Kind(NamedTuple):
 
     Attributes:
         space: of the parameters.
-        preset: about which it searches.
+        preset: around which it searches.
         generations: of the search.
         candidates: of a generation; None for the default of CMA-ES.
         episodes: by which a candidate is evaluated.
         steps: control steps of each.
-        skipped: steps at their beginning that earn nothing, as a robot that sets out is no walker yet.
-        starts: to choose the hard ones from; 0 for none.
+        skipped: first steps of an episode, in which the robot starts to walk; they do not count.
+        starts: from which the hard ones are chosen; 0 for none.
     """
 
     space: type[Space] | type[Torques]

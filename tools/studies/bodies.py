@@ -20,14 +20,15 @@ def read(path: Path) -> dict[tuple[str, str], dict[str, list[Comparison]]]:
     """
     rows = csv_files.read(path, COLUMNS)
     comparisons: dict[tuple[str, str], dict[str, list[Comparison]]] = {}
-    for rows_of_body in zip(*[iter(rows)] * len(WHO), strict=True):
+    for first in range(0, len(rows), len(WHO)):  # a row of each policy that is compared
+        rows_of_body = rows[first : first + len(WHO)]
         policy, task, family, body, *_ = rows_of_body[0].values()
-        judged = map(_judged, rows_of_body)
-        comparisons.setdefault((policy, task), {}).setdefault(family, []).append(Comparison(body, *judged))
+        comparison = Comparison(body, *map(_read_row, rows_of_body))
+        comparisons.setdefault((policy, task), {}).setdefault(family, []).append(comparison)
     return comparisons
 
 
-def _judged(row: Mapping[str, str]) -> Judged:
+def _read_row(row: Mapping[str, str]) -> Judged:
     return Judged(float(row["return"]), row["walked"] == "1", float(row["speed"]), float(row["tracking"]))
 
 

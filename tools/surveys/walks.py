@@ -62,7 +62,7 @@ def play(case: Case) -> tuple[control.Environment, walking.Verdict]:
     """Play the walk of one body by the demonstrator that suits the task.
 
     Returns:
-        The environment as the walk left it, and what the walk came to.
+        The environment after the walk, and the verdict on the walk.
 
     Raises:
         ValueError: a task without a target velocity or command.
@@ -116,29 +116,43 @@ def survey(cases: Sequence[Case], processes: int | None = None, progress: Callab
 def table(outcomes: Sequence[Outcome]) -> str:
     """Return a table of the bodies that walked and their median speed as a share of the target, by legs and links."""
     links = sorted({outcome.links for outcome in outcomes})
-    lines = ["legs " + "".join(f"{f'{k} link' + 's' * (k > 1):>18}" for k in links) + f"{'all':>18}"]
-    for legs in (*sorted({outcome.legs for outcome in outcomes}), "all"):
-        row = [o for o in outcomes if legs in (o.legs, "all")]
-        lines.append(f"{legs:>4} " + "".join(_cell([o for o in row if o.links == k]) for k in links) + _cell(row))
+    heads = [f"{count} link" if count == 1 else f"{count} links" for count in links]
+    lines = ["legs " + "".join(f"{head:>18}" for head in (*heads, "all"))]
+    for legs in sorted({outcome.legs for outcome in outcomes}):
+        lines.append(_line(str(legs), [outcome for outcome in outcomes if outcome.legs == legs], links))
+    lines.append(_line("all", outcomes, links))
     return "\n".join(lines)
+
+
+def _line(head: str, outcomes: Sequence[Outcome], links: Sequence[int]) -> str:
+    """Return a line of the table: a cell for each number of links, and one for all."""
+    cells = [_cell([outcome for outcome in outcomes if outcome.links == count]) for count in links]
+    return f"{head:>4} " + "".join([*cells, _cell(outcomes)])
 
 
 def _cell(outcomes: Sequence[Outcome]) -> str:
     if not outcomes:
         return f"{'-':>18}"
-    walked = sum(not outcome.failures for outcome in outcomes)
-    return f"{f'{walked}/{len(outcomes)}':>11}{np.median([outcome.speed for outcome in outcomes]):>7.2f}"
+    share = f"{_count_walking(outcomes)}/{len(outcomes)}"
+    median_speed = np.median([outcome.speed for outcome in outcomes])
+    return f"{share:>11}{median_speed:>7.2f}"
+
+
+def _count_walking(outcomes: Sequence[Outcome]) -> int:
+    return sum(not outcome.failures for outcome in outcomes)
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
     """Return a survey in a few lines of text."""
-    walked = sum(not outcome.failures for outcome in outcomes)
+    walking = _count_walking(outcomes)
     reasons = collections.Counter(reason for outcome in outcomes for reason in outcome.failures)
-    fast = np.mean([outcome.speed >= NEAR_TARGET for outcome in outcomes])
-    speed, drift = (np.median([getattr(outcome, name) for outcome in outcomes]) for name in ("speed", "drift"))
+    reasons_text = ", ".join(f"{name} {count}" for name, count in reasons.items()) or "none"
+    share_near_target = np.mean([outcome.speed >= NEAR_TARGET for outcome in outcomes])
+    speed = np.median([outcome.speed for outcome in outcomes])
+    drift = np.median([outcome.drift for outcome in outcomes])
     return (
-        f"{walked} of {len(outcomes)} bodies walk ({100.0 * walked / len(outcomes):.1f} %)\n"
-        f"failures: {', '.join(f'{name} {count}' for name, count in reasons.items()) or 'none'}\n"
-        f"{100.0 * fast:.1f} % reach {NEAR_TARGET} of the target speed; "
+        f"{walking} of {len(outcomes)} bodies walk ({100.0 * walking / len(outcomes):.1f} %)\n"
+        f"failures: {reasons_text}\n"
+        f"{100.0 * share_near_target:.1f} % reach {NEAR_TARGET} of the target speed; "
         f"median speed {speed:.2f} of it, median drift {drift:.2f}"
     )

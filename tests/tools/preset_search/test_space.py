@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from preset_search import Space
-from preset_search.space import HARMONICS, SPACES, Torques, rounded
+from preset_search.space import HARMONICS, SPACES, Torques, round_vector
 
 from arc_suite.cpg.prescribed import feedforward, pattern
 from arc_suite.cpg.presets import PRESETS
@@ -43,7 +43,7 @@ def test_every_number_of_a_vector_counts_and_stays_within_bounds():
         assert len({str(preset) for preset in presets}) == vector.size
         assert each.preset(np.full(vector.size, 1e9)) == each.preset(high)
         assert each.preset(np.full(vector.size, -1e9)) == each.preset(low)
-    assert rounded(np.full(origin.size, 0.12345), torques.ranges()).tolist() == [0.123] * origin.size
+    assert round_vector(np.full(origin.size, 0.12345), torques.ranges()).tolist() == [0.123] * origin.size
 
 
 @pytest.mark.parametrize("robot", PRESETS)
