@@ -157,7 +157,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         if seed is not None:
-            seeds = self._seeds(seed)
+            seeds = self._checked_seeds(seed)
             for group, indices, _ in self._places:
                 group._seed([seeds[index] for index in indices], np.ones(len(indices), bool))
         self._made = __name__
@@ -166,10 +166,10 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
         """Start an episode in every environment, or in some; see `VectorEnv.reset`."""
         self._check_open("reset")
-        mask = self._reset_mask(options)
+        mask = self._checked_reset_mask(options)
         if not (self._begun or mask.all()):
             raise ResetNeeded("cannot reset some environments: reset all of them first")
-        seeds, info = [None] * self.num_envs if seed is None else self._seeds(seed), {}
+        seeds, info = [None] * self.num_envs if seed is None else self._checked_seeds(seed), {}
         for group, indices, _ in self._places:
             if mask[indices].any():
                 options = {"reset_mask": mask[indices]}
@@ -228,7 +228,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def command(self, name: str, value, mask=None) -> None:
         """Set a command of the task in some environments; see `VectorEnv.command`."""
         self._check_open("command")
-        mask, value = self._mask(mask, "mask"), checked_command(self.tasks[0], name, value, (self.num_envs,))
+        mask, value = self._checked_mask(mask, "mask"), checked_command(self.tasks[0], name, value, (self.num_envs,))
         if not self._begun:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
         for group, indices, _ in self._places:
@@ -242,7 +242,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         Values broadcast to the fields of each body.
         """
         self._check_open("change the model")
-        chosen, mask = [], self._mask(mask, "mask")
+        chosen, mask = [], self._checked_mask(mask, "mask")
         for group, indices, _ in self._places:
             if mask[indices].any():
                 chosen.append((group, group._checked_fields(fields), mask[indices]))
@@ -253,7 +253,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def change_settings(self, settings: Mapping[str, Any], mask=None) -> None:
         """Set settings of some environments from their next reset on; see `VectorEnv.change_settings`."""
         self._check_open("change settings")
-        chosen, mask = [], self._mask(mask, "mask")
+        chosen, mask = [], self._checked_mask(mask, "mask")
         for group, indices, _ in self._places:
             if mask[indices].any():
                 chosen.append((group, mask[indices], group._checked_changes(settings)))
@@ -264,7 +264,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def rest(self, mask) -> None:
         """Let environments, and no others, stand still until they are reset; see `VectorEnv.rest`."""
         self._check_open("rest")
-        mask = self._mask(mask, "mask")
+        mask = self._checked_mask(mask, "mask")
         for group, indices, _ in self._places:
             group._resting = mask[indices]
 
@@ -312,7 +312,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         if self.render_mode is None:
             return None
         places = self._of_each(lambda group: [(group, place) for place in range(group.num_envs)])
-        chosen = [places[index] for index in self._indices(indices)]
+        chosen = [places[index] for index in self._checked_indices(indices)]
         return tuple(group.render([place])[0] for group, place in chosen)
 
     @one_thread_at_a_time

@@ -10,19 +10,21 @@ from arc_suite import checks
 
 MAX_ENVS = 1 << 20
 
-# Attributes that have a value for each environment.
-_OF_EACH = ("np_random", "np_random_seed", "render", "positions", "resampled")
-_OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
+# Attributes whose values, or whose methods' results, have an entry for each environment.
+_PER_ENVIRONMENT = ("np_random", "np_random_seed", "render", "positions", "resampled")
+# Attributes of a single environment -> the attribute of the vector environment with the same value.
+_SINGLE_ATTRIBUTES = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
 
 
 class BaseVectorEnv(gymnasium.vector.VectorEnv):
-    """A vector environment that answers for each of its environments."""
+    """A vector environment with the attributes and methods of each of its environments."""
 
     def call(self, name: str, *args, **kwargs) -> tuple:
         """Call a method, or read an attribute, of every environment, as Gymnasium's own vector environments do.
 
         Args:
-            name: of an attribute of this environment; what environments share is the value of each of them.
+            name: of an attribute or method of this environment. A value that the environments share is returned for
+                each of them.
             *args: of the method.
             **kwargs: of the method.
 
@@ -30,15 +32,17 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
             A value for each environment.
 
         Raises:
-            ValueError: `reset`, `step` or `close`, which are of all environments at once.
-            AttributeError: no such attribute.
+            ValueError: `reset`, `step` or `close`, which act on all environments at once.
+            AttributeError: there is no such attribute.
         """
         if name in ("reset", "step", "close"):
             raise ValueError(f"call {name!r}: environments do it together; call {name} of the environment itself")
-        value = getattr(self, _OF_ONE.get(name, name))
+        value = getattr(self, _SINGLE_ATTRIBUTES.get(name, name))
         if callable(value):
             value = value(*args, **kwargs)
-        return tuple(value) if name in _OF_EACH and value is not None else (value,) * self.num_envs
+        if name in _PER_ENVIRONMENT and value is not None:
+            return tuple(value)
+        return (value,) * self.num_envs
 
     def get_attr(self, name: str) -> tuple:
         """Return an attribute of every environment; see `call`."""
@@ -49,7 +53,7 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
 
         Args:
             name: of the attribute.
-            values: one for all, or a list or tuple of as many equal ones as there are environments.
+            values: one for all, or a list or tuple of equal values, one for each environment.
 
         Raises:
             ValueError: another number of values, or different ones.
@@ -62,27 +66,28 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
             )
         setattr(self, name, values[0])
 
-    def _check_open(self, call: str) -> None:
+    def _check_open(self, action: str) -> None:
+        """Raise ClosedEnvironmentError after `close`; `action` says in the error what was called."""
         if self.closed:
-            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
+            raise ClosedEnvironmentError(f"cannot {action}: the environment is closed; make a new one")
 
-    def _seeds(self, seed) -> list[int | None]:
-        """Return a seed for each environment."""
+    def _checked_seeds(self, seed) -> list[int | None]:
+        """Return a seed for each environment, given the seed of the first one or a list of all."""
         if np.ndim(seed) == 1:
             if len(seed) != self.num_envs:
                 raise ValueError(f"seed: expected one for each of {self.num_envs} environments, got {len(seed)}")
-            return [None if each is None else checks.seed(each) for each in seed]
+            return [None if single_seed is None else checks.seed(single_seed) for single_seed in seed]
         first = checks.integer("seed", checks.seed(seed), 0, checks.MAX_SEED - self.num_envs + 1)
         return [first + index for index in range(self.num_envs)]
 
-    def _reset_mask(self, options) -> np.ndarray:
-        """The checked mask of `reset`'s options."""
+    def _checked_reset_mask(self, options) -> np.ndarray:
+        """Return the mask (num_envs,) in the options of `reset`; all environments if there is none."""
         for name in checks.mapping("options", options):
             checks.name(name, ["reset_mask"], "option of reset")
-        return self._mask((options or {}).get("reset_mask"))
+        return self._checked_mask((options or {}).get("reset_mask"))
 
-    def _mask(self, mask, name: str = "reset_mask") -> np.ndarray:
-        """A checked mask; all environments for None."""
+    def _checked_mask(self, mask, name: str = "reset_mask") -> np.ndarray:
+        """Return a mask (num_envs,), in new memory; all environments for None. Errors begin with its name."""
         if mask is None:
             return np.ones(self.num_envs, bool)
         mask = np.asarray(mask)
@@ -92,12 +97,14 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
             )
         return mask.copy()
 
-    def _indices(self, indices: Iterable[int] | None) -> list[int]:
-        """Checked indices of environments; all for None."""
-        every = range(self.num_envs)
-        indices = list(every if indices is None else indices)
+    def _checked_indices(self, indices: Iterable[int] | None) -> list[int]:
+        """Return indices of environments; those of all for None."""
+        all_indices = range(self.num_envs)
+        if indices is None:
+            return list(all_indices)
+        indices = list(indices)
         for index in indices:
-            if index not in every:
+            if index not in all_indices:
                 raise ValueError(
                     f"indices: expected integers from 0 to {self.num_envs - 1}, got {checks.preview(index)}"
                 )

@@ -1,4 +1,4 @@
-"""Calls of an environment: one thread at a time, actions and live commands that fit, and commands of any thread."""
+"""Calls of an environment: one thread at a time, checked actions and live commands, and commands from any thread."""
 
 import functools
 import threading
@@ -11,21 +11,26 @@ from arc_suite.envs import trees
 from arc_suite.tasks import Task
 from arc_suite.tasks.parameters import LARGEST
 
-_NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
+# Kinds of arrays that NumPy would convert to floats although they are no real numbers: complex, objects, text, dates.
+_UNREAL_KINDS = "cOSUMmT"
 
 
 class KnownAttributes:
-    """An object whose public attributes are those that it was made with: others would be accepted, and do nothing.
+    """An object that refuses new public attributes once it is complete: a misspelled name would have no effect.
 
-    It sets `_made` once it is complete. Classes of other packages that inherit may add attributes of their own.
+    A class sets `_made` to its module's name at the end of `__init__`. Classes of other modules that inherit from it
+    may have new attributes.
     """
 
     def __setattr__(self, name: str, value: Any):
-        if name[0] != "_" and "_made" in self.__dict__:
+        is_public = name[0] != "_"
+        is_complete = "_made" in self.__dict__
+        if is_public and is_complete:
             self._check_known(name)
         super().__setattr__(name, value)
 
     def _check_known(self, name: str) -> None:
+        """Raise AttributeError for a name that no attribute has."""
         if name not in self.__dict__ and not hasattr(type(self), name) and type(self).__module__ == self._made:
             raise AttributeError(
                 f"cannot set {checks.preview(name)}: there is no such attribute; "
@@ -44,14 +49,16 @@ class Lock(type(threading.RLock())):  # type: ignore[misc]  # the class has no n
 
 
 def one_thread_at_a_time(method):
-    """Make a method of an environment, whose `_lock` is a `Lock`, refuse calls while another thread is in one.
+    """Make a method refuse calls while another thread is in such a method of the same environment.
+
+    The environment has a `Lock` as its attribute `_lock`.
 
     Raises:
         RuntimeError: another thread's call is at work; nothing has changed.
     """
 
     @functools.wraps(method)
-    def alone(self, *args, **kwargs):
+    def call_alone(self, *args, **kwargs):
         lock = self._lock
         if not lock.acquire(False):
             raise RuntimeError(
@@ -62,42 +69,53 @@ def one_thread_at_a_time(method):
         finally:
             lock.release()
 
-    return alone
+    return call_alone
 
 
 class LiveCommands:
-    """The latest value of each live command that no step has taken yet; any thread may put one at any time.
+    """The latest value of each live command that no step has used yet; any thread may set one at any time.
 
-    Pickles and copies hold the same values.
+    Pickles and copies have the same values.
     """
 
     def __init__(self):
         """Start without any."""
-        self._lock, self._latest = Lock(), {}  # the latter is replaced, never changed
+        self._lock = Lock()
+        # By name of the command: its value, and the mask of its environments or None. The dictionary is replaced as a
+        # whole, never changed, so that other threads may read it without the lock.
+        self._latest = {}
 
     def put(self, name: str, value: np.ndarray, mask: np.ndarray | None = None) -> None:
-        """Add a checked value, in a batch for the environments of a mask (num_envs,)."""
+        """Set the value of a command.
+
+        Args:
+            name: of the command.
+            value: checked, (size,), or (num_envs, size) with a mask.
+            mask: (num_envs,) the environments of a batch that get the value; None for a single environment.
+        """
         with self._lock:
             if mask is not None and name in self._latest:
-                before, others = self._latest[name]
-                value, mask = np.where(mask[:, None], value, before), mask | others
+                earlier_value, earlier_mask = self._latest[name]
+                value = np.where(mask[:, None], value, earlier_value)
+                mask = mask | earlier_mask
             self._latest = {**self._latest, name: (value, mask)}
 
     def peek(self, task: Task, memory) -> Any:
-        """Return the memory of an episode of a task as the next step will find it."""
-        return _commanded(task, memory, self._latest)
+        """Return the memory of an episode with the commands, as the next step will use it."""
+        return _apply_commands(task, memory, self._latest)
 
     def consume(self, task: Task, memory) -> Any:
-        """Return the memory of an episode of a task after the commands, which are gone then."""
+        """Return the memory of an episode with the commands, and forget the commands."""
         with self._lock:
-            latest, self._latest = self._latest, {}
-        return _commanded(task, memory, latest)
+            latest = self._latest
+            self._latest = {}
+        return _apply_commands(task, memory, latest)
 
 
-def _commanded(task: Task, memory, latest) -> Any:
+def _apply_commands(task: Task, memory, latest) -> Any:
     for name, (value, mask) in latest.items():
-        changed = task.with_command(memory, name, value)
-        memory = changed if mask is None else trees.where(mask, changed, memory)
+        changed_memory = task.with_command(memory, name, value)
+        memory = changed_memory if mask is None else trees.where(mask, changed_memory, memory)
     return memory
 
 
@@ -111,22 +129,31 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
     Raises:
         ValueError: another shape, not numbers, or NaN.
     """
-    array = _real(action)
+    array = _to_floats(action)
     if array is None:
-        numbers, kind = " x ".join(map(str, shape)), type(action).__name__
-        kind += f" of {action.dtype}" if isinstance(action, np.ndarray) else ""
+        numbers = " x ".join(map(str, shape))
+        kind = type(action).__name__
+        if isinstance(action, np.ndarray):
+            kind += f" of {action.dtype}"
         raise ValueError(f"action: expected {numbers} numbers, got {kind}")
     if array.shape != shape:
         raise ValueError(f"action: expected shape {shape}, got {array.shape}")
-    invalid = np.isnan(array)
-    if np.count_nonzero(invalid):
-        index = np.argwhere(invalid)[0]
+    is_nan = np.isnan(array)
+    if np.count_nonzero(is_nan):
+        index = np.argwhere(is_nan)[0]
         raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
     return array.clip(-1.0, 1.0)
 
 
 def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ()) -> np.ndarray:
-    """Return the value of a live command as floats, (*leading, size); None stands for what the task itself would do.
+    """Return the value of a live command as floats, (*leading, size).
+
+    Args:
+        task: of the environment.
+        name: one of the task's `commands`.
+        value: (size,) or (*leading, size) numbers, the name of a value, or None. None and NaN leave the command to
+            the task itself.
+        leading: the leading axes of a batch.
 
     Raises:
         ValueError: the task has no such command, or the value has another size or is out of range.
@@ -135,30 +162,47 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
         raise ValueError(f"command {checks.preview(name)}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
     if isinstance(value, str):
-        named = task.named_command(name, value)
-        if named is None:
-            raise ValueError(f"command {name!r}: expected numbers, got {checks.preview(value)}")
-        value = named
-    numbers = np.full(size, np.nan) if value is None else _real(value)
+        value = _look_up_value(task, name, value)
+    numbers = np.full(size, np.nan) if value is None else _to_floats(value)
     if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():
         raise ValueError(
             f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {checks.preview(value)}"
         )
-    low, high = task.command_limits.get(name, (-LARGEST, LARGEST))
-    if len(outside := np.argwhere((numbers < low) | (numbers > high))):
-        *_, place = outside[0]
-        raise ValueError(
-            f"command {name!r}: expected number {place} between {low[place]:g} and {high[place]:g}, "
-            f"got {numbers[tuple(outside[0])]:g}"
-        )
+    if name in task.command_limits:
+        _check_limits(name, numbers, *task.command_limits[name])
     return np.broadcast_to(numbers, (*leading, size)).copy()
 
 
-def _real(value) -> np.ndarray | None:
-    """The value as floats; None where it holds anything but real numbers, or hides some of them."""
+def _look_up_value(task: Task, name: str, value_name: str) -> np.ndarray:
+    """Return the numbers of a command's value that has a name, such as a gait.
+
+    Raises:
+        ValueError: the command has no such value, or none with names.
+    """
+    value = task.named_command(name, value_name)
+    if value is None:
+        raise ValueError(f"command {name!r}: expected numbers, got {checks.preview(value_name)}")
+    return value
+
+
+def _check_limits(name: str, numbers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Raise ValueError for a command (..., size) with a number below `low` or above `high`, (size,) each."""
+    outside = np.argwhere((numbers < low) | (numbers > high))
+    if len(outside):
+        index = outside[0]
+        number_index = index[-1]
+        raise ValueError(
+            f"command {name!r}: expected number {number_index} between {low[number_index]:g} "
+            f"and {high[number_index]:g}, got {numbers[tuple(index)]:g}"
+        )
+
+
+def _to_floats(value) -> np.ndarray | None:
+    """Return the value as floats; None where it has anything but real numbers, or a masked array hides some."""
     try:
         array = np.asarray(value)
-        if array.dtype.kind in _NOT_REAL or (array is not value and isinstance(value, np.ma.MaskedArray)):
+        hides_numbers = array is not value and isinstance(value, np.ma.MaskedArray)
+        if array.dtype.kind in _UNREAL_KINDS or hides_numbers:
             return None
         return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError, RecursionError):

@@ -168,7 +168,7 @@ class Environment(KnownAttributes, control.Environment):
         state, tasks = snapshots.from_arrays(like, run.definition, check, arrays, [run.opened], self.task_kwargs)
         self.physics.restore(state.simulations)
         run.restore(state, *(each for (each,) in tasks))
-        own = {name: array[0] for name, array in state.own.items()}
+        own = {name: array[0] for name, array in state.environment_arrays.items()}
         self._step_count, self._reset_next_step = int(own["steps"]), bool(own["ended"])
 
     def _state(self) -> snapshots.State:
@@ -431,13 +431,15 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._take_commands()
         task = self.definition
         observation = task.vector(task.observe(self._now.memory, task.read(physics.data.ptr)), np.float32)
-        own = (-1, self._stream_begins, steps, ended, False, observation)
+        values = (-1, self._stream_begins, steps, ended, False, observation)
         return snapshots.State(
             simulations=simulations,
             memory=trees.map_leaves(lambda leaf: np.asarray(leaf)[None], self._now.memory),
             streams=[self._stream],
             randoms=[self._random.get_state()],
-            own={name: np.asarray(value)[None] for name, value in zip(snapshots.OWN, own, strict=True)},
+            environment_arrays={
+                name: np.asarray(value)[None] for name, value in zip(snapshots.ENVIRONMENT_ARRAYS, values, strict=True)
+            },
             settings=([self._changes], [self.next_changes]),
         )
 
@@ -449,7 +451,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         (self._stream,), (self._changes,), (self.next_changes,) = state.streams, *state.settings
         self.definition, self._next, self._now.readings, self._starting = task, next_task, None, False
         self._random.set_state(state.randoms[0])
-        self._stream_begins = bool(state.own["streams_begin"][0])
+        self._stream_begins = bool(state.environment_arrays["streams_begin"][0])
 
     def _take_commands(self) -> None:
         if self._now.memory is not None:

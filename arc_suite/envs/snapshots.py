@@ -1,7 +1,7 @@
-"""Snapshots of environments: arrays by name, from which another one continues bit-exactly.
+"""Snapshots of environments: arrays by name, from which another environment continues bit-exactly.
 
-One environment has the snapshot of a vector environment of one. Unlike a pickle, arrays of others are data: all are
-checked before any is used.
+A single environment has the snapshot of a vector environment of one. Unlike a pickle, the arrays may come from
+others: they are data, and all are checked before any is used.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,143 +15,183 @@ from arc_suite.envs.prepare import with_changes
 from arc_suite.simulation.state_arrays import bounded, fitting
 from arc_suite.tasks import Task
 
-# Arrays of the driver, with a leading axis for the environments.
-OWN = ("stream_seeds", "streams_begin", "steps", "ended", "resting", "observation")
-# Parts of the state of a RandomState, by their names in a snapshot: types, and the largest sizes.
-_RANDOM = {
-    "random/keys": (np.uint32, 2**32 - 1),
-    "random/positions": (np.int64, 624),
-    "random/halves": (np.int64, 1),
-    "random/normals": (np.float64, 64),
+# Names of the arrays of the environment itself, as opposed to its simulations and its task. They have a leading axis
+# for the environments. A `VectorEnv` has each as an attribute, with an underscore before the name.
+ENVIRONMENT_ARRAYS = ("stream_seeds", "streams_begin", "steps", "ended", "resting", "observation")
+
+
+class _RandomArray(NamedTuple):
+    """An array with one part of the states of all `RandomState`s.
+
+    Attributes:
+        dtype: of the array.
+        smallest: valid number.
+        largest: valid number.
+    """
+
+    dtype: type
+    smallest: int
+    largest: int
+
+
+_KEY_COUNT = 624  # numbers in the key of the Mersenne Twister
+# By name, in the order of the parts in `RandomState.get_state()` after the generator's name.
+_RANDOM_ARRAYS = {
+    "random/keys": _RandomArray(np.uint32, 0, 2**32 - 1),
+    "random/positions": _RandomArray(np.int64, 0, _KEY_COUNT),
+    "random/halves": _RandomArray(np.int64, 0, 1),
+    "random/normals": _RandomArray(np.float64, -64, 64),
 }
-_SETTINGS = ("settings/present", "settings/next")  # missing where none was changed
+_SETTINGS_ARRAYS = ("settings/present", "settings/next")  # snapshots have them only if a setting was changed
 
 
 class State(NamedTuple):
     """State of environments whose episodes have begun.
 
     Attributes:
-        simulations: arrays of the simulations.
+        simulations: arrays of the simulations by name.
         memory: of the task, with a leading axis for the environments.
-        streams: state of each environment's stream.
-        randoms: states of each environment's `RandomState`.
-        own: arrays of the driver, by the names of `OWN`.
-        settings: JSON of changed settings of each environment: of the present episodes, and of the next.
+        streams: state of each environment's stream of episodes; see `Task.stream_state`.
+        randoms: state of each environment's `RandomState`, as its `get_state` returns it.
+        environment_arrays: by the names of `ENVIRONMENT_ARRAYS`.
+        settings: JSON of the changed settings of each environment: of the present episodes, and of the next ones.
     """
 
     simulations: Mapping[str, np.ndarray]
     memory: Any
     streams: list
     randoms: list[tuple]
-    own: Mapping[str, np.ndarray]
+    environment_arrays: Mapping[str, np.ndarray]
     settings: tuple[list[str], list[str]]
 
 
 def to_arrays(state: State) -> dict[str, np.ndarray]:
     """Return the snapshot of a state."""
-    found = {f"batch/{name}": array for name, array in state.simulations.items()}
-    found |= {f"memory/{place}": leaf.copy() for place, leaf in enumerate(trees.leaves(state.memory))}
-    found |= state.own
+    arrays = {f"batch/{name}": array for name, array in state.simulations.items()}
+    for leaf_index, leaf in enumerate(trees.leaves(state.memory)):
+        arrays[f"memory/{leaf_index}"] = leaf.copy()
+    arrays |= state.environment_arrays
     for index, stream in enumerate(state.streams):
-        found |= {f"stream/{index}/{place}": np.asarray(leaf) for place, leaf in enumerate(trees.leaves(stream))}
-    columns = zip(*(random[1:] for random in state.randoms), strict=True)
-    named = zip(_RANDOM.items(), columns, strict=True)
-    found |= {name: np.array(values, kind) for (name, (kind, _)), values in named}
-    if any(text != "{}" for texts in state.settings for text in texts):
-        found |= {name: np.array(texts) for name, texts in zip(_SETTINGS, state.settings, strict=True)}
-    return found
+        for leaf_index, leaf in enumerate(trees.leaves(stream)):
+            arrays[f"stream/{index}/{leaf_index}"] = np.asarray(leaf)
+    random_parts = zip(*(random[1:] for random in state.randoms), strict=True)  # without the generator's name
+    for (name, random_array), values in zip(_RANDOM_ARRAYS.items(), random_parts, strict=True):
+        arrays[name] = np.array(values, random_array.dtype)
+    present, upcoming = state.settings
+    if any(text != "{}" for text in [*present, *upcoming]):
+        for name, texts in zip(_SETTINGS_ARRAYS, state.settings, strict=True):
+            arrays[name] = np.array(texts)
+    return arrays
 
 
 def from_arrays(
     like: State,
     task: Task,
-    simulations: Callable[[Mapping[str, np.ndarray]], Any],
-    given: Mapping[str, np.ndarray],
-    opened: Sequence[Task],
+    check_simulations: Callable[[Mapping[str, np.ndarray]], Any],
+    arrays: Mapping[str, np.ndarray],
+    opened_tasks: Sequence[Task],
     settings: Mapping[str, Any],
 ) -> tuple[State, list[list[Task]]]:
     """Return the state of a snapshot, and the tasks of its episodes and of the next ones.
 
     Args:
-        like: the present state of the environments that it is for.
-        task: of them all.
-        simulations: checks the arrays of the simulations.
-        given: the snapshot.
-        opened: task of each environment, as it was opened.
-        settings: with which.
+        like: the present state of the environments that will continue from the snapshot.
+        task: of all these environments together.
+        check_simulations: raises ValueError for arrays of the simulations that do not fit.
+        arrays: the snapshot.
+        opened_tasks: task of each environment with the settings with which it was opened.
+        settings: these settings.
 
     Raises:
         ValueError: an array is missing or does not fit.
     """
     try:
-        ours = _of("batch/", given)
-        simulations(ours)
-        memory = _memory(like.memory, task, given)
-        own = {name: bounded(name, fitting(name, given[name], array)).copy() for name, array in like.own.items()}
-        states = _random_states(given, len(like.streams))
-        streams = [_refilled(each.first(), _of(f"stream/{index}/", given)) for index, each in enumerate(opened)]
-        texts = tuple(_texts(given.get(name), len(opened)) for name in _SETTINGS)
-        tasks = [_tasks(opened, settings, each) for each in texts]
+        simulations = _with_prefix("batch/", arrays)
+        check_simulations(simulations)
+        memory = _read_memory(like.memory, task, arrays)
+        environment_arrays = {}
+        for name, array in like.environment_arrays.items():
+            environment_arrays[name] = bounded(name, fitting(name, arrays[name], array)).copy()
+        randoms = _read_randoms(arrays, len(like.streams))
+        streams = []
+        for index, opened_task in enumerate(opened_tasks):
+            streams.append(_read_stream(opened_task.first(), _with_prefix(f"stream/{index}/", arrays)))
+        texts = tuple(_read_texts(arrays.get(name), len(opened_tasks)) for name in _SETTINGS_ARRAYS)
+        tasks = [_change_tasks(opened_tasks, settings, texts_of_episodes) for texts_of_episodes in texts]
     except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"snapshot: of another task or number of environments: {checks.quote(error)}") from None
-    return State(ours, memory, streams, states, own, texts), tasks
-
-
-def _of(prefix: str, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    return {name.removeprefix(prefix): array for name, array in given.items() if name.startswith(prefix)}
-
-
-def _memory(like, task: Task, given: Mapping[str, np.ndarray]) -> Any:
-    """A memory with the values of a snapshot; NaN stands where a command may be missing."""
-    free, count = like, len(next(trees.leaves(like)))
-    for name, size in task.commands.items():
-        free = task.with_command(free, name, np.full((count, size), np.nan))
-    places = iter(range(len(list(trees.leaves(like)))))
-
-    def filled(old, commanded):
-        name = f"memory/{next(places)}"
-        return bounded("memory", fitting("memory", given[name], old), np.isnan(commanded)).copy()
-
-    return trees.map_leaves(filled, like, free)
-
-
-def _random_states(given: Mapping[str, np.ndarray], count: int) -> list[tuple]:
-    for name, (kind, largest) in _RANDOM.items():
-        array = fitting(name, given[name], np.empty((count, 624) if name.endswith("keys") else count, kind))
-        least = 0 if kind is np.int64 else -largest
-        if not ((array >= least) & (array <= largest)).all():
-            raise ValueError(f"{name}: expected numbers from {least} to {largest}")
-    keys, *others = (given[name] for name in _RANDOM)
-    return [("MT19937", key, *values) for key, *values in zip(keys, *(each.tolist() for each in others), strict=True)]
-
-
-def _refilled(like, given: Mapping[str, np.ndarray]) -> Any:
-    """Return a tree like another one, with the values of arrays."""
-    values = (given[str(place)] for place, _ in enumerate(trees.leaves(like)))
-    return trees.map_leaves(lambda leaf: number(_stream(next(values), np.asarray(leaf)), leaf), like)
-
-
-def _stream(value: np.ndarray, like: np.ndarray) -> np.ndarray:
-    return bounded("stream", fitting("stream", value, like), np.isnan(like))
+    return State(simulations, memory, streams, randoms, environment_arrays, texts), tasks
 
 
 def number(value: np.ndarray, like) -> Any:
-    """Return an array as a number of the type of another one, or as it is."""
-    return value if isinstance(like, np.ndarray) else type(like)(value[()])
+    """Return an array () as a number of the type of `like`; if `like` is an array, return the array as it is."""
+    if isinstance(like, np.ndarray):
+        return value
+    return type(like)(value[()])
 
 
-def _texts(given: np.ndarray | None, count: int) -> list[str]:
-    if given is None:
+def _with_prefix(prefix: str, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the arrays whose names begin with a prefix, by name without it."""
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def _read_memory(like, task: Task, arrays: Mapping[str, np.ndarray]) -> Any:
+    """Return the memory of a snapshot: a tree like another memory."""
+    num_envs = len(next(trees.leaves(like)))
+    # A memory in which NaN marks the places of live commands: there a snapshot may have NaN, too.
+    marked_memory = like
+    for name, size in task.commands.items():
+        marked_memory = task.with_command(marked_memory, name, np.full((num_envs, size), np.nan))
+    leaf_indices = iter(range(len(list(trees.leaves(like)))))
+
+    def read_leaf(leaf, marked_leaf):
+        array = arrays[f"memory/{next(leaf_indices)}"]
+        return bounded("memory", fitting("memory", array, leaf), np.isnan(marked_leaf)).copy()
+
+    return trees.map_leaves(read_leaf, like, marked_memory)
+
+
+def _read_randoms(arrays: Mapping[str, np.ndarray], num_envs: int) -> list[tuple]:
+    """Return the state of each environment's `RandomState`."""
+    for name, (dtype, smallest, largest) in _RANDOM_ARRAYS.items():
+        shape = (num_envs, _KEY_COUNT) if name == "random/keys" else (num_envs,)
+        array = fitting(name, arrays[name], np.empty(shape, dtype))
+        if not ((array >= smallest) & (array <= largest)).all():
+            raise ValueError(f"{name}: expected numbers from {smallest} to {largest}")
+    keys, positions, halves, normals = (arrays[name] for name in _RANDOM_ARRAYS)
+    parts = zip(keys, positions.tolist(), halves.tolist(), normals.tolist(), strict=True)
+    return [("MT19937", *parts_of_state) for parts_of_state in parts]
+
+
+def _read_stream(like, leaves_by_index: Mapping[str, np.ndarray]) -> Any:
+    """Return the stream state of a snapshot: a tree like another stream state."""
+    leaf_indices = iter(range(len(list(trees.leaves(like)))))
+
+    def read_leaf(leaf):
+        array = leaves_by_index[str(next(leaf_indices))]
+        leaf_array = np.asarray(leaf)
+        checked_array = bounded("stream", fitting("stream", array, leaf_array), np.isnan(leaf_array))
+        return number(checked_array, leaf)
+
+    return trees.map_leaves(read_leaf, like)
+
+
+def _read_texts(array: np.ndarray | None, count: int) -> list[str]:
+    """Return the JSON of the changed settings of each environment; of no changes if the snapshot has no array."""
+    if array is None:
         return ["{}"] * count
-    if given.shape != (count,) or given.dtype.kind != "U":
-        raise ValueError(f"settings: expected {count} texts, got {given.dtype} {given.shape}")
-    return given.tolist()
+    if array.shape != (count,) or array.dtype.kind != "U":
+        raise ValueError(f"settings: expected {count} texts, got {array.dtype} {array.shape}")
+    return array.tolist()
 
 
-def _tasks(opened: Sequence[Task], settings: Mapping[str, Any], texts: Sequence[str]) -> list[Task]:
-    found: dict[tuple[int, str], Task] = {}
-    keys = [(id(task), text) for task, text in zip(opened, texts, strict=True)]
-    for key, task in zip(keys, opened, strict=True):
-        if key not in found:
-            found[key] = with_changes(task, settings, key[1])
-    return [found[key] for key in keys]
+def _change_tasks(opened_tasks: Sequence[Task], settings: Mapping[str, Any], texts: Sequence[str]) -> list[Task]:
+    """Return the task of each environment with changed settings; equal changes of one task give one task."""
+    changed_tasks: dict[tuple[int, str], Task] = {}
+    tasks = []
+    for opened_task, text in zip(opened_tasks, texts, strict=True):
+        key = (id(opened_task), text)
+        if key not in changed_tasks:
+            changed_tasks[key] = with_changes(opened_task, settings, text)
+        tasks.append(changed_tasks[key])
+    return tasks

@@ -1,4 +1,4 @@
-"""What an environment tells of its task: alike in dm_env, in Gymnasium and in vector environments."""
+"""The attribute `task` of an environment: the same in dm_env, in Gymnasium and in vector environments."""
 
 import collections
 from collections.abc import Mapping
@@ -12,14 +12,14 @@ from arc_suite.tasks.contract import Scene
 
 
 class TaskView:
-    """The task of an environment, `environment.task`.
+    """The task of an environment, `environment.task`. Vector environments give arrays a leading axis of num_envs.
 
     Attributes:
-        definition: the task, a value of the contract.
-        terms: unweighted terms of the latest step by name, each (...); empty before the first step.
-        progress: metrics of the episodes so far by name, each (...).
-        privileged: what no policy observes, by the names of `definition.privileged_blocks`, each (..., size); see
-            `tasks.privileged`.
+        definition: the task itself, see `tasks.contract.Task`.
+        terms: unweighted terms of the latest step's reward by name, each (...); empty before the first step.
+        progress: how well the episodes have gone so far, metrics (...) by name.
+        privileged: the present privileged observation, which no policy has, by the names of
+            `definition.privileged_blocks`, each (..., size); see `tasks.privileged`.
     """
 
     definition: Task

@@ -175,7 +175,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
         self._streams_begin = np.ones(self.num_envs, bool)  # environments whose next episode is the first of its stream
         if seed is not None:
-            self._seed(self._seeds(seed), np.ones(self.num_envs, bool))
+            self._seed(self._checked_seeds(seed), np.ones(self.num_envs, bool))
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
         self._ended = np.zeros(self.num_envs, bool)  # environments whose episode has ended and whose next has not begun
         self._resting = np.zeros(self.num_envs, bool)
@@ -218,11 +218,11 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("reset")
-        mask = self._reset_mask(options)
+        mask = self._checked_reset_mask(options)
         if self._memory is None and not mask.all():
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         if seed is not None:
-            self._seed(self._seeds(seed), mask)
+            self._seed(self._checked_seeds(seed), mask)
         self._take_commands()
         self._begin(mask, self._observation)
         return self._observation.copy(), self._privileged(mask)
@@ -315,7 +315,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("command")
-        mask, value = self._mask(mask, "mask"), checked_command(self._task, name, value, (self.num_envs,))
+        mask, value = self._checked_mask(mask, "mask"), checked_command(self._task, name, value, (self.num_envs,))
         if self._memory is None:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
         self._commands.put(name, value, mask)
@@ -336,7 +336,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("change the model")
-        mask, fields = self._mask(mask, "mask"), self._checked_fields(fields)
+        mask, fields = self._checked_mask(mask, "mask"), self._checked_fields(fields)
         self.batch.change_model(fields, mask)
 
     def _checked_fields(self, fields: Any) -> dict[str, np.ndarray]:
@@ -358,7 +358,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("change settings")
-        self._put_changes(self._mask(mask, "mask"), self._checked_changes(settings), CURRICULUM[1] in settings)
+        self._put_changes(self._checked_mask(mask, "mask"), self._checked_changes(settings), CURRICULUM[1] in settings)
 
     def _checked_changes(self, settings: Any) -> list[tuple[str, Task]]:
         """For each environment, the JSON of its changed settings, and its next task."""
@@ -388,7 +388,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("rest")
-        self._resting = self._mask(mask, "mask")
+        self._resting = self._checked_mask(mask, "mask")
 
     @one_thread_at_a_time
     def snapshot(self) -> dict[str, np.ndarray]:
@@ -435,7 +435,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         if self.render_mode is None:
             return None
         self._take_commands()
-        return tuple(self._picture_of(index) for index in self._indices(indices))
+        return tuple(self._picture_of(index) for index in self._checked_indices(indices))
 
     @one_thread_at_a_time
     def close(self, **kwargs) -> None:
@@ -466,7 +466,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         return [task] * self.num_envs, model
 
     def _state(self) -> snapshots.State:
-        own = {name: getattr(self, f"_{name}").copy() for name in snapshots.OWN}
+        own = {name: getattr(self, f"_{name}").copy() for name in snapshots.ENVIRONMENT_ARRAYS}
         settings = self._changes.tolist(), self._next_changes.tolist()
         randoms = [random.get_state() for random in self._randoms]
         return snapshots.State(self.batch.snapshot(), self._memory, self._streams, randoms, own, settings)
@@ -485,7 +485,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.batch.restore(state.simulations)
         self._task, self._memory, self._streams = _one(self._tasks), state.memory, state.streams
         self._changes, self._next_changes = (np.array(texts, object) for texts in state.settings)
-        for name, array in state.own.items():
+        for name, array in state.environment_arrays.items():
             setattr(self, f"_{name}", array)
         for random, each in zip(self._randoms, state.randoms, strict=True):
             random.set_state(each)
