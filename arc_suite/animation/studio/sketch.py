@@ -1,4 +1,4 @@
-"""What the widgets say, as one value, and the body, task and lines of text that it makes."""
+"""A sketch: the values of the widgets for body and task. Functions make the body, the task and lines of text of it."""
 
 import dataclasses
 import functools
@@ -16,10 +16,13 @@ from arc_suite.robots import ROBOTS, palettes
 from arc_suite.robots.spec import Body, Leg, Vector
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json
 
-LEGS, RANDOM, FILE = "legs and links", "random", "file"
-_DOING = ("task", "gait", "speed", "ground", "kicks", "settings", "policy", "preset")  # fields that are not the body's
-_SAME = 3e-5  # of the lengths of two vectors, by which they may differ: ends are rounded
-DEFAULT_CHOICE = "own"  # the gait, layout or preset that the body or task has by itself
+LEGS = "legs and links"  # source: a body of the generator
+RANDOM = "random"  # source: a random body
+FILE = "file"  # source: the text of a spec file
+DEFAULT_CHOICE = "own"  # leaves the gait, layout, preset or palette to the body or the task
+
+_TASK_FIELDS = ("task", "gait", "speed", "ground", "kicks", "settings", "policy", "preset")  # not about the body
+_MAX_END_DIFFERENCE = 3e-5  # share of two vectors' lengths; equal ends differ as much, as they are rounded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,23 +31,23 @@ class Sketch:
 
     Attributes:
         source: of the body: `LEGS`, `RANDOM`, the name of a robot or an example, or `FILE`.
-        legs: number of legs, of `LEGS`.
-        links: actuated links a leg, of `LEGS`.
-        layout: pairs, radial or `OWN`, of `LEGS`.
-        seed: of `RANDOM`.
-        file: the text of a spec file, of `FILE`.
+        legs: number of legs, for the source `LEGS`.
+        links: actuated links of each leg, for the source `LEGS`.
+        layout: pairs, radial or `DEFAULT_CHOICE`, for the source `LEGS`.
+        seed: for the source `RANDOM`.
+        file: the text of a spec file, for the source `FILE`.
         scale, length, width, thickness, fan: see `shaping.Shape`.
-        lengths: factors of links, pairs of a name and a number; those of links that the body lacks are ignored.
-        ends: see `shaping.Shape`, pairs of a part's name and an end; those of parts that the body lacks are ignored.
-        palette: of colors, a name of `spec.PALETTES`, a seed in digits, or `OWN`.
+        lengths: pairs of a link's name and the factor of its length. Links that the body lacks are ignored.
+        ends: pairs of a part's name and the link's end, see `shaping.Shape`. Parts that the body lacks are ignored.
+        palette: a name of `spec.PALETTES`, a seed in digits, or `DEFAULT_CHOICE`.
         task: name of the task.
-        gait: name of the gait, or `OWN`.
+        gait: name of the gait, or `DEFAULT_CHOICE`.
         speed: target velocity, as a multiple of the body's own.
         ground: name of an arena; ignored by a task that has its own.
         kicks: see `modifiers.Kicks`.
         settings: further settings of the task, as the text of a JSON object.
         policy: see `policies.policy`.
-        preset: of the demonstrator, or `OWN`.
+        preset: name of the demonstrator's preset, or `DEFAULT_CHOICE`.
     """
 
     source: str = LEGS
@@ -82,7 +85,8 @@ def source_body(sketch: Sketch) -> Body:
     Raises:
         ValueError: an unknown source, a value out of range, or a file that holds no body.
     """
-    return _source_body(sketch.source, sketch.legs, sketch.links, _given(sketch.layout), sketch.seed, sketch.file)
+    layout = None if sketch.layout == DEFAULT_CHOICE else sketch.layout
+    return _source_body(sketch.source, sketch.legs, sketch.links, layout, sketch.seed, sketch.file)
 
 
 @functools.lru_cache(maxsize=8)
@@ -97,18 +101,20 @@ def _source_body(source: str, legs: int, links: int, layout: str | None, seed: i
 
 
 def make_body(sketch: Sketch) -> Body:
-    """Return the body.
+    """Return the body in the proportions and colors of a sketch.
 
     Raises:
         ValueError: as `source_body`, proportions out of range, or an unknown palette.
     """
-    made = source_body(sketch)
-    made = shaped(made, **_shape(sketch, made))
-    return made if sketch.palette == DEFAULT_CHOICE else made.replace(palette=palettes.parse(sketch.palette))
+    original_body = source_body(sketch)
+    shaped_body = shaped(original_body, **_shape_changes(sketch, original_body))
+    if sketch.palette == DEFAULT_CHOICE:
+        return shaped_body
+    return shaped_body.replace(palette=palettes.parse(sketch.palette))
 
 
 def settings_field(sketch: Sketch) -> Mapping[str, Any]:
-    """Return the further settings of the task.
+    """Return the settings of the task that the text field holds.
 
     Raises:
         ValueError: the field holds no JSON object.
@@ -119,27 +125,32 @@ def settings_field(sketch: Sketch) -> Mapping[str, Any]:
         raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
 
 
-def make_settings(sketch: Sketch, made: Body) -> dict[str, Any]:
-    """Return the settings of the task, `task_kwargs` of `arc_suite.load`; those of the field come before the sliders'.
+def make_settings(sketch: Sketch, body: Body) -> dict[str, Any]:
+    """Return all settings of the task, as `task_kwargs` of `arc_suite.load`.
+
+    Settings of the text field replace those of other widgets.
 
     Raises:
         ValueError: the field holds no JSON object, a gait that does not fit, or an arena that is not registered.
     """
-    given, kind = settings_field(sketch), registry.task_of(sketch.task)
-    found: dict[str, Any] = {} if sketch.gait == DEFAULT_CHOICE else {"gait": sketch.gait}
+    typed_settings = settings_field(sketch)
+    task_class = registry.task_of(sketch.task)
+    settings: dict[str, Any] = {}
+    if sketch.gait != DEFAULT_CHOICE:
+        settings["gait"] = sketch.gait
     if sketch.speed != 1.0:
-        own = getattr(kind.settings_for(made, found), "parameters", None)
-        if own is None:
+        parameters = getattr(task_class.settings_for(body, settings), "parameters", None)
+        if parameters is None:
             expected = f"expected 1 for the task {sketch.task}, which prescribes none"
             raise ValueError(f"speed: {expected}, got {sketch.speed:g}")
-        found["target_velocity"] = float(f"{sketch.speed * own.target_velocity:.4g}")
-    if sketch.ground != "flat" and not kind.own_arena:
-        found["arena"] = sketch.ground
+        settings["target_velocity"] = float(f"{sketch.speed * parameters.target_velocity:.4g}")
+    if sketch.ground != "flat" and not task_class.own_arena:
+        settings["arena"] = sketch.ground
     if sketch.kicks:
-        found["kicks"] = sketch.kicks
-    found |= given
-    registry.check_stored_settings(found)  # a visitor of the page imports nothing
-    return found
+        settings["kicks"] = sketch.kicks
+    settings |= typed_settings
+    registry.check_stored_settings(settings)  # a visitor of the page imports nothing
+    return settings
 
 
 def make_setup(sketch: Sketch) -> Setup:
@@ -148,98 +159,170 @@ def make_setup(sketch: Sketch) -> Setup:
     Raises:
         ValueError: a name or a value that does not fit.
     """
-    made = make_body(sketch)
-    return Setup.of(made, sketch.task, make_settings(sketch, made))
+    body = make_body(sketch)
+    return Setup.of(body, sketch.task, make_settings(sketch, body))
 
 
 def chosen_preset(sketch: Sketch) -> str | None:
     """Return the demonstrator's preset; None for the one that suits the task and the body.
 
     Raises:
-        NotImported: the preset's module has not been imported yet: a visitor of the page imports nothing.
+        NotImported: the preset's module has not been imported yet. A visitor of the page imports nothing.
     """
-    given = _given(sketch.preset)
-    return given and registry.refuse_import("law", given)
+    if sketch.preset == DEFAULT_CHOICE:
+        return None
+    return registry.refuse_import("law", sketch.preset)
 
 
-def file_name(made: Body) -> str:
+def spec_file_name(body: Body) -> str:
     """Return the name of a body's spec file."""
-    return f"{made.name}.json"
+    return f"{body.name}.json"
 
 
 def python_lines(sketch: Sketch) -> str:
-    """Return Python that opens the same environment and policy; a body from a file is read from `file_name`."""
-    made, models, robots = source_body(sketch), [], []
-    if sketch.source == LEGS:
-        layout = "" if sketch.layout == DEFAULT_CHOICE else f', "{sketch.layout}"'
-        robots, code = ["generator"], f"generator.generate({sketch.legs}, {sketch.links}{layout})"
-    elif sketch.source == RANDOM:
-        models, code = ["families"], f"families.sound_body({sketch.seed})"
-    elif sketch.source in ROBOTS:
-        robots, code = ["ROBOTS"], f'ROBOTS["{sketch.source}"]'
-    else:
-        name = file_name(made) if sketch.source == FILE else sketch.source
-        robots, code = ["spec_files"], f'spec_files.load_body("{name}")'
-    if shape := _shape(sketch, made):
-        changes = ", ".join(f"{name}={value!r}" for name, value in shape.items())
-        robots, code = [*robots, "shaping"], f"shaping.shaped({code}, {changes})"
-    if sketch.palette != DEFAULT_CHOICE:
-        code = f"{code}.replace(palette={palettes.parse(sketch.palette)!r})"
-    options = make_settings(sketch, make_body(sketch))
-    packages = (("arc_suite", ["policies"]), ("arc_suite.models", models), ("arc_suite.robots", robots))
-    imports = "".join(f"from {package} import {', '.join(names)}\n" for package, names in packages if names)
+    """Return Python that opens the same environment and policy; a body from a file is read from `spec_file_name`."""
+    code, names_by_package = _body_code(sketch)
+    settings = make_settings(sketch, make_body(sketch))
+    settings_argument = f", {settings!r}" if settings else ""
     preset = chosen_preset(sketch)
+    imports = "".join(
+        f"from {package} import {', '.join(names)}\n" for package, names in names_by_package.items() if names
+    )
     return (
         f"import arc_suite\n{imports}\n"
         f"body = {code}\n"
-        f'environment = arc_suite.load(body, "{sketch.task}"{f", {options!r}" if options else ""})\n'
+        f'environment = arc_suite.load(body, "{sketch.task}"{settings_argument})\n'
         f"policy = policies.policy({sketch.policy!r}, body, {preset!r}, task=environment.task.definition)\n"
     )
 
 
+def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
+    """Return a Python expression that makes the body, and the names that the lines import, by package."""
+    original_body = source_body(sketch)
+    models: list[str] = []  # names of the package arc_suite.models
+    robots: list[str] = []  # names of the package arc_suite.robots
+    if sketch.source == LEGS:
+        layout_argument = "" if sketch.layout == DEFAULT_CHOICE else f', "{sketch.layout}"'
+        robots.append("generator")
+        code = f"generator.generate({sketch.legs}, {sketch.links}{layout_argument})"
+    elif sketch.source == RANDOM:
+        models.append("families")
+        code = f"families.sound_body({sketch.seed})"
+    elif sketch.source in ROBOTS:
+        robots.append("ROBOTS")
+        code = f'ROBOTS["{sketch.source}"]'
+    else:
+        spec_name = spec_file_name(original_body) if sketch.source == FILE else sketch.source
+        robots.append("spec_files")
+        code = f'spec_files.load_body("{spec_name}")'
+    shape_changes = _shape_changes(sketch, original_body)
+    if shape_changes:
+        arguments = ", ".join(f"{name}={value!r}" for name, value in shape_changes.items())
+        robots.append("shaping")
+        code = f"shaping.shaped({code}, {arguments})"
+    if sketch.palette != DEFAULT_CHOICE:
+        code = f"{code}.replace(palette={palettes.parse(sketch.palette)!r})"
+    return code, {"arc_suite": ["policies"], "arc_suite.models": models, "arc_suite.robots": robots}
+
+
+def command_line(sketch: Sketch) -> str:
+    """Return the command that shows the same creature in a window.
+
+    A body that the program cannot name or make is read from its saved spec, `spec_file_name`.
+    """
+    body = make_body(sketch)
+    is_unchanged = body == source_body(sketch)
+    if sketch.source in ROBOTS and is_unchanged:
+        body_flags = ["--robot", sketch.source]
+    elif sketch.source in EXAMPLES and is_unchanged:
+        body_flags = ["--spec", sketch.source]
+    elif sketch.source == LEGS and body == generator.generate(sketch.legs, sketch.links):
+        body_flags = ["--legs", str(sketch.legs), "--links", str(sketch.links)]
+    else:
+        body_flags = ["--spec", spec_file_name(body)]
+    setting_flags = [f"--set={name}={_flag_value(value)}" for name, value in make_settings(sketch, body).items()]
+    policy_flags = [] if sketch.policy == "cpg" else ["--policy", sketch.policy]
+    preset_flags = [] if sketch.preset == DEFAULT_CHOICE else ["--preset", sketch.preset]
+    task_flags = ["--task", sketch.task, *setting_flags]
+    return shlex.join(["arc-suite", "view", *body_flags, *task_flags, *policy_flags, *preset_flags])
+
+
+def _flag_value(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
 def open_file(sketch: Sketch, text: str) -> Sketch:
-    """Return the sketch with the body of a spec file's text, in its own proportions."""
-    as_it_is: dict[str, Any]
-    as_it_is = {field.name: field.default for field in dataclasses.fields(Sketch) if field.name not in _DOING}
-    return dataclasses.replace(sketch, **as_it_is | {"source": FILE, "file": text})
+    """Return the sketch with the body of a spec file, in the file's proportions.
+
+    Args:
+        sketch: whose task and policy stay.
+        text: of the spec file.
+    """
+    body_fields: dict[str, Any]
+    body_fields = {field.name: field.default for field in dataclasses.fields(Sketch) if field.name not in _TASK_FIELDS}
+    body_fields["source"] = FILE
+    body_fields["file"] = text
+    return dataclasses.replace(sketch, **body_fields)
 
 
 def apply_cure(sketch: Sketch, cure: Body) -> Sketch:
-    """Return the sketch with another body, as a file in its own proportions."""
+    """Return the sketch with another body, as a file in the proportions of that body."""
     return open_file(sketch, body_to_json(cure))
 
 
 def length_factor(sketch: Sketch, link: str) -> float:
-    """Return the length of a link as a multiple of the body's own.
+    """Return the length of a link as a multiple of its length in the source body.
 
     Args:
         sketch: of the body.
-        link: name of a link of all legs, or of the part that it is of one leg.
+        link: name of a link in all legs, or name of its part in one leg.
     """
-    own = _own_ends(sketch)
-    if link not in own:
+    original_ends = _original_ends(sketch)
+    if link not in original_ends:
         return dict(sketch.lengths).get(link, 1.0)
-    return math.hypot(*dict(sketch.ends).get(link, own[link])) / math.hypot(*own[link])
+    end = dict(sketch.ends).get(link, original_ends[link])
+    return math.hypot(*end) / math.hypot(*original_ends[link])
 
 
 def set_length_factor(sketch: Sketch, link: str, factor: float, symmetric: bool) -> Sketch:
-    """Return the sketch with another length of a link, as `length` returns it; `symmetric` as for `moved`."""
-    own = _own_ends(sketch)
-    if link in own:
-        ratio, end = factor / length_factor(sketch, link), dict(sketch.ends).get(link, own[link])
-        return set_end(sketch, link, tuple(ratio * number for number in end), symmetric)
-    lengths = dict(sketch.lengths) | {link: factor}
-    return dataclasses.replace(sketch, lengths=tuple((name, each) for name, each in lengths.items() if each != 1.0))
+    """Return the sketch with another length of a link.
+
+    Args:
+        sketch: to change.
+        link: as for `length_factor`.
+        factor: that `length_factor` returns for the new sketch.
+        symmetric: as for `set_end`.
+    """
+    original_ends = _original_ends(sketch)
+    if link in original_ends:
+        ratio = factor / length_factor(sketch, link)
+        end = dict(sketch.ends).get(link, original_ends[link])
+        return set_end(sketch, link, tuple(ratio * coordinate for coordinate in end), symmetric)
+    factors = dict(sketch.lengths) | {link: factor}
+    changed_lengths = tuple((name, number) for name, number in factors.items() if number != 1.0)
+    return dataclasses.replace(sketch, lengths=changed_lengths)
 
 
-def drag_end(sketch: Sketch, part: str, by: Sequence[float], symmetric: bool) -> Sketch:
-    """Return the sketch with the end of a link of one leg moved in its frame, m as the body is; see `moved`."""
-    own = _own_ends(sketch)
-    if part not in own:
+def drag_end(sketch: Sketch, part: str, shift: Sequence[float], symmetric: bool) -> Sketch:
+    """Return the sketch with a shifted end of a link of one leg.
+
+    Args:
+        sketch: to change.
+        part: name of the link's part; the sketch stays as it is if the body lacks it.
+        shift: (3,) in the frame of the link, m, in the body's present proportions.
+        symmetric: as for `set_end`.
+    """
+    original_ends = _original_ends(sketch)
+    if part not in original_ends:
         return sketch
-    factor = sketch.scale * next((each for name, each in sketch.lengths if part.endswith(f"_{name}")), 1.0)
-    end = dict(sketch.ends).get(part, own[part])
-    return set_end(sketch, part, tuple(old + new / factor for old, new in zip(end, by, strict=True)), symmetric)
+    factor = sketch.scale
+    for link, link_factor in sketch.lengths:
+        if part.endswith(f"_{link}"):
+            factor = sketch.scale * link_factor
+            break
+    end = dict(sketch.ends).get(part, original_ends[part])
+    shifted_end = tuple(coordinate + change / factor for coordinate, change in zip(end, shift, strict=True))
+    return set_end(sketch, part, shifted_end, symmetric)
 
 
 def set_end(sketch: Sketch, part: str, end: Vector, symmetric: bool) -> Sketch:
@@ -249,73 +332,71 @@ def set_end(sketch: Sketch, part: str, end: Vector, symmetric: bool) -> Sketch:
         sketch: to change.
         part: name of the link's part, which the body may lack.
         end: (3,) in the frame of the link, before proportions change, m.
-        symmetric: whether the leg across the body's plane of symmetry gets the mirrored end, if there is one.
+        symmetric: whether the leg on the other side of the body gets the mirrored end, if there is such a leg.
     """
-    made, (x, y, z) = source_body(sketch), (float(f"{number:.5g}") for number in end)
-    own, across = link_ends(made), _across(made, part) if symmetric else None
-    ends = dict(sketch.ends) | {part: (x, y, z)} | ({across: (x, -y, z)} if across else {})
-    changed = tuple((name, each) for name, each in ends.items() if not _near(each, own.get(name, each[:0])))
-    return dataclasses.replace(sketch, ends=changed)
+    original_body = source_body(sketch)
+    original_ends = link_ends(original_body)
+    x, y, z = (float(f"{coordinate:.5g}") for coordinate in end)
+    ends = dict(sketch.ends)
+    ends[part] = (x, y, z)
+    if symmetric:
+        opposite_part = _opposite_part(original_body, part)
+        if opposite_part is not None:
+            ends[opposite_part] = (x, -y, z)
+    changed_ends = tuple(
+        (name, point)
+        for name, point in ends.items()
+        if name not in original_ends or not _are_close(point, original_ends[name])
+    )
+    return dataclasses.replace(sketch, ends=changed_ends)
 
 
-def _own_ends(sketch: Sketch) -> Mapping[str, Vector]:
-    """The ends of links before proportions change; none of a sketch that makes no body, while widgets change it."""
+def _original_ends(sketch: Sketch) -> Mapping[str, Vector]:
+    """Return the ends of links before proportions change, by part.
+
+    The mapping is empty while widgets hold values that make no body.
+    """
     try:
         return link_ends(source_body(sketch))
     except ValueError:
         return {}
 
 
-def _across(made: Body, part: str) -> str | None:
-    """The name of the part in the leg that mirrors a part's leg; None without one."""
-    for leg in made.legs:
+def _opposite_part(body: Body, part: str) -> str | None:
+    """Return the name of the same part in the mirrored leg on the other side; None without such a leg."""
+    for leg in body.legs:
         if part in leg.part_names:
-            reflected = [(x, -y, z) for x, y, z in leg.points]
-            others = (other for other in made.legs if other is not leg and len(other.points) == len(reflected))
-            return next(
-                (other.part_names[leg.part_names.index(part)] for other in others if _alike(other, reflected)), None
-            )
+            mirrored_points = tuple((x, -y, z) for x, y, z in leg.points)
+            opposite_leg = _find_leg(body, mirrored_points, except_for=leg)
+            return None if opposite_leg is None else opposite_leg.part_names[leg.part_names.index(part)]
     return None
 
 
-def _alike(leg: Leg, points: list[Vector]) -> bool:
-    return all(_near(mine, other) for mine, other in zip(leg.points, points, strict=True))
+def _find_leg(body: Body, points: tuple[Vector, ...], except_for: Leg) -> Leg | None:
+    """Return the first leg whose joints and foot are at points, m."""
+    for leg in body.legs:
+        if leg is except_for or len(leg.points) != len(points):
+            continue
+        if all(_are_close(leg_point, point) for leg_point, point in zip(leg.points, points, strict=True)):
+            return leg
+    return None
 
 
-def _near(one: Vector, other: Vector) -> bool:
-    return len(one) == len(other) and math.dist(one, other) <= _SAME * math.hypot(*one, *other)
+def _are_close(first: Vector, second: Vector) -> bool:
+    return math.dist(first, second) <= _MAX_END_DIFFERENCE * math.hypot(*first, *second)
 
 
-def command_line(sketch: Sketch) -> str:
-    """Return the command that shows the same in a window; a body of its own is read from its saved spec."""
-    made = make_body(sketch)
-    unchanged = made == source_body(sketch)
-    if sketch.source in ROBOTS and unchanged:
-        chosen = ["--robot", sketch.source]
-    elif sketch.source in EXAMPLES and unchanged:
-        chosen = ["--spec", sketch.source]
-    elif sketch.source == LEGS and made == generator.generate(sketch.legs, sketch.links):
-        chosen = ["--legs", str(sketch.legs), "--links", str(sketch.links)]
-    else:
-        chosen = ["--spec", file_name(made)]
-    options = [f"--set={name}={_flag(value)}" for name, value in make_settings(sketch, made).items()]
-    policy = [] if sketch.policy == "cpg" else ["--policy", sketch.policy]
-    given = [] if sketch.preset == DEFAULT_CHOICE else ["--preset", sketch.preset]
-    return shlex.join(["arc-suite", "view", *chosen, "--task", sketch.task, *options, *policy, *given])
+def _shape_changes(sketch: Sketch, body: Body) -> dict[str, Any]:
+    """Return the fields of `shaping.Shape` in which the proportions of a sketch differ from those of its source.
 
-
-def _flag(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
-
-
-def _given(choice: str) -> str | None:
-    return None if choice == DEFAULT_CHOICE else choice
-
-
-def _shape(sketch: Sketch, made: Body) -> dict[str, Any]:
-    """The changes of proportions of a body, without those that change nothing."""
-    shape = {name: getattr(sketch, name) for name in Shape._fields if name not in ("links", "ends")}
-    names = link_names(made)
-    shape["links"] = {name: factor for name, factor in sketch.lengths if factor != 1.0 and name in names}
-    shape["ends"] = {name: end for name, end in sketch.ends if name in link_ends(made)}
-    return {name: value for name, value in shape.items() if value != getattr(Shape(), name)}
+    Args:
+        sketch: with proportions.
+        body: of the source.
+    """
+    shape: dict[str, Any] = {name: getattr(sketch, name) for name in Shape._fields if name not in ("links", "ends")}
+    links = link_names(body)
+    parts = link_ends(body).keys()
+    shape["links"] = {name: factor for name, factor in sketch.lengths if factor != 1.0 and name in links}
+    shape["ends"] = {name: end for name, end in sketch.ends if name in parts}
+    unchanged_shape = Shape()
+    return {name: value for name, value in shape.items() if value != getattr(unchanged_shape, name)}

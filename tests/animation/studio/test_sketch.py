@@ -97,7 +97,7 @@ def test_factors_of_links_that_the_body_lacks_are_ignored():
 @pytest.mark.parametrize("sketch", SKETCHES.values(), ids=SKETCHES)
 def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / sketches.file_name(sketches.source_body(sketch))).write_text(body_to_json(sketches.source_body(sketch)))
+    (tmp_path / sketches.spec_file_name(sketches.source_body(sketch))).write_text(body_to_json(sketches.source_body(sketch)))
     made = {}
     exec(sketches.python_lines(sketch), made)
     assert made["body"] == sketches.make_body(sketch)
@@ -111,7 +111,7 @@ def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
 def test_the_command_line_is_understood(sketch, tmp_path):
     """The window of `view` needs a display; `evaluate` takes the same flags."""
     body = sketches.make_body(sketch)
-    (tmp_path / sketches.file_name(body)).write_text(body_to_json(body))
+    (tmp_path / sketches.spec_file_name(body)).write_text(body_to_json(body))
     program, view, *flags = shlex.split(sketches.command_line(sketch))
     assert (program, view) == ("arc-suite", "view")
     done = programs.arc_suite("evaluate", *flags, "--episodes=1", "--set=time_limit=0.5", cwd=tmp_path)
