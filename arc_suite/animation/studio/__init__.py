@@ -1,6 +1,6 @@
-"""A page in which a creature is designed while it walks: a sketch, the creature it makes, its episodes, widgets.
+"""A page on which a creature is designed while it walks.
 
-`sketch` is what the widgets say of a creature, `states` all that they say and its history, `creature` opens a sketch,
-`session` steps it in real time, `saving` makes files of it. Only `page`, `layout`, `view`, `figure` and `charts` need
-viser.
+`sketch` holds the values of the widgets for body and task. `states` holds the values of all widgets, and their history.
+`creature` opens a sketch, `session` steps the creature in real time, and `saving` makes files of it. Only `page`,
+`gate`, `layout`, `view`, `figure` and `charts` need viser.
 """

@@ -1,4 +1,4 @@
-"""A sketch, opened: its environment, policy and what `check` says of its body."""
+"""A creature that can walk: the body, the environment and the policy of a sketch, and the flaws of its body."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import policies
 from arc_suite.animation.parts import Material, Part
-from arc_suite.animation.parts import describe_body as described
+from arc_suite.animation.parts import describe_body
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.sketch import Sketch
 from arc_suite.bodies.shaping import link_names
@@ -23,15 +23,16 @@ class Creature(NamedTuple):
     """A creature that can walk.
 
     Attributes:
-        sketch: what made it.
+        sketch: of which it is made.
         setup: body, task and settings.
-        environment: of its own; episodes have no time limit, and physics that diverges ends one.
+        environment: in which it walks. Episodes have no time limit; physics that diverges ends an episode.
         act: maps a `TimeStep` to an action.
         flaws: of the body.
         links: names of the links of its legs.
-        tile: side of the tiles of its ground, m, whose number tells its size: what its standing height is at size 1.
-        reach: how far it extends from the torso's origin along any axis, m.
-        parts: that are seen.
+        tile: side of the square tiles of its ground, m: the standing height of the body at scale 1. So tiles show how
+            much a sketch scales the body.
+        reach: greatest distance of a point of the body from the torso's origin along an axis, m.
+        parts: visible parts of the body; a part follows its parent.
         materials: of the parts, by name.
     """
 
@@ -51,14 +52,14 @@ def open_creature(sketch: Sketch) -> Creature:
     """Open a sketch.
 
     Raises:
-        ValueError: a name or a value that does not fit.
+        ValueError: a name or a value of the sketch does not fit.
         OSError: a file cannot be read.
     """
     setup = sketches.make_setup(sketch)
-    parts, materials = described(setup.body)
+    parts, materials = describe_body(setup.body)
     environment = load_environment(setup, time_limit=math.inf, on_divergence="terminate")
     act = alone(load_policy(sketch, environment))
-    act(load_environment(setup).reset())  # finds out at once whether the policy knows the observation
+    act(load_environment(setup).reset())  # raises an error now if the policy does not take the observation
     return Creature(
         sketch=sketch,
         setup=setup,
@@ -77,17 +78,18 @@ def load_environment(setup: Setup, **options) -> dm.Environment:
     """Open an environment of a setup, with the same first episode every time.
 
     Args:
-        setup: what to open.
-        options: settings of the task, unless the setup has them.
+        setup: to open.
+        options: settings of the task that the setup may replace.
     """
-    return dm.load(setup.body, setup.task, options | setup.task_kwargs | {"random": 0})
+    settings = options | setup.task_kwargs | {"random": 0}
+    return dm.load(setup.body, setup.task, settings)
 
 
 def load_policy(sketch: Sketch, environment: dm.Environment) -> Policy:
     """Return the policy of a sketch for one environment.
 
     Raises:
-        ValueError: it does not fit the body or the task.
+        ValueError: the policy does not fit the body or the task.
         OSError: a file cannot be read.
     """
     task = environment.task.definition

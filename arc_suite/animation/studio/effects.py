@@ -1,4 +1,4 @@
-"""Which widgets change nothing of a creature: the page does not show them."""
+"""Widgets without effect on a creature; the page hides them."""
 
 from arc_suite.animation import player_controls
 from arc_suite.animation.studio import sketch as sketches
@@ -7,29 +7,46 @@ from arc_suite.animation.studio.sketch import LEGS, RANDOM
 from arc_suite.animation.studio.states import POSE, VELOCITY, VisitorCommand
 from arc_suite.bodies.shaping import Shape
 
-_SHAPE = (*Shape._fields[: Shape._fields.index("links")], "lengths")
+_PROPORTIONS = Shape._fields[: Shape._fields.index("links")]  # fields of a shape that are about the body as a whole
+_SHAPE = (*_PROPORTIONS, "lengths")  # fields of a sketch that change the shape of a body
 
 
 def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
-    """Return the fields of a state that change nothing of a creature, by name.
+    """Return the names of the fields of a page's state that change nothing of a creature.
 
     Args:
         creature: that walks.
-        command: of now.
+        command: the present one.
     """
-    sketch, setup, task = creature.sketch, creature.setup, creature.environment.task.definition
-    field, by_hand, directs = sketches.settings_field(sketch), command.by_hand, player_controls.is_directed(task)
-    rules = (
-        (("legs", "links", "layout"), sketch.source != LEGS),
-        (("seed",), sketch.source != RANDOM),
-        (_SHAPE, setup.body.source is not None),  # an imported body keeps its shape
-        (("gait",), "gait" in field),  # the field of settings comes before the widgets
-        (("speed",), "target_velocity" in field or task.target_velocity is None and task.parameters is None),
-        (("ground",), "arena" in field or setup.kind.own_arena),
-        (("kicks",), "kicks" in field),
-        (("preset",), sketch.policy != "cpg"),
-        (("by_hand",), not task.commands),
-        (VELOCITY, not by_hand or task.commands.get("command") != 3),
-        (("gait_now", "tempo", *POSE), not by_hand or not directs),
-    )
-    return frozenset(name for names, holds in rules if holds for name in names)
+    sketch = creature.sketch
+    setup = creature.setup
+    task = creature.environment.task.definition
+    typed_settings = sketches.settings_field(sketch)  # settings of the text field replace those of other widgets
+    has_target_velocity = task.target_velocity is not None or task.parameters is not None
+    takes_velocity = task.commands.get("command") == 3
+    is_imported = setup.body.source is not None
+
+    idle: list[str] = []
+    if sketch.source != LEGS:
+        idle += ["legs", "links", "layout"]
+    if sketch.source != RANDOM:
+        idle.append("seed")
+    if is_imported:  # an imported body keeps its shape
+        idle += _SHAPE
+    if "gait" in typed_settings:
+        idle.append("gait")
+    if "target_velocity" in typed_settings or not has_target_velocity:
+        idle.append("speed")
+    if "arena" in typed_settings or setup.kind.own_arena:
+        idle.append("ground")
+    if "kicks" in typed_settings:
+        idle.append("kicks")
+    if sketch.policy != "cpg":
+        idle.append("preset")
+    if not task.commands:
+        idle.append("by_hand")
+    if not (command.by_hand and takes_velocity):
+        idle += VELOCITY
+    if not (command.by_hand and player_controls.is_directed(task)):
+        idle += ["gait_now", "tempo", *POSE]
+    return frozenset(idle)

@@ -8,25 +8,26 @@ import numpy as np
 from arc_suite.animation.episodes import Episodes
 from arc_suite.tasks.clock import TWO_PI
 
-_STEPS = 120  # control steps that are kept
+_MAX_STEPS = 120  # control steps of the history
+_SPEED_WINDOW = 1.0  # s, over which a speed is a mean
 
 
 class Moment(NamedTuple):
-    """A control step.
+    """The values of one control step.
 
     Attributes:
         terms: weighted terms of the reward by name.
         stance: (feet,) whether the foot is in stance; None in a task without a gait.
-        schedule: (feet,) whether the gait wants it there, all feet at a stop; None in a task without a gait.
-        place: (2,) of the torso, m.
-        desired: m/s that the command asks for; NaN where there is none.
+        schedule: (feet,) whether the gait schedules a stance, at a stop for all feet; None in a task without a gait.
+        position: (2,) of the torso over the ground, m.
+        desired_speed: by command, m/s; NaN without a command.
     """
 
     terms: dict[str, float]
     stance: np.ndarray | None
     schedule: np.ndarray | None
-    place: np.ndarray
-    desired: float
+    position: np.ndarray
+    desired_speed: float
 
 
 class History:
@@ -35,63 +36,81 @@ class History:
     def __init__(self, episodes: Episodes):
         """Begin without a step."""
         self._episodes = episodes
-        self._moments: collections.deque[Moment] = collections.deque(maxlen=_STEPS)
+        self._moments: collections.deque[Moment] = collections.deque(maxlen=_MAX_STEPS)
 
     def __len__(self) -> int:
         return len(self._moments)
 
     def observe(self) -> None:
-        """Remember the control step that the episodes have just taken; a new episode begins anew."""
-        environment, steps = self._episodes.environment, self._episodes.steps
-        task, data = environment.task.definition, environment.physics.data
-        if steps == 0:
+        """Add the control step that the episodes have just taken; at the start of an episode, forget all steps."""
+        if self._episodes.steps == 0:
             self._moments.clear()
             return
-        weights, run = task.settings.weights, environment.task
-        stance = schedule = None
-        if (gait := task.leg_phases(run.memory)) is not None:
-            phases, duty_factor = gait
+        environment = self._episodes.environment
+        data = environment.physics.data
+        run = environment.task
+        task = run.definition
+        weights = task.settings.weights
+        stance = None
+        schedule = None
+        gait = task.leg_phases(run.memory)
+        if gait is not None:
+            phases, duty_factor = gait  # rad, and the share of a cycle that a foot stands
             stance = task.read(data).foot_heights < task.parameters.stance_threshold
-            schedule = (phases % TWO_PI < TWO_PI * duty_factor) | self._stops()
-        terms = {name: weights[name] * float(value) for name, value in run.terms.items()}
-        self._moments.append(Moment(terms, stance, schedule, data.qpos[:2].copy(), self._desired()))
+            schedule = (phases % TWO_PI < TWO_PI * duty_factor) | self._is_at_stop()
+        moment = Moment(
+            terms={name: weights[name] * float(value) for name, value in run.terms.items()},
+            stance=stance,
+            schedule=schedule,
+            position=data.qpos[:2].copy(),
+            desired_speed=self._desired_speed(),
+        )
+        self._moments.append(moment)
 
     @property
     def times(self) -> np.ndarray:
-        """Times (steps,) of the control steps, s, 0 for the latest."""
+        """Return the times (steps,) of the control steps, s; the latest is at 0."""
         return self._episodes.control_timestep * np.arange(1 - len(self._moments), 1)
 
     def terms(self) -> dict[str, np.ndarray]:
         """Return the weighted terms of the reward by name, (steps,) each."""
-        names = self._moments[0].terms if self._moments else ()
-        return {name: np.array([moment.terms[name] for moment in self._moments]) for name in names}
+        if not self._moments:
+            return {}
+        return {name: np.array([moment.terms[name] for moment in self._moments]) for name in self._moments[0].terms}
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return which feet are in stance and which the gait wants there, (steps, feet); None without a gait."""
+        """Return which feet are in stance and which the gait schedules so, (steps, feet); None without a gait."""
         if not self._moments or self._moments[0].stance is None:
             return None
-        return np.array([m.stance for m in self._moments]), np.array([m.schedule for m in self._moments])
+        stance = np.array([moment.stance for moment in self._moments])
+        schedule = np.array([moment.schedule for moment in self._moments])
+        return stance, schedule
 
     def speeds(self) -> np.ndarray:
         """Return the speeds (steps,) of the torso over the ground, m/s: means over a second, or less at the start."""
-        step, places = self._episodes.control_timestep, np.array([moment.place for moment in self._moments])
-        count = min(max(1, round(1.0 / step)), len(places) - 1)
-        if count < 1:
-            return np.zeros(len(places))
-        means = np.linalg.norm(places[count:] - places[:-count], axis=1) / (count * step)
-        return np.concatenate([np.full(count, means[0]), means])
+        control_timestep = self._episodes.control_timestep
+        positions = np.array([moment.position for moment in self._moments])
+        window = max(1, round(_SPEED_WINDOW / control_timestep))
+        window = min(window, len(positions) - 1)  # control steps
+        if window < 1:
+            return np.zeros(len(positions))
+        distances = np.linalg.norm(positions[window:] - positions[:-window], axis=1)
+        means = distances / (window * control_timestep)
+        return np.concatenate([np.full(window, means[0]), means])
 
-    def desired(self) -> np.ndarray:
-        """Return the speeds (steps,) that the command asks for, m/s; NaN where there is no command."""
-        return np.array([moment.desired for moment in self._moments])
+    def desired_speeds(self) -> np.ndarray:
+        """Return the speeds (steps,) by command, m/s; NaN where there is no command."""
+        return np.array([moment.desired_speed for moment in self._moments])
 
-    def _stops(self) -> bool:
-        """Whether the clock of the gait rests, as at a stop."""
+    def _is_at_stop(self) -> bool:
+        """Return whether the clock of the gait, as it is observed, rests."""
         return not np.any(self._episodes.timestep.observation.get("gait_clock", 1.0))
 
-    def _desired(self) -> float:
+    def _desired_speed(self) -> float:
         task = self._episodes.environment.task.definition
-        command = self._episodes.timestep.observation.get("command")
+        command = self._episodes.timestep.observation.get("command")  # velocity in multiples of the target velocity
         if command is not None and task.parameters is not None:
             return float(np.hypot(*command[:2]) * task.parameters.target_velocity)
-        return np.nan if task.target_velocity is None else float(task.target_velocity)
+        if task.target_velocity is None:
+            return np.nan
+        return float(task.target_velocity)

@@ -1,7 +1,10 @@
-"""The widgets of the page, by the fields of a state that they show."""
+"""The widgets of the page.
+
+Functions add widgets to the page, and return them by the names of the fields of a `PageState` that they show.
+"""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import viser
 
@@ -17,72 +20,111 @@ from arc_suite.robots import gaits
 from arc_suite.robots.spec import PALETTES
 from arc_suite.tasks import TASKS
 
-LINKS = 8  # sliders of links, at most
-FACTORS = (0.5, 2.0, 0.05)  # of a length: least, most and step
+MAX_LINK_SLIDERS = 8
+LENGTH_FACTORS = (0.5, 2.0)  # lowest and highest factor of a length
+LENGTH_FACTOR_STEP = 0.05
+_MAX_KICKS = 3.0  # sqrt(g h)
+_MAX_SEED = 2**32 - 1
+
+
+class _Slider(NamedTuple):
+    """A slider of a number of a sketch.
+
+    Attributes:
+        field: name of the number.
+        label: that visitors see.
+        low: lowest number.
+        high: highest number.
+        step: between two numbers.
+    """
+
+    field: str
+    label: str
+    low: float
+    high: float
+    step: float
+
+
 _PROPORTIONS = (
-    ("scale", "Size", 0.25, 4.0, 0.05),
-    ("length", "Torso length", *FACTORS),
-    ("width", "Torso width", *FACTORS),
-    ("thickness", "Torso thickness", *FACTORS),
-    ("fan", "Fan of the legs", -40.0, 40.0, 1.0),
+    _Slider("scale", "Size", 0.25, 4.0, 0.05),
+    _Slider("length", "Torso length", *LENGTH_FACTORS, LENGTH_FACTOR_STEP),
+    _Slider("width", "Torso width", *LENGTH_FACTORS, LENGTH_FACTOR_STEP),
+    _Slider("thickness", "Torso thickness", *LENGTH_FACTORS, LENGTH_FACTOR_STEP),
+    _Slider("fan", "Fan of the legs", -40.0, 40.0, 1.0),  # degrees
 )
 
 
-def source(gui: viser.GuiApi, first: Sketch) -> dict[str, Any]:
-    """Add where the body comes from."""
+def add_source(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
+    """Add widgets for the source of the body, with the values of a sketch."""
+    sources = list_with(sketch.source, sketches.sources())
+    min_legs, max_legs = generator.LEGS
+    min_links, max_links = generator.LINKS
+    layouts = [DEFAULT_CHOICE, *generator.LAYOUTS]
     return {
-        "source": gui.add_dropdown("Body", list_with(first.source, sketches.sources()), initial_value=first.source),
-        "legs": gui.add_slider("Legs", *generator.LEGS, 1, first.legs),
-        "links": gui.add_slider("Links", *generator.LINKS, 1, first.links),
-        "layout": gui.add_dropdown("Layout", [DEFAULT_CHOICE, *generator.LAYOUTS], initial_value=first.layout),
-        "seed": gui.add_number("Seed", first.seed, min=0, max=2**32 - 1, step=1),
+        "source": gui.add_dropdown("Body", sources, initial_value=sketch.source),
+        "legs": gui.add_slider("Legs", min=min_legs, max=max_legs, step=1, initial_value=sketch.legs),
+        "links": gui.add_slider("Links", min=min_links, max=max_links, step=1, initial_value=sketch.links),
+        "layout": gui.add_dropdown("Layout", layouts, initial_value=sketch.layout),
+        "seed": gui.add_number("Seed", sketch.seed, min=0, max=_MAX_SEED, step=1),
     }
 
 
-def shape(gui: viser.GuiApi, first: Sketch) -> dict[str, Any]:
-    """Add the body's proportions and colors."""
-    sliders = {
-        name: gui.add_slider(label, low, high, step, getattr(first, name))
-        for name, label, low, high, step in _PROPORTIONS
-    }
-    palettes = list_with(first.palette, (DEFAULT_CHOICE, *PALETTES))
-    return sliders | {"palette": gui.add_dropdown("Palette", palettes, initial_value=first.palette)}
+def add_shape(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
+    """Add widgets for the body's proportions and colors, with the values of a sketch."""
+    widgets: dict[str, Any] = {}
+    for field, label, low, high, step in _PROPORTIONS:
+        value = getattr(sketch, field)
+        widgets[field] = gui.add_slider(label, min=low, max=high, step=step, initial_value=value)
+    palettes = list_with(sketch.palette, (DEFAULT_CHOICE, *PALETTES))
+    widgets["palette"] = gui.add_dropdown("Palette", palettes, initial_value=sketch.palette)
+    return widgets
 
 
-def task(gui: viser.GuiApi, first: Sketch) -> dict[str, Any]:
-    """Add the task and who acts."""
-    most, presets = max(3.0, first.kicks), list_with(first.preset, (DEFAULT_CHOICE, *preset_names()))
+def add_task(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
+    """Add widgets for the task and the policy, with the values of a sketch."""
+    tasks = list_with(sketch.task, TASKS)
+    grounds = list_with(sketch.ground, ARENAS)
+    gait_names = [DEFAULT_CHOICE, *gaits.NAMES]
+    max_kicks = max(_MAX_KICKS, sketch.kicks)
+    policies = list_with(sketch.policy, POLICIES)
+    presets = list_with(sketch.preset, (DEFAULT_CHOICE, *preset_names()))
     return {
-        "task": gui.add_dropdown("Task", list_with(first.task, TASKS), initial_value=first.task),
-        "ground": gui.add_dropdown("Ground", list_with(first.ground, ARENAS), initial_value=first.ground),
-        "gait": gui.add_dropdown("Gait", [DEFAULT_CHOICE, *gaits.NAMES], initial_value=first.gait),
-        "speed": gui.add_slider("Speed", 0.2, 2.0, 0.05, first.speed, hint="Multiple of the body's own"),
-        "kicks": gui.add_slider("Kicks", 0.0, most, 0.1, first.kicks, hint="At most, sqrt(g h)"),
-        "settings": gui.add_text("Settings", first.settings, hint="Of the task, as a JSON object"),
-        "policy": gui.add_dropdown("Policy", list_with(first.policy, POLICIES), initial_value=first.policy),
-        "preset": gui.add_dropdown("Preset", presets, initial_value=first.preset),
+        "task": gui.add_dropdown("Task", tasks, initial_value=sketch.task),
+        "ground": gui.add_dropdown("Ground", grounds, initial_value=sketch.ground),
+        "gait": gui.add_dropdown("Gait", gait_names, initial_value=sketch.gait),
+        "speed": gui.add_slider("Speed", 0.2, 2.0, 0.05, sketch.speed, hint="Multiple of the body's own"),
+        "kicks": gui.add_slider("Kicks", 0.0, max_kicks, 0.1, sketch.kicks, hint="At most, sqrt(g h)"),
+        "settings": gui.add_text("Settings", sketch.settings, hint="Of the task, as a JSON object"),
+        "policy": gui.add_dropdown("Policy", policies, initial_value=sketch.policy),
+        "preset": gui.add_dropdown("Preset", presets, initial_value=sketch.preset),
     }
 
 
-def velocity(gui: viser.GuiApi, first: PageState) -> dict[str, Any]:
-    """Add the velocity by command."""
-    by_hand = gui.add_checkbox("By hand", first.command.by_hand, hint="Else the task's own command")
-    sliders = {name: gui.add_slider(_label(name), -1.0, 1.0, 0.05, first.value(name)) for name in VELOCITY}
-    return {"by_hand": by_hand} | sliders
+def add_velocity(gui: viser.GuiApi, state: PageState) -> dict[str, Any]:
+    """Add widgets for the velocity by command, with the values of a state."""
+    widgets: dict[str, Any] = {}
+    widgets["by_hand"] = gui.add_checkbox("By hand", state.command.by_hand, hint="Else the task's own command")
+    for name in VELOCITY:
+        widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.05, state.value(name))
+    return widgets
 
 
-def pose(gui: viser.GuiApi) -> dict[str, Any]:
-    """Add pose and gait by command."""
-    gait = gui.add_dropdown("Gait now", [player_controls.OWN_GAIT], initial_value=player_controls.OWN_GAIT)
-    tempo = gui.add_slider("Frequency", *player_controls.TEMPO_RANGE, 0.05, 1.0, hint="Multiple of the gait's own")
-    hint = "Standing heights or rad"
-    sliders = {name: gui.add_slider(_label(name), -1.0, 1.0, 0.01, 0.0, hint=hint) for name in POSE}
-    return {"gait_now": gait, "tempo": tempo} | sliders
+def add_pose(gui: viser.GuiApi) -> dict[str, Any]:
+    """Add widgets for the pose and the gait by command."""
+    min_tempo, max_tempo = player_controls.TEMPO_RANGE
+    gait_names = [player_controls.OWN_GAIT]  # the page adds those that suit the body
+    widgets: dict[str, Any] = {
+        "gait_now": gui.add_dropdown("Gait now", gait_names, initial_value=player_controls.OWN_GAIT),
+        "tempo": gui.add_slider("Frequency", min_tempo, max_tempo, 0.05, 1.0, hint="Multiple of the gait's own"),
+    }
+    for name in POSE:
+        widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.01, 0.0, hint="Standing heights or rad")
+    return widgets
 
 
-def list_with(chosen: str, names: Iterable[str]) -> list[str]:
-    """Return names for a list to choose from, with the chosen one."""
-    return list(dict.fromkeys((*names, chosen)))
+def list_with(choice: str, names: Iterable[str]) -> list[str]:
+    """Return names for a list to choose from; the present choice comes last if it is not among them."""
+    return list(dict.fromkeys((*names, choice)))
 
 
 def _label(name: str) -> str:

@@ -109,14 +109,14 @@ class Page:
         self._view = View(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
-        self._gui.add_html(texts.styles())
+        self._gui.add_html(texts.style_sheet())
         self._status = self._gui.add_html("")
         self._add_changes()
         tabs, first = self._gui.add_tab_group(), session.creature.sketch
         with tabs.add_tab("Body"):
             self._add_body(first)
         with tabs.add_tab("Task"):
-            self._widgets |= layout.task(self._gui, first)
+            self._widgets |= layout.add_task(self._gui, first)
         with tabs.add_tab("Command"):
             self._add_command()
         with tabs.add_tab("Files"):
@@ -167,10 +167,10 @@ class Page:
     def _add_body(self, first: Sketch) -> None:
         gui = self._gui
         self._check = gui.add_folder("Check")
-        self._widgets |= layout.source(gui, first)
+        self._widgets |= layout.add_source(gui, first)
         upload = gui.add_upload_button("Open a spec or a design", mime_type="application/json")
         upload.on_upload(self._uploaded)
-        self._widgets |= layout.shape(gui, first)
+        self._widgets |= layout.add_shape(gui, first)
         self._shape = gui.add_folder("Links")
         with self._shape:
             self._leg = gui.add_dropdown("Legs to change", [_ALL], initial_value=_ALL)
@@ -184,15 +184,15 @@ class Page:
 
     def _add_command(self) -> None:
         gui = self._gui
-        self._widgets |= layout.velocity(gui, self._first)
+        self._widgets |= layout.add_velocity(gui, self._first)
         self._direction = gui.add_folder("Pose and gait")
         with self._direction:
-            self._widgets |= layout.pose(gui)
+            self._widgets |= layout.add_pose(gui)
             gui.add_button("Upright").on_click(lambda event: self._stand())
         for label, key, change in _KEYS:
             command = gui.add_command(label, hotkey=key)
             command.on_trigger(functools.partial(self._press, *change))
-        gui.add_html(texts.line(f"Keys: {_KEYS_TOLD}"))
+        gui.add_html(texts.paragraph(f"Keys: {_KEYS_TOLD}"))
         gui.add_button("Kick").on_click(lambda event: self._session.kick(random.uniform(-math.pi, math.pi)))
         gui.add_button("Restart").on_click(lambda event: self._session.restart())
         self._pause = gui.add_checkbox("Pause", False)
@@ -220,14 +220,14 @@ class Page:
         for handle in self._cures:
             handle.remove()
         with self._check:
-            self._cures = [self._gui.add_html(texts.checked(creature))]
+            self._cures = [self._gui.add_html(texts.flaws(creature))]
             for flaw in creature.flaws:
                 if flaw.cure is not None:
                     button = self._gui.add_button(f"Apply: {flaw.text.rpartition(': ')[2]}")
                     sketch = apply_cure(creature.sketch, flaw.cure)
                     button.on_click(lambda event, sketch=sketch: self._sketched(sketch, "cure"))
                     self._cures.append(button)
-        self._lines.content = texts.copied(creature.sketch)
+        self._lines.content = texts.lines_to_copy(creature.sketch)
 
     def _fit_direction(self, creature: Creature) -> None:
         """Offer the poses and gaits of a body, if they are by command in its task."""

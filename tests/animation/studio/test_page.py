@@ -156,10 +156,10 @@ def test_the_command_is_followed(served, tab):
     open_tab(tab, "Command")
     press(tab, "Turn", "End")
     press(tab, "Forward", "Home")
-    served.until(lambda: np.allclose(served.session.desired, (-1.0, 0.0, 1.0)))
+    served.until(lambda: np.allclose(served.session.velocity, (-1.0, 0.0, 1.0)))
     tab.evaluate("document.activeElement.blur()")  # keys go to the page, and not to a widget
     tab.keyboard.press("i")
-    served.until(lambda: np.allclose(served.session.desired, (-0.75, 0.0, 1.0)))
+    served.until(lambda: np.allclose(served.session.velocity, (-0.75, 0.0, 1.0)))
     served.until(lambda: served.session.episodes.timestep.observation["command"][0] == -0.75)
 
 
@@ -195,10 +195,10 @@ def test_undo_redo_and_reset(served, tab):
     served.until(lambda: served.session.creature.sketch.fan == 5.0)
     open_tab(tab, "Command")
     press(tab, "Left", "End")
-    served.until(lambda: served.session.desired[1] == 1.0)
+    served.until(lambda: served.session.velocity[1] == 1.0)
     tab.evaluate("document.activeElement.blur()")
     tab.keyboard.press("Control+z")
-    served.until(lambda: served.session.desired[1] == 0.0)
+    served.until(lambda: served.session.velocity[1] == 0.0)
     served.until(lambda: float(field(tab, "Left").get_by_role("slider").get_attribute("aria-valuenow")) == 0.0)
     tab.keyboard.press("Control+z")
     served.until(lambda: served.session.creature.sketch == before)
@@ -209,7 +209,7 @@ def test_undo_redo_and_reset(served, tab):
     tab.get_by_role("button", name="Redo").click()
     tab.get_by_role("button", name="Reset").click()
     served.until(lambda: served.session.creature.sketch == Sketch(legs=8, links=2))
-    served.until(lambda: served.session.desired.tolist() == [1.0, 0.0, 0.0])
+    served.until(lambda: served.session.velocity.tolist() == [1.0, 0.0, 0.0])
     open_tab(tab, "Body")
     served.until(lambda: field(tab, "Legs").get_by_role("textbox").input_value() == "8")
     for _ in range(2):
@@ -339,7 +339,7 @@ def test_a_design_is_opened_again(served, tab, tmp_path):
     tab.get_by_role("button", name="Reset").click()
     served.until(lambda: served.session.creature.sketch.fan == 0.0)
     upload(tab, tmp_path / name, content)
-    served.until(lambda: served.session.creature.sketch.fan == 3.0 and served.session.desired[2] == 1.0)
+    served.until(lambda: served.session.creature.sketch.fan == 3.0 and served.session.velocity[2] == 1.0)
     upload(tab, tmp_path / "bad.json", content.replace(b'"fan": 3.0', b'"policy": "file.py:make"'))
     tab.get_by_role("alert").get_by_text("unknown policy 'file.py:make'").wait_for()
     assert served.session.creature.sketch.fan == 3.0

@@ -57,11 +57,11 @@ def running(sketch=Sketch(legs=6, links=2)):  # noqa: B008
 def test_it_walks_as_the_command_says():
     with running() as (session, shown):
         shown.steps(60)
-        speed, asked = session.history.speeds()[-1], session.history.desired()[-1]
+        speed, asked = session.history.speeds()[-1], session.history.desired_speeds()[-1]
         assert asked > 0.1 and speed > 0.5 * asked
         session.command((0.0, 0.0, 0.0))
         shown.steps(60)
-        assert session.history.speeds()[-1] < 0.1 * asked and session.history.desired()[-1] == 0.0
+        assert session.history.speeds()[-1] < 0.1 * asked and session.history.desired_speeds()[-1] == 0.0
         assert session.history.contacts()[1][-1].all()  # at a stop all feet are scheduled on the ground
         session.command(None)
         shown.until(lambda: session.episodes.desired is None)
@@ -98,17 +98,17 @@ def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
 def test_a_kept_creature_walks_next_to_later_ones():
     with running() as (session, shown):
         session.keep(True)
-        shown.until(lambda: session.kept)
+        shown.until(lambda: session.companion)
         session.ask(Sketch(legs=4, links=3))
         shown.until(lambda: session.creature.sketch.legs == 4)
         session.command((0.5, 0.0, 0.0))
-        shown.until(lambda: session.kept.episodes.steps > 5)
-        for walker in (session.walker, session.kept):
+        shown.until(lambda: session.companion.episodes.steps > 5)
+        for walker in (session.walker, session.companion):
             shown.until(lambda walker=walker: walker.episodes.timestep.observation["command"][0] == 0.5)
-        assert session.kept.creature.setup.body.name == "walker_6x2"
+        assert session.companion.creature.setup.body.name == "walker_6x2"
         assert "walker_6x2, directed" in texts.status(session) and "walker_4x3, directed" in texts.status(session)
         session.keep(False)
-        shown.until(lambda: session.kept is None)
+        shown.until(lambda: session.companion is None)
 
 
 @pytest.mark.slow
@@ -143,8 +143,8 @@ def test_texts_of_the_page():
         told = texts.status(session)
         assert 'role="alert"' in told and "&lt;img src=x&gt;" in told and "<img" not in told
         assert "walker_6x2, directed" in told and "real time" in told
-        assert "walker_6x2 stands and can take steps" in texts.checked(session.creature)
-        assert "arc-suite view --legs 6 --links 2 --task directed" in texts.copied(session.creature.sketch)
+        assert "walker_6x2 stands and can take steps" in texts.flaws(session.creature)
+        assert "arc-suite view --legs 6 --links 2 --task directed" in texts.lines_to_copy(session.creature.sketch)
 
 
 def test_a_mistake_of_ours_is_told_too(monkeypatch, capsys):
