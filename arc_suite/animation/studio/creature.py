@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.animation.parts import Material, Part
-from arc_suite.animation.parts import describe_body
+from arc_suite.animation.parts import Material, Part, describe_body
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.sketch import Sketch
 from arc_suite.bodies.shaping import link_names

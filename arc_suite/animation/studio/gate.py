@@ -1,6 +1,7 @@
-"""Who may open the page, and what a visitor may send: a token, this machine's own names, and values that widgets offer.
+"""The gate of the studio: who may open the page, and what a visitor may send.
 
-A browser sends requests to this machine for every page that it shows, so a foreign page could speak to the studio.
+A visitor needs a token and a name of this machine, and may send values that the widgets offer. A browser sends requests
+to this machine for any page that it shows, so without the gate a foreign page could control the studio.
 """
 
 import asyncio
@@ -19,15 +20,16 @@ from websockets.http11 import Request, Response
 
 from arc_suite.robots.spec_files import MAX_IMPORTED
 
-LONGEST_TEXT = 10_000  # characters of a text field
-_MOST_PARTS = 16  # of an upload; a browser sends half a megabyte in each
+MAX_TEXT_LENGTH = 10_000  # characters of a text field
+_MAX_UPLOAD_PARTS = 16  # a browser sends half a megabyte in each
 
-_COOKIE = "arc_suite_studio"  # with a part of the token: cookies of all ports of a machine are sent to each
-_EVERYWHERE = ("0.0.0.0", "::", "")  # a host that listens on all addresses, whatever their names
+_COOKIE_NAME = "arc_suite_studio"  # before a part of the token: all ports of a machine share their cookies
+_TOKEN_PART_LENGTH = 8  # characters of the token in the name of the cookie
+_ALL_ADDRESSES = ("0.0.0.0", "::", "")  # hosts that listen on all addresses; requests may name any of them
 
 
 class Server(viser.ViserServer):
-    """A server that admits visitors with a token, and takes no value that its widgets do not offer.
+    """A server that admits visitors with a token, and accepts no value that its widgets do not offer.
 
     Attributes:
         token: without which a visitor is refused.
@@ -38,38 +40,41 @@ class Server(viser.ViserServer):
         self.token = secrets.token_urlsafe(16)
         serve = websockets.serve
 
-        def guarded(*args, process_request, **kwargs):
-            return serve(*args, process_request=_admitting(process_request, host, self.token), **kwargs)
+        def serve_with_gate(*args, process_request, **kwargs):
+            return serve(*args, process_request=_admit_and_process(process_request, host, self.token), **kwargs)
 
-        # viser has no hook for requests; its server starts in this call, and looks the function up then.
-        websockets.serve = guarded  # type: ignore[assignment,misc]
+        # Viser has no hook for requests, but its server looks this function up while it starts, in this call.
+        websockets.serve = serve_with_gate  # type: ignore[assignment,misc]
         try:
             super().__init__(host=host, port=port, **options)
         finally:
             websockets.serve = serve  # type: ignore[misc]
-        connection, gui = self._websock_server, self.gui
-        connection.get_message_buffer().message_event = _LoopEvent()
-        for kind, handler, taken in (
-            (messages.GuiUpdateMessage, gui._handle_gui_updates, self._offers),
-            (messages.FileTransferStartUpload, gui._handle_file_transfer_start, _fits),
-            (messages.FileTransferPart, gui._handle_file_transfer_part, lambda part: len(part.content) <= MAX_IMPORTED),
-        ):
-            connection.unregister_handler(kind, handler)
-            connection.register_handler(kind, _checking(handler, taken))
+        self._websock_server.get_message_buffer().message_event = _LoopEvent()
+        self._check_messages(messages.GuiUpdateMessage, self.gui._handle_gui_updates, self._is_offered)
+        self._check_messages(
+            messages.FileTransferStartUpload, self.gui._handle_file_transfer_start, _is_upload_of_right_size
+        )
+        self._check_messages(messages.FileTransferPart, self.gui._handle_file_transfer_part, _is_part_of_right_size)
 
     def request_share_url(self, verbose: bool = True) -> None:
         """Do nothing: the page stays on this machine, whatever a visitor requests."""
 
-    def _offers(self, message: messages.GuiUpdateMessage) -> bool:
-        """Return whether a widget offers the value of a message, which changes nothing else of it."""
+    def _check_messages(self, message_type: type, handler: Callable, is_acceptable: Callable[[Any], bool]) -> None:
+        """Pass messages of a type on to viser's handler only if they are acceptable."""
+        self._websock_server.unregister_handler(message_type, handler)
+        self._websock_server.register_handler(message_type, _handle_if(is_acceptable, handler))
+
+    def _is_offered(self, message: messages.GuiUpdateMessage) -> bool:
+        """Return whether a message changes just the value of a widget, to one that the widget offers."""
         handle = self.gui._gui_input_handle_from_uuid.get(message.uuid)
         return list(message.updates) == ["value"] and offers(handle, message.updates["value"])
 
 
 class _LoopEvent(asyncio.Event):
-    """An event that other threads do not set: in the midst of a loop's turn that breaks, and ends the walk.
+    """An event that only the thread of an event loop sets.
 
-    Viser sets it at once in the thread that sends, and has the loop set it soon after, which suffices.
+    Viser sets its event in the thread that sends a message, and asks the loop to set it soon after. The second call
+    suffices. The first call, while the loop runs, would break the loop and end the walk.
     """
 
     def set(self) -> None:
@@ -80,78 +85,101 @@ class _LoopEvent(asyncio.Event):
 
 
 def offers(handle: Any, value: Any) -> bool:
-    """Return whether a widget offers a value: an option of its list, a number that it spans, a text of bounded length.
+    """Return whether a widget offers a value: an option of a list, a number in a range, or a text of bounded length.
 
     Args:
         handle: of viser.
         value: of any type, as a visitor sends it.
     """
-    for kind, holds in _OFFERS.items():
-        if isinstance(handle, kind):
-            return holds(handle, value)
+    for handle_type, is_valid in _IS_VALID_VALUE.items():
+        if isinstance(handle, handle_type):
+            return is_valid(handle, value)
     return False
 
 
-def _fits(upload: messages.FileTransferStartUpload) -> bool:
-    return 0 <= upload.size_bytes <= MAX_IMPORTED and 0 <= upload.part_count <= _MOST_PARTS
+def _is_option(handle, value) -> bool:
+    return isinstance(value, str) and value in handle.options
 
 
-def _spans(handle, value) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and handle.min <= value <= handle.max
+def _is_number_in_range(handle, value) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and handle.min <= value <= handle.max
 
 
-_OFFERS: dict[type, Callable[[Any, Any], bool]] = {
-    viser.GuiDropdownHandle: lambda handle, value: isinstance(value, str) and value in handle.options,
-    viser.GuiSliderHandle: _spans,
-    viser.GuiNumberHandle: _spans,
-    viser.GuiTextHandle: lambda handle, value: isinstance(value, str) and len(value) <= LONGEST_TEXT,
-    viser.GuiCheckboxHandle: lambda handle, value: isinstance(value, bool),
-    viser.GuiButtonGroupHandle: lambda handle, value: isinstance(value, str) and value in handle.options,
-    viser.GuiButtonHandle: lambda handle, value: isinstance(value, bool),
+def _is_text(handle, value) -> bool:
+    return isinstance(value, str) and len(value) <= MAX_TEXT_LENGTH
+
+
+def _is_boolean(handle, value) -> bool:
+    return isinstance(value, bool)
+
+
+_IS_VALID_VALUE: dict[type, Callable[[Any, Any], bool]] = {
+    viser.GuiDropdownHandle: _is_option,
+    viser.GuiSliderHandle: _is_number_in_range,
+    viser.GuiNumberHandle: _is_number_in_range,
+    viser.GuiTextHandle: _is_text,
+    viser.GuiCheckboxHandle: _is_boolean,
+    viser.GuiButtonGroupHandle: _is_option,
+    viser.GuiButtonHandle: _is_boolean,
 }
 
 
-def _checking(handler: Callable, taken: Callable[[Any], bool]) -> Callable:
-    """Return a handler of messages that passes on those that are taken."""
-
-    async def checked(client_id, message):
-        if taken(message) and (answer := handler(client_id, message)) is not None:
-            await answer
-
-    return checked
+def _is_upload_of_right_size(upload: messages.FileTransferStartUpload) -> bool:
+    return 0 <= upload.size_bytes <= MAX_IMPORTED and 0 <= upload.part_count <= _MAX_UPLOAD_PARTS
 
 
-def _admitting(process_request: Callable, host: str, token: str) -> Callable:
-    """Return viser's answer to a request, for requests that are admitted."""
+def _is_part_of_right_size(part: messages.FileTransferPart) -> bool:
+    return len(part.content) <= MAX_IMPORTED
 
-    def answered(connection: websockets.ServerConnection, request: Request) -> Response | None:
+
+def _handle_if(is_acceptable: Callable[[Any], bool], handler: Callable) -> Callable:
+    """Return a handler of messages that passes acceptable ones on to another handler, and drops the rest."""
+
+    async def handle_if_acceptable(client_id, message):
+        if not is_acceptable(message):
+            return
+        result = handler(client_id, message)
+        if result is not None:  # the handler is asynchronous
+            await result
+
+    return handle_if_acceptable
+
+
+def _admit_and_process(process_request: Callable, host: str, token: str) -> Callable:
+    """Return a function that passes admitted requests on to viser's `process_request`, and refuses the rest."""
+
+    def process_admitted(connection: websockets.ServerConnection, request: Request) -> Response | None:
         if not admits(request, host, token):
-            line = "refused: open the address that the studio has printed\n"
-            return connection.respond(http.HTTPStatus.FORBIDDEN, line)
+            refusal = "refused: open the address that the studio has printed\n"
+            return connection.respond(http.HTTPStatus.FORBIDDEN, refusal)
         response = cast("Response | None", process_request(connection, request))
         if response is not None:
-            response.headers["Set-Cookie"] = f"{_COOKIE}-{token[:8]}={token}; Path=/; HttpOnly; SameSite=Strict"
+            cookie = f"{_COOKIE_NAME}-{token[:_TOKEN_PART_LENGTH]}={token}"
+            response.headers["Set-Cookie"] = f"{cookie}; Path=/; HttpOnly; SameSite=Strict"
         return response
 
-    return answered
+    return process_admitted
 
 
 def admits(request: Request, host: str, token: str) -> bool:
-    """Return whether a request comes from a page of this server, under a name of it, with the token.
+    """Return whether a request comes from a page of this server, under a name of this machine, with the token.
 
     Args:
         request: of a browser.
         host: that the server listens on.
         token: that the address or the cookie must hold.
     """
-    names = (host, "localhost", "127.0.0.1", "::1")
+    host_names = (host, "localhost", "127.0.0.1", "::1")
     try:
-        own, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        named = host in _EVERYWHERE or urlsplit(f"//{own}").hostname in names
-        at_home = origin is None or urlsplit(origin).netloc == own
-        given = parse_qs(urlsplit(request.path).query).get("token", [])
-        given += [cookie.value for cookie in SimpleCookie(request.headers.get("Cookie", "")).values()]
-    except (ValueError, LookupError, CookieError):  # an address or a cookie that is none, or a header twice
+        requested_host = request.headers.get("Host", "")
+        names_this_machine = host in _ALL_ADDRESSES or urlsplit(f"//{requested_host}").hostname in host_names
+        origin = request.headers.get("Origin")  # the page that sends the request; None for an address that is typed
+        comes_from_own_page = origin is None or urlsplit(origin).netloc == requested_host
+        tokens = parse_qs(urlsplit(request.path).query).get("token", [])
+        cookies = SimpleCookie(request.headers.get("Cookie", ""))
+        tokens += [cookie.value for cookie in cookies.values()]
+    except (ValueError, LookupError, CookieError):  # a malformed address or cookie, or a header that comes twice
         return False
-    return named and at_home and any(secrets.compare_digest(each.encode(), token.encode()) for each in given)
+    has_token = any(secrets.compare_digest(candidate.encode(), token.encode()) for candidate in tokens)
+    return names_this_machine and comes_from_own_page and has_token

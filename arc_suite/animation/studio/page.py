@@ -379,7 +379,7 @@ class Page:
         name, client = saving.download_name(creature, file), event.client
         note = client.add_notification(f"Making {name}", "", loading=True)
         try:
-            content = file.content(creature, creature.environment.physics.data.qpos.copy(), commands)
+            content = file.make(creature, creature.environment.physics.data.qpos.copy(), commands)
         except (ValueError, OSError, RenderingUnavailable) as error:
             client.add_notification(f"No {name}", " ".join(str(error).split()), color="red")
         else:

@@ -1,7 +1,6 @@
-"""Files of a creature, as bytes: what the buttons of the page save."""
+"""Files of a creature that the buttons of the page save, as bytes."""
 
 import contextlib
-import itertools
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -11,8 +10,7 @@ import imageio.v3 as imageio
 import numpy as np
 
 from arc_suite import models, style, versions
-from arc_suite.animation import clips as export
-from arc_suite.animation import pages, play_pages
+from arc_suite.animation import clips, pages, play_pages
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import Creature, load_environment, load_policy
 from arc_suite.animation.studio.sketch import Sketch
@@ -22,29 +20,31 @@ from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
 from arc_suite.simulation.pictures import picture
 
-_PAGE_STEPS, _FILM_STEPS = 400, 100
-_SIZE = (640, 480)  # of pictures and films, pixels
+_PAGE_STEPS = 400  # control steps of the episode on a page
+_FILM_STEPS = 100  # control steps of the episode in a film
+_WIDTH = 640  # pixels of pictures and films
+_HEIGHT = 480  # pixels of pictures and films
 
-Commands = Mapping[str, Any]  # values by name, None for what the task itself would do
+Commands = Mapping[str, Any]  # of a task, by name; None leaves a command to the task
 
 
 class File(NamedTuple):
-    """A file of a creature.
+    """A kind of file of a creature.
 
     Attributes:
         label: of its button.
-        extension: of its name.
-        content: makes it of a creature, the positions (nq,) in which it stands, and commands of its task.
+        suffix: of its name, after the name of the body.
+        make: returns the content for a creature, the positions (nq,) of its pose, and the commands of its task.
     """
 
     label: str
-    extension: str
-    content: Callable[[Creature, np.ndarray, Commands], bytes]
+    suffix: str
+    make: Callable[[Creature, np.ndarray, Commands], bytes]
 
 
 def download_name(creature: Creature, file: File) -> str:
     """Return the name under which a file is saved."""
-    return f"{creature.setup.body.name}{file.extension}"
+    return f"{creature.setup.body.name}{file.suffix}"
 
 
 def make_spec(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
@@ -59,16 +59,16 @@ def make_mjcf(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
 
 
 def make_clips(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
-    """Return animation clips as binary glTF; see `export.clips`.
+    """Return animation clips as binary glTF; see `animation.clips`.
 
     Raises:
         ValueError: a clip cannot be made.
     """
     sketch = creature.sketch
-    clips = export.clips(creature.setup, export.DEFAULT, sketch.policy, sketches.chosen_preset(sketch))
-    return export.glb(
-        creature.setup.body, clips, generator=f"arc_suite {versions.version_of('arc_suite') or ''}".strip()
-    )
+    preset = sketches.chosen_preset(sketch)
+    movements = clips.clips(creature.setup, clips.DEFAULT, sketch.policy, preset)
+    version = versions.version_of("arc_suite") or ""
+    return clips.glb(creature.setup.body, movements, generator=f"arc_suite {version}".strip())
 
 
 def make_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
@@ -77,17 +77,18 @@ def make_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
     Raises:
         ValueError: the viewer of pages has not been built.
     """
-    pages.viewer_script()  # finds out at once whether there is one
+    pages.viewer_script()  # raises an error now if there is no viewer
+    body = creature.setup.body
     environment = load_environment(creature.setup)
     with contextlib.closing(environment):
-        act = _commanded(environment, creature.sketch, commands)
-        acting = Individuals(lambda: act, 1, len(creature.setup.body.joint_names))
-        track = style.record(environment, acting, 0, _PAGE_STEPS)
-    return pages.page({creature.setup.body.name: track}).encode()
+        act = _policy_under_commands(environment, creature.sketch, commands)
+        policy = Individuals(lambda: act, num_envs=1, joints=len(body.joint_names))
+        track = style.record(environment, policy, seed=0, max_steps=_PAGE_STEPS)
+    return pages.page({body.name: track}).encode()
 
 
 def make_playable_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
-    """Return a page in which keys walk the creature about; see `play_pages`.
+    """Return a page on which keys steer the creature; see `play_pages`.
 
     Raises:
         ValueError: the scripts of pages have not been built, or the policy does not run in a page.
@@ -99,14 +100,22 @@ def make_playable_page(creature: Creature, qpos: np.ndarray, commands: Commands)
 
 
 def make_picture(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
-    """Return a picture of the creature where it stands, as PNG.
+    """Return a picture of the creature in its pose, as PNG.
 
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
-    arena, data = creature.environment.task.definition.scene.arena, creature.environment.physics.data
-    width, height = _SIZE
-    view = picture(creature.setup.body, arena, qpos, height, width, "portrait", mocap_pos=data.mocap_pos.copy())
+    arena = creature.environment.task.definition.scene.arena
+    obstacle_positions = creature.environment.physics.data.mocap_pos.copy()
+    view = picture(
+        creature.setup.body,
+        arena,
+        qpos,
+        height=_HEIGHT,
+        width=_WIDTH,
+        camera_id="portrait",
+        mocap_pos=obstacle_positions,
+    )
     return imageio.imwrite("<bytes>", view, extension=".png")
 
 
@@ -117,27 +126,28 @@ def make_film(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
         RenderingUnavailable: no OpenGL here.
     """
     environment = load_environment(creature.setup)
-    act = _commanded(environment, creature.sketch, commands)
-    footage = films.Footage(creature.setup.body.name, environment, act, "profile", _SIZE)
-    frame = films.frame_seconds(footage.control_timestep)
+    act = _policy_under_commands(environment, creature.sketch, commands)
+    footage = films.Footage(creature.setup.body.name, environment, act, "profile", (_WIDTH, _HEIGHT))
+    film_seconds = _FILM_STEPS * footage.control_timestep
+    frame_seconds = films.frame_seconds(footage.control_timestep)
     with contextlib.closing(footage), tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        views = films.frames([footage], _FILM_STEPS * footage.control_timestep, frame)
-        films.write_mp4(path, itertools.chain.from_iterable(views), frame)
+        frames = (views[0] for views in films.frames([footage], film_seconds, frame_seconds))
+        films.write_mp4(path, frames, frame_seconds)
         return path.read_bytes()
 
 
-def _commanded(environment: Environment, sketch: Sketch, commands: Commands):
-    """Return the policy of a sketch as a function of a `TimeStep`, which sets commands at the start of episodes."""
+def _policy_under_commands(environment: Environment, sketch: Sketch, commands: Commands) -> Callable:
+    """Return the policy of a sketch as a function of a `TimeStep` that sets commands at the start of episodes."""
     act = alone(load_policy(sketch, environment))
 
-    def acting(timestep):
+    def set_commands_and_act(timestep):
         if timestep.first():
             for name, value in commands.items():
                 environment.command(name, value)
         return act(timestep)
 
-    return acting
+    return set_commands_and_act
 
 
 FILES = (

@@ -150,7 +150,7 @@ def test_what_a_widget_offers_is_taken(studio):
         *(("task", "antigravity:walk"), ("source", "antigravity:queen"), ("ground", "antigravity:flat")),
         *(("speed", value) for value in (2.0001, float("nan"), True, "1")),
         *(("seed", -1), ("seed", 2**32), ("kicks", 10**400)),
-        *(("settings", value) for value in (" " * (gate.LONGEST_TEXT + 1), 5)),
+        *(("settings", value) for value in (" " * (gate.MAX_TEXT_LENGTH + 1), 5)),
     ],
 )
 def test_no_other_value_is_taken(studio, name, value):
@@ -194,5 +194,5 @@ def test_an_upload_that_is_too_large_is_not_begun(studio):
 
 def test_every_widget_of_the_page_has_a_rule(studio):
     handles = studio.server.gui._gui_input_handle_from_uuid.values()
-    without = {type(handle) for handle in handles if not isinstance(handle, tuple(gate._OFFERS))}
+    without = {type(handle) for handle in handles if not isinstance(handle, tuple(gate._IS_VALID_VALUE))}
     assert without == {viser.GuiUploadButtonHandle}  # whose files come by other messages

@@ -27,7 +27,7 @@ def creature():
 
 
 def content(creature, label, **commands):
-    return FILES[label].content(creature, creature.environment.physics.data.qpos.copy(), commands)
+    return FILES[label].make(creature, creature.environment.physics.data.qpos.copy(), commands)
 
 
 def test_names(creature):

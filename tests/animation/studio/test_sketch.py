@@ -97,7 +97,9 @@ def test_factors_of_links_that_the_body_lacks_are_ignored():
 @pytest.mark.parametrize("sketch", SKETCHES.values(), ids=SKETCHES)
 def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / sketches.spec_file_name(sketches.source_body(sketch))).write_text(body_to_json(sketches.source_body(sketch)))
+    (tmp_path / sketches.spec_file_name(sketches.source_body(sketch))).write_text(
+        body_to_json(sketches.source_body(sketch))
+    )
     made = {}
     exec(sketches.python_lines(sketch), made)
     assert made["body"] == sketches.make_body(sketch)
