@@ -1,4 +1,4 @@
-"""A creature in viser's scene: a tree of frames, so that a pose sends the torso and the joints alone."""
+"""A creature in viser's scene, as a tree of frames: a pose sends only the torso's place and the turns of the joints."""
 
 import functools
 from collections.abc import Callable
@@ -8,12 +8,14 @@ import viser
 
 from arc_suite import rotations
 from arc_suite.animation.clips.meshes import part_meshes
+from arc_suite.animation.parts import Part
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.tasks import readings
 
-_BALL, _ORANGE = 1.35, (255, 140, 0)  # radius of a handle, of its link's, and its color
-_FURTHEST = 10.0  # of the unit, that a link can be dragged at once
-_TOLERANCE = 0.01  # of a creature's reach, by which a face may cut into a round shape
+_HANDLE_SCALE = 1.35  # radius of a handle's ball, in radii of its link
+_HANDLE_COLOR = (255, 140, 0)  # orange
+_MAX_DRAG = 10.0  # units of the scene, that one drag can move a link's end
+_MAX_DEVIATION = 0.01  # of a mesh from a round shape, in reaches of the creature
 
 
 class Figure:
@@ -28,75 +30,106 @@ class Figure:
             creature: to show.
             unit: of lengths in the scene, m.
         """
-        self.creature, self._scene, self._unit = creature, scene, unit
+        self.creature = creature
+        self._scene = scene
+        self._unit = unit
         self._balls: list[viser.IcosphereHandle] = []
-        self._frames: list[viser.FrameHandle] = []
-        names: list[str] = []
+        self._frames: list[viser.FrameHandle] = []  # of the creature's parts
         for part in creature.parts:
-            names.append(f"{root if part.parent is None else names[part.parent]}/{part.name}")
-            frame = scene.add_frame(names[-1], show_axes=False, position=part.place / unit, wxyz=part.quaternion)
-            self._frames.append(frame)
-            for material, mesh in part_meshes(part, _TOLERANCE * creature.reach).items():
-                color = rgb(creature.materials[material].color)
-                scene.add_mesh_simple(f"{names[-1]}/{material}", mesh.points / unit, mesh.triangles, color=color)
-        self._hinges = [(index, part.joint) for index, part in enumerate(creature.parts) if part.joint is not None]
-        self._standing = np.array([creature.parts[index].quaternion for index, _ in self._hinges])
-        self._axes = np.array([creature.parts[index].axis for index, _ in self._hinges])
+            self._add_part(part, root)
+        hinged_parts = [part for part in creature.parts if part.joint is not None]
+        self._hinged_frames = [
+            frame for frame, part in zip(self._frames, creature.parts, strict=True) if part.joint is not None
+        ]
+        self._hinge_joints = [part.joint for part in hinged_parts]  # indices of joints
+        self._hinge_axes = np.array([part.axis for part in hinged_parts])  # (hinges, 3)
+        self._standing_turns = np.array([part.quaternion for part in hinged_parts])  # (hinges, 4)
 
-    def handles(self, dragged: Callable[[str, np.ndarray], None] | None) -> None:
-        """Show a ball at the end of every link, which visitors drag; None hides them.
+    def handles(self, on_drag: Callable[[str, np.ndarray], None] | None) -> None:
+        """Show a ball at the end of every link, which visitors drag; None hides the balls.
 
         Args:
-            dragged: called with the name of a link's part, and by how much (3,) its end was dragged, in the frame of
-                the link, m.
+            on_drag: called with the name of a link's part, and the shift (3,) of its end in the frame of the link, m.
         """
         for ball in self._balls:
             ball.remove()
         self._balls = []
-        frames = dict(zip((part.name for part in self.creature.parts), self._frames, strict=True))
-        links = [(leg.full_name(link), link) for leg in self.creature.setup.body.legs for link in leg.links]
-        for name, link in links if dragged else ():
-            radius, end = _BALL * link.radius / self._unit, np.array(link.end) / self._unit
-            ball = self._scene.add_icosphere(f"{frames[name].name}/end", radius, color=_ORANGE, position=end)
-            ball.on_drag(functools.partial(self._drag, name, dragged))
-            self._balls.append(ball)
-
-    async def _drag(self, name: str, dragged: Callable, event: viser.SceneNodeDragEvent) -> None:
-        """Take a drag when it ends; a browser may send anything."""
-        if event.phase != "end":
+        if on_drag is None:
             return
-        moved = np.subtract(event.end_position, event.start_position)
-        if moved.shape == (3,) and np.isfinite(moved).all() and np.linalg.norm(moved) < _FURTHEST:
-            dragged(name, self._unit * moved @ self._turn(name))
+        frame_names = {part.name: frame.name for part, frame in zip(self.creature.parts, self._frames, strict=True)}
+        for leg in self.creature.setup.body.legs:
+            for link in leg.links:
+                part_name = leg.full_name(link)
+                ball = self._scene.add_icosphere(
+                    f"{frame_names[part_name]}/end",
+                    radius=_HANDLE_SCALE * link.radius / self._unit,
+                    color=_HANDLE_COLOR,
+                    position=np.array(link.end) / self._unit,
+                )
+                ball.on_drag(functools.partial(self._drag, part_name, on_drag))
+                self._balls.append(ball)
 
-    def _turn(self, name: str) -> np.ndarray:
-        """Return the axes of a part's frame in the scene, as columns (3, 3)."""
-        parts, turn = self.creature.parts, np.eye(3)
-        index = next((index for index, part in enumerate(parts) if part.name == name), None)
-        while index is not None:
-            turn, index = rotations.matrix(self._frames[index].wxyz) @ turn, parts[index].parent
-        return turn
-
-    def pose(self, qpos: np.ndarray, place: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Take a pose.
+    def pose(self, qpos: np.ndarray, shown_position: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Show a pose.
 
         Args:
             qpos: (nq,) positions.
-            place: where the scene shows a position (3,) of the torso, m.
+            shown_position: maps the position (3,) of the torso to the position at which the scene shows it, m.
 
         Returns:
             The position (3,) of the torso, m.
         """
-        now = readings.pose(qpos, self.creature.environment.task.definition.scene.layout)
-        half = 0.5 * now[7:][[joint for _, joint in self._hinges], None]
-        turned = rotations.product(self._standing, np.concatenate([np.cos(half), np.sin(half) * self._axes], axis=-1))
-        self._frames[0].position, self._frames[0].wxyz = place(now[:3]) / self._unit, now[3:7]
-        for (index, _), wxyz in zip(self._hinges, turned, strict=True):
-            self._frames[index].wxyz = wxyz
-        return now[:3]
+        pose = readings.pose(qpos, self.creature.environment.task.definition.scene.layout)
+        torso_position = pose[:3]
+        torso_quaternion = pose[3:7]
+        hinge_angles = pose[7:][self._hinge_joints]  # (hinges,) rad, from the standing pose
+        half_angles = 0.5 * hinge_angles[:, None]
+        joint_turns = np.concatenate([np.cos(half_angles), np.sin(half_angles) * self._hinge_axes], axis=-1)
+        quaternions = rotations.product(self._standing_turns, joint_turns)
+        torso_frame = self._frames[0]
+        torso_frame.position = shown_position(torso_position) / self._unit
+        torso_frame.wxyz = torso_quaternion
+        for frame, quaternion in zip(self._hinged_frames, quaternions, strict=True):
+            frame.wxyz = quaternion
+        return torso_position
+
+    def _add_part(self, part: Part, root: str) -> None:
+        """Add the frame of a part, in the frame of its parent, and a mesh for each of its materials."""
+        parent_name = root if part.parent is None else self._frames[part.parent].name
+        frame_name = f"{parent_name}/{part.name}"
+        frame = self._scene.add_frame(
+            frame_name, show_axes=False, position=part.place / self._unit, wxyz=part.quaternion
+        )
+        self._frames.append(frame)
+        for material, mesh in part_meshes(part, _MAX_DEVIATION * self.creature.reach).items():
+            color = rgb(self.creature.materials[material].color)
+            self._scene.add_mesh_simple(
+                f"{frame_name}/{material}", mesh.points / self._unit, mesh.triangles, color=color
+            )
+
+    async def _drag(
+        self, part_name: str, on_drag: Callable[[str, np.ndarray], None], event: viser.SceneNodeDragEvent
+    ) -> None:
+        """Report a drag when it ends, if it is a short vector: a browser may send anything."""
+        if event.phase != "end":
+            return
+        shift = np.subtract(event.end_position, event.start_position)
+        if shift.shape == (3,) and np.isfinite(shift).all() and np.linalg.norm(shift) < _MAX_DRAG:
+            on_drag(part_name, self._unit * shift @ self._axes_in_scene(part_name))
+
+    def _axes_in_scene(self, part_name: str) -> np.ndarray:
+        """Return the axes of a part's frame in the scene, as columns (3, 3)."""
+        parts = self.creature.parts
+        index_by_name = {part.name: index for index, part in enumerate(parts)}
+        index: int | None = index_by_name[part_name]
+        axes = np.eye(3)
+        while index is not None:
+            axes = rotations.matrix(self._frames[index].wxyz) @ axes
+            index = parts[index].parent
+        return axes
 
 
 def rgb(color) -> tuple[int, int, int]:
     """Return a color (3,), 0 to 1, in whole numbers, 0 to 255."""
-    red, green, blue = (round(255.0 * float(part)) for part in color)
+    red, green, blue = (round(255.0 * float(component)) for component in color)
     return red, green, blue
