@@ -45,7 +45,7 @@ class Figure:
         self._hinge_axes = np.array([part.axis for part in hinged_parts])  # (hinges, 3)
         self._standing_turns = np.array([part.quaternion for part in hinged_parts])  # (hinges, 4)
 
-    def handles(self, on_drag: Callable[[str, np.ndarray], None] | None) -> None:
+    def show_handles(self, on_drag: Callable[[str, np.ndarray], None] | None) -> None:
         """Show a ball at the end of every link, which visitors drag; None hides the balls.
 
         Args:

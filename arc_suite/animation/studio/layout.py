@@ -127,5 +127,20 @@ def list_with(choice: str, names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys((*names, choice)))
 
 
+def set_value(widget: Any, value: Any) -> None:
+    """Have a widget show a value, or what is nearest to it among the values that the widget offers."""
+    if isinstance(widget, viser.GuiSliderHandle):
+        value = min(max(value, widget.min), widget.max)
+    elif isinstance(widget, viser.GuiDropdownHandle) and value not in widget.options:
+        value = DEFAULT_CHOICE
+    widget.value = value
+
+
+def set_visible(widget: Any, visible: bool) -> None:
+    """Show or hide a widget."""
+    if widget.visible != visible:  # viser would send a value that stays the same, too
+        widget.visible = visible
+
+
 def _label(name: str) -> str:
     return name.replace("_", " ").capitalize()

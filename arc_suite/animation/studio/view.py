@@ -1,11 +1,13 @@
 """Creatures on their ground in viser's scene, in the light of pages to play in.
 
-Lengths are in a `unit`, how far the creatures extend, so that the camera suits any size. The world moves under it.
+The scene measures lengths in a `unit`, the extent of the creatures, so that the camera suits creatures of any size. The
+camera stands still, and the world moves under it.
 """
 
 import functools
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -17,199 +19,357 @@ from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.figure import Figure, rgb
 from arc_suite.markers import Marker
 
-_TOLERANCE = 0.01  # units, by which a face may cut into a round shape of the ground
-_AROUND = 14.0  # units of ground to each side of the torso, where it is not endless
-_NEAR = 10.0  # units from the edge of that ground, at which it is drawn anew
-_FOLLOW = 0.1  # of the difference, by which the camera follows the height of the ground in a picture
-_THIN: dict = {"thickness": 1.5, "thickness_units": "screen"}  # pixels
-_RAISED = 0.005  # units, of lines over the ground
-_SAME = 0.02  # units, by which an arrow may be off
-_LANE = 0.9  # of both creatures' reach, between the one of now and the one that is kept
-_CAMERA, _TARGET = (3.4, -4.7, 2.3), (0.0, 0.0, 0.25)  # units: the arrow of a command ends in the picture, too
-_OVER_SHEET = (0.0, 0.0, -2.3)  # where the camera of a phone looks, whose lower part a sheet of widgets covers
-_PHONE = 500  # pixels, of the width of a picture
-_ANGLE = math.radians(35.0)  # of the camera, over the shorter side of a picture
-_SKY, _GROUND, _LINES, _STEPS = (163, 173, 184), (93, 104, 117), (141, 153, 166), (93, 104, 117)
-_FOG = (7.0, 18.0)  # units from the camera
-_GRID: dict = {"infinite_grid": True, "fade_distance": 60.0, "cell_color": _LINES, "section_color": _LINES}
-_GRID |= {"plane_color": _GROUND, "plane_opacity": 1.0, "shadow_opacity": 0.45}
+_CAMERA_POSITION = (3.4, -4.7, 2.3)  # units
+_CAMERA_TARGET = (0.0, 0.0, 0.25)  # units, from which the arrow of a command is in the picture, too
+_PHONE_TARGET = (0.0, 0.0, -2.3)  # units; a sheet of widgets covers the lower part of a phone's picture
+_MAX_PHONE_WIDTH = 500  # pixels of a picture
+_CAMERA_ANGLE = math.radians(35.0)  # over the shorter side of a picture
+_FLOOR_FOLLOWING = 0.1  # share of the difference, by which the camera follows the height of the ground in a picture
+_COMPANION_DISTANCE = 0.9  # between both creatures, in sums of their reaches
+
+_GROUND_EXTENT = 14.0  # units of uneven ground to each side of the torso, that are drawn
+_GROUND_MARGIN = 10.0  # units from the edge of that ground, at which it is drawn again around the torso
+_MAX_DEVIATION = 0.01  # units, of a mesh from a round shape of the ground
+_LINE_LIFT = 0.005  # units, of lines over uneven ground
+_LINE_STYLE: dict = {"thickness": 1.5, "thickness_units": "screen"}  # pixels
+_TILES_PER_SECTION = 5.0
+
+_MAX_ARROW_ERROR = 0.02  # units, by which an arrow may be off
+_CYLINDER_OPACITY = 0.7
+
+_SKY_COLOR = (163, 173, 184)
+_GROUND_COLOR = (93, 104, 117)
+_LINE_COLOR = (141, 153, 166)
+_STEP_COLOR = (93, 104, 117)  # of steps and blocks in full light
+_FOG_RANGE = (7.0, 18.0)  # units from the camera
+_GRID_STYLE: dict = {
+    "infinite_grid": True,
+    "fade_distance": 60.0,  # units
+    "cell_color": _LINE_COLOR,
+    "section_color": _LINE_COLOR,
+    "plane_color": _GROUND_COLOR,
+    "plane_opacity": 1.0,
+    "shadow_opacity": 0.45,
+}
 
 
 class View:
-    """Shows a creature to all visitors."""
+    """Shows a creature, and perhaps a companion, to all visitors."""
 
     def __init__(self, server: viser.ViserServer):
         """Set up light and camera."""
-        self._server, scene, camera = server, server.scene, server.initial_camera
+        self._server = server
+        scene = server.scene
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/sky", sky_color=(223, 232, 242), ground_color=(86, 96, 108), intensity=2.2)
-        sun = {"color": (255, 244, 230), "intensity": 3.4, "position": (-0.3, 0.5, 1.2)}
-        scene.add_light_directional("/sun", cast_shadow=True, **sun)
-        scene.set_background_image(np.full((1, 1, 3), _SKY, np.uint8), format="png")
-        scene.configure_fog(*_FOG, color=_SKY)
-        camera.position, camera.look_at, camera.fov = _CAMERA, _TARGET, _ANGLE
-        server.on_client_connect(_aim)
+        scene.add_light_directional(
+            "/sun", color=(255, 244, 230), intensity=3.4, position=(-0.3, 0.5, 1.2), cast_shadow=True
+        )
+        scene.set_background_image(np.full((1, 1, 3), _SKY_COLOR, np.uint8), format="png")
+        scene.configure_fog(*_FOG_RANGE, color=_SKY_COLOR)
+        camera = server.initial_camera
+        camera.position = _CAMERA_POSITION
+        camera.look_at = _CAMERA_TARGET
+        camera.fov = _CAMERA_ANGLE
+        server.on_client_connect(_aim_camera)
 
-    def show(self, creature: Creature, kept: Creature | None = None) -> None:
-        """Take the creature of the one before, in its pose of now, and one that is kept next to it."""
-        self._creature, self._unit, self._lane = creature, creature.reach, np.zeros(3)
-        if kept is not None:
-            self._lane[1] = _LANE * (creature.reach + kept.reach)
-            self._unit = max(creature.reach, kept.reach) + 0.5 * self._lane[1]
+    def show(self, creature: Creature, companion: Creature | None = None) -> None:
+        """Show a creature in place of the one before, and perhaps a companion next to it."""
+        self._unit = creature.reach
+        self._lane = np.zeros(3)  # from the creature to its companion, m
+        if companion is not None:
+            self._lane[1] = _COMPANION_DISTANCE * (creature.reach + companion.reach)
+            self._unit = max(creature.reach, companion.reach) + 0.5 * self._lane[1]
+        scene = self._server.scene
         with self._server.atomic():
-            self._server.scene.remove_by_name("/world")
-            self._world = self._server.scene.add_frame("/world", show_axes=False)
-            self._figure = Figure(self._server.scene, "/world/now", creature, self._unit)
-            self._kept = kept and Figure(self._server.scene, "/world/kept", kept, self._unit)
-            self._height, self._aside = 0.0, np.full(3, np.inf)
-            self._draw_ground()
-            self._anchor = self._server.scene.add_frame("/world/markers", show_axes=False)
-            self._arrows, self._cylinders = None, {}
+            scene.remove_by_name("/world")
+            self._world = scene.add_frame("/world", show_axes=False)
+            self._figure = Figure(scene, "/world/now", creature, self._unit)
+            self._companion = None
+            if companion is not None:
+                self._companion = Figure(scene, "/world/kept", companion, self._unit)
+            self._companion_shift = np.full(3, np.inf)  # from where it walks to where it is shown, m; not yet known
+            self._shown_floor = 0.0  # units, height of the floor that the camera follows
+            self._ground = _Ground(scene, creature, self._unit)
+            self._markers = _Markers(scene, self._unit)
 
-    def pose(self, qpos: np.ndarray, markers: list[Marker], kept: np.ndarray | None = None) -> None:
-        """Take a pose.
+    def pose(self, qpos: np.ndarray, markers: list[Marker], companion_qpos: np.ndarray | None = None) -> None:
+        """Show a pose.
 
         Args:
-            qpos: (nq,) positions.
+            qpos: (nq,) positions of the creature.
             markers: of the task.
-            kept: positions of the creature that is kept, if one is.
+            companion_qpos: (nq,) positions of the companion; None without one.
         """
         with self._server.atomic():
-            place = self._figure.pose(qpos, lambda place: place)
-            if self._kept is not None:
-                self._kept.pose(kept, functools.partial(self._next_to, place))
-            middle, place = (place + 0.5 * self._lane) / self._unit, place / self._unit
-            if self._ground_is_stale(place):
-                self._draw_ground()
-            floor = float(self._arena.height(*place[:2] * self._unit)) / self._unit
-            self._height += _FOLLOW * (floor - self._height)
-            self._world.position = (-middle[0], -middle[1], -self._height)
-            self._anchor.position = place * (1.0, 1.0, 0.0)
-            self._mark(markers, place * (1.0, 1.0, 0.0))
+            torso = self._figure.pose(qpos, shown_position=lambda position: position)
+            if self._companion is not None:
+                self._companion.pose(companion_qpos, functools.partial(self._place_companion, torso))
+            self._ground.follow(torso)
+            floor = self._ground.height(torso) / self._unit
+            self._shown_floor += _FLOOR_FOLLOWING * (floor - self._shown_floor)
+            center = (torso + 0.5 * self._lane) / self._unit  # between the creature and its companion
+            self._world.position = (-center[0], -center[1], -self._shown_floor)
+            self._markers.show(markers, torso)
 
-    def handles(self, dragged: Callable[[str, np.ndarray], None] | None) -> None:
-        """Show balls to drag the creature's links by, or hide them; see `Figure.handles`."""
+    def show_handles(self, on_drag: Callable[[str, np.ndarray], None] | None) -> None:
+        """Show balls to drag the creature's links by, or hide them; see `Figure.show_handles`."""
         with self._server.atomic():
-            self._figure.handles(dragged)
+            self._figure.show_handles(on_drag)
 
-    def _next_to(self, place: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Return where the scene shows the kept creature, whose torso is at a place of its `own`, m.
+    def _place_companion(self, torso: np.ndarray, companion_torso: np.ndarray) -> np.ndarray:
+        """Return where the scene shows the companion's torso, (3,) m.
 
-        It walks as far as it does, and is set next to the other one again where it would leave the picture.
+        The companion walks as far as it does. Where it would leave the picture, it is shown next to the creature again.
+
+        Args:
+            torso: (3,) position of the creature's torso, m.
+            companion_torso: (3,) position of the companion's torso in its own episode, m.
         """
-        if not np.linalg.norm(own + self._aside - place - self._lane) < self._lane[1]:
-            self._aside = (place + self._lane - own) * (1.0, 1.0, 0.0)
-        shown = own + self._aside
-        arena = self._kept.creature.environment.task.definition.scene.arena
-        rise = float(self._arena.height(*shown[:2])) - float(arena.height(*own[:2]))
-        return shown + (0.0, 0.0, rise)
+        lane_error = np.linalg.norm(companion_torso + self._companion_shift - torso - self._lane)
+        is_in_picture = lane_error < self._lane[1]
+        if not is_in_picture:
+            self._companion_shift = (torso + self._lane - companion_torso) * (1.0, 1.0, 0.0)
+        shown_position = companion_torso + self._companion_shift
+        arena = self._companion.creature.environment.task.definition.scene.arena
+        shown_floor = self._ground.height(shown_position)
+        companion_floor = float(arena.height(*companion_torso[:2]))
+        return shown_position + (0.0, 0.0, shown_floor - companion_floor)
 
-    def _add(self, name: str, mesh: Mesh, color: tuple[int, int, int]):
-        return self._server.scene.add_mesh_simple(name, mesh.points / self._unit, mesh.triangles, color=color)
 
-    def _ground_is_stale(self, place: np.ndarray) -> bool:
-        walked = abs(place[:2] - self._middle).max() > _AROUND - _NEAR and not self._endless
-        return walked or not np.array_equal(self._obstacles, self._mocap())
+class _Ground:
+    """The ground and the obstacles of a creature's episode: level ground without end, or uneven ground around it."""
 
-    def _mocap(self) -> np.ndarray:
-        return self._creature.environment.physics.data.mocap_pos.copy()
+    def __init__(self, scene: viser.SceneApi, creature: Creature, unit: float):
+        """Draw the ground.
 
-    def _draw_ground(self) -> None:
-        environment = self._creature.environment
-        self._arena = environment.task.definition.scene.arena
-        self._middle, self._obstacles = environment.physics.data.qpos[:2] / self._unit, self._mocap()
-        self._endless = self._arena.is_level and not len(self._obstacles)
-        found: dict = {"planes": [0.0], "fields": [], "solids": []}
-        if not self._endless:
-            reach, middle = _AROUND * self._unit, self._unit * self._middle
-            found = describe_ground(environment, middle - reach, middle + reach)
-        self._server.scene.remove_by_name("/world/ground")
-        self._server.scene.add_frame("/world/ground", show_axes=False)
-        for index, height in enumerate(found["planes"]):
-            place = (0.0, 0.0, height / self._unit)
-            tile = self._creature.tile / self._unit
-            sizes = {"cell_size": tile, "section_size": 5.0 * tile}
-            self._server.scene.add_grid(f"/world/ground/plane{index}", position=place, **_GRID | sizes)
-        for index, field in enumerate(found["fields"]):
-            self._add(f"/world/ground/field{index}", _surface(field), _GROUND)
-            lines = _tiles(field, self._creature.tile) / self._unit + (0.0, 0.0, _RAISED)
-            self._server.scene.add_line_segments(f"/world/ground/tiles{index}", lines, _LINES, **_THIN)
-        solids: dict[tuple[int, int, int], list[Mesh]] = {}
-        for solid in found["solids"]:
-            mesh = shapes.shape_mesh(solid["kind"], solid["size"], _TOLERANCE * self._unit)
-            shaded = [solid["shade"] * part for part in _STEPS]
-            color = rgb([part / 255.0 for part in shaded] if solid["color"] is None else solid["color"])
-            solids.setdefault(color, []).append(mesh.transform(solid["place"], np.eye(3)))
-        for index, (color, meshes) in enumerate(solids.items()):
-            self._add(f"/world/ground/solid{index}", shapes.join_meshes(meshes), color)
-
-    def _mark(self, markers: list[Marker], anchor: np.ndarray) -> None:
-        """Move arrows and cylinders, or draw them anew where there are others.
-
-        They hang on an anchor (3,), as browsers show a frame's position at once and new points of arrows later.
+        Args:
+            scene: of viser, with a node "/world".
+            creature: on the ground.
+            unit: of lengths in the scene, m.
         """
-        arrows = [marker for marker in markers if marker.shape == "arrow"]
-        points = np.array([(marker.start, marker.end) for marker in arrows]).reshape(-1, 2, 3) / self._unit - anchor
-        if self._arrows is None or len(self._arrows.points) != len(arrows):
-            if self._arrows is not None:
-                self._arrows.remove()
+        self._scene = scene
+        self._environment = creature.environment
+        self._tile = creature.tile  # m
+        self._unit = unit
+        self._draw()
+
+    def height(self, position: np.ndarray) -> float:
+        """Return the height of the ground under a position (3,), m."""
+        return float(self._arena.height(*position[:2]))
+
+    def follow(self, torso: np.ndarray) -> None:
+        """Draw the ground again if the torso, at (3,) m, is near its edge, or if obstacles have moved."""
+        walked_distance = abs(torso[:2] - self._center).max() / self._unit
+        is_near_edge = walked_distance > _GROUND_EXTENT - _GROUND_MARGIN and not self._is_endless
+        if is_near_edge or not np.array_equal(self._obstacles, self._obstacle_positions()):
+            self._draw()
+
+    def _obstacle_positions(self) -> np.ndarray:
+        return self._environment.physics.data.mocap_pos.copy()
+
+    def _draw(self) -> None:
+        """Draw planes, height fields and solids around the torso."""
+        self._arena = self._environment.task.definition.scene.arena
+        self._center = self._environment.physics.data.qpos[:2].copy()  # m
+        self._obstacles = self._obstacle_positions()
+        self._is_endless = self._arena.is_level and not len(self._obstacles)
+        if self._is_endless:
+            ground: dict = {"planes": [0.0], "fields": [], "solids": []}
+        else:
+            extent = _GROUND_EXTENT * self._unit
+            ground = describe_ground(self._environment, self._center - extent, self._center + extent)
+        self._scene.remove_by_name("/world/ground")
+        self._scene.add_frame("/world/ground", show_axes=False)
+        self._add_planes(ground["planes"])
+        self._add_height_fields(ground["fields"])
+        self._add_solids(ground["solids"])
+
+    def _add_planes(self, heights: list[float]) -> None:
+        """Add endless planes at heights, m, with tiles."""
+        tile = self._tile / self._unit
+        for index, height in enumerate(heights):
+            self._scene.add_grid(
+                f"/world/ground/plane{index}",
+                position=(0.0, 0.0, height / self._unit),
+                cell_size=tile,
+                section_size=_TILES_PER_SECTION * tile,
+                **_GRID_STYLE,
+            )
+
+    def _add_height_fields(self, fields: list[dict]) -> None:
+        """Add height fields of `scenery.describe_ground`, with tiles."""
+        for index, field in enumerate(fields):
+            self._add_mesh(f"/world/ground/field{index}", _surface_mesh(field), _GROUND_COLOR)
+            lines = _tile_edges(field, self._tile) / self._unit + (0.0, 0.0, _LINE_LIFT)
+            self._scene.add_line_segments(f"/world/ground/tiles{index}", lines, _LINE_COLOR, **_LINE_STYLE)
+
+    def _add_solids(self, solids: list[dict]) -> None:
+        """Add solids of `scenery.describe_ground`, those of one color as one mesh."""
+        meshes_by_color: dict[tuple[int, int, int], list[Mesh]] = {}
+        for solid in solids:
+            mesh = shapes.shape_mesh(solid["kind"], solid["size"], _MAX_DEVIATION * self._unit)
+            if solid["color"] is None:
+                color = rgb([solid["shade"] * component / 255.0 for component in _STEP_COLOR])
+            else:
+                color = rgb(solid["color"])
+            meshes_by_color.setdefault(color, []).append(mesh.transform(solid["place"], np.eye(3)))
+        for index, (color, meshes) in enumerate(meshes_by_color.items()):
+            self._add_mesh(f"/world/ground/solid{index}", shapes.join_meshes(meshes), color)
+
+    def _add_mesh(self, name: str, mesh: Mesh, color: tuple[int, int, int]) -> None:
+        self._scene.add_mesh_simple(name, mesh.points / self._unit, mesh.triangles, color=color)
+
+
+class _CylinderStyle(NamedTuple):
+    """What tells one drawn cylinder from another.
+
+    Attributes:
+        index: among the cylinders of the task.
+        radius: units.
+        height: units.
+        color: 0 to 255.
+    """
+
+    index: int
+    radius: float
+    height: float
+    color: tuple[int, int, int]
+
+
+class _Markers:
+    """The debug markers of a task: arrows and cylinders.
+
+    They hang on an anchor under the torso: browsers show a frame's position at once, and new points of arrows later.
+    """
+
+    def __init__(self, scene: viser.SceneApi, unit: float):
+        """Begin without markers.
+
+        Args:
+            scene: of viser, with a node "/world".
+            unit: of lengths in the scene, m.
+        """
+        self._scene = scene
+        self._unit = unit
+        self._anchor = scene.add_frame("/world/markers", show_axes=False)
+        self._arrows: viser.ArrowsHandle | None = None
+        self._cylinders: dict[_CylinderStyle, viser.CylinderHandle] = {}
+
+    def show(self, markers: list[Marker], torso: np.ndarray) -> None:
+        """Move the markers, or draw them again if they are other ones.
+
+        Args:
+            markers: of the task.
+            torso: (3,) its position, m.
+        """
+        anchor = torso / self._unit * (1.0, 1.0, 0.0)
+        self._anchor.position = anchor
+        self._show_arrows([marker for marker in markers if marker.shape == "arrow"], anchor)
+        self._show_cylinders([marker for marker in markers if marker.shape == "cylinder"], anchor)
+
+    def _show_arrows(self, arrows: list[Marker], anchor: np.ndarray) -> None:
+        """Show arrows relative to the anchor (3,), units."""
+        ends = np.array([(arrow.start, arrow.end) for arrow in arrows]).reshape(-1, 2, 3)  # m
+        points = ends / self._unit - anchor
+        if self._arrows is not None and len(self._arrows.points) == len(arrows):
+            if abs(self._arrows.points - points).max() > _MAX_ARROW_ERROR:
+                self._arrows.points = points
+            return
+        if self._arrows is not None:
+            self._arrows.remove()
             self._arrows = None
-            if arrows:
-                radius = arrows[0].radius / self._unit
-                colors = np.array([rgb(marker.color[:3]) for marker in arrows])
-                sizes: dict = {"shaft_radius": radius, "head_radius": 2.0 * radius, "head_length": 3.0 * radius}
-                self._arrows = self._server.scene.add_arrows("/world/markers/arrows", points, colors, **sizes)
-        elif arrows and abs(self._arrows.points - points).max() > _SAME:
-            self._arrows.points = points
-        cylinders = [marker for marker in markers if marker.shape == "cylinder"]
-        shown = {self._style(index, marker): marker for index, marker in enumerate(cylinders)}
-        for style in self._cylinders.keys() - shown.keys():
+        if arrows:
+            radius = arrows[0].radius / self._unit
+            self._arrows = self._scene.add_arrows(
+                "/world/markers/arrows",
+                points,
+                np.array([rgb(arrow.color[:3]) for arrow in arrows]),
+                shaft_radius=radius,
+                head_radius=2.0 * radius,
+                head_length=3.0 * radius,
+            )
+
+    def _show_cylinders(self, cylinders: list[Marker], anchor: np.ndarray) -> None:
+        """Show cylinders relative to the anchor (3,), units."""
+        cylinder_by_style = {
+            self._cylinder_style(index, cylinder): cylinder for index, cylinder in enumerate(cylinders)
+        }
+        for style in self._cylinders.keys() - cylinder_by_style.keys():
             self._cylinders.pop(style).remove()
-        for style, marker in shown.items():
-            middle = 0.5 * (marker.start + marker.end) / self._unit - anchor
+        for style, cylinder in cylinder_by_style.items():
+            center = 0.5 * (cylinder.start + cylinder.end) / self._unit - anchor
             if style not in self._cylinders:
-                index, radius, height, color = style
-                self._cylinders[style] = self._server.scene.add_cylinder(
-                    f"/world/markers/cylinder{index}", radius, height, color=color, opacity=0.7, position=middle
+                self._cylinders[style] = self._scene.add_cylinder(
+                    f"/world/markers/cylinder{style.index}",
+                    style.radius,
+                    style.height,
+                    color=style.color,
+                    opacity=_CYLINDER_OPACITY,
+                    position=center,
                 )
-            self._cylinders[style].position = middle
+            self._cylinders[style].position = center
 
-    def _style(self, index: int, marker: Marker) -> tuple:
-        height = np.linalg.norm(marker.end - marker.start) / self._unit
-        return index, round(marker.radius / self._unit, 4), round(float(height), 4), rgb(marker.color[:3])
+    def _cylinder_style(self, index: int, cylinder: Marker) -> _CylinderStyle:
+        height = np.linalg.norm(cylinder.end - cylinder.start) / self._unit
+        return _CylinderStyle(
+            index=index,
+            radius=round(cylinder.radius / self._unit, 4),
+            height=round(float(height), 4),
+            color=rgb(cylinder.color[:3]),
+        )
 
 
-def _surface(field: dict) -> Mesh:
-    """A height field as triangles."""
+def _surface_points(field: dict) -> np.ndarray:
+    """Return the points (rows, columns, 3) of a height field of `scenery.describe_ground`, m."""
     heights = field["heights"]
     count_y, count_x = heights.shape
-    axes = zip(field["low"], field["cell"], (count_x, count_y), strict=True)
-    grid_x, grid_y = np.meshgrid(*(low + cell * np.arange(count) for low, cell, count in axes))
-    corner = (np.arange(count_y - 1)[:, None] * count_x + np.arange(count_x - 1)).reshape(-1, 1)
-    triangles = np.concatenate([corner + (0, 1, count_x), corner + (1, count_x + 1, count_x)])
-    points = np.stack([grid_x, grid_y, heights], axis=-1).reshape(-1, 3)
-    return Mesh(points, np.tile((0.0, 0.0, 1.0), (len(points), 1)), triangles)
+    x = field["low"][0] + field["cell"][0] * np.arange(count_x)
+    y = field["low"][1] + field["cell"][1] * np.arange(count_y)
+    grid_x, grid_y = np.meshgrid(x, y)
+    return np.stack([grid_x, grid_y, heights], axis=-1)
 
 
-def _tiles(field: dict, tile: float) -> np.ndarray:
-    """The edges of tiles on a height field, at rows and columns of its points, as segments (n, 2, 3), m."""
-    points = _surface(field).points.reshape(*field["heights"].shape, 3)
-    strides = np.maximum(1, np.round(tile / field["cell"]).astype(int))
-    starts = -np.round(field["low"] / field["cell"]).astype(int) % strides  # the same in every part of a field
-    along_x, along_y = points[starts[1] :: strides[1]], points[:, starts[0] :: strides[0]]
-    segments = (along_x[:, :-1], along_x[:, 1:]), (along_y[:-1], along_y[1:])
-    return np.concatenate([np.stack(pair, axis=2).reshape(-1, 2, 3) for pair in segments])
+def _surface_mesh(field: dict) -> Mesh:
+    """Return a height field of `scenery.describe_ground` as a mesh of two triangles a cell."""
+    count_y, count_x = field["heights"].shape
+    points = _surface_points(field).reshape(-1, 3)
+    normals = np.tile((0.0, 0.0, 1.0), (len(points), 1))
+    # Indices of the points at the low corners of cells; the next column is 1 further, the next row count_x further.
+    corners = (np.arange(count_y - 1)[:, None] * count_x + np.arange(count_x - 1)).reshape(-1, 1)
+    lower_triangles = corners + (0, 1, count_x)
+    upper_triangles = corners + (1, count_x + 1, count_x)
+    return Mesh(points, normals, np.concatenate([lower_triangles, upper_triangles]))
 
 
-def _aim(client: viser.ClientHandle) -> None:
-    """Have a visitor's camera suit the form of the picture, now and later."""
-    if client.camera.image_width < _PHONE:
-        client.camera.look_at = _OVER_SHEET
+def _tile_edges(field: dict, tile: float) -> np.ndarray:
+    """Return the edges of tiles on a height field, at rows and columns of its points, as segments (n, 2, 3), m.
+
+    Args:
+        field: of `scenery.describe_ground`.
+        tile: side of a tile, m.
+    """
+    points = _surface_points(field)
+    strides = np.maximum(1, np.round(tile / field["cell"]).astype(int))  # points between two edges, along x and y
+    # Edges count from the world's origin, so that they are the same in every part of a field.
+    first_edges = -np.round(field["low"] / field["cell"]).astype(int) % strides
+    lines_along_x = points[first_edges[1] :: strides[1]]
+    lines_along_y = points[:, first_edges[0] :: strides[0]]
+    segments_along_x = np.stack([lines_along_x[:, :-1], lines_along_x[:, 1:]], axis=2)
+    segments_along_y = np.stack([lines_along_y[:-1], lines_along_y[1:]], axis=2)
+    return np.concatenate([segments_along_x.reshape(-1, 2, 3), segments_along_y.reshape(-1, 2, 3)])
+
+
+def _aim_camera(client: viser.ClientHandle) -> None:
+    """Have a visitor's camera suit the shape of the picture, now and later."""
+    if client.camera.image_width < _MAX_PHONE_WIDTH:
+        client.camera.look_at = _PHONE_TARGET
     _fit_lens(client.camera)
     client.camera.on_update(_fit_lens)
 
 
 def _fit_lens(camera: viser.CameraHandle) -> None:
-    """Have a creature as far from the sides of a narrow picture as it is from top and bottom of a wide one."""
-    camera.fov = 2.0 * math.atan(math.tan(0.5 * _ANGLE) * max(1.0, 1.0 / camera.aspect))
+    """Set the angle of view so that the shorter side of the picture always spans the same angle."""
+    tangent = math.tan(0.5 * _CAMERA_ANGLE)  # of half of the angle over the shorter side
+    camera.fov = 2.0 * math.atan(tangent * max(1.0, 1.0 / camera.aspect))  # over the height of the picture

@@ -311,20 +311,20 @@ def test_a_joint_is_dragged(served, tab):
 def test_a_kept_creature_walks_next_to(served, tab):
     view = served.page._view
     tab.get_by_role("checkbox", name="Keep").click()
-    served.until(lambda: view._kept)
+    served.until(lambda: view._companion)
     press(tab, "Size", "End")
     served.until(lambda: view._figure.creature.sketch.scale == 4.0)
-    assert view._kept.creature.sketch.scale == 1.0
+    assert view._companion.creature.sketch.scale == 1.0
     tab.get_by_text("kept").wait_for()
-    lane = 0.9 * (view._figure.creature.reach + view._kept.creature.reach)
+    lane = 0.9 * (view._figure.creature.reach + view._companion.creature.reach)
 
     def apart():
-        return (view._kept._frames[0].position - view._figure._frames[0].position)[:2] * view._unit
+        return (view._companion._frames[0].position - view._figure._frames[0].position)[:2] * view._unit
 
     served.until(lambda: 0.0 < np.linalg.norm(apart() - (0.0, lane)) < lane)
     tab.get_by_role("checkbox", name="Keep").click()
     tab.get_by_role("button", name="Undo").click()
-    served.until(lambda: view._kept is None and view._figure.creature.sketch.scale == 1.0)
+    served.until(lambda: view._companion is None and view._figure.creature.sketch.scale == 1.0)
 
 
 def test_a_design_is_opened_again(served, tab, tmp_path):
