@@ -128,11 +128,11 @@ def _design() -> None:
     """Begin or resume a search for creatures."""
     trial = Trial.of("walk", {}, "speed", Budget(mass=12.0, span=1.5), 10)
     search = Search(ProportionGenes(), Map.of(("legs", "links"), None, 0.1), trial, 0, "design")
-    with contextlib.closing(Journal("bodies.jsonl", {"goal": "speed"}, Candidates.restored)) as journal:
+    with contextlib.closing(Journal("bodies.jsonl", {"goal": "speed"}, Candidates.from_json)) as journal:
         for batch in journal.generations:
             search.add(batch)
         if not journal.generations:
-            journal.append(search.batch(lambda jobs: list(itertools.starmap(evaluate, jobs))))
+            journal.append(search.evaluate_batch(lambda jobs: list(itertools.starmap(evaluate, jobs))))
 
 
 def _run() -> tables.Run:

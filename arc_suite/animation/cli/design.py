@@ -1,7 +1,7 @@
 """Search for creatures that walk well: the best body of every kind, within budgets.
 
 The search is MAP-Elites over the proportions of bodies; the fitted demonstrator of each body walks it. It writes specs,
-a table of all bodies, a picture and pages into a folder. Broken off at any moment, the same command goes on.
+a table of all bodies, a picture and pages into a folder. Interrupted at any moment, the same command goes on.
 
   arc-suite design --goal transport --bodies 260 --output gallery
   arc-suite design --goal progress --task stairs --set rise=0.12 --set width=0.3 --bodies 300 --output gallery
@@ -36,9 +36,15 @@ from arc_suite.robots.spec import MAX_LENGTH, MAX_NAME, Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation.cores import use_one_thread
 
-MASS, SPAN = 12.0, 1.5  # of a budget, kg and m
-_BOUNDS = {"mass": (1e-6, 1e6), "span": (0.05, MAX_LENGTH), "height": (0.02, MAX_LENGTH), "power": (0.0, 1e6)}
-_STEM = MAX_NAME - 7  # of the names of variants, before an underscore and a number
+DEFAULT_MASS = 12.0  # kg, of a budget
+DEFAULT_SPAN = 1.5  # m, of a budget
+_BUDGET_BOUNDS = {
+    "mass": (1e-6, 1e6),  # kg
+    "span": (0.05, MAX_LENGTH),  # m
+    "height": (0.02, MAX_LENGTH),  # m
+    "power": (0.0, 1e6),  # W/kg
+}
+_MAX_STEM = MAX_NAME - 7  # characters of a creature's name in the names of its variants, before _ and a number
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("goal", "transport", f"{', '.join(GOALS)}; docs/design.md describes them.")
@@ -48,8 +54,10 @@ flags.DEFINE_string("around", None, f"A creature whose variants are searched: {R
 flags.DEFINE_float(
     "amount", 0.1, "Standard deviation of the variants' lengths (logarithm) and headings (rad).", 0.001, 0.5
 )
-flags.DEFINE_float("mass", None, f"Mass of every body, kg. [default: {MASS:g}, or that of --around]")
-flags.DEFINE_float("span", None, f"Greatest extent of a standing body, m. [default: {SPAN:g}, or that of --around]")
+flags.DEFINE_float("mass", None, f"Mass of every body, kg. [default: {DEFAULT_MASS:g}, or that of --around]")
+flags.DEFINE_float(
+    "span", None, f"Greatest extent of a standing body, m. [default: {DEFAULT_SPAN:g}, or that of --around]"
+)
 flags.DEFINE_float("height", None, "Greatest standing height, m. [default: as the span allows]")
 flags.DEFINE_float("power", None, "Greatest mean power of the motors, W/kg. [default: any]")
 flags.DEFINE_list(
@@ -76,58 +84,89 @@ flags.DEFINE_bool("pages", True, "Write pages on which the best walk.")
 flags.DEFINE_string("output", None, "Folder to write to, made if need be. Required.", short_name="o")
 
 
-def budget(around: Body | None) -> Budget:
-    """Return what bodies may spend; variants weigh as much as their creature and are no larger, if not said otherwise.
+def budget_from_flags(around: Body | None) -> Budget:
+    """Return what bodies may spend.
+
+    Unless flags say otherwise, variants weigh as much as their creature and are no larger.
+
+    Args:
+        around: creature whose variants are searched; None for a search of all bodies.
 
     Raises:
         ValueError: a number out of range.
     """
-    mass, span = (standing(around).mass, float(extent(around).max())) if around else (MASS, SPAN)
-    usual = {"mass": mass, "span": span}
-    given = {name: FLAGS[name].value for name in Budget._fields if FLAGS[name].value is not None}
-    return Budget(**{name: checks.number(name, value, *_BOUNDS[name]) for name, value in (usual | given).items()})
+    if around is None:
+        limits = {"mass": DEFAULT_MASS, "span": DEFAULT_SPAN}
+    else:
+        limits = {"mass": standing(around).mass, "span": float(extent(around).max())}
+    for name in Budget._fields:
+        if FLAGS[name].value is not None:
+            limits[name] = FLAGS[name].value
+    return Budget(**{name: checks.number(name, value, *_BUDGET_BOUNDS[name]) for name, value in limits.items()})
 
 
 @contextlib.contextmanager
-def evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]], list[Outcome]]]:
-    """Open processes that evaluate bodies: yields a map of `trials.evaluate` over its arguments, in order."""
+def open_evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]], list[Outcome]]]:
+    """Yield a function that maps tuples of arguments of `trials.evaluate` to outcomes, in order.
+
+    Args:
+        processes: that evaluate bodies; None for one per core.
+    """
     if processes == 1:
         yield lambda jobs: list(itertools.starmap(evaluate, jobs))
         return
-    # Processes inherit that they ignore Ctrl-C, which the parent answers. Spawned, not forked: a fork would share
-    # whatever OpenGL or threads the caller has open.
-    answer = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # The parent answers Ctrl-C. Its processes inherit that they ignore Ctrl-C. They are spawned, not forked: a fork would
+    # share whatever OpenGL or threads the caller has open.
+    interrupt_handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     pool = multiprocessing.get_context("spawn").Pool(processes)
-    signal.signal(signal.SIGINT, answer)
+    signal.signal(signal.SIGINT, interrupt_handler)
     with pool:
         yield lambda jobs: pool.starmap(evaluate, jobs, chunksize=1)
 
 
-def settled(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
-    """Return what determines a search, as JSON holds it: lists in place of tuples."""
-    values = {"task": trial.task, "goal": trial.goal}
-    values |= {name: getattr(trial, name)._asdict() for name in ("budget", "first", "second")}
-    values |= {"map": cells._asdict(), "around": around and body_to_json(around), "amount": around and FLAGS.amount}
-    values |= {"seed": FLAGS.seed, "random": FLAGS.random, "versions": versions.dependency_versions()}
-    return json.loads(json.dumps(values))
+def search_settings(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
+    """Return the settings that determine a search, as JSON holds them: with lists in place of tuples."""
+    settings = {
+        "task": trial.task,
+        "goal": trial.goal,
+        "budget": trial.budget._asdict(),
+        "first": trial.first._asdict(),
+        "second": trial.second._asdict(),
+        "map": cells._asdict(),
+        "around": None if around is None else body_to_json(around),
+        "amount": None if around is None else FLAGS.amount,
+        "seed": FLAGS.seed,
+        "random": FLAGS.random,
+        "versions": versions.dependency_versions(),
+    }
+    return json.loads(json.dumps(settings))
 
 
-def search(folder: pathlib.Path, course: Search, known: Mapping[str, Any]) -> None:
-    """Search behind a progress bar, or go on."""
-    with contextlib.closing(Journal(folder / "journal.jsonl", known, Candidates.restored)) as journal:
+def run_search(folder: pathlib.Path, search: Search, settings: Mapping[str, Any]) -> None:
+    """Start or continue a search, behind a progress bar.
+
+    Args:
+        folder: of the journal.
+        search: without bodies; gets those of the journal, and new bodies.
+        settings: that determine the search.
+    """
+    with contextlib.closing(Journal(folder / "journal.jsonl", settings, Candidates.from_json)) as journal:
         for batch in journal.generations:
-            course.add(batch)
-        done, batches = len(journal.generations), -(-FLAGS.bodies // BATCH_SIZE)
-        if done >= batches:
+            search.add(batch)
+        finished_batches = len(journal.generations)
+        batches = math.ceil(FLAGS.bodies / BATCH_SIZE)
+        if finished_batches >= batches:
             return
         say(f"{folder}: {BATCH_SIZE * batches} bodies")
         with (
-            evaluators(FLAGS.processes) as evaluated,
-            progress(total=BATCH_SIZE * batches, initial=BATCH_SIZE * done, desc=FLAGS.goal, unit="body") as bar,
+            open_evaluators(FLAGS.processes) as evaluate_all,
+            progress(
+                total=BATCH_SIZE * batches, initial=BATCH_SIZE * finished_batches, desc=FLAGS.goal, unit="body"
+            ) as bar,
         ):
-            for _ in range(done, batches):
-                journal.append(course.batch(evaluated))
-                bar.set_postfix_str(f"{len(course.elites)} cells", refresh=False)
+            for _ in range(finished_batches, batches):
+                journal.append(search.evaluate_batch(evaluate_all))
+                bar.set_postfix_str(f"{len(search.elites)} cells", refresh=False)
                 bar.update(BATCH_SIZE)
 
 
@@ -138,38 +177,59 @@ def main() -> None:
         raise ValueError("no folder to write to; say --output=FOLDER")
     goal = GOALS[checks.name(FLAGS.goal, GOALS, "goal")]
     around = None if FLAGS.around is None else registry.body_of(FLAGS.around)
-    space = ProportionGenes() if around is None else VariantGenes(around, FLAGS.amount)
-    cells = Map.of(FLAGS.map or (("legs", "links") if around is None else ("height", "width")), around, FLAGS.amount)
-    task, settings = FLAGS.task or goal.task, named_values("set", FLAGS["set"].value)
-    trial = Trial.of(task, settings, FLAGS.goal, budget(around), FLAGS.steps)
-    stem = "design" if around is None else around.name[:_STEM]
-    course = Search(space, cells, trial, FLAGS.seed, stem, FLAGS.random)
-    check(trial, course.middle())
+    if around is None:
+        space = ProportionGenes()
+        default_axes = ("legs", "links")
+        stem = "design"
+    else:
+        space = VariantGenes(around, FLAGS.amount)
+        default_axes = ("height", "width")
+        stem = around.name[:_MAX_STEM]
+    cells = Map.of(FLAGS.map or default_axes, around, FLAGS.amount)
+    task = FLAGS.task or goal.task
+    task_settings = named_values("set", FLAGS["set"].value)
+    trial = Trial.of(task, task_settings, FLAGS.goal, budget_from_flags(around), FLAGS.steps)
+    search = Search(space, cells, trial, FLAGS.seed, stem, FLAGS.random)
+    check_one_step(trial, search.middle_body())
     if FLAGS.pages:
-        pages.viewer_script()  # finds out at once whether there is one
+        pages.viewer_script()  # raises an error now if there is no viewer
     folder = files.folder(FLAGS.output)
-    known = settled(trial, cells, around)
+    settings = search_settings(trial, cells, around)
     with resumable(folder):
-        search(folder, course, known)
-    best = gallery.elites(course, cells)
-    gallery.write_table(folder / "bodies.csv", course, cells)
-    gallery.write_specs(folder / "bodies", best)
-    with files.writing_json(folder / "design.json") as report:
-        report.update(known, bodies=len(course.candidates), elites=[elite.to_dict() for elite in best])
-    if not best:
-        reasons = collections.Counter(one.outcome.reason.split(":")[0] for one in course.candidates)
-        raise ValueError(f"none of {len(course.candidates)} bodies counts; most often: {reasons.most_common(1)[0][0]}")
-    print_table(best, trial)
-    views = gallery.pictures(progress(best, "rendering", unit="body", leave=False), cells, trial)
-    gallery.write_picture(folder / "gallery.png", views)
-    if FLAGS.pages:
-        gallery.write_walks(folder / "walks", progress(best, "walking", unit="body", leave=False), cells, trial)
-        gallery.write_page(folder / "gallery.html", views, cells, f"{FLAGS.goal} in {task}")
+        run_search(folder, search, settings)
+    write_results(folder, search, cells, trial, settings)
     print(f"wrote {folder}")
 
 
-def check(trial: Trial, body: Body | str) -> None:
-    """Let one body take a step.
+def write_results(folder: pathlib.Path, search: Search, cells: Map, trial: Trial, settings: Mapping[str, Any]) -> None:
+    """Write the files of a search and print a row for each cell.
+
+    Raises:
+        ValueError: no cell has a body.
+    """
+    elites = gallery.find_elites(search, cells)
+    gallery.write_table(folder / "bodies.csv", search, cells)
+    gallery.write_specs(folder / "bodies", elites)
+    with files.writing_json(folder / "design.json") as report:
+        report.update(settings, bodies=len(search.candidates), elites=[elite.to_dict() for elite in elites])
+    if not elites:
+        reasons = collections.Counter(candidate.outcome.reason.split(":")[0] for candidate in search.candidates)
+        [(most_common_reason, _)] = reasons.most_common(1)
+        raise ValueError(f"none of {len(search.candidates)} bodies counts; most often: {most_common_reason}")
+    print_table(elites, trial)
+    pictures = gallery.draw_pictures(progress(elites, "rendering", unit="body", leave=False), cells, trial)
+    gallery.write_picture(folder / "gallery.png", pictures)
+    if FLAGS.pages:
+        gallery.write_walks(folder / "walks", progress(elites, "walking", unit="body", leave=False), cells, trial)
+        gallery.write_page(folder / "gallery.html", pictures, cells, f"{trial.goal} in {trial.task}")
+
+
+def check_one_step(trial: Trial, body: Body | str) -> None:
+    """Let one body take a step, to find errors before the search.
+
+    Args:
+        trial: of the search.
+        body: to try, or the reason why there is no body.
 
     Raises:
         ValueError: no body within the budget, a setting that does not fit, or a task that does not measure the metric.
@@ -177,17 +237,19 @@ def check(trial: Trial, body: Body | str) -> None:
     if isinstance(body, str):
         raise ValueError(body)
     goal = GOALS[trial.goal]
-    for episodes in (trial.first, trial.second):
-        tried = measure_walk(body, trial.task, episodes._replace(steps=1), goal)
-    if math.isnan(goal.value(tried)):
+    measure_walk(body, trial.task, trial.first._replace(steps=1), goal)
+    second_walk = measure_walk(body, trial.task, trial.second._replace(steps=1), goal)
+    if math.isnan(goal.value(second_walk)):
         raise ValueError(f"--goal={trial.goal}: task {trial.task} does not measure {goal.metric}")
 
 
-def print_table(best: Iterable[gallery.Elite], trial: Trial) -> None:
+def print_table(elites: Iterable[gallery.Elite], trial: Trial) -> None:
     """Print a row for each cell: its body, and the metric in both evaluations."""
-    goal = GOALS[trial.goal]
+    metric = GOALS[trial.goal].metric
     line = "{:<24} {:>6} {:>12} {:>12} {:>12}"
-    print(line.format("cell", "body", goal.metric[:12], "evaluated again", "power, W/kg"))
-    for elite in best:
-        first, second = (f"{getattr(walk, goal.metric):.3f}" for walk in (elite.first, elite.second))
-        print(line.format(elite.label, elite.number, first, second, f"{elite.second.power:.1f}"))
+    print(line.format("cell", "body", metric[:12], "evaluated again", "power, W/kg"))
+    for elite in elites:
+        first = f"{getattr(elite.first, metric):.3f}"
+        second = f"{getattr(elite.second, metric):.3f}"
+        power = f"{elite.second.power:.1f}"
+        print(line.format(elite.label, elite.number, first, second, power))

@@ -1,4 +1,4 @@
-"""Axes of a map: what tells bodies apart, so that the best of every kind is kept."""
+"""Axes of a map: properties that tell bodies apart, so that a search keeps the best body of every kind."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -15,33 +15,41 @@ class Axis(NamedTuple):
     """A property of bodies.
 
     Attributes:
-        of: its value.
-        edges: between the bins of any bodies; None for a count, which is its own bin.
+        measure: returns the value of a body.
+        edges: between the bins of all bodies; None for a count, where each count is a bin.
     """
 
-    of: Callable[[Body], float]
+    measure: Callable[[Body], float]
     edges: tuple[float, ...] | None = None
 
 
-def _ratio(over: int, under: int) -> Callable[[Body], float]:
-    """The ratio of two extents of the standing body."""
-
-    def ratio(body: Body) -> float:
-        extents = extent(body)
-        return float(extents[over] / extents[under])
-
-    return ratio
+def _count_legs(body: Body) -> int:
+    return len(body.legs)
 
 
-# Edges are rounded fifths of 500 random bodies.
+def _count_links(body: Body) -> int:
+    return max(len(leg.links) for leg in body.legs)
+
+
+def _relative_height(body: Body) -> float:
+    length, _, height = extent(body)
+    return float(height / length)
+
+
+def _relative_width(body: Body) -> float:
+    length, width, _ = extent(body)
+    return float(width / length)
+
+
+# Edges are rounded quintiles of 500 random bodies.
 AXES: Mapping[str, Axis] = {
-    "legs": Axis(lambda body: len(body.legs)),
-    "links": Axis(lambda body: max(len(leg.links) for leg in body.legs)),
-    "height": Axis(_ratio(2, 0), (0.33, 0.37, 0.41, 0.47)),
-    "width": Axis(_ratio(1, 0), (0.92, 1.0, 1.02, 1.07)),
+    "legs": Axis(_count_legs),
+    "links": Axis(_count_links),
+    "height": Axis(_relative_height, (0.33, 0.37, 0.41, 0.47)),
+    "width": Axis(_relative_width, (0.92, 1.0, 1.02, 1.07)),
 }
 HELP = "legs, links: their numbers; height, width: over the length, in five bins"
-SPREAD = (-0.75, -0.25, 0.25, 0.75)  # edges of the bins around a body, standard deviations of its variants
+VARIANT_EDGES = (-0.75, -0.25, 0.25, 0.75)  # of the bins around a body, standard deviations of its variants
 
 
 class Map(NamedTuple):
@@ -57,7 +65,12 @@ class Map(NamedTuple):
 
     @classmethod
     def of(cls, names: Sequence[str], around: Body | None = None, amount: float = 0.0) -> "Map":
-        """Return the map of one or two axes, with bins about a body if there is one.
+        """Return the map of one or two axes.
+
+        Args:
+            names: of the axes.
+            around: a body whose variants are searched, with bins about it; None for bins of all bodies.
+            amount: standard deviation of the logarithms of the variants' lengths.
 
         Raises:
             ValueError: an unknown axis, a repeated one, or more than two.
@@ -65,23 +78,25 @@ class Map(NamedTuple):
         names = tuple(checks.name(name, AXES, "axis") for name in names)
         if len(names) not in (1, 2) or len(set(names)) < len(names):
             raise ValueError(f"map: expected one or two different axes of {', '.join(AXES)}, got {','.join(names)}")
-        return cls(names, tuple(_edges(AXES[name], around, amount) for name in names))
+        edges = tuple(_bin_edges(AXES[name], around, amount) for name in names)
+        return cls(names, edges)
 
     def cell(self, body: Body) -> tuple[int, ...]:
-        """Return the bin of a body on each axis; bins of ratios count from 1."""
-        values = (AXES[name].of(body) for name in self.names)
-        return tuple(
-            int(value) if edges is None else 1 + int(np.searchsorted(edges, value))
-            for value, edges in zip(values, self.edges, strict=True)
-        )
+        """Return the bin of a body on each axis: its count, or the number of its bin, from 1."""
+        cell = []
+        for name, edges in zip(self.names, self.edges, strict=True):
+            value = AXES[name].measure(body)
+            cell.append(int(value) if edges is None else 1 + int(np.searchsorted(edges, value)))
+        return tuple(cell)
 
     def label(self, cell: Sequence[int]) -> str:
-        """Return the name of a cell's files: legs6_links3."""
-        return "_".join(f"{name}{bin}" for name, bin in zip(self.names, cell, strict=True))
+        """Return the name of a cell's files, such as legs6_links3."""
+        return "_".join(f"{name}{number}" for name, number in zip(self.names, cell, strict=True))
 
 
-def _edges(axis: Axis, around: Body | None, amount: float) -> tuple[float, ...] | None:
+def _bin_edges(axis: Axis, around: Body | None, amount: float) -> tuple[float, ...] | None:
+    """Return the edges of the bins of an axis; see `Map.of`."""
     if axis.edges is None or around is None:
         return axis.edges
-    value = axis.of(around)
-    return tuple(round(value * math.exp(amount * deviation), 4) for deviation in SPREAD)
+    value = axis.measure(around)
+    return tuple(round(value * math.exp(amount * deviation), 4) for deviation in VARIANT_EDGES)

@@ -1,13 +1,12 @@
-"""The files of a search: specs of the best, a table of all, a picture, and pages on which the best walk.
+"""The files of a search: specs of the elites, a table of all bodies, a picture, and pages on which the elites walk.
 
-All follow from the outcomes, so that a search that was broken off leaves the same files in the end.
+Files follow from the outcomes alone. So a search that was interrupted leaves the same files in the end.
 """
 
 import base64
 import csv
 import html
 import io
-import itertools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple, cast
@@ -25,10 +24,16 @@ from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
 
-STEPS = 200  # control steps of a walk on a page
-_BEFORE_PICTURE = 60
-_SIZE = (300, 225)  # pixels of a cell of the picture
-_FIELDS = ("number", "cell", "elite", "reason", *(f"{name}_{turn}" for turn in (1, 2) for name in WalkMeans._fields))
+WALK_STEPS = 200  # control steps of a walk on a page
+_PICTURE_STEP = 60  # control steps before the picture of a walk
+_PICTURE_WIDTH = 300  # pixels of a cell
+_PICTURE_HEIGHT = 225  # pixels of a cell
+_MAX_COLUMNS = 4  # of a picture whose cells differ along one axis
+_JPEG_QUALITY = 85
+_WALK_COLUMNS = [f"{name}_{evaluation}" for evaluation in (1, 2) for name in WalkMeans._fields]
+_COLUMNS = ("number", "cell", "elite", "reason", *_WALK_COLUMNS)  # before those of genes
+
+Cell = tuple[int, ...]  # see `Map.cell`
 
 
 class Elite(NamedTuple):
@@ -39,123 +44,154 @@ class Elite(NamedTuple):
         cell: of the map.
         number: of the body in the table.
         body: the body.
-        first, second: its walks; see `trials.Outcome`.
+        first: its first walk; see `trials.Outcome`.
+        second: its second walk.
     """
 
     label: str
-    cell: tuple[int, ...]
+    cell: Cell
     number: int
     body: Body
     first: WalkMeans
     second: WalkMeans
 
     def to_dict(self) -> dict:
-        """Return what `design.json` holds of it."""
+        """Return what `design.json` holds of the elite."""
         return {"cell": self.label, "number": self.number, "first": self.first, "second": self.second}
 
 
-def elites(search: Search, cells: Map) -> list[Elite]:
-    """Return the best bodies, in the order of their cells."""
-    found = []
+class Layout(NamedTuple):
+    """How a picture arranges cells.
+
+    Attributes:
+        cells: row by row, from left to right.
+        columns: their number.
+    """
+
+    cells: list[Cell]
+    columns: int
+
+
+def find_elites(search: Search, cells: Map) -> list[Elite]:
+    """Return the elites of a search, in the order of their cells."""
+    elites = []
     for cell, number in sorted(search.elites.items()):
-        one = search.candidates[number]
-        body = cast(Body, search.body(one.genes, number))  # an elite has one, and no reason why it has none
-        found.append(Elite(cells.label(cell), cell, number, body, one.outcome.first, one.outcome.second))
-    return found
+        candidate = search.candidates[number]
+        body = cast(Body, search.body(candidate.genes, number))  # genes of an elite make a body
+        outcome = candidate.outcome
+        elites.append(Elite(cells.label(cell), cell, number, body, outcome.first, outcome.second))
+    return elites
 
 
 def write_table(path: Path, search: Search, cells: Map) -> None:
-    """Write a row for every body evaluated, CSV: cell, why it is excluded, metrics of both evaluations, genes."""
-    best, none = set(search.elites.values()), [""] * len(WalkMeans._fields)
+    """Write a row for every evaluated body, as CSV.
+
+    A row holds the body's cell, why the body is excluded, the metrics of both evaluations, and the genes.
+    """
+    elite_numbers = set(search.elites.values())
+    no_walk = [""] * len(WalkMeans._fields)
     with files.writing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow([*_FIELDS, *search.genes])
-        for number, (numbers, cell, (reason, first, second)) in enumerate(search.candidates):
-            label = "" if cell is None else cells.label(cell)
-            walks = [*(first or none), *(second or none)]
-            table.writerow([number, label, int(number in best), reason, *walks, *numbers])
+        table.writerow([*_COLUMNS, *search.genes])
+        for number, candidate in enumerate(search.candidates):
+            label = "" if candidate.cell is None else cells.label(candidate.cell)
+            is_elite = int(number in elite_numbers)
+            reason, first, second = candidate.outcome
+            walks = [*(first or no_walk), *(second or no_walk)]
+            table.writerow([number, label, is_elite, reason, *walks, *candidate.genes])
 
 
-def write_specs(folder: Path, best: Iterable[Elite]) -> None:
+def write_specs(folder: Path, elites: Iterable[Elite]) -> None:
     """Write the spec of every elite, named by its cell."""
     files.folder(folder)
-    for elite in best:
+    for elite in elites:
         files.write(folder / f"{elite.label}.json", body_to_json(elite.body))
 
 
 def caption(elite: Elite, cells: Map, goal: str) -> str:
-    """Return the cell of an elite and its metric in its second evaluation."""
-    names = ", ".join(f"{number} {name}" for name, number in zip(cells.names, elite.cell, strict=True))
-    return f"{names}: {getattr(elite.second, GOALS[goal].metric):.3g}{GOALS[goal].unit}"
+    """Return the cell of an elite, and its metric in its second evaluation."""
+    bins = ", ".join(f"{number} {name}" for name, number in zip(cells.names, elite.cell, strict=True))
+    metric = getattr(elite.second, GOALS[goal].metric)
+    return f"{bins}: {metric:.3g}{GOALS[goal].unit}"
 
 
-def pictures(best: Iterable[Elite], cells: Map, trial: Trial) -> dict[tuple[int, ...], np.ndarray]:
-    """Return a captioned picture of every elite on its way, by its cell.
+def draw_pictures(elites: Iterable[Elite], cells: Map, trial: Trial) -> dict[Cell, np.ndarray]:
+    """Return a captioned picture (height, width, 3) of every elite in its walk, by its cell.
 
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
-    views = {}
-    for elite in best:
+    pictures = {}
+    for elite in elites:
         environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
         act = policies.alone(policy, trial.first.seeds[0])
-        footage = films.Footage(elite.label, environment, act, "portrait", _SIZE)
-        for _ in range(_BEFORE_PICTURE):
+        size = (_PICTURE_WIDTH, _PICTURE_HEIGHT)
+        footage = films.Footage(elite.label, environment, act, "portrait", size)
+        for _ in range(_PICTURE_STEP):
             footage.step()
-        views[elite.cell] = films.captioned(footage.view(), caption(elite, cells, trial.goal))
+        pictures[elite.cell] = films.captioned(footage.view(), caption(elite, cells, trial.goal))
         footage.close()
-    return views
+    return pictures
 
 
-def write_picture(path: Path, views: Mapping[tuple[int, ...], np.ndarray]) -> None:
-    """Write pictures as one; see `_arranged`."""
-    shown, columns = _arranged(views)
-    nothing = np.zeros((*_SIZE[::-1], 3), np.uint8)
+def write_picture(path: Path, pictures: Mapping[Cell, np.ndarray]) -> None:
+    """Write pictures as one picture, with black in place of cells without an elite."""
+    layout = _arrange_cells(pictures)
+    empty_picture = np.zeros((_PICTURE_HEIGHT, _PICTURE_WIDTH, 3), np.uint8)
+    all_pictures = [pictures.get(cell, empty_picture) for cell in layout.cells]
     with files.writing(path) as temporary:
-        films.write_png(temporary, [films.grid([views.get(cell, nothing) for cell in shown], columns)], 0.0)
+        films.write_png(temporary, [films.grid(all_pictures, layout.columns)], 0.0)
 
 
-def write_walks(folder: Path, best: Iterable[Elite], cells: Map, trial: Trial) -> None:
+def write_walks(folder: Path, elites: Iterable[Elite], cells: Map, trial: Trial) -> None:
     """Write a page for each elite, on which it walks.
 
     Raises:
         ValueError: the viewer has not been built.
     """
     files.folder(folder)
-    for elite in best:
+    for elite in elites:
         environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
-        track = style.record(environment, policy, trial.first.seeds[0], STEPS)
+        track = style.record(environment, policy, seed=trial.first.seeds[0], max_steps=WALK_STEPS)
         environment.close()
-        files.write(folder / f"{elite.label}.html", pages.page({caption(elite, cells, trial.goal): track}))
+        page = pages.page({caption(elite, cells, trial.goal): track})
+        files.write(folder / f"{elite.label}.html", page)
 
 
-def write_page(path: Path, views: Mapping[tuple[int, ...], np.ndarray], cells: Map, title: str) -> None:
-    """Write a page of all pictures, each a link to the page on which the body walks, with a link to its spec."""
-    shown, columns = _arranged(views)
-    items = "\n".join(_item(cells.label(cell), views.get(cell)) for cell in shown)
-    text = pages.template("design/gallery.html").substitute(title=html.escape(title), columns=columns, items=items)
-    files.write(path, text)
+def write_page(path: Path, pictures: Mapping[Cell, np.ndarray], cells: Map, title: str) -> None:
+    """Write a page of all pictures, with links to the walks and to the specs."""
+    layout = _arrange_cells(pictures)
+    items = "\n".join(_figure_html(cells.label(cell), pictures.get(cell)) for cell in layout.cells)
+    template = pages.template("design/gallery.html")
+    files.write(path, template.substitute(title=html.escape(title), columns=layout.columns, items=items))
 
 
-def _item(label: str, view: np.ndarray | None) -> str:
-    """Return the figure of a cell as HTML; an empty one without a picture."""
+def _figure_html(label: str, picture: np.ndarray | None) -> str:
+    """Return the figure of a cell as HTML; an empty figure without a picture."""
     figure = ElementTree.Element("figure")
-    if view is not None:
+    if picture is not None:
         buffer = io.BytesIO()
-        Image.fromarray(view).save(buffer, "JPEG", quality=85)
+        Image.fromarray(picture).save(buffer, "JPEG", quality=_JPEG_QUALITY)
         source = f"data:image/jpeg;base64,{base64.b64encode(buffer.getvalue()).decode()}"
-        walk = ElementTree.SubElement(figure, "a", href=f"walks/{label}.html")
-        ElementTree.SubElement(walk, "img", alt=label, src=source)
-        name = ElementTree.SubElement(ElementTree.SubElement(figure, "figcaption"), "a", href=f"bodies/{label}.json")
-        name.text = f"{label}.json"
+        walk_link = ElementTree.SubElement(figure, "a", href=f"walks/{label}.html")
+        ElementTree.SubElement(walk_link, "img", alt=label, src=source)
+        figure_caption = ElementTree.SubElement(figure, "figcaption")
+        spec_link = ElementTree.SubElement(figure_caption, "a", href=f"bodies/{label}.json")
+        spec_link.text = f"{label}.json"
     return ElementTree.tostring(figure, encoding="unicode", method="html")
 
 
-def _arranged(views: Mapping[tuple[int, ...], np.ndarray]) -> tuple[list[tuple[int, ...]], int]:
-    """Return the cells to show, row by row, and how many columns there are: the axis with fewer values has columns."""
-    axes = [sorted(set(values)) for values in zip(*views, strict=True)]
-    if min(map(len, axes)) == 1 or len(axes) == 1:
-        return sorted(views), min(4, len(views))
-    across = int(len(axes[1]) < len(axes[0]))
-    cells = sorted(itertools.product(*axes), key=lambda cell: (cell[1 - across], cell[across]))
-    return cells, len(axes[across])
+def _arrange_cells(pictures: Mapping[Cell, np.ndarray]) -> Layout:
+    """Return the layout of all cells between those with pictures.
+
+    The axis with fewer values runs across. Cells that differ along one axis only follow each other.
+    """
+    values_by_axis = [sorted(set(values)) for values in zip(*pictures, strict=True)]
+    if len(values_by_axis) == 1 or min(len(values) for values in values_by_axis) == 1:
+        return Layout(sorted(pictures), min(_MAX_COLUMNS, len(pictures)))
+    first_values, second_values = values_by_axis
+    if len(second_values) < len(first_values):
+        cells = [(first, second) for first in first_values for second in second_values]
+        return Layout(cells, columns=len(second_values))
+    cells = [(first, second) for second in second_values for first in first_values]
+    return Layout(cells, columns=len(first_values))

@@ -1,7 +1,7 @@
-"""Genes and bodies: vectors of numbers from 0 to 1, and the bodies that they stand for within budgets.
+"""Genes and bodies: vectors of numbers from 0 to 1, and the bodies that they make within a budget.
 
-A body is the best that a goal has only if all bodies may spend the same. So a budget fixes what a body weighs and
-bounds its extent. Shapes come first and sizes last: a shape is scaled until it keeps the budget.
+Bodies can be compared only if all may spend the same. So a budget fixes the mass of a body and bounds its extent. Genes
+make the shape of a body first. The shape is scaled then, so that the body keeps the budget.
 """
 
 import math
@@ -15,7 +15,7 @@ from arc_suite.models.outline import outline
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 
-GENE_DEVIATIONS = 2.0  # standard deviations of a mutation that a gene spans to either side
+GENE_DEVIATIONS = 2.0  # standard deviations of a variant's lengths, that a gene spans to either side of its middle
 
 
 class Budget(NamedTuple):
@@ -34,26 +34,27 @@ class Budget(NamedTuple):
     power: float = math.inf
 
 
-# Ranges of proportions, those of `generator.random_body`; lengths of half of the torso's length where not said.
+# Lowest and highest proportions, those of `generator.random_body`. Lengths are in half-lengths of the torso, unless a
+# comment says otherwise.
 _RANGES = {
-    "legs": (4.0, 13.0),  # rounded down, as are links
-    "links": (2.0, 5.0),
-    "layout": (0.0, 1.0),  # radial from `_RADIAL` on
+    "legs": (4.0, 13.0),  # rounded down
+    "links": (2.0, 5.0),  # rounded down
+    "layout": (0.0, 1.0),  # radial from `_MIN_RADIAL` on
     "height": (0.6, 1.4),
     "width": (0.35, 0.7),
     "thickness": (0.15, 0.3),  # of the height
     "fan": (15.0, 45.0),  # degrees
     "reach": (0.7, 1.2),  # of the height
-    **{f"share_{link}": (0.8, 1.2) for link in range(1, 5)},
+    **{f"share_{link}": (0.8, 1.2) for link in range(1, 5)},  # factors of the lengths of links
     **{f"elevation_{link}": (-8.0, 8.0) for link in range(1, 5)},  # degrees
-    **{f"reach_{place}": (0.75, 1.3) for place in ("front", "middle", "rear")},
-    "size": (0.5, 1.0),  # of the greatest within the budget
+    **{f"reach_{part}": (0.75, 1.3) for part in ("front", "middle", "rear")},  # factors of the reach
+    "size": (0.5, 1.0),  # of the largest size within the budget
 }
-_RADIAL = 0.7
+_MIN_RADIAL = 0.7  # gene of the layout, from which legs stand around the torso
 
 
 class ProportionGenes:
-    """Bodies of all the proportions of `generator.random_body`, whose unequal legs change evenly along the body."""
+    """Genes of all proportions of `generator.random_body`, where the reach of legs changes evenly along the body."""
 
     names = tuple(_RANGES)
 
@@ -63,48 +64,64 @@ class ProportionGenes:
         Raises:
             ValueError: a length out of range.
         """
-        gene = self._numbers(genes)
-        legs, links = (int(min(gene[name], _RANGES[name][1] - 1.0)) for name in ("legs", "links"))
-        layout = "radial" if legs % 2 or gene["layout"] >= _RADIAL else "pairs"
-        along = generator.places(legs, layout)
-        unequal = np.interp(along, (-1.0, 0.0, 1.0), [gene[f"reach_{place}"] for place in ("rear", "middle", "front")])
+        numbers = self._numbers(genes)
+        legs = self._whole_number(numbers, "legs")
+        links = self._whole_number(numbers, "links")
+        is_radial = legs % 2 == 1 or numbers["layout"] >= _MIN_RADIAL
+        layout = "radial" if is_radial else "pairs"
+        leg_positions = generator.places(legs, layout)  # along the body, from -1 at the rear to 1 in front
+        reach_factors = np.interp(
+            leg_positions,
+            (-1.0, 0.0, 1.0),
+            (numbers["reach_rear"], numbers["reach_middle"], numbers["reach_front"]),
+        )
         profile = [
-            (share * gene[f"share_{link}"], elevation + gene[f"elevation_{link}"])
+            (share * numbers[f"share_{link}"], elevation + numbers[f"elevation_{link}"])
             for link, (share, elevation) in enumerate(generator.PROFILES[links], 1)
         ]
         proportions = Proportions(
-            height=gene["height"],
+            height=numbers["height"],
             half_length=1.0,
-            half_width=1.0 if layout == "radial" else gene["width"],
-            thickness=gene["thickness"],
-            fan=gene["fan"],
+            half_width=1.0 if is_radial else numbers["width"],
+            thickness=numbers["thickness"],
+            fan=numbers["fan"],
             profile=profile,
-            reaches=(gene["reach"] * unequal).tolist(),
+            reaches=(numbers["reach"] * reach_factors).tolist(),
         )
         return generator.proportioned("design", legs, layout, proportions)
 
-    def size(self, genes: np.ndarray) -> float:
-        """Return the share of the greatest size within a budget."""
+    def size_share(self, genes: np.ndarray) -> float:
+        """Return the size of the body as a share of the largest size within a budget."""
         return self._numbers(genes)["size"]
 
     def _numbers(self, genes: np.ndarray) -> dict[str, float]:
-        low, high = np.transpose(list(_RANGES.values()))
-        return dict(zip(_RANGES, (low + (high - low) * genes).tolist(), strict=True))
+        """Return the proportions of genes, by name."""
+        lowest, highest = np.transpose(list(_RANGES.values()))
+        numbers = lowest + (highest - lowest) * genes
+        return dict(zip(_RANGES, numbers.tolist(), strict=True))
+
+    @staticmethod
+    def _whole_number(numbers: dict[str, float], name: str) -> int:
+        """Return a number rounded down, and less than the end of its range."""
+        _, end = _RANGES[name]
+        return int(min(numbers[name], end - 1.0))
 
 
 class VariantGenes:
-    """Bodies like another one: legs of other lengths and headings, as those of `generator.mutated`."""
+    """Genes of the variants of a body, whose legs have other lengths and headings, as those of `generator.mutated`."""
 
     def __init__(self, body: Body, amount: float):
         """Take the body, and the standard deviation of logarithms of lengths and of headings in rad."""
-        self._body, self._amount = body, amount
+        self._body = body
+        self._amount = amount
         self.names = tuple(f"deformation_{number}" for number in range(1, generator.deformations(body) + 1))
 
     def shape(self, genes: np.ndarray) -> Body:
-        """Return the deformed body; genes of 0.5 leave it as it is."""
-        return generator.deformed(self._body, self._amount * GENE_DEVIATIONS * (2.0 * genes - 1.0))
+        """Return the variant of genes (n,) from 0 to 1; genes of 0.5 leave the body as it is."""
+        changes = self._amount * GENE_DEVIATIONS * (2.0 * genes - 1.0)
+        return generator.deformed(self._body, changes)
 
-    def size(self, genes: np.ndarray) -> None:
+    def size_share(self, genes: np.ndarray) -> None:
         """Return None: variants have the size of the body."""
 
 
@@ -112,29 +129,33 @@ Genes = ProportionGenes | VariantGenes
 
 
 def extent(body: Body) -> np.ndarray:
-    """Return the extent (3,) of the standing body along x, y and z, from the floor on, m."""
+    """Return the extent (3,) of the standing body along x, y and z, in z from the floor, m."""
     points = outline(body)
-    lowest = -body.torso.standing_height
-    return points.max(axis=0) - np.append(points.min(axis=0)[:2], lowest)
+    lowest = points.min(axis=0)
+    lowest[2] = -body.torso.standing_height
+    return points.max(axis=0) - lowest
 
 
 def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: str) -> Body:
-    """Return the body of genes, scaled and of the density that keeps a budget.
+    """Return the body of genes, with the scale and the density that keep a budget.
 
     Args:
         budget: to keep.
-        space: of the bodies.
+        space: that makes bodies of genes.
         genes: (n,) from 0 to 1.
         name: of the body.
 
     Raises:
         ValueError: a length or density out of range.
     """
-    shape, share = space.shape(genes), space.size(genes)
-    most = min(budget.span / float(extent(shape).max()), budget.height / shape.torso.standing_height)
-    factor = min(most, 1.0) if share is None else share * most
-    # The density comes first: small parts of a light body would be refused.
-    ballast = sum(weight.mass for weight in shape.ballast)
+    shape = space.shape(genes)
+    size_share = space.size_share(genes)
+    largest_factor = min(budget.span / float(extent(shape).max()), budget.height / shape.torso.standing_height)
+    factor = min(largest_factor, 1.0) if size_share is None else size_share * largest_factor
+    # The density comes before the scale: small parts of the shape's own density could be too light to be allowed.
+    ballast = sum(weight.mass for weight in shape.ballast)  # kg, does not depend on the density
     density = shape.density * (budget.mass / factor**3 - ballast) / (standing(shape).mass - ballast)
     body = shape.replace(density=density)
-    return (generator.scaled(body, factor) if factor != 1.0 else body).replace(name=name)
+    if factor != 1.0:
+        body = generator.scaled(body, factor)
+    return body.replace(name=name)

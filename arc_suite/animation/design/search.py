@@ -1,10 +1,12 @@
 """MAP-Elites (Mouret and Clune, "Illuminating search spaces by mapping elites", 2015): the best body of every cell.
 
-Bodies come in batches, and a batch depends on the seed, its number and the bodies before it alone. So a search does not
-depend on the number of processes, and one that was broken off resumes from the outcomes in its journal. New genes are
-those of an elite, moved at random and along the line to another elite (Vassiliades and Mouret, "Discovering the elite
-hypervolume by leveraging interspecies correlation", 2018). Better elites are chosen more often, as a search has few
-bodies for a cell.
+The best body of a cell is its elite. Bodies come in batches. A batch depends only on the seed, its number and the
+bodies before it. So a search does not depend on the number of processes, and an interrupted search resumes from the
+outcomes in its journal.
+
+New genes are those of an elite, moved at random and along the line to another elite (Vassiliades and Mouret,
+"Discovering the elite hypervolume by leveraging interspecies correlation", 2018). Better elites become parents more
+often, as a search has few bodies for a cell.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -17,14 +19,12 @@ from arc_suite.animation.design.genes import Genes, body_within_budget
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, WalkMeans
 from arc_suite.robots.spec import Body
 
-BATCH_SIZE = 20
-RANDOM_BODIES = 40  # bodies of random genes, with which a search begins if not said otherwise
-ISOTROPIC_DEVIATION, LINE_DEVIATION = (
-    0.15,
-    0.2,
-)  # standard deviations of the moves, shares of a gene's range and of the distance
-PARENT_BIAS = 3.0  # towards good elites: the rank of a parent, by their number, is a uniform number to this power
-REDRAW_PROBABILITY = 0.05  # probability that a gene is drawn anew, by which counts change too
+BATCH_SIZE = 20  # bodies
+RANDOM_BODIES = 40  # bodies of random genes, with which a search begins by default
+ISOTROPIC_DEVIATION = 0.15  # of a gene's random move, a share of its range
+LINE_DEVIATION = 0.2  # of the move along the line to another elite, a share of the distance
+PARENT_BIAS = 3.0  # exponent; the rank of a parent is the number of parents, times a uniform number to this power
+REDRAW_PROBABILITY = 0.05  # that a gene is random, and not that of a parent, so that counts change too
 
 
 class Candidate(NamedTuple):
@@ -51,13 +51,22 @@ class Candidates(NamedTuple):
     candidates: Sequence[Candidate]
 
     @classmethod
-    def restored(cls, candidates: Sequence[Sequence]) -> "Candidates":
+    def from_json(cls, candidates: Sequence[Sequence]) -> "Candidates":
         """Return a batch from lists as JSON holds them."""
-        return cls([Candidate(tuple(genes), cell and tuple(cell), _outcome(*rest)) for genes, cell, rest in candidates])
+        return cls([_candidate_from_json(*fields) for fields in candidates])
 
 
-def _outcome(reason: str, first: Sequence | None, second: Sequence | None) -> Outcome:
-    return Outcome(reason, WalkMeans(*first) if first else None, WalkMeans(*second) if second else None)
+def _candidate_from_json(genes: Sequence[float], cell: Sequence[int] | None, outcome: Sequence) -> Candidate:
+    reason, first, second = outcome
+    return Candidate(
+        genes=tuple(genes),
+        cell=tuple(cell) if cell else None,
+        outcome=Outcome(
+            reason=reason,
+            first=WalkMeans(*first) if first else None,
+            second=WalkMeans(*second) if second else None,
+        ),
+    )
 
 
 class Search:
@@ -66,7 +75,7 @@ class Search:
     Attributes:
         genes: their names.
         candidates: all bodies, in order.
-        elites: by cell, the index of the best in `candidates`.
+        elites: by cell, the index of the best body in `candidates`.
     """
 
     def __init__(self, space: Genes, cells: Map, trial: Trial, seed: int, stem: str, random: int = RANDOM_BODIES):
@@ -78,63 +87,81 @@ class Search:
             trial: by which bodies are evaluated.
             seed: of the genes.
             stem: of the names of bodies, `<stem>_<index>`.
-            random: bodies of random genes, with which the search begins.
+            random: number of bodies of random genes, with which the search begins.
         """
         self.genes = space.names
-        self._space, self._cells, self._trial, self._seed, self._stem = space, cells, trial, seed, stem
+        self._space = space
+        self._cells = cells
+        self._trial = trial
+        self._seed = seed
+        self._stem = stem
         self._random = random
         self.candidates: list[Candidate] = []
         self.elites: dict[tuple[int, ...], int] = {}
 
-    def batch(self, evaluated: Callable[[Iterable[tuple]], Iterable[Outcome]]) -> Candidates:
-        """Evaluate the next batch of bodies, add and return it.
+    def evaluate_batch(self, evaluate_all: Callable[[Iterable[tuple]], Iterable[Outcome]]) -> Candidates:
+        """Evaluate the next batch of bodies, add it and return it.
 
         Args:
-            evaluated: maps arguments of `trials.evaluate` to outcomes, in order.
+            evaluate_all: maps tuples of arguments of `trials.evaluate` to outcomes, in order.
         """
-        genes = self._genes()
-        bodies = [self.body(numbers, len(self.candidates) + index) for index, numbers in enumerate(genes)]
-        cells = [None if isinstance(body, str) else self._cells.cell(body) for body in bodies]
-        outcomes = evaluated([(self._trial, body, self._value(cell)) for body, cell in zip(bodies, cells, strict=True)])
-        found = Candidates([Candidate(*each) for each in zip(map(tuple, genes.tolist()), cells, outcomes, strict=True)])
-        self.add(found)
-        return found
+        genes = self._next_genes()
+        jobs = []
+        cells = []
+        for index, body_genes in enumerate(genes):
+            body = self.body(body_genes, len(self.candidates) + index)
+            cell = None if isinstance(body, str) else self._cells.cell(body)
+            cells.append(cell)
+            jobs.append((self._trial, body, self._elite_value(cell)))
+        outcomes = evaluate_all(jobs)
+        batch = Candidates(
+            [
+                Candidate(tuple(body_genes), cell, outcome)
+                for body_genes, cell, outcome in zip(genes.tolist(), cells, outcomes, strict=True)
+            ]
+        )
+        self.add(batch)
+        return batch
 
     def add(self, batch: Candidates) -> None:
-        """Add evaluated bodies: one whose second evaluation exceeds that of its cell's elite takes its place."""
-        for one in batch.candidates:
-            walk = None if one.outcome.reason else one.outcome.second
-            if walk is not None and GOALS[self._trial.goal].value(walk) > self._value(one.cell):
-                self.elites[one.cell] = len(self.candidates)
-            self.candidates.append(one)
+        """Add evaluated bodies: a body whose second evaluation exceeds that of its cell's elite becomes the elite."""
+        goal = GOALS[self._trial.goal]
+        for candidate in batch.candidates:
+            counts = not candidate.outcome.reason and candidate.outcome.second is not None
+            if counts and goal.value(candidate.outcome.second) > self._elite_value(candidate.cell):
+                self.elites[candidate.cell] = len(self.candidates)
+            self.candidates.append(candidate)
 
-    def middle(self) -> Body | str:
+    def middle_body(self) -> Body | str:
         """Return the body in the middle of all ranges, or the reason why there is none."""
         return self.body([0.5] * len(self._space.names), 0)
 
     def body(self, genes: Sequence[float], index: int) -> Body | str:
-        """Return the body of genes, named by its index; where they make none, the reason."""
+        """Return the body of genes, named by its index, or the reason why genes make no body."""
         try:
             return body_within_budget(self._trial.budget, self._space, np.array(genes), f"{self._stem}_{index}")
         except ValueError as error:
             return f"no body: {error}"
 
-    def _genes(self) -> np.ndarray:
-        """Return the genes (BATCH, n) of the next batch, rounded as files hold them."""
+    def _next_genes(self) -> np.ndarray:
+        """Return the genes (BATCH_SIZE, n) of the next batch, rounded as files hold them."""
         random = np.random.default_rng((self._seed, len(self.candidates)))
-        drawn = random.uniform(size=(BATCH_SIZE, len(self._space.names)))
-        best = sorted(self.elites, key=self._value, reverse=True)
-        parents = [self.candidates[self.elites[cell]].genes for cell in best]
-        if len(self.candidates) >= self._random and parents:
-            ranks = len(parents) * random.uniform(size=(2, BATCH_SIZE)) ** PARENT_BIAS
-            first, second = np.array(parents)[ranks.astype(int)]
-            moved = first + ISOTROPIC_DEVIATION * random.standard_normal(drawn.shape)
-            moved += LINE_DEVIATION * random.standard_normal((BATCH_SIZE, 1)) * (second - first)
-            drawn = np.where(random.uniform(size=drawn.shape) < REDRAW_PROBABILITY, drawn, moved.clip(0.0, 1.0))
-        return drawn.round(6)
+        random_genes = random.uniform(size=(BATCH_SIZE, len(self._space.names)))
+        best_cells = sorted(self.elites, key=self._elite_value, reverse=True)
+        parents = np.array([self.candidates[self.elites[cell]].genes for cell in best_cells])  # the best first
+        if len(self.candidates) < self._random or not len(parents):
+            return random_genes.round(6)
+        parent_ranks = len(parents) * random.uniform(size=(2, BATCH_SIZE)) ** PARENT_BIAS
+        first_parents, second_parents = parents[parent_ranks.astype(int)]
+        genes = first_parents + ISOTROPIC_DEVIATION * random.standard_normal(random_genes.shape)
+        line_moves = LINE_DEVIATION * random.standard_normal((BATCH_SIZE, 1))
+        genes += line_moves * (second_parents - first_parents)
+        is_redrawn = random.uniform(size=genes.shape) < REDRAW_PROBABILITY
+        return np.where(is_redrawn, random_genes, genes.clip(0.0, 1.0)).round(6)
 
-    def _value(self, cell: tuple[int, ...] | None) -> float:
-        """Return the metric of a cell's elite as a number to be raised."""
+    def _elite_value(self, cell: tuple[int, ...] | None) -> float:
+        """Return the value of a cell's elite, see `Goal.value`; -inf without an elite."""
         if cell not in self.elites:
             return -np.inf
-        return GOALS[self._trial.goal].value(self.candidates[self.elites[cell]].outcome.second)
+        elite = self.candidates[self.elites[cell]]
+        return GOALS[self._trial.goal].value(elite.outcome.second)

@@ -1,4 +1,4 @@
-"""Evaluation of bodies: a demonstrator, fitted to each, walks it; a goal says what the walk is worth."""
+"""Evaluation of bodies: a fitted demonstrator walks each body, and a goal says what the walk is worth."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,19 +17,19 @@ from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import energy
 
-_TERMINATING = {"on_divergence": "terminate"}  # counts as a fall
-_SEEDS = 2**32  # of a ground
+_DIVERGENCE_SETTINGS = {"on_divergence": "terminate"}  # an end that counts as a fall
+_NUM_TERRAIN_SEEDS = 2**32
 
 
 class WalkMeans(NamedTuple):
     """Means over episodes.
 
     Attributes:
-        speed: along world x, m/s; a body that has fallen rests.
-        achieved: share of what is commanded: tracking, or in tasks that lead along x the displacement by that at the
-            target velocity.
-        tracking: mean over all steps, 0 after a fall; NaN in a task without.
-        cost_of_transport: positive work of the motors by weight and path.
+        speed: along world x, m/s; a body that has fallen counts as standing still.
+        achieved: share of the command that is achieved. In tasks that lead along x, it is the displacement, divided by
+            that at the target velocity; in other tasks, it is `tracking`.
+        tracking: mean of the task's tracking over all steps, 0 after a fall; NaN in a task without tracking.
+        cost_of_transport: positive work of the motors, divided by weight and path.
         power: mean positive power of the motors until the end of an episode, W/kg.
         falls: share of the episodes that ended early in a fall.
     """
@@ -46,11 +46,11 @@ class Goal(NamedTuple):
     """What bodies are searched for.
 
     Attributes:
-        metric: of a walk, named as in `WalkMeans`.
-        sign: 1 for a metric to be raised, -1 for one to be lowered.
-        task: by default.
+        metric: of a walk, a field of `WalkMeans`.
+        sign: 1 for a metric to be raised, -1 for a metric to be lowered.
+        task: name of the default task.
         preset: of the demonstrator; None for the one that suits task and body.
-        may_fall: whether a fall only lowers the metric, and does not exclude the body.
+        may_fall: whether a fall lowers the metric only, and does not exclude the body.
         unit: of the metric.
     """
 
@@ -62,7 +62,7 @@ class Goal(NamedTuple):
     unit: str = ""
 
     def value(self, walk: WalkMeans) -> float:
-        """Return the metric as a number to be raised."""
+        """Return the metric of a walk as a number to be raised."""
         return self.sign * getattr(walk, self.metric)
 
 
@@ -76,7 +76,7 @@ GOALS: Mapping[str, Goal] = {
 
 
 class Round(NamedTuple):
-    """Episodes of an evaluation.
+    """The episodes of one evaluation.
 
     Attributes:
         settings: of the task.
@@ -96,8 +96,8 @@ class Trial(NamedTuple):
         task: its name.
         goal: a name of `GOALS`.
         budget: that the body keeps.
-        first: of all bodies.
-        second: of those that challenge the elite of their cell.
+        first: episodes of all bodies.
+        second: episodes of the bodies that challenge the elite of their cell.
     """
 
     task: str
@@ -110,21 +110,24 @@ class Trial(NamedTuple):
     def of(cls, task: str, settings: Mapping[str, Any], goal: str, budget: Budget, steps: int) -> "Trial":
         """Return the trial whose second evaluation has another seed, twice the steps and the ground's next seed."""
         ground = getattr(registry.task_of(task), "ground", None)
-        other = dict(settings)
+        second_settings = dict(settings)
         if ground is not None and "terrain_seed" in ground.settings:
-            seed = settings.get("terrain_seed", ground.terrain_seed)
-            other["terrain_seed"] = (checks.integer("terrain_seed", seed, 0, _SEEDS - 1) + 1) % _SEEDS
-        return cls(task, goal, budget, Round(settings, (0,), steps), Round(other, (1,), 2 * steps))
+            terrain_seed = settings.get("terrain_seed", ground.terrain_seed)
+            terrain_seed = checks.integer("terrain_seed", terrain_seed, 0, _NUM_TERRAIN_SEEDS - 1)
+            second_settings["terrain_seed"] = (terrain_seed + 1) % _NUM_TERRAIN_SEEDS
+        first = Round(settings, seeds=(0,), steps=steps)
+        second = Round(second_settings, seeds=(1,), steps=2 * steps)
+        return cls(task, goal, budget, first, second)
 
 
 class Outcome(NamedTuple):
-    """What a body came to.
+    """The result of evaluating a body.
 
     Attributes:
-        reason: why it is excluded; empty if it is not.
-        first: its walk; None for a body that was not let walk.
-        second: from another seed and on other ground, twice as long; None for one that did not challenge its cell's
-            elite.
+        reason: why the body is excluded; empty if it is not.
+        first: its first walk; None for a body that could not walk.
+        second: its second walk, from another seed and on other ground, twice as long; None for a body that did not
+            challenge the elite of its cell.
     """
 
     reason: str = ""
@@ -136,36 +139,39 @@ def evaluate(trial: Trial, body: Body | str, elite: float) -> Outcome:
     """Evaluate a body, and a second time if the first value is above that of the elite of its cell.
 
     Args:
-        trial: how.
-        body: to evaluate, or in its place the reason why there is none.
+        trial: how to evaluate.
+        body: to evaluate, or the reason why there is no body.
         elite: value of the elite's metric; see `Goal.value`.
     """
     if isinstance(body, str):
         return Outcome(body)
-    if found := flaws(body):
-        return Outcome(f"unsound: {found[0].text}")
+    body_flaws = flaws(body)
+    if body_flaws:
+        return Outcome(f"unsound: {body_flaws[0].text}")
     goal = GOALS[trial.goal]
     try:
         first = measure_walk(body, trial.task, trial.first, goal)
-        reason = exclusion_reason(goal, trial.budget, first)
-        if reason or goal.value(first) <= elite:
-            return Outcome(reason, first)
+        first_reason = exclusion_reason(goal, trial.budget, first)
+        if first_reason or goal.value(first) <= elite:
+            return Outcome(first_reason, first)
         second = measure_walk(body, trial.task, trial.second, goal)
     except ValueError as error:
         return Outcome(f"refused: {error}")
-    reason = exclusion_reason(goal, trial.budget, second)
-    return Outcome(f"evaluated again: {reason}" if reason else "", first, second)
+    second_reason = exclusion_reason(goal, trial.budget, second)
+    return Outcome(f"evaluated again: {second_reason}" if second_reason else "", first, second)
 
 
 def exclusion_reason(goal: Goal, budget: Budget, walk: WalkMeans) -> str:
-    """Return why a walk counts for nothing; empty if it counts."""
+    """Return why a walk excludes its body; empty if it does not."""
     if walk.falls and not goal.may_fall:
         return "fell"
     if walk.power > budget.power:
         return f"power: {walk.power:.3g} W/kg"
     if goal.metric == "cost_of_transport" and walking.is_slow(walk.achieved):
         return f"slow: {walk.achieved:.2f} of the command"
-    return "" if math.isfinite(goal.value(walk)) else "no finite metric"
+    if not math.isfinite(goal.value(walk)):
+        return "no finite metric"
+    return ""
 
 
 def measure_walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMeans:
@@ -176,36 +182,56 @@ def measure_walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMean
     """
     environment, policy = open_walk(body, task, episodes, goal)
     try:
-        walks = [_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
+        walks = [_walk_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
     finally:
         environment.close()
     return WalkMeans(*map(float, np.mean(walks, axis=0)))
 
 
 def open_walk(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environment, Policy]:
-    """Open an environment and fit the demonstrator.
+    """Open an environment of a body, fit the demonstrator, and return both.
 
     Raises:
-        ValueError: as `walk`.
+        ValueError: as `measure_walk`.
     """
-    environment = Setup.of(body, task, {**episodes.settings, **_TERMINATING}).load(episodes.seeds[0])
-    return environment, policies.policy("cpg", body, goal.preset, task=environment.task.definition)
+    settings = {**episodes.settings, **_DIVERGENCE_SETTINGS}
+    environment = Setup.of(body, task, settings).load(episodes.seeds[0])
+    policy = policies.policy("cpg", body, goal.preset, task=environment.task.definition)
+    return environment, policy
 
 
-def _episode(environment, policy, seed: int, steps: int) -> WalkMeans:
-    data, task = environment.physics.data.ptr, environment.task.definition
-    body, seconds = task.scene.body, steps * task.scene.control_timestep
-    torques, spent = energy.torques(body), energy.start(len(body.joint_names))
+def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: int) -> WalkMeans:
+    """Return the means of one episode."""
+    data = environment.physics.data.ptr
+    task = environment.task.definition
+    body = task.scene.body
+    control_timestep = task.scene.control_timestep
+    torques = energy.torques(body)
+    work = energy.start(len(body.joint_names))
     for timestep in evaluation.rollout(environment, policy, seed, steps):
+        joint_angles = data.qpos[7:]
         if timestep.first():
-            start, length, spent = data.qpos[0], 0, energy.begin(spent, data.qpos[7:])
-            fell = False
+            start_x = data.qpos[0]
+            steps_taken = 0
+            has_fallen = False
+            work = energy.begin(work, joint_angles)
         else:
-            length, spent = length + 1, energy.after(spent, torques, data.ctrl, data.qpos[7:])
-            fell |= walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
-    progress, way = environment.task.progress, data.qpos[0] - start
-    tracking = progress.get("tracking", math.nan) * length / steps
-    target = task.parameters.target_velocity * seconds
-    achieved = way / target if "distance" in progress or math.isnan(tracking) else tracking
-    power = spent.total * GRAVITY / (length * task.scene.control_timestep)
-    return WalkMeans(way / seconds, achieved, tracking, progress.get("cost_of_transport", math.nan), power, fell)
+            steps_taken += 1
+            has_fallen |= walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
+            work = energy.after(work, torques, data.ctrl, joint_angles)
+    progress = environment.task.progress  # the task's metrics of the episode
+    displacement = data.qpos[0] - start_x
+    seconds = steps * control_timestep  # of an episode without a fall
+    tracking = progress.get("tracking", math.nan) * steps_taken / steps
+    if "distance" in progress or math.isnan(tracking):
+        achieved = displacement / (task.parameters.target_velocity * seconds)
+    else:
+        achieved = tracking
+    return WalkMeans(
+        speed=displacement / seconds,
+        achieved=achieved,
+        tracking=tracking,
+        cost_of_transport=progress.get("cost_of_transport", math.nan),
+        power=work.total * GRAVITY / (steps_taken * control_timestep),
+        falls=has_fallen,
+    )

@@ -86,9 +86,7 @@ class View:
             scene.remove_by_name("/world")
             self._world = scene.add_frame("/world", show_axes=False)
             self._figure = Figure(scene, "/world/now", creature, self._unit)
-            self._companion = None
-            if companion is not None:
-                self._companion = Figure(scene, "/world/kept", companion, self._unit)
+            self._companion = None if companion is None else Figure(scene, "/world/kept", companion, self._unit)
             self._companion_shift = np.full(3, np.inf)  # from where it walks to where it is shown, m; not yet known
             self._shown_floor = 0.0  # units, height of the floor that the camera follows
             self._ground = _Ground(scene, creature, self._unit)

@@ -28,7 +28,7 @@ def evaluated(jobs):
 
 def search(seed=3, goes=10, random=RANDOM_BODIES):
     course = Search(ProportionGenes(), Map.of(["legs", "links"]), TRIAL, seed, "body", random)
-    return course, [course.batch(evaluated) for _ in range(goes)]
+    return course, [course.evaluate_batch(evaluated) for _ in range(goes)]
 
 
 def costs(course):
@@ -46,9 +46,9 @@ def test_a_search_restored_from_json_goes_on_as_if_nothing_had_happened():
     straight, batches = search()
     again = Search(ProportionGenes(), Map.of(["legs", "links"]), TRIAL, 3, "body")
     for batch in batches[:6]:
-        again.add(Candidates.restored(**json.loads(json.dumps(batch._asdict()))))
+        again.add(Candidates.from_json(**json.loads(json.dumps(batch._asdict()))))
     for _ in range(4):
-        again.batch(evaluated)
+        again.evaluate_batch(evaluated)
     assert again.candidates == straight.candidates and again.elites == straight.elites
 
 
@@ -70,19 +70,19 @@ def test_a_search_beats_as_many_random_bodies():
 
 def test_one_that_is_excluded_the_second_time_takes_no_cell():
     course = Search(ProportionGenes(), Map.of(["legs"]), TRIAL, 0, "body")
-    course.batch(lambda jobs: [Outcome("evaluated again: fell", fake(body), fake(body)) for _, body, _ in jobs])
+    course.evaluate_batch(lambda jobs: [Outcome("evaluated again: fell", fake(body), fake(body)) for _, body, _ in jobs])
     assert not course.elites and len(course.candidates) == BATCH_SIZE
 
 
 def test_an_elite_is_challenged_by_the_second_metric():
     """A body of a better first walk and a worse second one leaves the elite where it is."""
     course = Search(ProportionGenes(), Map.of(["legs"]), TRIAL, 0, "body")
-    course.batch(evaluated)
+    course.evaluate_batch(evaluated)
     before = dict(course.elites)
 
     def lucky(jobs):
         worse = WalkMeans(1.0, 1.0, 1.0, 9.0, 5.0, 0.0)
         return [Outcome("", worse._replace(cost_of_transport=0.1), worse) for _ in jobs]
 
-    course.batch(lucky)
+    course.evaluate_batch(lucky)
     assert {cell: course.elites[cell] for cell in before} == before
