@@ -18,7 +18,7 @@ import math
 
 from absl import flags
 
-from arc_suite.animation import clips as export
+from arc_suite.animation import clips as catalog
 from arc_suite.animation.clips import clip_files
 from arc_suite.cli.flags import define_walk, only_setup, policy_name
 from arc_suite.cli.program import progress
@@ -29,12 +29,12 @@ FLAGS = flags.FLAGS
 define_walk(task="steer")
 flags.DEFINE_list(
     "clips",
-    list(export.DEFAULT),
-    f"Which, with commas between them: {', '.join(export.CLIPS)}; module:name of one that another package has; or "
-    f"{export.ALL}.",
+    list(catalog.DEFAULT),
+    f"Which, with commas between them: {', '.join(catalog.CLIPS)}; module:name of one that another package has; or "
+    f"{catalog.ALL}.",
 )
-flags.DEFINE_float("fps", export.FPS, "Frames a second.", 1.0, 1000.0)
-flags.DEFINE_string("rig", "skin", f"{' or '.join(export.RIGS)}: bones and one mesh, or rigid parts.")
+flags.DEFINE_float("fps", catalog.FPS, "Frames a second.", 1.0, 1000.0)
+flags.DEFINE_string("rig", "skin", f"{' or '.join(catalog.RIGS)}: bones and one mesh, or rigid parts.")
 flags.DEFINE_string(
     "root_motion", "both", "moving: the root goes as the body walks; in_place: it stays; both: each clip twice."
 )
@@ -63,10 +63,12 @@ flags.DEFINE_string("output", None, "File to write, .glb, .mp4, .gif, .webp or .
 
 
 def main() -> None:
-    """Record and write what the extension asks for, and print a row for each clip of a file of several."""
+    """Record clips, write the file, and print a row for each clip of a .glb."""
     setup = only_setup()
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
+    # Files of other kinds have other options: only those that flags name are passed on.
+    options = {name: FLAGS[name].value for name in clip_files.OPTION_EXTENSIONS if FLAGS[name].present}
     clips = clip_files.animate(
         setup.body,
         FLAGS.output,
@@ -74,9 +76,12 @@ def main() -> None:
         task=setup.task,
         task_kwargs=setup.task_kwargs,
         policy=policy_name(FLAGS.policy),
-        **{name: FLAGS[name].value for name in ("preset", "fps", "straight", "plant")},
+        preset=FLAGS.preset,
+        fps=FLAGS.fps,
+        straight=FLAGS.straight,
+        plant=FLAGS.plant,
         progress=progress,
-        **{name: FLAGS[name].value for name in clip_files.OPTION_EXTENSIONS if FLAGS[name].present},
+        **options,
     )
     if FLAGS.output.lower().endswith(".glb"):
         print_table(clips)
@@ -85,12 +90,23 @@ def main() -> None:
         print(f"wrote {FLAGS.output}")
 
 
-def print_table(clips: list[export.Clip]) -> None:
-    """Print a row for each clip."""
+def print_table(clips: list[catalog.Clip]) -> None:
+    """Print a row for each clip.
+
+    The seam is the largest difference of poses where the end of a loop was made to meet its start.
+    """
     line = "{:<20}" + " {:>11}" * (len(_COLUMNS) - 1)
     print(line.format(*_COLUMNS))
     for clip in clips:
-        forward, left, turning = clip.motion.twist + 0.0
-        cells = [f"{forward:.3f}", f"{left:.3f}", f"{math.degrees(turning):.1f}"]
-        seam = f"{math.degrees(clip.motion.seam):.3f}" if clip.cycles else "-"
-        print(line.format(clip.name, f"{clip.motion.seconds:.3f}", len(clip.times), clip.cycles, *cells, seam))
+        forward, left, turning = clip.motion.twist + 0.0  # m/s and rad/s; + 0.0 makes -0 a 0
+        row = (
+            clip.name,
+            f"{clip.motion.seconds:.3f}",
+            len(clip.times),
+            clip.cycles,
+            f"{forward:.3f}",
+            f"{left:.3f}",
+            f"{math.degrees(turning):.1f}",
+            f"{math.degrees(clip.motion.seam):.3f}" if clip.cycles else "-",
+        )
+        print(line.format(*row))

@@ -115,8 +115,8 @@ def open_evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]
     if processes == 1:
         yield lambda jobs: list(itertools.starmap(evaluate, jobs))
         return
-    # The parent answers Ctrl-C. Its processes inherit that they ignore Ctrl-C. They are spawned, not forked: a fork would
-    # share whatever OpenGL or threads the caller has open.
+    # The parent answers Ctrl-C, which its processes inherit to ignore. They are spawned, not forked: a fork would share
+    # whatever OpenGL or threads the caller has open.
     interrupt_handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     pool = multiprocessing.get_context("spawn").Pool(processes)
     signal.signal(signal.SIGINT, interrupt_handler)

@@ -39,9 +39,13 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
     checks.extension(FLAGS.output, [".html"])
-    named = bodies_from_flags()  # first: this imports the modules that flags name
-    walkers = progress(choose_bodies(policy_setup(), named).values(), "fitting", leave=False)
+    bodies = bodies_from_flags()  # first: this imports the modules that flags name
+    bodies = choose_bodies(policy_setup(), bodies)
+    policy = policy_name(FLAGS.policy)
     with files.writing(FLAGS.output) as temporary:
-        page = play_pages.page([play_pages.creature(body, policy_name(FLAGS.policy), FLAGS.preset) for body in walkers])
+        creatures = []
+        for body in progress(bodies.values(), "fitting", leave=False):
+            creatures.append(play_pages.creature(body, policy, FLAGS.preset))
+        page = play_pages.page(creatures)
         temporary.write_text(page, encoding="utf-8")
     print(f"wrote {FLAGS.output}, {len(page.encode()) / 1e6:.1f} MB")

@@ -30,12 +30,13 @@ from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.policies import Policy, alone, policy
 from arc_suite.simulation import films
 
-_STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".webp": 80, ".html": 400}
-_SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180), ".webp": (480, 360)}
-_FILMS = (".mp4", ".gif", ".webp")
-_OWN = {"fps": _FILMS, "loop": _FILMS}  # flags that are for some files alone
-_CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
-_SETTLE = 60  # control steps, after which the start of an episode is forgotten
+_DEFAULT_STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".webp": 80, ".html": 400}  # control steps
+_DEFAULT_SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180), ".webp": (480, 360)}  # pixels
+_FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
+_EXTENSIONS_OF_FLAG = {"fps": _FILM_EXTENSIONS, "loop": _FILM_EXTENSIONS}  # flags for some files only
+_CYCLE_VIEWS = 6  # of a picture of one gait cycle
+_CYCLE_COLUMNS = 3
+_SETTLING_STEPS = 60  # control steps, after which the gait does not depend on the start of the episode
 
 FLAGS = flags.FLAGS
 define_walk(more=", or all of them side by side")
@@ -59,96 +60,127 @@ flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif, .webp or .
 
 def main() -> None:
     """Play the episodes, write the file and print the returns."""
-    walkers = setups_from_flags()
-    usual = "profile" if len(walkers) == 1 else "portrait"
-    camera = checks.name(usual if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
-    environments = {name: setup.load(FLAGS.seed) for name, setup in walkers.items()}
+    setups = setups_from_flags()
+    default_camera = "profile" if len(setups) == 1 else "portrait"
+    camera = checks.name(default_camera if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
+    environments = {name: setup.load(FLAGS.seed) for name, setup in setups.items()}
     policies = {
         name: policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=environments[name].task.definition)
-        for name, setup in walkers.items()
+        for name, setup in setups.items()
     }
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html")
-    extension = checks.extension(FLAGS.output, _STEPS)
-    steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
+    extension = checks.extension(FLAGS.output, _DEFAULT_STEPS)
+    steps = _DEFAULT_STEPS[extension] if FLAGS.steps is None else FLAGS.steps
     if steps < 1 and extension != ".png":
         raise ValueError(f"--steps={steps}: expected 1 or more for a film or a page")
-    check_flags_suit_file(extension, _OWN)
+    check_flags_suit_file(extension, _EXTENSIONS_OF_FLAG)
     films.check_fps(FLAGS.fps or 0.0, extension)
 
-    with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:
+    with files.writing(FLAGS.output) as temporary:
         if extension == ".html":
             write_page(temporary, environments, policies, steps)
         else:
-            size = (FLAGS.width or _SIZES[extension][0], FLAGS.height or _SIZES[extension][1])
-            footages, quality = [], "still" if extension == ".png" else "film"
-            for name, walker in policies.items():
-                walk = alone(walker, FLAGS.seed)
-                footages.append(films.Footage(name, environments[name], walk, camera, size, quality))
-                stack.callback(footages[-1].close)
-            footages[0].view()  # finds out at once whether there is OpenGL
-            frames, frame = (still(footages, steps), 0.0) if extension == ".png" else film(footages, steps)
-            films.WRITERS[extension](temporary, frames, frame)
-            for footage in footages:
-                print(f"{footage.robot}: return {footage.earned:.1f} in {footage.steps} steps")
+            write_views(temporary, extension, environments, policies, camera, steps)
     print(f"wrote {FLAGS.output}")
 
 
 def write_page(path: Path, environments: Mapping, policies: Mapping[str, Policy], steps: int) -> None:
-    """Record an episode of each policy and write the page that plays them side by side."""
-    pages.viewer_script()  # finds out at once whether there is one
+    """Record an episode of each policy, and write the page that plays them side by side."""
+    pages.viewer_script()  # raises an error now if there is no viewer
     tracks = {}
-    for name, walker in progress(policies.items(), "walking", leave=False):
-        tracks[name] = style.record(environments[name], walker, FLAGS.seed, steps)
+    for name, walker_policy in progress(policies.items(), "walking", leave=False):
+        tracks[name] = style.record(environments[name], walker_policy, FLAGS.seed, steps)
     path.write_text(pages.page(tracks), encoding="utf-8")
     for name, track in tracks.items():
         print(f"{name}: return {track.rewards.sum():.1f} in {len(track.times)} steps")
 
 
-def still(footages: list[films.Footage], steps: int) -> Iterator[np.ndarray]:
-    """Yield one picture after so many steps: a gait cycle of a lone demonstrator, else a moment."""
+def write_views(
+    path: Path, extension: str, environments: Mapping, policies: Mapping[str, Policy], camera: str, steps: int
+) -> None:
+    """Play an episode of each policy, and write what cameras see as a picture or a film."""
+    default_width, default_height = _DEFAULT_SIZES[extension]
+    size = (FLAGS.width or default_width, FLAGS.height or default_height)
+    is_picture = extension == ".png"
+    quality = "still" if is_picture else "film"
+    with contextlib.ExitStack() as stack:
+        footages = []
+        for name, walker_policy in policies.items():
+            act = alone(walker_policy, FLAGS.seed)
+            footage = films.Footage(name, environments[name], act, camera, size, quality)
+            stack.callback(footage.close)
+            footages.append(footage)
+        footages[0].view()  # raises an error now if there is no OpenGL
+        if is_picture:
+            frames = picture_frames(footages, steps)
+            frame_seconds = 0.0
+        else:
+            frames, frame_seconds = film_frames(footages, steps)
+        films.WRITERS[extension](path, frames, frame_seconds)
+        for footage in footages:
+            print(f"{footage.robot}: return {footage.earned:.1f} in {footage.steps} steps")
+
+
+def picture_frames(footages: list[films.Footage], steps: int) -> Iterator[np.ndarray]:
+    """Yield one picture after some control steps: a gait cycle of one demonstrator, or else a moment."""
     for _ in progress(range(steps), "walking", leave=False):
         for footage in footages:
             footage.step()
-    if len(footages) == 1 and FLAGS.policy == "cpg" and footages[0].advance:
+    has_gait_clock = footages[0].advance > 0.0
+    if len(footages) == 1 and FLAGS.policy == "cpg" and has_gait_clock:
         views = progress(films.cycle(footages[0], _CYCLE_VIEWS), "rendering", _CYCLE_VIEWS, leave=False)
         yield films.grid(list(views), _CYCLE_COLUMNS)
     else:
-        yield panel(footages, [footage.view() for footage in footages])
+        yield join_views(footages, [footage.view() for footage in footages])
 
 
-def film(footages: list[films.Footage], steps: int) -> tuple[Iterator[np.ndarray], float]:
-    """Return the frames until all episodes have ended, and the seconds of each."""
-    step = footages[0].control_timestep
-    seconds, frame = steps * step, 1.0 / FLAGS.fps if FLAGS.fps else films.frame_seconds(step)
+def film_frames(footages: list[films.Footage], steps: int) -> tuple[Iterator[np.ndarray], float]:
+    """Return the frames until all episodes have ended, and the seconds of each frame."""
+    control_timestep = footages[0].control_timestep
+    film_seconds = steps * control_timestep
+    frame_seconds = 1.0 / FLAGS.fps if FLAGS.fps else films.frame_seconds(control_timestep)
     if FLAGS.loop:
-        seconds = settled(footages, steps)
-        frame = seconds / max(1, round(seconds / frame))
-    views = progress(films.frames(footages, seconds, frame), "rendering", round(seconds / frame), leave=False)
-    return (panel(footages, each) for each in views), frame
+        film_seconds = settle_gait(footages, steps)
+        frame_seconds = film_seconds / max(1, round(film_seconds / frame_seconds))
+    views_of_frames = progress(
+        films.frames(footages, film_seconds, frame_seconds),
+        "rendering",
+        round(film_seconds / frame_seconds),
+        leave=False,
+    )
+    return (join_views(footages, views) for views in views_of_frames), frame_seconds
 
 
-def settled(footages: list[films.Footage], steps: int) -> float:
-    """Walk until the gait has settled, and return how long its whole cycles nearest to a number of steps last, s.
+def settle_gait(footages: list[films.Footage], steps: int) -> float:
+    """Walk until the gait has settled, and return how long whole gait cycles last, s.
+
+    Args:
+        footages: one of them.
+        steps: control steps, to which the whole cycles are the nearest.
 
     Raises:
-        ValueError: several creatures, whose cycles differ, or no clock of a gait.
+        ValueError: several creatures, whose cycles differ, or no gait clock.
     """
     if len(footages) > 1:
         raise ValueError(f"--loop: expected one creature, got {len(footages)}, whose gait cycles differ")
     (footage,) = footages
-    for _ in range(_SETTLE):
+    for _ in range(_SETTLING_STEPS):
         footage.step()
-    if footage.ended or not footage.advance:
-        raise ValueError(
-            f"--loop: {footage.robot} {'falls' if footage.ended else 'has no clock of a gait'} in this task"
-        )
-    return max(1, round(steps * footage.advance)) / footage.advance * footage.control_timestep
+    if footage.ended:
+        raise ValueError(f"--loop: {footage.robot} falls in this task")
+    cycles_per_step = footage.advance
+    if not cycles_per_step:
+        raise ValueError(f"--loop: {footage.robot} has no clock of a gait in this task")
+    cycles = max(1, round(steps * cycles_per_step))
+    return cycles / cycles_per_step * footage.control_timestep
 
 
-def panel(footages: list[films.Footage], views: list[np.ndarray]) -> np.ndarray:
-    """Return what all cameras see, two side by side, with names where there are several."""
+def join_views(footages: list[films.Footage], views: list[np.ndarray]) -> np.ndarray:
+    """Return the views of all cameras as one, two side by side, with names if there are several."""
     if len(footages) == 1:
         return views[0]
-    named = zip(views, footages, strict=True)
-    return films.grid([films.captioned(view, footage.robot.capitalize()) for view, footage in named], 2)
+    captioned_views = [
+        films.captioned(view, footage.robot.capitalize()) for view, footage in zip(views, footages, strict=True)
+    ]
+    return films.grid(captioned_views, columns=2)

@@ -18,7 +18,7 @@ from absl import flags
 
 from arc_suite import versions
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, apply_cure, sources
+from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, sources
 from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name
 from arc_suite.cpg.selection import check_preset_name
 
@@ -32,28 +32,36 @@ def main() -> None:
     """Open the page and step until Ctrl-C."""
     with versions.require_extra("the studio needs viser", "animate"):
         from arc_suite.animation.studio.page import serve
-    serve(Session(_sketch()), FLAGS.host, FLAGS.port, lambda url: print(f"the studio is at {url}", flush=True))
+    serve(Session(_sketch_from_flags()), FLAGS.host, FLAGS.port, _print_address)
 
 
-def _sketch() -> Sketch:
-    """Return what the flags say."""
+def _print_address(url: str) -> None:
+    print(f"the studio is at {url}", flush=True)
+
+
+def _sketch_from_flags() -> Sketch:
+    """Return the sketch of the body, task and policy that flags name."""
     setup = only_setup()
     if FLAGS.preset is not None:
         check_preset_name(FLAGS.preset)
     settings = setup.task_kwargs
-    ground, kicks = settings.pop("arena", "flat"), settings.pop("kicks", 0.0)
-    player = {"policy": policy_name(FLAGS.policy), "preset": FLAGS.preset or DEFAULT_CHOICE}
-    directed = player["policy"] == "cpg" and not FLAGS["task"].present
-    doing = Sketch(
-        task=Sketch.task if directed else setup.task,
+    ground = settings.pop("arena", "flat")
+    kicks = settings.pop("kicks", 0.0)
+    policy = policy_name(FLAGS.policy)
+    has_default_task = policy == "cpg" and not FLAGS["task"].present
+    sketch = Sketch(
+        task=Sketch.task if has_default_task else setup.task,
         ground=ground,
         kicks=kicks,
         settings=json.dumps(settings),
-        **player,
+        policy=policy,
+        preset=FLAGS.preset or DEFAULT_CHOICE,
+        lengths=tuple(named_values("length", FLAGS.length).items()),
+        palette=FLAGS.palette or DEFAULT_CHOICE,
     )
-    shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or DEFAULT_CHOICE}
     if FLAGS.legs is not None:
-        return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)
-    if (source := FLAGS.spec or (FLAGS.robot if FLAGS["robot"].present else setup.robot)) in sources():
-        return dataclasses.replace(doing, source=source, **shape)
-    return apply_cure(doing, setup.body)
+        return dataclasses.replace(sketch, legs=FLAGS.legs, links=FLAGS.links or 3)
+    source = FLAGS.spec or (FLAGS.robot if FLAGS["robot"].present else setup.robot)
+    if source in sources():
+        return dataclasses.replace(sketch, source=source)
+    return open_body(sketch, setup.body)  # which has the lengths and colors that flags ask for

@@ -14,7 +14,8 @@ browser. What every metric means is written in arc_suite/style/metrics.py.
 import contextlib
 import math
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 from absl import flags
 
@@ -30,6 +31,7 @@ from arc_suite.cli.flags import (
 )
 from arc_suite.cli.program import progress
 from arc_suite.cli.summary import transport_footnote
+from arc_suite.envs.setup import Setup
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
@@ -44,8 +46,57 @@ flags.DEFINE_string("page", None, "File to write a page to that plays the first 
 flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz).")
 
 
-def chosen_sources() -> dict[str, style.Source]:
-    """Return the sources of the columns, by label."""
+def main() -> None:
+    """Record, measure, print and write."""
+    # First: these import the modules that flags name, which files cannot import.
+    bodies_from_flags()
+    task_from_flags()
+    sources_by_label = find_sources()
+    setups = setups_from_flags(find_stored_setup(sources_by_label))
+    seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
+    recorders_by_robot = {
+        robot: {label: source.recorders(setup, seeds) for label, source in sources_by_label.items()}
+        for robot, setup in setups.items()
+    }
+    draw_pictures = load_picture_functions() if FLAGS.output else None
+    robots = list(setups)
+    check_files(robots)
+    reports = {}
+    first_tracks = {}  # by labels of the page
+    with contextlib.ExitStack() as stack:
+        json_content = stack.enter_context(files.writing_json(FLAGS.json))
+        page_path = stack.enter_context(files.writing(FLAGS.page)) if FLAGS.page else None
+        tracks_path = stack.enter_context(files.writing(FLAGS.save)) if FLAGS.save else None
+        for robot in robots:
+            tracks_by_label = record_tracks(robot, recorders_by_robot[robot])
+            reports[robot] = {label: style.report(tracks) for label, tracks in tracks_by_label.items()}
+            print_report(robot, reports[robot])
+            robot_first_tracks = {f"{robot}, {label}": tracks[0] for label, tracks in tracks_by_label.items()}
+            first_tracks |= robot_first_tracks
+            if tracks_path:
+                first_label = next(iter(tracks_by_label))
+                style.save(tracks_path, tracks_by_label[first_label])
+            if draw_pictures:
+                folder = pathlib.Path(FLAGS.output, robot if len(robots) > 1 else "")
+                draw_pictures(folder, robot_first_tracks)
+        footnote = transport_footnote(setup.body for setup in setups.values())
+        if footnote:
+            print(footnote)
+        if page_path:
+            page_path.write_text(pages.page(first_tracks), encoding="utf-8")
+        any_setup = setups[robots[0]]  # all have the same task
+        json_content.update(
+            task=any_setup.task,
+            task_kwargs=any_setup.task_kwargs,
+            episodes=FLAGS.episodes,
+            seed=FLAGS.seed,
+            robots=reports,
+            versions=versions.dependency_versions(),
+        )
+
+
+def find_sources() -> dict[str, style.Source]:
+    """Return the sources of tracks that --policy and --compare name, by label of their columns."""
     first = style.source(policy_name(FLAGS.policy), FLAGS.preset)
     if FLAGS.compare is None:
         return {first.label: first}
@@ -57,79 +108,24 @@ def chosen_sources() -> dict[str, style.Source]:
     return {FLAGS.policy: first, FLAGS.compare: second}  # files of one name in two folders
 
 
-def number(value: float, decimals: int = 3) -> str:
-    """Return a number as text; a dash for NaN."""
-    return "-" if math.isnan(value) else f"{value:.{decimals}f}"
-
-
-def spread(summary: evaluation.Summary) -> str:
-    """Return mean +- standard deviation as text, the mean alone where it is not finite."""
-    if not math.isfinite(summary.mean):
-        return number(summary.mean)
-    decimals = 1 if abs(summary.mean) >= 100.0 else 3
-    return f"{number(summary.mean, decimals)} +- {number(summary.deviation, decimals)}"
-
-
-def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, list[str]]]) -> None:
-    """Print rows of a name, a metric, and a cell for each column."""
-    width = max(8, *(len(text) for text in [*columns, *(cell for _, _, cells in rows for cell in cells)]))
-    first = max(18, len(heading))
-    line = f"{{:<{first}}} {{:<8}} {{:>10}}" + f"  {{:>{width}}}" * len(columns)
-    header = line.format(heading, "unit", "prescribed", *columns)
-    print("", header, "-" * len(header), sep="\n")
-    for name, metric, cells in rows:
-        prescribed = metric.get("prescribed")
-        prescribed = "" if prescribed is None else number(prescribed)
-        print(line.format(name.replace("_", " "), metric.get("unit", ""), prescribed, *cells))
-
-
-def print_report(robot: str, reports: dict) -> None:
-    """Print the tables of one robot: its own metrics, policies side by side, then those of the legs for each policy."""
-    first = next(iter(reports.values()))
-    rows = [(name, {}, [spread(r[name]) for r in reports.values()]) for name in ("return", "length")]
-    others = [name for name in first["progress"] if name not in first["metrics"]]
-    rows += [(name, {}, [spread(r["progress"][name]) for r in reports.values()]) for name in others]
-    rows += [
-        (name, metric, [spread(r["metrics"][name]["robot"]) for r in reports.values()])
-        for name, metric in first["metrics"].items()
-    ]
-    print_table(robot, list(reports), rows)
-    for label, metrics in reports.items():
-        rows = [
-            (name, metric, [number(summary.mean) for summary in metric["legs"].values()])
-            for name, metric in metrics["metrics"].items()
-            if metric["legs"]
-        ]
-        print_table(f"{robot}, {label}", list(first["metrics"]["foot_slip"]["legs"]), rows)
-
-
-def pictures() -> Callable[[pathlib.Path, dict], None]:
-    """Return a function that draws tracks by label into a folder.
-
-    Raises:
-        ValueError: matplotlib is not installed.
-    """
-    with versions.require_extra("pictures need matplotlib", "animate"):
-        from arc_suite.animation.style_plots import GAIT_PICTURES, PICTURES
-
-    def draw(folder, tracks):
-        gaits = all(track.parameters is not None for track in tracks.values())
-        for name in PICTURES if gaits else PICTURES.keys() - GAIT_PICTURES:
-            with files.writing(files.folder(folder) / f"{name}.png") as file:
-                PICTURES[name](tracks).savefig(file)
-
-    return draw
+def find_stored_setup(sources_by_label: Mapping[str, style.Source]) -> Setup | None:
+    """Return the setup of the first source that has stored tracks; None if no source has any."""
+    for source in sources_by_label.values():
+        if source.setup:
+            return source.setup
+    return None
 
 
 def check_files(robots: list[str]) -> None:
-    """Find out at once whether the files of flags can be made.
+    """Check before recording that the files of flags can be made.
 
     Raises:
         ValueError: another extension, several robots to save, or no viewer of pages.
         OSError: the folder of pictures cannot be made.
     """
     for flag, extension in (("page", ".html"), ("save", ".npz")):
-        if (path := FLAGS[flag].value) is not None and not path.endswith(extension):
+        path = FLAGS[flag].value
+        if path is not None and not path.endswith(extension):
             raise ValueError(f"--{flag}={path}: expected a file that ends in {extension}")
     if FLAGS.save is not None and len(robots) > 1:
         raise ValueError(f"--save={FLAGS.save}: expected one robot, got {', '.join(robots)}")
@@ -139,39 +135,110 @@ def check_files(robots: list[str]) -> None:
         files.folder(FLAGS.output)
 
 
-def main() -> None:
-    """Record, measure, print and write."""
-    bodies_from_flags(), task_from_flags()  # first: this imports the modules that flags name, which files cannot import
-    chosen = chosen_sources()
-    chosen_for = setups_from_flags(next((source.setup for source in chosen.values() if source.setup), None))
-    seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
-    recorders = {
-        robot: {label: source.recorders(setup, seeds) for label, source in chosen.items()}
-        for robot, setup in chosen_for.items()
-    }
-    draw = FLAGS.output and pictures()
-    check_files(list(recorders))
-    reports, played = {}, {}
-    with contextlib.ExitStack() as stack:
-        file = stack.enter_context(files.writing_json(FLAGS.json))
-        page, saved = (path and stack.enter_context(files.writing(path)) for path in (FLAGS.page, FLAGS.save))
-        for robot, by_label in recorders.items():
-            tracks = {}
-            for label, several in by_label.items():
-                with progress(several, desc=f"{robot}, {label}", unit="episode", leave=False) as bar:
-                    tracks[label] = [recorder() for recorder in bar]
-            reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
-            print_report(robot, reports[robot])
-            firsts = {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()}
-            played |= firsts
-            if saved:
-                style.save(saved, next(iter(tracks.values())))
-            if draw:
-                draw(pathlib.Path(FLAGS.output, robot if len(recorders) > 1 else ""), firsts)
-        if text := transport_footnote(setup.body for setup in chosen_for.values()):
-            print(text)
-        if page:
-            page.write_text(pages.page(played), encoding="utf-8")
-        setup = next(iter(chosen_for.values()))
-        named = {"task": setup.task, "task_kwargs": setup.task_kwargs, "episodes": FLAGS.episodes, "seed": FLAGS.seed}
-        file.update(named, robots=reports, versions=versions.dependency_versions())
+def record_tracks(robot: str, recorders_by_label: Mapping[str, list[Callable]]) -> dict[str, list[style.Track]]:
+    """Return the tracks of one robot by label, recorded behind progress bars."""
+    tracks_by_label = {}
+    for label, recorders in recorders_by_label.items():
+        with progress(recorders, desc=f"{robot}, {label}", unit="episode", leave=False) as bar:
+            tracks_by_label[label] = [record() for record in bar]
+    return tracks_by_label
+
+
+def load_picture_functions() -> Callable[[pathlib.Path, dict], None]:
+    """Return a function that draws tracks by label into a folder.
+
+    Raises:
+        ValueError: matplotlib is not installed.
+    """
+    with versions.require_extra("pictures need matplotlib", "animate"):
+        from arc_suite.animation.style_plots import GAIT_PICTURES, PICTURES
+
+    def draw_pictures(folder, tracks_by_label):
+        all_have_gaits = all(track.parameters is not None for track in tracks_by_label.values())
+        names = PICTURES if all_have_gaits else PICTURES.keys() - GAIT_PICTURES
+        for name in names:
+            with files.writing(files.folder(folder) / f"{name}.png") as file:
+                PICTURES[name](tracks_by_label).savefig(file)
+
+    return draw_pictures
+
+
+class TableLine(NamedTuple):
+    """A line of a table.
+
+    Attributes:
+        name: of a metric.
+        metric: with its `unit` and the value `prescribed`, if it has them; see `style.report`.
+        cells: one for each column.
+    """
+
+    name: str
+    metric: Mapping[str, Any]
+    cells: list[str]
+
+
+def print_report(robot: str, reports: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print the tables of one robot: a table that compares policies, then a table of the legs for each policy.
+
+    Args:
+        robot: its name.
+        reports: of `style.report`, by label of the policy.
+    """
+    print_table(robot, list(reports), _robot_lines(list(reports.values())))
+    first_report = next(iter(reports.values()))
+    leg_names = list(first_report["metrics"]["foot_slip"]["legs"])
+    for label, report in reports.items():
+        lines = []
+        for name, metric in report["metrics"].items():
+            if metric["legs"]:
+                cells = [format_number(summary.mean) for summary in metric["legs"].values()]
+                lines.append(TableLine(name, metric, cells))
+        print_table(f"{robot}, {label}", leg_names, lines)
+
+
+def _robot_lines(reports: list[Mapping[str, Any]]) -> list[TableLine]:
+    """Return the lines of a table with a column for each report: return, length, the task's metrics, style metrics."""
+    first_report = reports[0]
+    lines = []
+    for name in ("return", "length"):
+        lines.append(TableLine(name, {}, [format_summary(report[name]) for report in reports]))
+    for name in first_report["progress"]:
+        if name not in first_report["metrics"]:
+            lines.append(TableLine(name, {}, [format_summary(report["progress"][name]) for report in reports]))
+    for name, metric in first_report["metrics"].items():
+        cells = [format_summary(report["metrics"][name]["robot"]) for report in reports]
+        lines.append(TableLine(name, metric, cells))
+    return lines
+
+
+def print_table(heading: str, columns: list[str], lines: list[TableLine]) -> None:
+    """Print a table.
+
+    Args:
+        heading: of the first column.
+        columns: headings of the columns of cells.
+        lines: of the table.
+    """
+    texts = [*columns, *(cell for line in lines for cell in line.cells)]
+    cell_width = max(8, *(len(text) for text in texts))
+    name_width = max(18, len(heading))
+    template = f"{{:<{name_width}}} {{:<8}} {{:>10}}" + f"  {{:>{cell_width}}}" * len(columns)
+    header = template.format(heading, "unit", "prescribed", *columns)
+    print("", header, "-" * len(header), sep="\n")
+    for name, metric, cells in lines:
+        prescribed_value = metric.get("prescribed")
+        prescribed = "" if prescribed_value is None else format_number(prescribed_value)
+        print(template.format(name.replace("_", " "), metric.get("unit", ""), prescribed, *cells))
+
+
+def format_number(value: float, decimals: int = 3) -> str:
+    """Return a number as text; a dash for NaN."""
+    return "-" if math.isnan(value) else f"{value:.{decimals}f}"
+
+
+def format_summary(summary: evaluation.Summary) -> str:
+    """Return mean +- standard deviation as text, only the mean if it is not finite."""
+    if not math.isfinite(summary.mean):
+        return format_number(summary.mean)
+    decimals = 1 if abs(summary.mean) >= 100.0 else 3
+    return f"{format_number(summary.mean, decimals)} +- {format_number(summary.deviation, decimals)}"

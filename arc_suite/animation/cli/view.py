@@ -21,7 +21,7 @@ from arc_suite.animation.cli.live import Live, play
 from arc_suite.cli.flags import define_walk, only_setup, policy_name
 from arc_suite.envs.window import Window
 
-_INSTEAD = "`arc-suite render -o walk.html` writes a page that plays in any browser"
+_ALTERNATIVE = "`arc-suite render -o walk.html` writes a page that plays in any browser"
 
 FLAGS = flags.FLAGS
 define_walk()
@@ -30,11 +30,12 @@ define_walk()
 def main() -> None:
     """Open the window and play until it is closed."""
     setup = only_setup()
-    environment = arc_suite.load(setup.body, setup.task, {"time_limit": math.inf} | setup.task_kwargs)
-    definition = environment.task.definition
-    policy = policies.policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=definition)
+    settings = {"time_limit": math.inf} | setup.task_kwargs
+    environment = arc_suite.load(setup.body, setup.task, settings)
+    task = environment.task.definition
+    policy = policies.policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=task)
     live = Live(environment, policies.alone(policy))
     keys = queue.SimpleQueue()
-    window = Window(live.shown, pressed=keys.put, instead=_INSTEAD)
+    window = Window(live.shown, pressed=keys.put, instead=_ALTERNATIVE)
     with contextlib.closing(window):
         play(window, live, keys)

@@ -25,7 +25,7 @@ from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.gate import Server, offers
 from arc_suite.animation.studio.links import LinkWidgets
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, apply_cure, open_file
+from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, open_file
 from arc_suite.animation.studio.states import POSE, PageState, VisitorCommand, from_json, is_state
 from arc_suite.animation.studio.view import View
 from arc_suite.cpg.selection import presets_of
@@ -252,7 +252,7 @@ class Page:
                 if flaw.cure is not None:
                     advice = flaw.text.rpartition(": ")[2]
                     button = self._gui.add_button(f"Apply: {advice}")
-                    button.on_click(functools.partial(self._apply_cure, apply_cure(creature.sketch, flaw.cure)))
+                    button.on_click(functools.partial(self._apply_cure, open_body(creature.sketch, flaw.cure)))
                     self._flaw_widgets.append(button)
 
     def _apply_cure(self, sketch: Sketch, event: viser.GuiEvent) -> None:

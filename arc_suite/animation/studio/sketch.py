@@ -265,9 +265,9 @@ def open_file(sketch: Sketch, text: str) -> Sketch:
     return dataclasses.replace(sketch, **body_fields)
 
 
-def apply_cure(sketch: Sketch, cure: Body) -> Sketch:
+def open_body(sketch: Sketch, body: Body) -> Sketch:
     """Return the sketch with another body, as a file in the proportions of that body."""
-    return open_file(sketch, body_to_json(cure))
+    return open_file(sketch, body_to_json(body))
 
 
 def length_factor(sketch: Sketch, link: str) -> float:

@@ -70,7 +70,9 @@ def test_a_search_beats_as_many_random_bodies():
 
 def test_one_that_is_excluded_the_second_time_takes_no_cell():
     course = Search(ProportionGenes(), Map.of(["legs"]), TRIAL, 0, "body")
-    course.evaluate_batch(lambda jobs: [Outcome("evaluated again: fell", fake(body), fake(body)) for _, body, _ in jobs])
+    course.evaluate_batch(
+        lambda jobs: [Outcome("evaluated again: fell", fake(body), fake(body)) for _, body, _ in jobs]
+    )
     assert not course.elites and len(course.candidates) == BATCH_SIZE
 
 

@@ -146,7 +146,7 @@ def test_what_check_says_can_be_applied():
     creature = open_creature(dataclasses.replace(sketch, scale=1.0))
     (flaw,) = creature.flaws
     assert flaw.text == "feet hang 0.1 m above the floor: standing_height 0.4 fits"
-    mended = sketches.apply_cure(sketch, flaw.cure)
+    mended = sketches.open_body(sketch, flaw.cure)
     assert (mended.source, mended.gait, mended.kicks, mended.scale) == (FILE, "ripple", 0.2, 1.0)
     assert sketches.make_body(mended).torso.standing_height == 0.4 and flaws(sketches.make_body(mended)) == []
 
@@ -157,7 +157,7 @@ def test_legs_that_overlap_are_moved_apart():
     assert re.fullmatch(
         r"[lr]\d+_\w+ and [lr]\d+_\w+ overlap by .* m in a stride: legs mounted .* as far out fit", flaw.text
     )
-    assert open_creature(sketches.apply_cure(sketch, flaw.cure)).flaws == ()
+    assert open_creature(sketches.open_body(sketch, flaw.cure)).flaws == ()
 
 
 @pytest.mark.parametrize(
