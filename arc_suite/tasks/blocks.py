@@ -74,7 +74,7 @@ class Block(NamedTuple):
         Raises:
             ValueError: there is none for this body.
         """
-        return mirrors.joined([part.mirror(image) for part in self.parts])
+        return mirrors.join([part.mirror(image) for part in self.parts])
 
     def entries(self) -> list[tuple[str, str]]:
         """Return the name and the unit of every number."""

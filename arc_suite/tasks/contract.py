@@ -92,7 +92,7 @@ class Observed(ABC):
         for name, block in self.blocks.items():
             if not block.has_frame:
                 raise ValueError(f"task {self.name}: block {name!r} has numbers without a frame, so no mirror image")
-        observation = mirrors.joined(block.mirror(image) for block in self.blocks.values())
+        observation = mirrors.join(block.mirror(image) for block in self.blocks.values())
         return Symmetry(observation, mirrors.joints(image))
 
     @functools.cached_property
@@ -342,7 +342,7 @@ class Task(Observed):
 
     def privileged(self, memory, data) -> dict:
         """Return the privileged observation's blocks, each (..., size), of `MjData` or anything with its fields."""
-        return privileged.observed(self.scene, data)
+        return privileged.observe_body(self.scene, data)
 
     def read_back(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
         """Return those privileged blocks of one environment, each (size,), that changed fields of the model decide."""

@@ -25,12 +25,12 @@ class Mirror(NamedTuple):
     signs: np.ndarray
 
     @classmethod
-    def signed(cls, *signs: int) -> Self:
+    def with_signs(cls, *signs: int) -> Self:
         """Return the map that leaves numbers in place, some with the other sign."""
         return cls(np.arange(len(signs)), np.array(signs, np.int8))
 
     @classmethod
-    def moved(cls, sources: np.ndarray) -> Self:
+    def permute(cls, sources: np.ndarray) -> Self:
         """Return the map that takes numbers from other places, with their signs."""
         return cls(sources, np.ones(len(sources), np.int8))
 
@@ -39,9 +39,9 @@ class Mirror(NamedTuple):
         return vectors[..., self.sources] * self.signs
 
 
-POLAR = Mirror.signed(1, -1, 1)  # positions, velocities, forces
-AXIAL = Mirror.signed(-1, 1, -1)  # angular velocities, torques
-QUATERNION = Mirror.signed(1, -1, 1, -1)  # w first
+POLAR = Mirror.with_signs(1, -1, 1)  # positions, velocities, forces
+AXIAL = Mirror.with_signs(-1, 1, -1)  # angular velocities, torques
+QUATERNION = Mirror.with_signs(1, -1, 1, -1)  # w first
 
 
 class Symmetry(NamedTuple):
@@ -56,7 +56,7 @@ class Symmetry(NamedTuple):
     action: Mirror
 
 
-def joined(mirrors: Iterable[Mirror]) -> Mirror:
+def join(mirrors: Iterable[Mirror]) -> Mirror:
     """Return the map of vectors that are joined of the vectors of several maps."""
     sources, signs, size = [], [], 0
     for mirror in mirrors:
@@ -71,7 +71,7 @@ def joints(image: Image) -> Mirror:
     return Mirror(image.joints, image.signs.astype(np.int8))
 
 
-def of_each(places: np.ndarray, mirror: Mirror) -> Mirror:
+def repeat(places: np.ndarray, mirror: Mirror) -> Mirror:
     """Return the map of the vectors of several parts, one behind the other.
 
     Args:

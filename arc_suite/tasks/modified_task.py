@@ -51,7 +51,7 @@ class ModifiedMemory(NamedTuple):
     changes: Changes
 
 
-def modified(task: Task, settings: Mapping[str, Any]) -> Task:
+def modify_task(task: Task, settings: Mapping[str, Any]) -> Task:
     """Return a task with modifiers.
 
     Args:

@@ -19,11 +19,11 @@ def noise(key, step, count: int):
     """
     numpy = key.__array_namespace__()
     index = numpy.arange(count, dtype=numpy.uint32)
-    drawn = scrambled(scrambled(key ^ (step * _GOLDEN)) + index * _GOLDEN)
+    drawn = scramble(scramble(key ^ (step * _GOLDEN)) + index * _GOLDEN)
     return drawn * 2.0**-31 - 1.0
 
 
-def scrambled(bits):
+def scramble(bits):
     """Return scrambled uint32 numbers (...), a bijection in which every bit depends on all bits.
 
     This is the finalizer of MurmurHash3 (Appleby 2011).

@@ -115,7 +115,7 @@ class Scalar(Part):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the map that keeps the number or changes its sign."""
-        return Mirror.signed(self.sign)
+        return Mirror.with_signs(self.sign)
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit."""
@@ -154,7 +154,7 @@ class Planar(_Components):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the reflection across the x-z plane."""
-        return Mirror.signed(-1, 1) if self.axial else Mirror.signed(1, -1)
+        return Mirror.with_signs(-1, 1) if self.axial else Mirror.with_signs(1, -1)
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the rotation by the leg's turn."""
@@ -233,7 +233,7 @@ class Joints(Part):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the map to the joints across."""
-        return mirrors.joints(image) if self.signed else Mirror.moved(image.joints)
+        return mirrors.joints(image) if self.signed else Mirror.permute(image.joints)
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights (joints, joints of a leg) of the leg's own joints; 0 for joints that it lacks."""
@@ -269,7 +269,7 @@ class Legs(Part):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the map to the legs across."""
-        return Mirror.moved(image.legs)
+        return Mirror.permute(image.legs)
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights (legs, 1) of the leg's own number."""
@@ -315,7 +315,7 @@ class RigidParts(Part):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the map to the rigid parts across."""
-        return mirrors.of_each(image.parts, mirrors.joined([part.mirror(image) for part in self.parts]))
+        return mirrors.repeat(image.parts, mirrors.join([part.mirror(image) for part in self.parts]))
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights of torso and leg; 0 for rigid parts that another leg has and this one lacks."""
@@ -380,10 +380,10 @@ class Phase(Part):
         if default is not None and not np.allclose(mirrors.joints(image)(default), default):
             raise ValueError("default_angles: expected mirrored poses left and right")
         if self.offsets is None:
-            return Mirror.signed(-1, -1)
+            return Mirror.with_signs(-1, -1)
         for sign in (1, -1):  # of the clock's sine and cosine, whose leads over the legs across are 0 or half a cycle
             if np.allclose(np.exp(1j * self.offsets[image.legs]), sign * np.exp(1j * self.offsets)):
-                return Mirror.signed(sign, sign)
+                return Mirror.with_signs(sign, sign)
         raise ValueError("phase_offsets: expected legs across from each other to move together, or half a cycle apart")
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
@@ -410,7 +410,7 @@ class _Points(Part):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the map to the points across."""
-        return Mirror.moved(_across(self.points))
+        return Mirror.permute(_across(self.points))
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each point."""
@@ -483,7 +483,7 @@ class Repeated(Part):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the map of each control step."""
-        return mirrors.of_each(np.arange(self.count), mirrors.joined([part.mirror(image) for part in self.parts]))
+        return mirrors.repeat(np.arange(self.count), mirrors.join([part.mirror(image) for part in self.parts]))
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights of each control step."""

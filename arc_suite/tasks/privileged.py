@@ -33,7 +33,7 @@ def blocks(body: Body) -> dict[str, Block]:
     }
 
 
-def observed(scene, data) -> dict:
+def observe_body(scene, data) -> dict:
     """Return the blocks of every task, each (..., size).
 
     Args:

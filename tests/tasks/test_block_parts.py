@@ -43,7 +43,7 @@ class Pair(Part):
     size = 12
 
     def mirror(self, image):
-        return mirrors.of_each(image.legs, mirrors.Mirror.signed(1, 1))
+        return mirrors.repeat(image.legs, mirrors.Mirror.with_signs(1, 1))
 
     def view(self, leg):
         return np.eye(12)[:, [2 * leg.index, 2 * leg.index + 1]]
@@ -150,7 +150,7 @@ def test_a_turned_state_permutes_the_views(task):
 def test_a_mirrored_state_reflects_the_views(task):
     """To each leg, a mirrored state is what the leg across saw of the state, its own pair included."""
     blocks, image = blocks_of(task) if isinstance(task, str) else task, mirror.image(STAR)
-    observation = mirrors.joined([block.mirror(image) for block in blocks.values()])
+    observation = mirrors.join([block.mirror(image) for block in blocks.values()])
     views = leg_views(STAR, blocks, mirrors.Symmetry(observation, mirrors.joints(image)))
     vectors = np.random.default_rng(1).normal(size=(4, sum(block.size for block in blocks.values())))
     assert_allclose(seen(views, observation(vectors)), seen(views, vectors)[:, image.legs], atol=1e-6)

@@ -163,8 +163,8 @@ def test_the_mirror_image_of_a_directed_walk():
     task, image = one.task.definition, mirror.image(ROBOTS["queen"])
     observation, action = task.symmetry
     start = other.task.definition.start
-    poses = mirrors.joined([mirrors.POLAR, mirrors.QUATERNION, action])
-    velocities = mirrors.joined([mirrors.POLAR, mirrors.AXIAL, action])
+    poses = mirrors.join([mirrors.POLAR, mirrors.QUATERNION, action])
+    velocities = mirrors.join([mirrors.POLAR, mirrors.AXIAL, action])
 
     def gait(numbers):
         offsets = (numbers[..., :-2][..., image.legs] + CYCLE // 2) % CYCLE

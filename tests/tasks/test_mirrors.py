@@ -25,8 +25,8 @@ def look_into_the_mirror(task):
     """Let a task start mirrored, with the clock of its gait half a cycle later where its sides take turns."""
     image, action = mirror.image(task.scene.body), task.symmetry.action
     sign = task.blocks["gait_clock"].mirror(image).signs[0]
-    poses = mirrors.joined([mirrors.POLAR, mirrors.QUATERNION, action])
-    velocities = mirrors.joined([mirrors.POLAR, mirrors.AXIAL, action])
+    poses = mirrors.join([mirrors.POLAR, mirrors.QUATERNION, action])
+    velocities = mirrors.join([mirrors.POLAR, mirrors.AXIAL, action])
     start, clock = task.start, task.clock
 
     def mirrored(random, stream):
@@ -84,7 +84,7 @@ def hidden(environment):
 def mirror_of_hidden(task):
     """The mirror map of privileged observations."""
     image = mirror.image(task.scene.body)
-    return mirrors.joined(block.mirror(image) for block in task.privileged_blocks.values())
+    return mirrors.join(block.mirror(image) for block in task.privileged_blocks.values())
 
 
 DRAWN = {"payload": (0.1, 0.4), "center_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0)}

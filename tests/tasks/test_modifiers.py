@@ -462,7 +462,7 @@ def test_noise_is_uniform_and_depends_on_all_that_it_counts():
         for lag in (1, 2, 7):
             assert abs((lines[lag:] * lines[:-lag]).mean() * 3.0) < 0.012
     # As MurmurHash3's own finalizer computes.
-    scrambled = noise.scrambled(np.array([0, 1, 0xDEADBEEF], np.uint32))
+    scrambled = noise.scramble(np.array([0, 1, 0xDEADBEEF], np.uint32))
     assert_array_equal(scrambled, [0, 0x514E28B7, 0x0DE5C6A9])
 
 
@@ -561,7 +561,7 @@ def test_a_wrong_modifier_is_one_line(settings, message):
         with refused(message, begins=True):
             use("tick", "walk", settings)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
-        modified_task.modified(prepare_task("tick", "walk")[0], {"kick": 1.0})
+        modified_task.modify_task(prepare_task("tick", "walk")[0], {"kick": 1.0})
 
 
 GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()

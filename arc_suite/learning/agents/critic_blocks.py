@@ -18,7 +18,7 @@ def mirror_maps(task: Task, critic_blocks: Iterable[str] = ()) -> Symmetry | Non
         more = [task.privileged_blocks[name].mirror(image) for name in critic_blocks]
     except ValueError:
         return None
-    return own._replace(observation=mirrors.joined([own.observation, *more]))
+    return own._replace(observation=mirrors.join([own.observation, *more]))
 
 
 def privileged_columns(task: Task, critic_blocks: Sequence[str]) -> np.ndarray:

@@ -27,7 +27,7 @@ class ExcludedBlocks(_ExcludedBlocksFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        return cls(check_excluded(settings["exclude_blocks"], blocks))
+        return cls(check_exclusion(settings["exclude_blocks"], blocks))
 
     @property
     def is_active(self) -> bool:
@@ -48,7 +48,7 @@ class ExcludedBlocks(_ExcludedBlocksFields, Modifier):
         return {name: block for name, block in observed.items() if name not in self.exclude_blocks}
 
 
-def check_excluded(value, blocks: Iterable[str]) -> tuple[str, ...]:
+def check_exclusion(value, blocks: Iterable[str]) -> tuple[str, ...]:
     """Return the checked names of blocks that are left out.
 
     Raises:

@@ -9,7 +9,7 @@ from arc_suite import checks
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.modifiers.draws import Episode
-from arc_suite.tasks.modifiers.excluded_blocks import check_excluded
+from arc_suite.tasks.modifiers.excluded_blocks import check_exclusion
 from arc_suite.tasks.modifiers.modifier import Modifier
 from arc_suite.tasks.parts import Joints, Repeated
 
@@ -52,7 +52,7 @@ class History(_HistoryFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        excluded = check_excluded(settings["exclude_blocks"], blocks)
+        excluded = check_exclusion(settings["exclude_blocks"], blocks)
         count = checks.integer("history", settings["history"], *cls.bounds["history"])
         joint_blocks = select_blocks(blocks, excluded)
         if count and not joint_blocks:

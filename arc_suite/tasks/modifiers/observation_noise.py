@@ -10,7 +10,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import noise
 from arc_suite.tasks.blocks import Block, places
 from arc_suite.tasks.modifiers.draws import Episode
-from arc_suite.tasks.modifiers.excluded_blocks import check_excluded
+from arc_suite.tasks.modifiers.excluded_blocks import check_exclusion
 from arc_suite.tasks.modifiers.modifier import Modifier
 
 
@@ -52,7 +52,7 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
         """Return the modifier that settings ask for."""
         noisy = {name: block for name, block in blocks.items() if block.noise is not None}
         levels = cls._check_levels(settings["observation_noise"], noisy)
-        excluded = check_excluded(settings["exclude_blocks"], blocks)
+        excluded = check_exclusion(settings["exclude_blocks"], blocks)
         numbers = places({name: block.size for name, block in noisy.items()})  # of the noise of all blocks
         names = [name for name in noisy if levels.get(name) and name not in excluded]
         widths = {name: levels[name] * noisy[name].widths for name in names}
