@@ -54,7 +54,7 @@ def prepare_task(
         model={name: getattr(model, name).copy() for name in CHANGEABLE},
     )
     task = kind(scene, settings, _step_limit(time_limit, step))
-    return modified_task.modify_task(task, changes) if changes else task, model
+    return modified_task.add_modifiers(task, changes) if changes else task, model
 
 
 def _take_modifiers(settings: dict[str, Any]) -> dict[str, Any]:

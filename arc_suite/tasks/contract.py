@@ -342,7 +342,7 @@ class Task(Observed):
 
     def privileged(self, memory, data) -> dict:
         """Return the privileged observation's blocks, each (..., size), of `MjData` or anything with its fields."""
-        return privileged.observe_body(self.scene, data)
+        return privileged.read_observation(self.scene, data)
 
     def read_back(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
         """Return those privileged blocks of one environment, each (size,), that changed fields of the model decide."""

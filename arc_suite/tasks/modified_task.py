@@ -51,7 +51,7 @@ class ModifiedMemory(NamedTuple):
     changes: Changes
 
 
-def modify_task(task: Task, settings: Mapping[str, Any]) -> Task:
+def add_modifiers(task: Task, settings: Mapping[str, Any]) -> Task:
     """Return a task with modifiers.
 
     Args:

@@ -33,7 +33,7 @@ def blocks(body: Body) -> dict[str, Block]:
     }
 
 
-def observe_body(scene, data) -> dict:
+def read_observation(scene, data) -> dict:
     """Return the blocks of every task, each (..., size).
 
     Args:

@@ -561,7 +561,7 @@ def test_a_wrong_modifier_is_one_line(settings, message):
         with refused(message, begins=True):
             use("tick", "walk", settings)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
-        modified_task.modify_task(prepare_task("tick", "walk")[0], {"kick": 1.0})
+        modified_task.add_modifiers(prepare_task("tick", "walk")[0], {"kick": 1.0})
 
 
 GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()

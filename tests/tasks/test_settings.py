@@ -12,7 +12,7 @@ from tiers import tiers
 import arc_suite
 from arc_suite.tasks import TASKS, parameters
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.modified_task import modify_task
+from arc_suite.tasks.modified_task import add_modifiers
 from arc_suite.tasks.suite import Steer
 
 # Another value of every setting.
@@ -94,7 +94,7 @@ def test_settings_of_walk_alone_are_refused_elsewhere(task):
 
 def test_a_modified_task_has_every_member_of_the_contract_and_of_its_own():
     plain = arc_suite.load("tick", "steer").task.definition
-    task = modify_task(plain, {"kicks": 1.0})
+    task = add_modifiers(plain, {"kicks": 1.0})
     members = {name for name in (*vars(Task), *Task.__annotations__, *vars(Steer)) if not name.startswith("_")}
     assert [name for name in members if not hasattr(task, name)] == []
     assert (task.context, task.health, task.unwrapped) == (plain.context, plain.health, plain)
