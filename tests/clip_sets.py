@@ -32,7 +32,7 @@ LOW = 0.01  # of a sole that slips
 class Kept(Recorder):
     """A recorder that records each passage once."""
 
-    transition = functools.cache(Recorder.record_transition)
+    record_transition = functools.cache(Recorder.record_transition)
 
 
 def apart(body, one, other) -> float:
@@ -52,7 +52,7 @@ def apart(body, one, other) -> float:
 def slip(body, motion) -> tuple[float, float]:
     """Return the path of soles near the ground by that of the root, and how far they sink in it, standing heights."""
     legs, height = Legs.of(body), body.torso.standing_height
-    feet = planting._feet(legs, motion) - (0.0, 0.0, 1.0) * legs.radii[:, None]
+    feet = planting._foot_positions(legs, motion) - (0.0, 0.0, 1.0) * legs.radii[:, None]
     low = feet[..., 2] < LOW * height
     paths = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1) * (low[1:] & low[:-1])
     root = np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=-1).sum()

@@ -21,10 +21,14 @@ from arc_suite.simulation.model import compiled
 from arc_suite.tasks import readings
 
 # Durations are multiples of sqrt(h / g), h being the standing height.
-_SINK, _HOLD, _GIVE, _FALL = 6.0, 2.0, 1.5, 6.0
-_FLACCID = 0.05  # of the damping of joints without life
-_LIES = 0.6  # of the height at rest, below which a torso lies
-_NEAR = 0.1  # of the height at rest, within which a torso lies on the ground
+_SINK_DURATION = 6.0
+_HOLD_DURATION = 2.0
+_COLLAPSE_DURATION = 1.5  # in which legs give way in a death
+_LIMP_DURATION = 6.0
+
+_LIMP_DAMPING_SHARE = 0.05  # of the damping of joints, in joints without life
+_LYING_HEIGHT = 0.6  # of the torso's height at rest: a lower torso lies
+_LYING_CLEARANCE = 0.1  # of the torso's height at rest: a torso whose lowest point is nearer to the ground lies
 
 
 def rise(body: Body, rest: Pose) -> Motion:
@@ -33,13 +37,15 @@ def rise(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: the legs hardly fold.
     """
-    sink, hold = _steps(body, _SINK), _steps(body, _HOLD)
-    share = np.concatenate([_eased(sink), np.ones(hold), _eased(sink)[::-1], np.zeros(hold)])
-    joints = gestures.lower_torso(body, rest, share * _depth(body, rest))
-    recording = _driven(body, rest, joints + _holding(body, rest) - rest.joints)
-    first = sizing.simulation(body).substeps * (sink + hold)
+    sink_steps = _to_steps(body, _SINK_DURATION)
+    hold_steps = _to_steps(body, _HOLD_DURATION)
+    sinking = _ease_in(sink_steps)
+    depth_shares = np.concatenate([sinking, np.ones(hold_steps), sinking[::-1], np.zeros(hold_steps)])
+    joints = gestures.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
+    recording = _simulate(body, rest, joints + _loaded_targets(body, rest) - rest.joints)
+    first = sizing.simulation(body).substeps * (sink_steps + hold_steps)
     _check_lies(body, rest, recording.poses[first])
-    return stay_at_start(recording, first, len(recording.poses) - 1 - first)
+    return stay_at_start(recording, first, samples=len(recording.poses) - 1 - first)
 
 
 def jump(body: Body, rest: Pose) -> Motion:
@@ -48,8 +54,8 @@ def jump(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: its feet do not leave the ground, or it does not land on them.
     """
-    recording = _leapt(body, rest, leaps.JUMPS, "clearance")
-    return stay_at_start(recording, 0, len(recording.poses) - 1)
+    recording = _simulate_leap(body, rest, leaps.JUMPS, "clearance")
+    return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
 
 
 def leap(body: Body, rest: Pose) -> Motion:
@@ -58,15 +64,8 @@ def leap(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: its feet do not leave the ground, or it does not land on them.
     """
-    return advance_straight(_leapt(body, rest, presets_of(body)["leaping"].choice, "distance"))
-
-
-def _leapt(body: Body, rest: Pose, choice: tuple[leaps.Leap, ...], measure: str) -> Recording:
-    legs = Legs.of(sizing.sized(body))
-    found = leaps.found(body, tuple(rest.joints.tolist()), choice, measure)
-    targets = leaps.keyframes(body, legs, legs.by_leg(rest.joints), found)
-    held = np.tile(rest.joints, (_steps(body, _HOLD), 1))
-    return _driven(body, rest, np.concatenate([targets, held]) + _holding(body, rest) - rest.joints)
+    candidates = presets_of(body)["leaping"].choice
+    return advance_straight(_simulate_leap(body, rest, candidates, "distance"))
 
 
 def death(body: Body, rest: Pose) -> Motion:
@@ -75,72 +74,95 @@ def death(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: the legs hardly fold.
     """
-    give, fall = _steps(body, _GIVE), _steps(body, _FALL)
-    joints = gestures.lower_torso(body, rest, np.append(_eased(give), 1.0) * _depth(body, rest))
-    limp = np.full((fall, len(rest.joints)), np.nan)
-    recording = _driven(body, rest, np.concatenate([joints, limp]), damping=_FLACCID)
+    collapse_steps = _to_steps(body, _COLLAPSE_DURATION)
+    limp_steps = _to_steps(body, _LIMP_DURATION)
+    depth_shares = np.append(_ease_in(collapse_steps), 1.0)
+    joints = gestures.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
+    no_torque = np.full((limp_steps, len(rest.joints)), np.nan)
+    recording = _simulate(body, rest, np.concatenate([joints, no_torque]), damping_share=_LIMP_DAMPING_SHARE)
     _check_lies(body, rest, recording.poses[-1])
-    return stay_at_start(recording, 0, len(recording.poses) - 1)
+    return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
 
 
-def _depth(body: Body, rest: Pose) -> float:
+def _simulate_leap(body: Body, rest: Pose, candidates: tuple[leaps.Leap, ...], measure: str) -> Recording:
+    """Return the best of some leaps by a measure of `leaps`, from rest to rest."""
+    legs = Legs.of(sizing.sized(body))
+    best_leap = leaps.found(body, tuple(rest.joints.tolist()), candidates, measure)
+    leap_joints = leaps.keyframes(body, legs, legs.by_leg(rest.joints), best_leap)
+    rest_joints = np.tile(rest.joints, (_to_steps(body, _HOLD_DURATION), 1))
+    joints = np.concatenate([leap_joints, rest_joints])
+    return _simulate(body, rest, joints + _loaded_targets(body, rest) - rest.joints)
+
+
+def _belly_height(body: Body, rest: Pose) -> float:
     """Return the height of the torso's lowest point over the ground at rest, m."""
-    return rest.position[2] + torso_box(body)[0][2]
+    lowest_corner, _ = torso_box(body)  # in the torso's frame, m
+    return rest.position[2] + lowest_corner[2]
 
 
 def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
-    """Raise a ValueError if a torso stands still."""
-    if (
-        pose[2] > _LIES * rest.position[2]
-        and pose[2] - rest.position[2] + _depth(body, rest) > _NEAR * rest.position[2]
-    ):
+    """Raise a ValueError if a torso in a pose (7 + joints,) stands still."""
+    rest_height = rest.position[2]
+    height = pose[2]
+    is_high = height > _LYING_HEIGHT * rest_height
+    is_clear = height - rest_height + _belly_height(body, rest) > _LYING_CLEARANCE * rest_height
+    if is_high and is_clear:
         raise ValueError("the legs do not fold far enough to lie down")
 
 
-def _steps(body: Body, duration: float) -> int:
+def _to_steps(body: Body, duration: float) -> int:
     """Return the number of control steps in a multiple of sqrt(h / g)."""
-    return round(duration * math.sqrt(body.torso.standing_height / sizing.GRAVITY) / sizing.control_timestep(body))
+    seconds = duration * math.sqrt(body.torso.standing_height / sizing.GRAVITY)
+    return round(seconds / sizing.control_timestep(body))
 
 
-def _eased(steps: int) -> np.ndarray:
+def _ease_in(steps: int) -> np.ndarray:
+    """Return shares (steps,) that rise smoothly from 0, and would be 1 after the last."""
     return 0.5 - 0.5 * np.cos(np.pi * np.arange(steps) / steps)
 
 
-def _holding(body: Body, rest: Pose) -> np.ndarray:
+def _loaded_targets(body: Body, rest: Pose) -> np.ndarray:
     """Return the target angles (joints,), rad, at which position control holds a pose under the body's weight."""
-    sized = sizing.sized(body)
-    pose = posed(sized, rest.joints)
-    limits = np.array([joint.torque for joint in sized.joints])
-    return rest.joints + pose.loads / (limits * drive(sized, pose.inertias).stiffness)
+    sized_body = sizing.sized(body)
+    standing_pose = posed(sized_body, rest.joints)
+    torque_limits = np.array([joint.torque for joint in sized_body.joints])  # N m
+    stiffness = drive(sized_body, standing_pose.inertias).stiffness  # shares of the torque limits per rad
+    return rest.joints + standing_pose.loads / (torque_limits * stiffness)
 
 
-def _driven(body: Body, rest: Pose, targets: np.ndarray, damping: float = 1.0) -> Recording:
+def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float = 1.0) -> Recording:
     """Simulate a body from rest.
 
     Args:
         body: the spec.
         rest: first pose.
         targets: (steps + 1, joints) of position control, rad; NaN for no torque.
-        damping: of the joints, as a share of their own.
+        damping_share: damping of the joints, as a share of their own.
 
     Returns:
         A pose for every substep.
     """
-    sized = sizing.sized(body)
-    driven = drive(sized, posed(sized, rest.joints).inertias)
+    sized_body = sizing.sized(body)
+    joint_drive = drive(sized_body, posed(sized_body, rest.joints).inertias)
+    control_timestep = sizing.control_timestep(body)
+    substeps = sized_body.simulation.substeps
+    joint_count = len(body.joint_names)
+    is_imported = bool(body.source)
     model = copy.copy(compiled(body))
-    model.dof_damping[6:] *= damping
+    model.dof_damping[6:] *= damping_share  # the first six are the torso's
     layout = readings.layout(model, body)
-    data, step = mujoco.MjData(model), sizing.control_timestep(body)
+    data = mujoco.MjData(model)
     data.qpos[:] = readings.positions(np.concatenate(rest), layout, stood(model))
-    moved, count = [data.qpos.copy()], len(body.joint_names)
-    for target, later in zip(targets[:-1], targets[1:], strict=True):
-        angles, speeds = readings.pose(data.qpos, layout)[7:], data.qvel[layout.joint_velocities]
-        actions = driven.actions(target, (later - target) / step, angles, speeds)
-        data.ctrl[:count] = np.nan_to_num(actions)
-        if body.source:
-            data.ctrl[count : 2 * count] = np.isnan(actions)  # releases of servos
-        for _ in range(sized.simulation.substeps):
+    positions = [data.qpos.copy()]
+    for target, next_target in zip(targets[:-1], targets[1:], strict=True):
+        angles = readings.pose(data.qpos, layout)[7:]
+        speeds = data.qvel[layout.joint_velocities]
+        target_speeds = (next_target - target) / control_timestep
+        actions = joint_drive.actions(target, target_speeds, angles, speeds)
+        data.ctrl[:joint_count] = np.nan_to_num(actions)
+        if is_imported:  # the other controls release servos
+            data.ctrl[joint_count : 2 * joint_count] = np.isnan(actions)
+        for _ in range(substeps):
             mujoco.mj_step(model, data)
-            moved.append(data.qpos.copy())
-    return Recording(model.opt.timestep, sized.simulation.substeps, readings.pose(np.stack(moved), layout))
+            positions.append(data.qpos.copy())
+    return Recording(model.opt.timestep, substeps, readings.pose(np.stack(positions), layout))

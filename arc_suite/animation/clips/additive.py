@@ -11,42 +11,62 @@ from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compiled
 
-_DEEPEST = 0.03  # standing heights, that a sole may be below the ground
-_STARTS = 4  # phases of a loop in which a clip that is not in step with it begins
+_MAX_SOLE_DEPTH = 0.03  # standing heights, that a sole may be below the ground
+_TRIED_PHASES = 4  # of a base loop, in which a clip that is not in step with it begins
+_CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
 
 
-def find_bases(body: Body, name: str, motion: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose) -> list[str]:
+def find_bases(
+    body: Body, name: str, motions: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose
+) -> list[str]:
     """Return the names of the loops over which an additive clip brings no sole deeper than 0.03 standing heights.
 
     Args:
         body: the spec.
         name: of the additive clip.
-        motion: of each clip, by name, with frames of one rate.
+        motions: of each clip, by name, with frames of one rate.
         loops: whether each of them loops.
         idle: first pose of the idle clip, which engines subtract.
     """
-    return [
-        base
-        for base in motion
-        if loops[base] and not is_additive(base) and _depth(body, name, base, motion, idle) <= _DEEPEST
-    ]
+    bases = []
+    for base in motions:
+        if loops[base] and not is_additive(base):
+            depth = _measure_sole_depth(body, name, base, motions, idle)
+            if depth <= _MAX_SOLE_DEPTH:
+                bases.append(base)
+    return bases
 
 
-def add_clip(clip: Motion, idle: Pose, base: Motion, indices: np.ndarray) -> np.ndarray:
-    """Return the poses (frames, 7 + joints) of a clip added to samples (frames,) of another, over a root at 0."""
-    turns = rotations.product(clip.quaternions, idle.quaternion * (1.0, -1.0, -1.0, -1.0))
-    positions = base.positions[indices] + clip.positions - idle.position
-    joints = base.joints[indices] + clip.joints - idle.joints
-    return np.concatenate([positions, rotations.product(turns, base.quaternions[indices]), joints], axis=-1)
-
-
-def _depth(body: Body, name: str, base: str, motion: Mapping[str, Motion], idle: Pose) -> float:
-    """Return how deep a sole is below the ground, standing heights."""
-    clip, under = motion[name], motion[base]
-    frames, around = np.arange(len(clip.joints)), len(under.joints) - 1
-    if isinstance(clip_of(name), Difference) and isinstance(clip_of(base), WalkLoop):  # in step
-        starts = np.round(frames * around / frames[-1]).astype(int)[None]
+def _measure_sole_depth(body: Body, name: str, base: str, motions: Mapping[str, Motion], idle: Pose) -> float:
+    """Return how deep a sole is below the ground, standing heights, while an additive clip plays over a base loop."""
+    motion = motions[name]
+    base_motion = motions[base]
+    frames = np.arange(len(motion.joints))
+    base_frames_in_loop = len(base_motion.joints) - 1
+    in_step = isinstance(clip_of(name), Difference) and isinstance(clip_of(base), WalkLoop)
+    if in_step:
+        tried_base_frames = np.round(frames * base_frames_in_loop / frames[-1]).astype(int)[None]
     else:
-        starts = frames + np.arange(_STARTS)[:, None] * around // _STARTS
-    poses = np.concatenate([add_clip(clip, idle, under, each % around) for each in starts])
-    return -float(sole_heights(compiled(body), body, poses).min()) / body.torso.standing_height
+        first_frames = np.arange(_TRIED_PHASES) * base_frames_in_loop // _TRIED_PHASES
+        tried_base_frames = frames + first_frames[:, None]
+    poses = [
+        add_clip(motion, idle, base_motion, base_frames % base_frames_in_loop) for base_frames in tried_base_frames
+    ]
+    lowest = float(sole_heights(compiled(body), body, np.concatenate(poses)).min())  # m
+    return -lowest / body.torso.standing_height
+
+
+def add_clip(motion: Motion, idle: Pose, base_motion: Motion, base_frames: np.ndarray) -> np.ndarray:
+    """Return the poses (frames, 7 + joints) of an additive clip over a base, with a root at 0.
+
+    Args:
+        motion: of the additive clip.
+        idle: pose that is subtracted from it.
+        base_motion: of the base.
+        base_frames: (frames,) the frame of the base for each frame of the additive clip.
+    """
+    turns = rotations.product(motion.quaternions, idle.quaternion * _CONJUGATE)
+    positions = base_motion.positions[base_frames] + motion.positions - idle.position
+    quaternions = rotations.product(turns, base_motion.quaternions[base_frames])
+    joints = base_motion.joints[base_frames] + motion.joints - idle.joints
+    return np.concatenate([positions, quaternions, joints], axis=-1)

@@ -9,102 +9,133 @@ from arc_suite import rotations
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.animation.parts import Part, part_frames
 
-_ALONG = np.sqrt(0.5)  # cosine: a link that is nearer to its hinge than to the plane across lies along it
-_SAME = 1e-4  # of the longest link, by which places differ
+_MAX_CROSSING_COSINE = np.sqrt(0.5)  # between a link and its hinge: with a larger one, the link lies along the hinge
+_SAME_POSITION = 1e-4  # of the longest link, by which positions of parts differ at least
 
 
 def align_bones(parts: Sequence[Part]) -> list[Part]:
     """Return the same parts with other frames, in which a joint is one curve, and a bone points along its link.
 
     In glTF's axes, x is the hinge, and y points to the next part as far as it can across x. The bone of a link that
-    lies along its hinge has the hinge as y. A foot goes on as the link above. The torso keeps its frame.
+    lies along its hinge has the hinge as y. A foot has the direction of the link above. The torso keeps its frame.
 
     Args:
         parts: of a body, those above first.
     """
-    places, turns = part_frames(parts)
-    axes: list[np.ndarray] = []
+    positions, orientations = part_frames(parts)
+    axes_of_bones: list[np.ndarray] = []  # (3, 3) in the world, as columns
     for index, part in enumerate(parts):
         if part.parent is None:
-            axes.append(turns[index])
-        else:
-            hinge = None if part.axis is None else turns[index] @ part.axis
-            axes.append(_bone(hinge, _link(parts, places, index), axes[part.parent]))
-    return [_reframed(part, index, places, turns, axes) for index, part in enumerate(parts)]
+            axes_of_bones.append(orientations[index])
+            continue
+        hinge = None
+        if part.axis is not None:
+            hinge = orientations[index] @ part.axis
+        link = _link_direction(parts, positions, index)
+        axes_of_bones.append(_bone_axes(hinge, link, parent_axes=axes_of_bones[part.parent]))
+
+    bones = []
+    for index, part in enumerate(parts):
+        part = _turn_frame(part, axes_of_bones[index].T @ orientations[index])
+        if part.parent is not None:
+            to_parent = axes_of_bones[part.parent].T
+            part = part._replace(
+                place=to_parent @ (positions[index] - positions[part.parent]),
+                quaternion=_to_quaternion(to_parent @ axes_of_bones[index]),
+            )
+        bones.append(part)
+    return bones
 
 
 def pose_parts(parts: Sequence[Part], pose: Pose) -> list[Part]:
     """Return the parts as they stand in a pose."""
-    found = []
+    posed_parts = []
     for part in parts:
         if part.parent is None:
             part = part._replace(place=pose.position, quaternion=pose.quaternion)
         elif part.joint is not None:
             part = part._replace(quaternion=hinge_orientations(part, pose.joints[part.joint]))
-        found.append(part)
-    return found
+        posed_parts.append(part)
+    return posed_parts
 
 
 def hinge_orientations(part: Part, angles) -> np.ndarray:
     """Return the orientations (..., 4) of a part on the one above, at angles (...) of its joint, rad."""
-    half = 0.5 * np.asarray(angles)[..., None]
-    return rotations.product(part.quaternion, np.concatenate([np.cos(half), np.sin(half) * part.axis], axis=-1))
+    half_angles = 0.5 * np.asarray(angles)[..., None]
+    turns = np.concatenate([np.cos(half_angles), np.sin(half_angles) * part.axis], axis=-1)
+    return rotations.product(part.quaternion, turns)
 
 
-def _link(parts: Sequence[Part], places, index: int) -> np.ndarray | None:
-    """Return the direction (3,) from a part to the next one that is elsewhere; None without one."""
-    longest = max(np.linalg.norm(part.place) for part in parts if part.parent is not None)
-    for below, part in enumerate(parts[index + 1 :], start=index + 1):
-        if part.parent != below - 1:  # another leg
-            break
-        way = places[below] - places[index]
-        if (length := np.linalg.norm(way)) > _SAME * longest:
-            return way / length
+def _link_direction(parts: Sequence[Part], positions, index: int) -> np.ndarray | None:
+    """Return the direction (3,) from a part to the next one below it that is elsewhere; None without one."""
+    longest_link = max(np.linalg.norm(part.place) for part in parts if part.parent is not None)
+    for below in range(index + 1, len(parts)):
+        if parts[below].parent != below - 1:  # another leg begins
+            return None
+        link = positions[below] - positions[index]
+        length = np.linalg.norm(link)
+        if length > _SAME_POSITION * longest_link:
+            return link / length
     return None
 
 
-def _bone(hinge: np.ndarray | None, link: np.ndarray | None, above: np.ndarray) -> np.ndarray:
-    """Return the axes of a bone as the columns (3, 3) of a rotation, given those of the bone above."""
+def _bone_axes(hinge: np.ndarray | None, link: np.ndarray | None, parent_axes: np.ndarray) -> np.ndarray:
+    """Return the axes of a bone as the columns (3, 3) of a rotation.
+
+    Args:
+        hinge: (3,) its direction; None for a part without a joint.
+        link: (3,) direction to the next part; None for the last part of a leg.
+        parent_axes: (3, 3) of the bone above.
+    """
     if link is None and hinge is None:
-        return above
+        return parent_axes
     if link is None:
-        link = above[:, 2]
-    if hinge is not None and abs(cosine := hinge @ link) <= _ALONG:
-        return _frame(hinge, _across(link, hinge))
-    y = link if hinge is None else np.sign(cosine) * hinge
-    # x of glTF is, across, that of the bone above, or its y; with its z Euler angles of FBX would be near gimbal lock.
-    _, *others = above.T
-    return _frame(_across(min(others, key=lambda other: abs(y @ other)), y), y)
+        link = parent_axes[:, 2]  # y of glTF, along the link above
+    if hinge is None:
+        return _axes_along(link, parent_axes)
+    cosine = hinge @ link
+    if abs(cosine) <= _MAX_CROSSING_COSINE:
+        return _axes_of(x=hinge, y=_direction_across(link, hinge))
+    return _axes_along(np.sign(cosine) * hinge, parent_axes)
 
 
-def _frame(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the rotation whose axes are x and y of glTF, which are our y and z."""
+def _axes_along(y: np.ndarray, parent_axes: np.ndarray) -> np.ndarray:
+    """Return the axes of a bone along y of glTF, whose x is near x or y of the bone above, the one more across.
+
+    With z of the bone above in place of x, Euler angles of FBX would be near gimbal lock.
+    """
+    _, parent_x, parent_y = parent_axes.T
+    across_x = abs(y @ parent_x) <= abs(y @ parent_y)
+    reference = parent_x if across_x else parent_y
+    return _axes_of(x=_direction_across(reference, y), y=y)
+
+
+def _axes_of(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the rotation whose axes are x and y of glTF, which are MuJoCo's y and z."""
     return np.stack([np.cross(x, y), x, y], axis=-1)
 
 
-def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Return the direction of what a vector has across an axis."""
-    across = vector - (vector @ axis) * axis
-    return across / np.linalg.norm(across)
+def _direction_across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Return the direction of the component of a vector that is perpendicular to an axis."""
+    component = vector - (vector @ axis) * axis
+    return component / np.linalg.norm(component)
 
 
-def _reframed(part: Part, index: int, places, turns, axes) -> Part:
-    """Return a part in the frame that `axes` has for it."""
-    own, above = axes[index].T @ turns[index], None if part.parent is None else axes[part.parent].T
-    turn = _quaternion(own)
-    moved = (
-        shape._replace(place=own @ shape.place, quaternion=rotations.product(turn, shape.quaternion))
-        for shape in part.shapes
-    )
-    part = part._replace(shapes=tuple(moved), axis=None if part.axis is None else (own @ part.axis).round(12))
-    if above is None:
-        return part
-    return part._replace(
-        place=above @ (places[index] - places[part.parent]), quaternion=_quaternion(above @ axes[index])
-    )
+def _turn_frame(part: Part, rotation: np.ndarray) -> Part:
+    """Return a part with its shapes and axis in another frame, given the rotation (3, 3) into that frame."""
+    quaternion = _to_quaternion(rotation)
+    turned_shapes = []
+    for shape in part.shapes:
+        turned_shapes.append(
+            shape._replace(place=rotation @ shape.place, quaternion=rotations.product(quaternion, shape.quaternion))
+        )
+    axis = None
+    if part.axis is not None:
+        axis = (rotation @ part.axis).round(12)
+    return part._replace(shapes=tuple(turned_shapes), axis=axis)
 
 
-def _quaternion(matrix: np.ndarray) -> np.ndarray:
-    found = np.empty(4)
-    mujoco.mju_mat2Quat(found, np.ascontiguousarray(matrix).ravel())
-    return found
+def _to_quaternion(rotation: np.ndarray) -> np.ndarray:
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
+    return quaternion

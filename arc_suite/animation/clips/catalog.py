@@ -15,7 +15,7 @@ class WalkLoop(NamedTuple):
     """A loop under a command.
 
     Attributes:
-        command: forward, left and turning, in units of the task: the body's own speed.
+        command: forward, left and turning, in units of the task, which are speeds that suit the body.
         failing: index of a leg whose motors fail; None for a sound body.
         crouch: by which the torso is lowered, standing heights, as far as the legs fold.
     """
@@ -51,8 +51,8 @@ class Acted(NamedTuple):
     """A motion from rest, simulated or drawn.
 
     Attributes:
-        play: makes it of the body and its pose at rest.
-        ends: those at which it has the first pose of idle: 0 and -1.
+        play: makes the motion, given the body and its pose at rest.
+        ends: at which it has the first pose of idle: the first sample, 0, the last one, -1, or both.
         loops: whether it is a loop.
         steps: whether feet step in it.
         additive: whether it is added to other clips, as its difference from the first pose of idle.
@@ -69,8 +69,8 @@ class Difference(NamedTuple):
     """How a loop differs from another, added to the first pose of idle.
 
     Attributes:
-        loop: its name.
-        base: name of the other.
+        loop: name of the loop.
+        base: name of the loop that it differs from.
     """
 
     loop: str
@@ -81,7 +81,7 @@ class Showcase(NamedTuple):
     """A loop of a preset of the demonstrator, in a gait of its own.
 
     Attributes:
-        preset: its name.
+        preset: name of the preset.
     """
 
     preset: str
@@ -90,6 +90,7 @@ class Showcase(NamedTuple):
 Kind = WalkLoop | Passage | Turn | Acted | Difference | Showcase
 
 WALK = WalkLoop((1.0, 0.0, 0.0))
+BOTH_ENDS = (0, -1)  # of `Acted.ends`: the first and the last sample
 CLIPS: dict[str, Kind] = {
     "walk": WALK,
     "slow": WalkLoop((0.6, 0.0, 0.0)),
@@ -107,36 +108,34 @@ CLIPS: dict[str, Kind] = {
     "start": Passage(starts=True, cycles=3),
     "stop": Passage(starts=False, cycles=3),
     "turn_180": Turn(180.0),
-    "idle": Acted(gestures.idle, (0,), loops=True),
-    "idle_look": Acted(gestures.glance, (0, -1), loops=True),
-    "idle_settle": Acted(gestures.settle, (0, -1), loops=True, steps=True),
+    "idle": Acted(gestures.idle, ends=(0,), loops=True),
+    "idle_look": Acted(gestures.glance, BOTH_ENDS, loops=True),
+    "idle_settle": Acted(gestures.settle, BOTH_ENDS, loops=True, steps=True),
     "crouch_walk": WalkLoop((0.6, 0.0, 0.0), crouch=0.3),
-    "lean_left": Acted(functools.partial(gestures.turn_torso, number="roll", sign=-1.0), (0, -1)),
-    "lean_right": Acted(functools.partial(gestures.turn_torso, number="roll", sign=1.0), (0, -1)),
-    "look_up": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=-1.0), (0, -1)),
-    "look_down": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=1.0), (0, -1)),
+    "lean_left": Acted(functools.partial(gestures.turn_torso, number="roll", sign=-1.0), BOTH_ENDS),
+    "lean_right": Acted(functools.partial(gestures.turn_torso, number="roll", sign=1.0), BOTH_ENDS),
+    "look_up": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=-1.0), BOTH_ENDS),
+    "look_down": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=1.0), BOTH_ENDS),
     "limp_walk": WalkLoop((1.0, 0.0, 0.0), failing=0),
-    "limp": Difference("limp_walk", "walk"),
-    **{
-        f"hit_{side}": Acted(functools.partial(gestures.hit, side=side), (0, -1), additive=True)
-        for side in gestures.HIT_DIRECTIONS
-    },
-    "attack": Acted(gestures.strike, (0, -1), steps=True),
-    "rise": Acted(acting.rise, (-1,)),
-    "jump": Acted(acting.jump, (0, -1)),
-    "leap": Acted(acting.leap, (0, -1)),
-    "death": Acted(acting.death, (0,)),
+    "limp": Difference(loop="limp_walk", base="walk"),
+    "hit_front": Acted(functools.partial(gestures.hit, side="front"), BOTH_ENDS, additive=True),
+    "hit_back": Acted(functools.partial(gestures.hit, side="back"), BOTH_ENDS, additive=True),
+    "hit_left": Acted(functools.partial(gestures.hit, side="left"), BOTH_ENDS, additive=True),
+    "hit_right": Acted(functools.partial(gestures.hit, side="right"), BOTH_ENDS, additive=True),
+    "attack": Acted(gestures.strike, BOTH_ENDS, steps=True),
+    "rise": Acted(acting.rise, ends=(-1,)),
+    "jump": Acted(acting.jump, BOTH_ENDS),
+    "leap": Acted(acting.leap, BOTH_ENDS),
+    "death": Acted(acting.death, ends=(0,)),
     "tuned": Showcase("tuned"),
     "refined": Showcase("refined"),
 }
 DEFAULT = ("walk", "slow", "fast", "turn_left", "turn_right", "start", "stop", "idle")
-SPEED_RATIOS = {
-    "slow": (0.0, 1.0 / 1.1),
-    "fast": (1.1, math.inf),
-    "run": (1.4, math.inf),
-}  # speeds, of that of the walk
-ALL = "all"  # in place of all names
-REST = "rest"  # the recording of a stop, of rest and of a start
+ALL = "all"  # what users write in place of all names
+REST = "rest"  # name of the recording of a stop, of rest and of a start
+
+# The least and the greatest speed of loops that are left out otherwise, of the speed of the walk.
+SPEED_RATIOS = {"slow": (0.0, 1.0 / 1.1), "fast": (1.1, math.inf), "run": (1.4, math.inf)}
 
 
 def clip_names() -> list[str]:
@@ -163,24 +162,31 @@ def is_additive(name: str) -> bool:
     return isinstance(clip, Difference) or (isinstance(clip, Acted) and clip.additive)
 
 
-def recordings_needed(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return the names of the recordings that clips are made of, each with the clips that cannot be made without it."""
-    found: dict[str, list[str]] = {}
+def recordings_for_clips(names: Sequence[str]) -> dict[str, list[str]]:
+    """Return the names of the recordings that clips use, each with the clips that cannot be made without it.
+
+    A clip that compares itself with the walk uses its recording, but can be made without it.
+    """
+    clips_of_recording: dict[str, list[str]] = {}
     for name in names:
         clip = clip_of(name)
-        match clip:
-            case Difference():
-                needs = clip.loop, REST
-            case Turn():
-                needs = name, REST
-            case WalkLoop() | Showcase():
-                needs = (name,)
-            case _:
-                needs = (REST,)
-        for source in needs:
-            found.setdefault(source, []).append(name)
+        for recording in _required_recordings(name, clip):
+            clips_of_recording.setdefault(recording, []).append(name)
         if isinstance(clip, Difference):
-            found.setdefault(clip.base, [])
+            clips_of_recording.setdefault(clip.base, [])
         if isinstance(clip, Passage) or name in SPEED_RATIOS:
-            found.setdefault("walk", [])
-    return found
+            clips_of_recording.setdefault("walk", [])
+    return clips_of_recording
+
+
+def _required_recordings(name: str, clip: Kind) -> tuple[str, ...]:
+    """Return the names of the recordings without which a clip cannot be made."""
+    match clip:
+        case Difference():
+            return clip.loop, REST
+        case Turn():
+            return name, REST
+        case WalkLoop() | Showcase():
+            return (name,)
+        case _:
+            return (REST,)

@@ -13,7 +13,7 @@ from arc_suite import checks, files, versions
 from arc_suite.animation.clips import catalog, filming
 from arc_suite.animation.clips.catalog import ALL, DEFAULT
 from arc_suite.animation.clips.clips import FPS, Clip
-from arc_suite.animation.clips.clips import clips as recorded
+from arc_suite.animation.clips.clips import clips as make_clips
 from arc_suite.animation.clips.creatures import RIGS, glb
 from arc_suite.animation.clips.metadata import ROOT_MOTIONS, sidecar
 from arc_suite.envs.setup import Setup
@@ -21,23 +21,29 @@ from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
 
+GLB_EXTENSION = ".glb"
 FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
-EXTENSIONS = (".glb", *FILM_EXTENSIONS, ".png")
-_CLEAR = (".webp", ".png")  # with an alpha
-# The extensions of each option that suits some files alone.
+SHEET_EXTENSION = ".png"
+EXTENSIONS = (GLB_EXTENSION, *FILM_EXTENSIONS, SHEET_EXTENSION)
+
+# The extensions of files that take an option.
 OPTION_EXTENSIONS = {
-    **dict.fromkeys(("rig", "root_motion", "triangles", "uv", "reduce"), (".glb",)),
-    **{
-        "transparent": _CLEAR,
-        "turntable": FILM_EXTENSIONS,
-        "directions": (".png",),
-        "size": (*FILM_EXTENSIONS, ".png"),
-    },
+    "rig": (GLB_EXTENSION,),
+    "root_motion": (GLB_EXTENSION,),
+    "triangles": (GLB_EXTENSION,),
+    "uv": (GLB_EXTENSION,),
+    "reduce": (GLB_EXTENSION,),
+    "transparent": (".webp", SHEET_EXTENSION),  # formats that have an alpha channel
+    "turntable": FILM_EXTENSIONS,
+    "directions": (SHEET_EXTENSION,),
+    "size": (*FILM_EXTENSIONS, SHEET_EXTENSION),
 }
-OPTION_BOUNDS = {"size": (16, MAX_HEIGHT), "directions": (1, 64), "triangles": (1, None)}
-DEFAULT_SIZE, DEFAULT_DIRECTIONS = 480, 8
-_WIDEST = 16384  # pixels of a sheet
-_CONVERTED = (".fbx", ".bvh", ".blend")  # what tools/to_fbx.py writes
+OPTION_BOUNDS = {"size": (16, MAX_HEIGHT), "directions": (1, 64), "triangles": (1, None)}  # least and greatest value
+DEFAULT_SIZE = 480  # pixels, width and height of a picture
+DEFAULT_DIRECTIONS = 8  # of a sheet
+
+_MAX_SHEET_WIDTH = 16384  # pixels
+_BLENDER_EXTENSIONS = (".fbx", ".bvh", ".blend")  # of the files that tools/to_fbx.py writes
 
 
 def animate(
@@ -77,18 +83,22 @@ def animate(
     setup = Setup.of(robot, task, task_kwargs)
     names = [clips] if isinstance(clips, str) else list(clips)
     path = Path(path)
-    extension = _checked(path, names, fps, options)
-    recording = functools.partial(progress, desc="recording", unit="clip", leave=False)
+    extension = _check_arguments(path, names, fps, options)
+    metrics_path = metrics_file(path) if extension == GLB_EXTENSION else None
+    recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
     with contextlib.ExitStack() as stack:
         temporary = stack.enter_context(files.writing(path))
-        metrics = stack.enter_context(files.writing_json(metrics_file(path) if extension == ".glb" else None))
-        names = catalog.clip_names() if names == [ALL] else names
-        made = recorded(setup, names, policy, preset, fps, recording, straight, plant)
-        if extension == ".glb":
-            metrics |= _write_glb(temporary, setup.body, made, **options)
+        metrics = stack.enter_context(files.writing_json(metrics_path))
+        if names == [ALL]:
+            names = catalog.clip_names()
+        made_clips = make_clips(setup, names, policy, preset, fps, recording_progress, straight, plant)
+        if extension == GLB_EXTENSION:
+            metrics |= _write_glb(temporary, setup.body, made_clips, **options)
+        elif extension == SHEET_EXTENSION:
+            _write_sheet(temporary, setup.body, made_clips[0], **options)
         else:
-            _write_pictures(temporary, extension, setup.body, made[0], progress, **options)
-    return made
+            _write_film(temporary, extension, setup.body, made_clips[0], progress, **options)
+    return made_clips
 
 
 def metrics_file(path: str | os.PathLike) -> Path:
@@ -96,21 +106,24 @@ def metrics_file(path: str | os.PathLike) -> Path:
     return Path(path).with_suffix(".clips.json")
 
 
-def _checked(path: Path, names: Sequence[str], fps: float, options: Mapping[str, Any]) -> str:
-    """Return the extension of a file to write; a ValueError says what does not suit it."""
-    if (extension := path.suffix.lower()) in _CONVERTED:
-        raise ValueError(f"{path}: clips are written as .glb; tools/to_fbx.py makes {extension} of it, by Blender")
+def _check_arguments(path: Path, names: Sequence[str], fps: float, options: Mapping[str, Any]) -> str:
+    """Return the extension of a file to write; a ValueError says which argument does not suit it."""
+    suffix = path.suffix.lower()
+    if suffix in _BLENDER_EXTENSIONS:
+        raise ValueError(f"{path}: clips are written as .glb; tools/to_fbx.py makes {suffix} of it, by Blender")
     extension = checks.extension(path, EXTENSIONS)
-    for name in options:
-        fitting = OPTION_EXTENSIONS[checks.name(name, OPTION_EXTENSIONS, "option of clips")]
-        if extension not in fitting:
-            raise ValueError(f"{name}: it is for {', '.join(fitting)}, not for {extension}")
-    if extension != ".glb" and (len(names) != 1 or names == [ALL]):
+    for option in options:
+        checks.name(option, OPTION_EXTENSIONS, "option of clips")
+        suitable = OPTION_EXTENSIONS[option]
+        if extension not in suitable:
+            raise ValueError(f"{option}: it is for {', '.join(suitable)}, not for {extension}")
+    if extension != GLB_EXTENSION and (len(names) != 1 or names == [ALL]):
         raise ValueError(f"clips: expected one for {extension}, got {', '.join(names)}")
     films.check_fps(fps, extension)
-    for name in OPTION_BOUNDS.keys() & options.keys():
-        if options[name] is not None:
-            checks.integer(name, options[name], *OPTION_BOUNDS[name])
+    for option in OPTION_BOUNDS.keys() & options.keys():
+        if options[option] is not None:
+            least, greatest = OPTION_BOUNDS[option]
+            checks.integer(option, options[option], least, greatest)
     checks.name(options.get("rig", RIGS[0]), RIGS, "rig")
     checks.name(options.get("root_motion", "both"), ROOT_MOTIONS, "root_motion")
     return extension
@@ -132,7 +145,7 @@ def _write_glb(
     return sidecar(body, clips, root_motion)
 
 
-def _write_pictures(
+def _write_film(
     path: Path,
     extension: str,
     body: Body,
@@ -141,14 +154,25 @@ def _write_pictures(
     size: int = DEFAULT_SIZE,
     transparent: bool = False,
     turntable: bool = False,
+) -> None:
+    """Write a film of a clip."""
+    pictures = filming.film_pictures(body, clip, size, transparent, turntable)
+    picture_count = filming.count_film_pictures(clip, turntable)
+    pictures = progress(pictures, "rendering", picture_count, leave=False)
+    films.WRITERS[extension](path, pictures, clip.motion.time_step)
+
+
+def _write_sheet(
+    path: Path,
+    body: Body,
+    clip: Clip,
+    size: int = DEFAULT_SIZE,
+    transparent: bool = False,
     directions: int = DEFAULT_DIRECTIONS,
 ) -> None:
-    """Write a film or a sheet of a clip."""
-    if extension != ".png":
-        frames = filming.film_pictures(body, clip, size, transparent, turntable)
-        frames = progress(frames, "rendering", filming.count_film_pictures(clip, turntable), leave=False)
-        films.WRITERS[extension](path, frames, clip.motion.time_step)
-        return
-    if (width := size * len(clip.times)) > _WIDEST:
-        raise ValueError(f"the sheet is {width} pixels wide, more than {_WIDEST}; lower fps or size")
-    films.write_png(path, [filming.sprite_sheet(body, clip, size, directions, transparent)], 0.0)
+    """Write a sheet of sprites of a clip."""
+    width = size * len(clip.times)
+    if width > _MAX_SHEET_WIDTH:
+        raise ValueError(f"the sheet is {width} pixels wide, more than {_MAX_SHEET_WIDTH}; lower fps or size")
+    sheet = filming.sprite_sheet(body, clip, size, directions, transparent)
+    films.write_png(path, [sheet], 0.0)

@@ -1,7 +1,7 @@
 """Animation clips: named motions of one body, which loop, stay in step and connect."""
 
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,9 +15,9 @@ from arc_suite.animation.clips.root_motion import Motion
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
 
-FPS = 60
-_PRESET = "steered"  # its integral brings the speeds of clips to those of their commands
-_RATE = 30.0  # Hz: a clip lasts a whole number of frames at this rate, and so at 60 Hz
+FPS = 60  # frames a second
+_PRESET = "steered"  # the integral in its control brings the speeds of clips to those of their commands
+_PACE_RATE = 30.0  # Hz: a clip lasts a whole number of frames at this rate, and so at 60 Hz
 
 
 class Clip(NamedTuple):
@@ -30,7 +30,7 @@ class Clip(NamedTuple):
         cycles: of the gait.
         foot_contacts: events, in the order of time.
         feet: names of all feet.
-        slip: path of a sole near the ground, m a meter of the root, as a mean over the feet; None if the root stays.
+        slip: mean path of a foot in stance over the ground, m a meter of the root; None if the root stays.
         additive_over: names of the clips that an additive clip can be added to; None for a clip that is not additive.
     """
 
@@ -69,8 +69,8 @@ def clips(
     The policy walks under the commands of clips where the task has a command; in another task there is the clip walk
     alone. A cycle of the gait is a whole number of control steps, unless the setup sets `gait_frequency`.
 
-    Loops begin where the gait schedules the touchdown of the first foot, and hold the same number of cycles: the least
-    with which the most of them close within two degrees. Stops begin and starts end with the first pose of the walk;
+    Loops begin where the gait schedules the touchdown of the first foot. All hold the same number of cycles: the least
+    with which most of them close within two degrees. Stops begin and starts end with the first pose of the walk;
     stops end and starts begin with the first pose of idle. A clip lasts a whole number of frames at 30 and at 60 a
     second. The median height of soles in stance is 0.
 
@@ -102,36 +102,42 @@ def clips(
     names = [registry.bare_name(name) for name in names]
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
-    if policy == "cpg" and preset is None and "command" in setup.definition.blocks and not setup.kind.own_arena:
+    follows_command = "command" in setup.definition.blocks
+    if policy == "cpg" and preset is None and follows_command and not setup.kind.own_arena:
         preset = _PRESET
-    recorder, left_out = Recorder(setup, policy, preset), {}
-    made = make_drafts(recorder, names, progress, left_out, straight, plant)
-    told = {name: f"{setup.body.name}, clip {name}" for name in names if name in left_out}
-    if len(told) == len(names):
-        name = names[0]
-        raise ValueError(f"{told[name]}: {left_out[name]}")
-    for name, clip in told.items():
-        warnings.warn(f"{clip} is left out: {left_out[name]}", stacklevel=2)
-    framed = {name: _framed(name, setup.body, made[name], fps) for name in names if name not in left_out}
-    motions = {name: clip.motion for name, clip in framed.items()}
-    loops = {name: clip.loops for name, clip in framed.items()}
-    for name in filter(catalog.is_additive, framed):
-        over = additive.find_bases(setup.body, name, motions, loops, made["idle"].start)
-        framed[name] = framed[name]._replace(additive_over=tuple(over))
-    return list(framed.values())
+    recorder = Recorder(setup, policy, preset)
+    left_out: dict[str, str] = {}
+    drafts = make_drafts(recorder, names, progress, left_out, straight, plant)
+    _report_left_out(setup.body, names, left_out)
+    clip_of_name = {name: _sample_clip(name, setup.body, drafts[name], fps) for name in names if name not in left_out}
+    motions = {name: clip.motion for name, clip in clip_of_name.items()}
+    loops = {name: clip.loops for name, clip in clip_of_name.items()}
+    for name, clip in clip_of_name.items():
+        if catalog.is_additive(name):
+            bases = additive.find_bases(setup.body, name, motions, loops, drafts["idle"].start)
+            clip_of_name[name] = clip._replace(additive_over=tuple(bases))
+    return list(clip_of_name.values())
 
 
-def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
-    """Return a draft as frames: a whole number of them at 30 and at 60 a second."""
-    # A loop was found in whole control steps, which gait cycles need not fill: these give the pace.
-    lasts = draft.cycles * draft.cycle if draft.loops and draft.cycles else draft.motion.seconds
-    seconds = max(1, round(lasts * _RATE)) / _RATE
-    cycle = draft.cycle * seconds / lasts
-    draft = draft._replace(motion=draft.motion.stretch_to(seconds), cycle=cycle)
+def _report_left_out(body: Body, names: Sequence[str], left_out: Mapping[str, str]) -> None:
+    """Warn of each named clip that is left out; a ValueError if all of them are."""
+    missing = [name for name in names if name in left_out]
+    if len(missing) == len(names):
+        raise ValueError(f"{body.name}, clip {names[0]}: {left_out[names[0]]}")
+    for name in missing:
+        warnings.warn(f"{body.name}, clip {name} is left out: {left_out[name]}", stacklevel=3)
+
+
+def _sample_clip(name: str, body: Body, draft: Draft, fps: float) -> Clip:
+    """Return a draft as frames; it lasts a whole number of frames at 30 and at 60 a second."""
+    draft_seconds = draft.motion.seconds
+    if draft.loops and draft.cycles:
+        # A loop is a whole number of control steps, its gait cycles need not be. The gait cycles set the pace.
+        draft_seconds = draft.cycles * draft.cycle
+    seconds = max(1, round(draft_seconds * _PACE_RATE)) / _PACE_RATE
+    draft = draft._replace(motion=draft.motion.stretch_to(seconds), cycle=draft.cycle * seconds / draft_seconds)
     frames = max(1, round(seconds * fps))
-    motion, contacts = (
-        draft.motion.sample_at(np.linspace(0.0, seconds, frames + 1)),
-        tuple(draft.find_foot_contacts(body)[1]),
-    )
+    motion = draft.motion.sample_at(np.linspace(0.0, seconds, frames + 1))
+    _, contacts = draft.stance_height_and_contacts(body)
     slip = planting.slip(body, motion) if draft.loops else None
-    return Clip(name, motion, draft.loops, draft.cycles, contacts, body.foot_names, slip)
+    return Clip(name, motion, draft.loops, draft.cycles, tuple(contacts), body.foot_names, slip)

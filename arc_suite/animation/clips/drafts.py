@@ -19,7 +19,7 @@ from arc_suite.animation.clips.catalog import (
     Turn,
     WalkLoop,
     clip_of,
-    recordings_needed,
+    recordings_for_clips,
 )
 from arc_suite.animation.clips.foot_contacts import MIN_RISE, TOUCH_DOWN, FootContact, find_foot_contacts, sole_heights
 from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording, TurnRecording
@@ -27,12 +27,13 @@ from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compiled
 
-_MOST_CYCLES = 4  # of loops that stay in step
-_MOST_ALONE = 12  # of a loop with a gait of its own
-_FOLLOWS = 0.25  # of its command's velocity, that a loop has at least
-_DEEPEST = 0.025  # of the standing height, that a sole is below the ground where others are on it
-_RAISED = 0.05  # of the standing height, that a foot which steps rises in a gesture
-_FAR = np.radians(20.0)  # from the pose of a clip, from which a stop or a start is not made to meet it
+_MAX_CYCLES_IN_STEP = 4  # gait cycles of loops that stay in step
+_MAX_CYCLES_ALONE = 12  # gait cycles of a loop with a gait of its own
+_MIN_SPEED_SHARE = 0.25  # of its command's velocity, that a loop has at least
+_MAX_SOLE_DEPTH = 0.025  # standing heights, that a sole is below the ground where others are on it
+_MIN_RISE_IN_GESTURE = 0.05  # standing heights: a foot that rises less in a gesture does not step
+_MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
+_CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
 
 
 class Draft(NamedTuple):
@@ -43,7 +44,7 @@ class Draft(NamedTuple):
         cycles: of the gait; 0 without a gait.
         cycle: s.
         loops: whether its last pose is its first one.
-        stands: whether there is nothing to tell of feet.
+        stands: whether all feet stay on the ground, so that there are no foot contact events.
     """
 
     motion: Motion
@@ -57,14 +58,21 @@ class Draft(NamedTuple):
         """First pose."""
         return self.motion.pose(0)
 
-    def find_foot_contacts(self, body: Body) -> tuple[float, list[FootContact]]:
+    @property
+    def cycle_samples(self) -> int:
+        """Samples in a gait cycle."""
+        return round(self.cycle / self.motion.time_step)
+
+    def stance_height_and_contacts(self, body: Body) -> tuple[float, list[FootContact]]:
         """Return the median height of soles in stance, m, and the foot contact events; none without a gait."""
         heights = sole_heights(compiled(body), body, self.motion.poses())
         if self.stands:
             return float(np.median(heights)), []
-        least = MIN_RISE if self.cycles else _RAISED
-        found, stance = find_foot_contacts(self.motion, body, heights, self.cycle, self.loops, least)
-        return float(np.median(heights[stance])) if stance.any() else 0.0, found
+        min_rise = MIN_RISE if self.cycles else _MIN_RISE_IN_GESTURE
+        contacts, stance = find_foot_contacts(self.motion, body, heights, self.cycle, self.loops, min_rise)
+        if not stance.any():
+            return 0.0, contacts
+        return float(np.median(heights[stance])), contacts
 
     def plant_feet(self, body: Body) -> "Draft":
         """Return the draft with feet in stance that do not slide; see `planting.plant_feet`."""
@@ -73,7 +81,8 @@ class Draft(NamedTuple):
     def put_on_ground(self, body: Body) -> "Draft":
         """Return the draft with soles in stance on the ground, and none deep in it."""
         lowest = float(sole_heights(compiled(body), body, self.motion.poses()).min())
-        height = min(self.find_foot_contacts(body)[0], lowest + _DEEPEST * body.torso.standing_height)
+        stance_height, _ = self.stance_height_and_contacts(body)
+        height = min(stance_height, lowest + _MAX_SOLE_DEPTH * body.torso.standing_height)
         return self._replace(motion=self.motion.lower(height))
 
 
@@ -95,180 +104,282 @@ def make_drafts(
         straight: whether loops that do not turn go exactly where their commands say.
         plant: whether feet in stance do not slide.
     """
-    body, recorded = recorder.body, _recordings(recorder, names, progress, left_out)
-    gaits = {name: each for name, each in recorded.items() if isinstance(each, GaitRecording)}
-    clocked = {name: each for name, each in gaits.items() if each.phase is not None}
-    found = _in_step(body, clocked, _MOST_CYCLES, loops.MAX_SEAM, left_out) if clocked else {}
-    for name in gaits.keys() - clocked.keys():
-        found |= _in_step(body, {name: gaits[name]}, _MOST_ALONE, loops.GOOD_SEAM, left_out)
-    reasons = {name: _unfit(name, draft, recorder.velocity_units, found.get("walk")) for name, draft in found.items()}
-    left_out.update({name: reason for name, reason in reasons.items() if reason})
-    found = {name: draft for name, draft in found.items() if not reasons[name]}
+    body = recorder.body
+    gaits, transition, turns = _make_recordings(recorder, names, progress, left_out)
+    drafts = _cut_loops(body, gaits, left_out)
+    for name, draft in list(drafts.items()):
+        reason = _why_misnamed(name, draft, recorder.velocity_units, drafts.get("walk"))
+        if reason:
+            left_out[name] = reason
+    drafts = {name: draft for name, draft in drafts.items() if name not in left_out}
     if straight:
-        found = {name: draft._replace(motion=_straight(name, draft.motion)) for name, draft in found.items()}
-    walk = found.get("walk")
+        drafts = {name: draft._replace(motion=_straighten(name, draft.motion)) for name, draft in drafts.items()}
+
+    walk = drafts.get("walk")
+    planted_walk = None
     if plant:
-        found = {name: draft.plant_feet(body) for name, draft in found.items()}
-    if isinstance(transition := recorded.get(REST), TransitionRecording):
-        turns = {name: each for name, each in recorded.items() if isinstance(each, TurnRecording)}
-        found |= _connected(body, transition, turns, names, walk, found.get("walk") if plant else None, left_out)
+        drafts = {name: draft.plant_feet(body) for name, draft in drafts.items()}
+        planted_walk = drafts.get("walk")
+    if transition is not None:
+        drafts |= _make_connected(body, transition, turns, names, walk, planted_walk, left_out)
     for name in names:
-        if isinstance(spec := clip_of(name), Difference) and name not in left_out:
-            if {spec.loop, spec.base, "idle"} <= found.keys():
-                found[name] = _difference(found[spec.loop], found[spec.base], found["idle"].start)
-            else:
-                left_out[name] = left_out.get(spec.loop, f"there is no {spec.base} that it differs from")
-    return found
+        clip = clip_of(name)
+        if not isinstance(clip, Difference) or name in left_out:
+            continue
+        if {clip.loop, clip.base, "idle"} <= drafts.keys():
+            drafts[name] = _make_difference(drafts[clip.loop], drafts[clip.base], drafts["idle"].start)
+        else:
+            left_out[name] = left_out.get(clip.loop, f"there is no {clip.base} that it differs from")
+    return drafts
 
 
-def _recordings(
+# Recordings.
+
+
+def _make_recordings(
     recorder: Recorder, names, progress, left_out
-) -> dict[str, GaitRecording | TransitionRecording | TurnRecording]:
-    """Return recordings by name; reasons of failures go to `left_out`."""
-    found = {}
-    for source, needed_by in progress(list(recordings_needed(names).items())):
+) -> tuple[dict[str, GaitRecording], TransitionRecording | None, dict[str, TurnRecording]]:
+    """Return recordings of gaits by name, of the stop and the start, and of turns by name.
+
+    Reasons of failures go to `left_out`, for all clips that need the recording.
+    """
+    gaits = {}
+    transition = None
+    turns = {}
+    for source, dependent_clips in progress(list(recordings_for_clips(names).items())):
         try:
-            found[source] = _recording(recorder, source)
+            if source == REST:
+                transition = recorder.record_transition(WALK.command)
+                continue
+            clip = clip_of(source)
+            if isinstance(clip, Turn):
+                turns[source] = recorder.record_turn(math.radians(clip.angle))
+            else:
+                gaits[source] = _record_gait(recorder, source)
         except ValueError as error:
-            left_out |= dict.fromkeys(needed_by, str(error))
-    return found
+            left_out |= dict.fromkeys(dependent_clips, str(error))
+    return gaits, transition, turns
 
 
-def _recording(recorder: Recorder, source: str) -> GaitRecording | TransitionRecording | TurnRecording:
-    if source == REST:
-        return recorder.record_transition(WALK.command)
-    match clip_of(source):
-        case Turn() as turn:
-            return recorder.record_turn(math.radians(turn.angle))
-        case Showcase() as showcase:
-            return recorder.record_showcase(showcase.preset)
-        case WalkLoop() as loop:
-            return (
-                recorder.record_without_command()
-                if source == "walk" and not recorder.has_command
-                else recorder.record_walk(*loop)
-            )
-    raise ValueError(f"{source} is no loop that is recorded")  # of a difference of another package
+def _record_gait(recorder: Recorder, name: str) -> GaitRecording:
+    clip = clip_of(name)
+    if isinstance(clip, Showcase):
+        return recorder.record_showcase(clip.preset)
+    if not isinstance(clip, WalkLoop):
+        raise ValueError(f"{name} is no loop that is recorded")  # of a difference of another package
+    if name == "walk" and not recorder.has_command:
+        return recorder.record_without_command()
+    return recorder.record_walk(clip.command, clip.failing, clip.crouch)
 
 
-def _in_step(body: Body, recorded: Mapping[str, GaitRecording], most: int, bound: float, left_out) -> dict[str, Draft]:
-    """Return loops of recordings that hold the same number of cycles and begin at the same phase, on the ground."""
-    closings = {name: loops.find_closings(each.recording, each.cycle, most) for name, each in recorded.items()}
-    cycles, found = loops.choose_cycles(closings, bound), {}
-    for name, each in recorded.items():
+# Loops.
+
+
+def _cut_loops(body: Body, gaits: Mapping[str, GaitRecording], left_out) -> dict[str, Draft]:
+    """Return loops of recordings on the ground; those with a gait clock stay in step."""
+    with_clock = {name: gait for name, gait in gaits.items() if gait.phase is not None}
+    drafts = {}
+    if with_clock:
+        drafts = _cut_loops_in_step(body, with_clock, _MAX_CYCLES_IN_STEP, loops.MAX_SEAM, left_out)
+    for name in gaits.keys() - with_clock.keys():
+        drafts |= _cut_loops_in_step(body, {name: gaits[name]}, _MAX_CYCLES_ALONE, loops.GOOD_SEAM, left_out)
+    return drafts
+
+
+def _cut_loops_in_step(
+    body: Body, gaits: Mapping[str, GaitRecording], most_cycles: int, good_seam: float, left_out
+) -> dict[str, Draft]:
+    """Return loops of recordings that hold the same number of cycles and begin at the same phase, on the ground.
+
+    Args:
+        body: the spec.
+        gaits: recordings by name.
+        most_cycles: in a loop.
+        good_seam: rad; see `loops.choose_cycles`.
+        left_out: takes the reasons why loops do not close.
+    """
+    closings = {name: loops.find_closings(gait.recording, gait.cycle, most_cycles) for name, gait in gaits.items()}
+    cycles = loops.choose_cycles(closings, good_seam)
+    drafts = {}
+    for name, gait in gaits.items():
         closing = closings[name][cycles]
         if closing.seam > loops.MAX_SEAM:
-            bound, seam = np.degrees((loops.MAX_SEAM, closing.seam))
-            left_out[name] = f"the pose does not return within {bound:.0f} degrees: {seam:.1f} after {cycles} cycles"
+            max_degrees = np.degrees(loops.MAX_SEAM)
+            degrees = np.degrees(closing.seam)
+            left_out[name] = (
+                f"the pose does not return within {max_degrees:.0f} degrees: {degrees:.1f} after {cycles} cycles"
+            )
             continue
-        first = loops.choose_start(each.recording, closing.samples)
-        draft = Draft(loops.cut_loop(each.recording, first, closing.samples), cycles, each.cycle).put_on_ground(body)
-        begin = _first_touchdown(body, draft) if each.phase is None else each.wait(first)
-        found[name] = draft._replace(motion=draft.motion.start_at(begin))
-    return found
+        first = loops.choose_start(gait.recording, closing.samples)
+        motion = loops.cut_loop(gait.recording, first, closing.samples)
+        draft = Draft(motion, cycles, gait.cycle).put_on_ground(body)
+        has_clock = gait.phase is not None
+        begin = gait.samples_to_touchdown(first) if has_clock else _find_first_touchdown(body, draft)
+        drafts[name] = draft._replace(motion=draft.motion.start_at(begin))
+    return drafts
 
 
-def _straight(name: str, motion: Motion) -> Motion:
+def _find_first_touchdown(body: Body, draft: Draft) -> int:
+    """Return the sample in which the first foot that steps touches down first; 0 if no foot does."""
+    _, contacts = draft.stance_height_and_contacts(body)
+    for foot in body.foot_names:
+        samples = [contact.sample for contact in contacts if contact.event == TOUCH_DOWN and contact.foot == foot]
+        if samples:
+            return min(samples)
+    return 0
+
+
+def _straighten(name: str, motion: Motion) -> Motion:
     """Return a loop that goes where its command says, unless that is a turn."""
-    spec = clip_of(name)
-    forward, left, turning = spec.command if isinstance(spec, WalkLoop) else (1.0, 0.0, 0.0)
-    return motion if turning else loops.straighten_loop(motion, math.atan2(left, forward))
+    clip = clip_of(name)
+    command = clip.command if isinstance(clip, WalkLoop) else WALK.command
+    forward, left, turning = command
+    if turning:
+        return motion
+    return loops.straighten_loop(motion, course=math.atan2(left, forward))
 
 
-def _first_touchdown(body: Body, draft: Draft) -> int:
-    """Return the sample in which the first foot that steps touches down; 0 if none does."""
-    downs = [contact for contact in draft.find_foot_contacts(body)[1] if contact.event == TOUCH_DOWN]
-    return min(downs, key=lambda contact: (body.foot_names.index(contact.foot), contact.sample)).sample if downs else 0
-
-
-def _unfit(name: str, draft: Draft, units: np.ndarray | None, walk: Draft | None) -> str:
+def _why_misnamed(name: str, draft: Draft, velocity_units: np.ndarray | None, walk: Draft | None) -> str:
     """Return why a loop is not what its name says: it does not follow its command, or is as fast as the walk; or ""."""
-    if units is not None and isinstance(spec := clip_of(name), WalkLoop):
-        command = np.array(spec.command)
-        share = command @ (draft.motion.twist / units) / (command @ command)
-        if share < _FOLLOWS:
-            return f"the policy moves at {round(100.0 * share)} % of its command, less than {100.0 * _FOLLOWS:.0f} %"
+    clip = clip_of(name)
+    if velocity_units is not None and isinstance(clip, WalkLoop):
+        command = np.array(clip.command)
+        share = command @ (draft.motion.twist / velocity_units) / (command @ command)
+        if share < _MIN_SPEED_SHARE:
+            percent = round(100.0 * share)
+            return f"the policy moves at {percent} % of its command, less than {100.0 * _MIN_SPEED_SHARE:.0f} %"
     if name in SPEED_RATIOS and walk is not None:
-        (low, high), (speed, usual) = SPEED_RATIOS[name], (np.hypot(*each.motion.twist[:2]) for each in (draft, walk))
-        if not low <= speed / usual <= high:
-            rule = f"{low:g} times that or more" if low else f"{high:.2g} times that or less"
-            return f"its speed is {speed:.3f} m/s, and that of the walk {usual:.3f}: {name} has {rule}"
+        min_ratio, max_ratio = SPEED_RATIOS[name]
+        speed = np.hypot(*draft.motion.twist[:2])
+        walk_speed = np.hypot(*walk.motion.twist[:2])
+        if not min_ratio <= speed / walk_speed <= max_ratio:
+            rule = f"{min_ratio:g} times that or more" if min_ratio else f"{max_ratio:.2g} times that or less"
+            return f"its speed is {speed:.3f} m/s, and that of the walk {walk_speed:.3f}: {name} has {rule}"
     return ""
 
 
-def _connected(
+def _make_difference(draft: Draft, base: Draft, pose: Pose) -> Draft:
+    """Return how a loop differs from another in step with it, added to a pose; its root stays."""
+    base_motion = base.motion
+    times = np.linspace(0.0, base_motion.seconds, len(base_motion.joints))
+    motion = draft.motion.sample_at(times * draft.motion.seconds / base_motion.seconds)
+    turns = rotations.product(motion.quaternions, base_motion.quaternions * _CONJUGATE)
+    difference = motion._replace(
+        time_step=base_motion.time_step,
+        root=np.zeros_like(base_motion.root),
+        positions=pose.position + motion.positions - base_motion.positions,
+        quaternions=rotations.product(turns, np.broadcast_to(pose.quaternion, turns.shape)),
+        joints=pose.joints + motion.joints - base_motion.joints,
+        twist=np.zeros(3),
+    )
+    return draft._replace(motion=difference, cycle=base.cycle, stands=True)
+
+
+# Clips that connect to idle, and some to the walk.
+
+
+def _make_connected(
     body: Body,
     transition: TransitionRecording,
     turns: Mapping[str, TurnRecording],
     names: Sequence[str],
     walk: Draft | None,
-    planted: Draft | None,
+    planted_walk: Draft | None,
     left_out,
 ) -> dict[str, Draft]:
-    """Return the draft of idle, and of the clips that connect to it where they are asked for.
+    """Return the draft of idle, and those of the named clips that connect to it.
 
     Args:
         body: the spec.
-        transition: from which rest is taken, and stops and starts.
+        transition: from which rest, stops and starts are taken.
         turns: recordings by name.
         names: of the clips.
         walk: that stops and starts connect to, with feet as in the physics.
-        planted: the same with planted feet; None if feet are not to be planted.
+        planted_walk: the same with planted feet; None if feet are not to be planted.
         left_out: takes the reasons why clips cannot be made.
     """
-    rest = root_motion.stay_at_start(transition.recorded.recording, transition.start, 1).pose(0)
-    idle = _played(body, cast(Acted, clip_of("idle")), rest).put_on_ground(body)
-    found = {"idle": idle}
+    rest = root_motion.stay_at_start(transition.gait.recording, transition.start, samples=1).pose(0)
+    idle_clip = cast(Acted, clip_of("idle"))
+    idle = _play(body, idle_clip, rest).put_on_ground(body)
+    drafts = {"idle": idle}
     for name in names:
         try:
             match clip_of(name):
-                case Acted() as spec if name != "idle":
-                    found[name] = _acted(body, spec, rest, idle.start)
-                case Turn() as spec if name in turns:
-                    draft = _turn(body, math.radians(spec.angle), turns[name], idle.start)
-                    found[name] = _planted_turn(body, draft, idle.start) if planted else draft
-                case Passage() as spec:
-                    draft = _passage(body, spec, transition, idle.start, walk)
-                    found[name] = _planted_passage(body, spec, draft, idle.start, walk, planted) if planted else draft
+                case Acted() as clip if name != "idle":
+                    drafts[name] = _act(body, clip, rest, idle.start)
+                case Turn() as clip if name in turns:
+                    draft = _make_turn(body, math.radians(clip.angle), turns[name], idle.start)
+                    if planted_walk is not None:
+                        draft = _plant_turn(body, draft, idle.start)
+                    drafts[name] = draft
+                case Passage() as clip:
+                    draft = _make_passage(body, clip, transition, idle.start, walk)
+                    if planted_walk is not None:
+                        draft = _plant_passage(body, clip, draft, idle.start, walk, planted_walk)
+                    drafts[name] = draft
         except ValueError as error:
             left_out[name] = str(error)
-    return found
+    return drafts
 
 
-def _played(body: Body, spec: Acted, rest: Pose) -> Draft:
+def _play(body: Body, clip: Acted, rest: Pose) -> Draft:
     """Return a motion from the pose at rest.
 
     Raises:
         ValueError: the clip plays no motion, as one of another package may.
     """
-    motion = spec.play(body, rest)
+    motion = clip.play(body, rest)
     if not isinstance(motion, Motion):
         raise ValueError(f"expected a Motion of its play, got {type(motion).__name__}")
-    return Draft(motion, loops=spec.loops, stands=not spec.steps)
+    return Draft(motion, loops=clip.loops, stands=not clip.steps)
 
 
-def _acted(body: Body, spec: Acted, rest: Pose, idle: Pose) -> Draft:
+def _act(body: Body, clip: Acted, rest: Pose, idle: Pose) -> Draft:
     """Return a motion from the pose at rest, which meets idle; see `Acted`."""
-    draft = _played(body, spec, rest)
+    draft = _play(body, clip, rest)
     motion = draft.motion.lower(rest.position[2] - idle.position[2])
-    for end in spec.ends:
-        motion = motion.end_with(idle, end, len(motion.joints) // 3)
+    for end in clip.ends:
+        motion = motion.end_with(idle, end, samples=len(motion.joints) // 3)
     return draft._replace(motion=motion)
 
 
-def _turn(body: Body, angle: float, turned: TurnRecording, idle: Pose) -> Draft:
-    """Return a turn from idle to idle by exactly an angle, rad, which the root takes up."""
-    recorded = turned.recorded
-    cycle = round(recorded.cycle / recorded.recording.time_step)
-    motion = root_motion.follow_mean_path(recorded.recording, turned.first, turned.samples, cycle)
-    draft = Draft(motion, round(turned.samples / cycle), recorded.cycle, loops=False).put_on_ground(body)
-    motion = draft.motion.meet(idle, 0, cycle).meet(idle, -1, cycle)
-    missing = (angle - motion.root[-1, 2]) * np.linspace(0.0, 1.0, len(motion.root))
-    root = motion.root + missing[:, None] * (0.0, 0.0, 1.0)
-    return draft._replace(motion=motion._replace(root=root, twist=root_motion.twist_to(root[-1]) / motion.seconds))
+def _make_turn(body: Body, angle: float, turn: TurnRecording, idle: Pose) -> Draft:
+    """Return a turn from idle to idle by exactly an angle, rad; the root takes up what the recording lacks."""
+    recording = turn.gait.recording
+    cycle_samples = round(turn.gait.cycle / recording.time_step)
+    motion = root_motion.follow_mean_path(recording, turn.first, turn.samples, window=cycle_samples)
+    cycles = round(turn.samples / cycle_samples)
+    draft = Draft(motion, cycles, turn.gait.cycle, loops=False).put_on_ground(body)
+    motion = draft.motion.meet(idle, 0, cycle_samples).meet(idle, -1, cycle_samples)
+    missing_angles = (angle - motion.root[-1, 2]) * np.linspace(0.0, 1.0, len(motion.root))
+    root = motion.root + missing_angles[:, None] * (0.0, 0.0, 1.0)
+    twist = root_motion.twist_to(root[-1]) / motion.seconds
+    return draft._replace(motion=motion._replace(root=root, twist=twist))
 
 
-def _passage(body: Body, spec: Passage, transition: TransitionRecording, idle: Pose, walk: Draft | None) -> Draft:
+def _plant_turn(body: Body, draft: Draft, idle: Pose) -> Draft:
+    """Return a turn with planted feet, which meets idle."""
+    motion = draft.plant_feet(body).motion
+    motion = motion.end_with(idle, 0, draft.cycle_samples)
+    motion = motion.end_with(idle, -1, draft.cycle_samples)
+    return draft._replace(motion=motion)
+
+
+def cut_passage(body: Body, clip: Passage, transition: TransitionRecording) -> Draft:
+    """Return a stop or a start as it was recorded, with soles in stance on the ground."""
+    gait = transition.gait
+    cycle_samples = round(gait.cycle / gait.recording.time_step)
+    samples = clip.cycles * cycle_samples
+    if clip.starts:
+        first = transition.start
+        samples -= transition.delay  # it ends at a scheduled touchdown
+    else:
+        first = transition.stop
+    motion = root_motion.follow_mean_path(gait.recording, first, samples, window=cycle_samples)
+    return Draft(motion, clip.cycles, gait.cycle, loops=False).put_on_ground(body)
+
+
+def _make_passage(body: Body, clip: Passage, transition: TransitionRecording, idle: Pose, walk: Draft | None) -> Draft:
     """Return a stop or a start, which meets idle and the walk.
 
     Raises:
@@ -276,63 +387,47 @@ def _passage(body: Body, spec: Passage, transition: TransitionRecording, idle: P
     """
     if walk is None:
         raise ValueError("there is no walk that it connects to")
-    draft = cut_passage(body, spec, transition)
-    cycle, still, going = round(draft.cycle / draft.motion.time_step), *((0, -1) if spec.starts else (-1, 0))
-    motion = draft.motion.meet(idle, still, cycle).meet(walk.start, going, cycle)
-    if motion.seam > _FAR:
-        seam, most = np.degrees((motion.seam, _FAR))
-        raise ValueError(f"its pose is {seam:.0f} degrees from that of the walk or of idle, more than {most:.0f}")
+    draft = cut_passage(body, clip, transition)
+    idle_end, walk_end = _ends_of_passage(clip)
+    motion = draft.motion.meet(idle, idle_end, draft.cycle_samples)
+    motion = motion.meet(walk.start, walk_end, draft.cycle_samples)
+    if motion.seam > _MAX_MEETING_SEAM:
+        seam = np.degrees(motion.seam)
+        max_seam = np.degrees(_MAX_MEETING_SEAM)
+        raise ValueError(f"its pose is {seam:.0f} degrees from that of the walk or of idle, more than {max_seam:.0f}")
     return draft._replace(motion=motion)
 
 
-def _planted_turn(body: Body, draft: Draft, idle: Pose) -> Draft:
-    """Return a turn with planted feet, which meets idle."""
-    motion, cycle = draft.plant_feet(body).motion, round(draft.cycle / draft.motion.time_step)
-    return draft._replace(motion=motion.end_with(idle, 0, cycle).end_with(idle, -1, cycle))
-
-
-def _planted_passage(body: Body, spec: Passage, draft: Draft, idle: Pose, walk: Draft, planted: Draft) -> Draft:
+def _plant_passage(body: Body, clip: Passage, draft: Draft, idle: Pose, walk: Draft, planted_walk: Draft) -> Draft:
     """Return a stop or a start with planted feet, which meets idle, and the planted walk in pose and velocity.
 
-    It is planted together with the walk, so that a stance that lasts beyond its end has one place.
+    The passage is planted together with the walk, so that a foot whose stance goes on in the walk stays in one place.
 
     Args:
         body: the spec.
-        spec: of the clip.
-        draft: the clip before, which meets idle and the walk.
+        clip: the stop or the start.
+        draft: its draft with feet as in the physics, which meets idle and the walk.
         idle: first pose of idle.
         walk: with feet as in the physics.
-        planted: the same with planted feet.
+        planted_walk: the same with planted feet.
     """
-    motion, count = draft.motion, len(draft.motion.joints)
-    parts = (motion, walk.motion) if spec.starts else (walk.motion, motion)
-    joints = draft._replace(motion=parts[0].append(parts[1])).plant_feet(body).motion.joints
-    motion = motion._replace(joints=joints[:count] if spec.starts else joints[-count:])
-    cycle, still, going = round(draft.cycle / motion.time_step), *((0, -1) if spec.starts else (-1, 0))
-    return draft._replace(motion=motion.end_with(idle, still, cycle).end_with(planted.start, going, cycle))
+    samples = len(draft.motion.joints)
+    if clip.starts:
+        motion_with_walk = draft.motion.append(walk.motion)
+        passage_samples = slice(None, samples)
+    else:
+        motion_with_walk = walk.motion.append(draft.motion)
+        passage_samples = slice(-samples, None)
+    planted_with_walk = draft._replace(motion=motion_with_walk).plant_feet(body).motion
+    idle_end, walk_end = _ends_of_passage(clip)
+    motion = draft.motion._replace(joints=planted_with_walk.joints[passage_samples])
+    motion = motion.end_with(idle, idle_end, draft.cycle_samples)
+    motion = motion.end_with(planted_walk.start, walk_end, draft.cycle_samples)
+    return draft._replace(motion=motion)
 
 
-def cut_passage(body: Body, spec: Passage, transition: TransitionRecording) -> Draft:
-    """Return a stop or a start as it was recorded, with soles in stance on the ground."""
-    recorded = transition.recorded
-    cycle = round(recorded.cycle / recorded.recording.time_step)
-    first = transition.start if spec.starts else transition.stop
-    samples = spec.cycles * cycle - transition.late * spec.starts
-    motion = root_motion.follow_mean_path(recorded.recording, first, samples, cycle)
-    return Draft(motion, spec.cycles, recorded.cycle, loops=False).put_on_ground(body)
-
-
-def _difference(draft: Draft, usual: Draft, pose: Pose) -> Draft:
-    """Return how a loop differs from another in step with it, added to a pose; its root stays."""
-    times = np.linspace(0.0, usual.motion.seconds, len(usual.motion.joints))
-    motion, same = draft.motion.sample_at(times * draft.motion.seconds / usual.motion.seconds), usual.motion
-    turns = rotations.product(motion.quaternions, same.quaternions * (1.0, -1.0, -1.0, -1.0))
-    motion = motion._replace(
-        time_step=same.time_step,
-        root=np.zeros_like(same.root),
-        positions=pose.position + motion.positions - same.positions,
-        quaternions=rotations.product(turns, np.broadcast_to(pose.quaternion, turns.shape)),
-        joints=pose.joints + motion.joints - same.joints,
-        twist=np.zeros(3),
-    )
-    return draft._replace(motion=motion, cycle=usual.cycle, stands=True)
+def _ends_of_passage(clip: Passage) -> tuple[int, int]:
+    """Return the end, 0 or -1, at which a passage meets idle, and that at which it meets the walk."""
+    if clip.starts:
+        return 0, -1
+    return -1, 0

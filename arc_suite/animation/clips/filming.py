@@ -14,15 +14,17 @@ from arc_suite.simulation import opengl, pictures
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import readings
 
-_FREE = -1  # the camera without a name
-_LOOKS, _DOWN = 90.0, -20.0  # degrees: a body that is not turned goes to the right in the picture, seen from above
-_MARGIN = 1.0  # around the body
-_EXTENTS = 1.5  # of the scene, from which the free camera looks
-_PLAIN = (0.36, 0.40, 0.45, 1.0)  # a ground without a grid, which would stand still under a body that walks in place
-_NONE = (0.0, 0.0, 0.0, 0.0)
-_AROUND = 6.0  # s, about what a turn on the turntable takes
-_SOLID = pictures.QUALITIES["still"]  # of many pixels, body or not, whose mean is an alpha
-_GROUNDED = pictures.QUALITIES["film"]
+_FREE_CAMERA = -1  # MuJoCo's number of the camera without a name
+_AZIMUTH = 90.0  # degrees: a body with heading 0 goes to the right in the picture
+_ELEVATION = -20.0  # degrees: the camera looks down
+_FRAMING = 1.0  # times the distance at which the body fills the picture
+_EXTENTS_TO_CAMERA = 1.5  # distance of MuJoCo's free camera, in extents of the scene
+_PLAIN_GROUND = (0.36, 0.40, 0.45, 1.0)  # RGBA; a grid would stand still under a body that walks in place
+_NO_GROUND = (0.0, 0.0, 0.0, 0.0)
+_TURN_SECONDS = 6.0  # s, about what a turn on the turntable takes
+# A transparent picture is drawn with many pixels for each of its own: the share that shows the body is the alpha.
+_TRANSPARENT_QUALITY = pictures.QUALITIES["still"]
+_OPAQUE_QUALITY = pictures.QUALITIES["film"]
 
 
 def film_pictures(
@@ -44,22 +46,26 @@ def film_pictures(
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
-    total = count_film_pictures(clip, turntable)
-    headings = heading + np.linspace(0.0, 2.0 * np.pi * turntable, total, endpoint=False)
-    yield from _views(body, clip, np.arange(total) % _count(clip), headings, size, transparent)
+    picture_count = count_film_pictures(clip, turntable)
+    frames = np.arange(picture_count) % _count_frames(clip)
+    turn = 2.0 * np.pi if turntable else 0.0
+    headings = heading + np.linspace(0.0, turn, picture_count, endpoint=False)
+    yield from _render(body, clip, frames, headings, size, transparent)
 
 
 def count_film_pictures(clip: Clip, turntable: bool = False) -> int:
     """Return the number of pictures of a film; see `film_pictures`."""
-    rounds = max(1, round(_AROUND / clip.motion.seconds)) if turntable else 1
-    return rounds * _count(clip)
+    repetitions = 1
+    if turntable:
+        repetitions = max(1, round(_TURN_SECONDS / clip.motion.seconds))
+    return repetitions * _count_frames(clip)
 
 
 def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent: bool = False) -> np.ndarray:
     """Return one picture with a row for each direction and a column for each frame of the clip.
 
     The first row goes to the right in the picture; each next one is turned further to the left. Other arguments are
-    those of `loop`.
+    those of `film_pictures`.
 
     Args:
         body: of the clip.
@@ -68,64 +74,85 @@ def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent
         directions: how many.
         transparent: whether all but the body is left out.
     """
-    count = _count(clip)
-    headings = np.repeat(2.0 * np.pi * np.arange(directions) / directions, count)
-    views = list(_views(body, clip, np.tile(np.arange(count), directions), headings, size, transparent))
-    return np.concatenate([np.concatenate(views[i : i + count], axis=1) for i in range(0, len(views), count)])
+    columns = _count_frames(clip)
+    frames = np.tile(np.arange(columns), directions)
+    headings = np.repeat(2.0 * np.pi * np.arange(directions) / directions, columns)
+    squares = list(_render(body, clip, frames, headings, size, transparent))
+    sheet_rows = []
+    for first in range(0, len(squares), columns):
+        sheet_rows.append(np.concatenate(squares[first : first + columns], axis=1))
+    return np.concatenate(sheet_rows)
 
 
-def _count(clip: Clip) -> int:
-    """Return the frames of a clip, without that which is the first one again."""
-    return len(clip.times) - clip.loops
+def _count_frames(clip: Clip) -> int:
+    """Return the number of different frames of a clip; the last one of a loop is the first one again."""
+    if clip.loops:
+        return len(clip.times) - 1
+    return len(clip.times)
 
 
-def _views(body: Body, clip: Clip, frames, headings, size: int, transparent: bool) -> Iterator[np.ndarray]:
-    """Yield pictures (size, size, channels) of frames (n,) under headings (n,), rad."""
-    poses = clip.motion._replace(root=0.0 * clip.motion.root).poses()[frames]
+def _render(body: Body, clip: Clip, frames, headings, size: int, transparent: bool) -> Iterator[np.ndarray]:
+    """Yield pictures (size, size, channels) of frames (n,) under headings (n,), rad, with the root at 0."""
+    motion_in_place = clip.motion._replace(root=np.zeros_like(clip.motion.root))
+    poses = motion_in_place.poses()[frames]
     poses[:, :2] = rotations.to_heading_frame(poses[:, :2], -headings)
     poses[:, 3:7] = rotations.turn_about_z(poses[:, 3:7], headings)
     model = compiled(body)
     positions = readings.positions(poses, readings.layout(model, body), stood(model))
-    stage = opengl.call(lambda: _stage(body, positions[: _count(clip)], transparent))
+    framed_positions = positions[: _count_frames(clip)]
+    stage = opengl.call(lambda: _prepare_stage(body, framed_positions, transparent))
     try:
         for qpos in positions:
-            yield opengl.call(lambda qpos=qpos: _view(stage, qpos, size, transparent))
+            yield opengl.call(lambda qpos=qpos: _render_pose(stage, qpos, size, transparent))
     finally:
         opengl.call(stage.free)
 
 
-def _stage(body: Body, positions: np.ndarray, transparent: bool) -> pictures.Decorated:
-    """Return a model to draw, with the free camera on all of it in all positions (n, nq)."""
-    quality, ground = (_SOLID, _NONE) if transparent else (_GROUNDED, _PLAIN)
-    stage = pictures.Decorated.from_body(body, quality=quality, ground=ground)
-    model, around, above = stage.model.ptr, 0.0, 0.0
-    own = model.geom_bodyid > 0
-    for qpos in positions:
-        stage.pose(qpos)
-        places, radii = stage.data.geom_xpos[own], model.geom_rbound[own]
-        around = max(around, (np.linalg.norm(places[:, :2], axis=-1) + radii).max())
-        above = max(above, (places[:, 2] + radii).max())
-    view, half = model.vis.global_, 0.5 * above
-    view.azimuth, view.elevation = _LOOKS, _DOWN
-    model.stat.center[:] = 0.0, 0.0, half
-    distance = _MARGIN * math.hypot(around, half) / math.sin(math.radians(0.5 * view.fovy))
-    model.vis.map.shadowclip *= model.stat.extent * _EXTENTS / distance
-    model.stat.extent = distance / _EXTENTS
+def _prepare_stage(body: Body, positions: np.ndarray, transparent: bool) -> pictures.Decorated:
+    """Return a model to draw, with the free camera on all of the body in all positions (n, nq)."""
+    if transparent:
+        stage = pictures.Decorated.from_body(body, quality=_TRANSPARENT_QUALITY, ground=_NO_GROUND)
+    else:
+        stage = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
+    model = stage.model.ptr
+    radius, height = _bounding_cylinder(stage, positions)
+    camera = model.vis.global_
+    camera.azimuth = _AZIMUTH
+    camera.elevation = _ELEVATION
+    model.stat.center[:] = 0.0, 0.0, 0.5 * height
+    half_view = math.radians(0.5 * camera.fovy)
+    distance = _FRAMING * math.hypot(radius, 0.5 * height) / math.sin(half_view)
+    model.vis.map.shadowclip *= model.stat.extent * _EXTENTS_TO_CAMERA / distance
+    model.stat.extent = distance / _EXTENTS_TO_CAMERA
     return stage
 
 
-def _view(stage: pictures.Decorated, qpos: np.ndarray, size: int, transparent: bool) -> np.ndarray:
+def _bounding_cylinder(stage: pictures.Decorated, positions: np.ndarray) -> tuple[float, float]:
+    """Return radius and height, m, of the cylinder about the vertical axis that holds the body in all positions."""
+    model = stage.model.ptr
+    is_body_geom = model.geom_bodyid > 0
+    geom_radii = model.geom_rbound[is_body_geom]
+    radius = 0.0
+    height = 0.0
+    for qpos in positions:
+        stage.pose(qpos)
+        centers = stage.data.geom_xpos[is_body_geom]
+        radius = max(radius, (np.linalg.norm(centers[:, :2], axis=-1) + geom_radii).max())
+        height = max(height, (centers[:, 2] + geom_radii).max())
+    return radius, height
+
+
+def _render_pose(stage: pictures.Decorated, qpos: np.ndarray, size: int, transparent: bool) -> np.ndarray:
+    """Return a picture (size, size, 3 or 4), drawn larger and reduced."""
     stage.pose(qpos)
-    scale = min((_SOLID if transparent else _GROUNDED).scale, pictures.LARGEST * MAX_HEIGHT // size)
-
-    def drawn(**kwargs):
-        return stage.render(scale * size, scale * size, _FREE, **kwargs)
-
-    colors = drawn()
+    quality = _TRANSPARENT_QUALITY if transparent else _OPAQUE_QUALITY
+    scale = min(quality.scale, pictures.LARGEST * MAX_HEIGHT // size)  # pixels drawn, for each of the picture
+    colors = stage.render(scale * size, scale * size, _FREE_CAMERA)
     if not transparent:
         return pictures.smaller(colors, scale)
-    parts = drawn(segmentation=True)[..., :1]
-    solid = (parts >= 0) & (stage.model.ptr.geom_bodyid[parts] > 0)
-    alpha = pictures.smaller(np.uint8(255) * solid, scale)
-    shade = pictures.smaller(colors * solid, scale) * (255.0 / np.maximum(alpha, 1))
-    return np.concatenate([shade.clip(0.0, 255.0).round().astype(np.uint8), alpha], axis=-1)
+    geoms = stage.render(scale * size, scale * size, _FREE_CAMERA, segmentation=True)[..., :1]  # -1 where none is
+    shows_body = (geoms >= 0) & (stage.model.ptr.geom_bodyid[geoms] > 0)
+    alpha = pictures.smaller(np.uint8(255) * shows_body, scale)
+    premultiplied = pictures.smaller(colors * shows_body, scale)
+    straight_colors = premultiplied * (255.0 / np.maximum(alpha, 1))
+    return np.concatenate([straight_colors.clip(0.0, 255.0).round().astype(np.uint8), alpha], axis=-1)

@@ -10,14 +10,16 @@ from arc_suite.models.standing import stood
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import readings
 
-TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
+TOUCH_DOWN = "touch_down"
+LIFT_OFF = "lift_off"
+MIN_RISE = 0.005  # standing heights: a foot that rises less never leaves the ground
 
-# Shares of the range of a foot's height: a swing rises above the upper one, and lasts while the foot is above the
-# lower one.
-_RISES, _LASTS = 0.5, 0.2
-_BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
-MIN_RISE = 0.005  # of the standing height: a foot that rises less never leaves the ground
-_NEAR = 0.005  # of the standing height: a sole that is lower touches
+# Heights between which a foot swings, as shares of the range of its height: it rises above the upper one, and the
+# swing lasts while the foot is above the lower one.
+_SWING_UPPER = 0.5
+_SWING_LOWER = 0.2
+_BOUNCE = 0.1  # gait cycles: a foot that touches for less in a swing bounces
+_TOUCHING_HEIGHT = 0.005  # standing heights: a sole that is lower touches
 
 
 class FootContact(NamedTuple):
@@ -42,74 +44,84 @@ def sole_heights(model: mujoco.MjModel, body: Body, poses: np.ndarray) -> np.nda
     Args:
         model: of the body.
         body: its spec.
-        poses: (samples, 7 + joints)
+        poses: (samples, 7 + joints) in the world.
     """
     data = mujoco.MjData(model)
-    feet = [model.body(name).id for name in body.foot_names]
-    layout = readings.layout(model, body)
-    positions = readings.positions(poses, layout, stood(model))
-    heights = np.empty((len(poses), len(feet)))
-    for qpos, row in zip(positions, heights, strict=True):
+    foot_ids = [model.body(name).id for name in body.foot_names]
+    foot_radii = [leg.foot.radius for leg in body.legs]
+    positions = readings.positions(poses, readings.layout(model, body), stood(model))
+    center_heights = np.empty((len(poses), len(foot_ids)))
+    for sample, qpos in enumerate(positions):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
-        row[:] = data.xpos[feet, 2]
-    return heights - [leg.foot.radius for leg in body.legs]
+        center_heights[sample] = data.xpos[foot_ids, 2]
+    return center_heights - foot_radii
 
 
-def find_swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.ndarray:
+def find_swings(heights: np.ndarray, min_rise: float, bounce: float, loops: bool) -> np.ndarray:
     """Return when a foot swings, (samples,) booleans.
 
     Args:
         heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.
-        least: m; a foot that rises less does not swing.
+        min_rise: m; a foot that rises less does not swing.
         bounce: samples; a shorter contact does not end a swing.
         loops: whether the first sample follows the last.
     """
-    low, lift = heights.min(), np.ptp(heights)
-    if lift < least:
+    lowest = heights.min()
+    rise = np.ptp(heights)
+    if rise < min_rise:
         return np.zeros(len(heights), bool)
-    up, high = (heights > low + share * lift for share in (_LASTS, _RISES))
-    begin = int(up.argmin()) if loops else 0  # in stance, so that no swing is cut in two
-    up, high = np.roll(up, -begin), np.roll(high, -begin)
-    starts, ends = _runs(up)
-    for end, start in zip(ends[:-1], starts[1:], strict=True):
-        up[end:start] |= start - end < bounce
-    for start, end in zip(*_runs(up), strict=True):
-        up[start:end] = high[start:end].any()
-    return np.roll(up, begin)
+    is_up = heights > lowest + _SWING_LOWER * rise
+    is_high = heights > lowest + _SWING_UPPER * rise
+    begin = 0
+    if loops:
+        begin = int(is_up.argmin())  # a sample in stance, so that no swing is cut in two
+    is_up = np.roll(is_up, -begin)
+    is_high = np.roll(is_high, -begin)
+
+    starts, ends = _find_runs(is_up)
+    for end, next_start in zip(ends[:-1], starts[1:], strict=True):
+        if next_start - end < bounce:
+            is_up[end:next_start] = True
+    starts, ends = _find_runs(is_up)
+    for start, end in zip(starts, ends, strict=True):
+        is_up[start:end] = is_high[start:end].any()
+    return np.roll(is_up, begin)
 
 
-def find_touching(heights: np.ndarray, up: np.ndarray, near: float, loops: bool) -> np.ndarray:
+def find_touching(heights: np.ndarray, swings: np.ndarray, near: float, loops: bool) -> np.ndarray:
     """Return when a foot touches the ground, (samples,) booleans: while it is near, once in each stance.
+
+    A foot that stays higher throughout a stance touches where it is near its lowest point. One that still sinks at the
+    end of the samples, or already rises at the start, does not touch there.
 
     Args:
         heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.
-        up: (samples,) when it swings.
-        near: m; a foot that stays higher throughout a stance touches where it is within this of its lowest point. One
-            that still sinks at the end of the samples, or already rises at the start, does not touch there.
+        swings: (samples,) when it swings.
+        near: m.
         loops: whether the first sample follows the last.
     """
-    begin = int(up.argmax()) if loops else 0  # in swing, so that no stance is cut in two
-    heights, up = np.roll(heights, -begin), np.roll(up, -begin)
-    down = np.zeros(len(up), bool)
-    for start, end in zip(*_runs(~up), strict=True):
+    begin = 0
+    if loops:
+        begin = int(swings.argmax())  # a sample in swing, so that no stance is cut in two
+    heights = np.roll(heights, -begin)
+    swings = np.roll(swings, -begin)
+    touches = np.zeros(len(swings), bool)
+    starts, ends = _find_runs(~swings)
+    for start, end in zip(starts, ends, strict=True):
         lowest = start + int(heights[start:end].argmin())
-        if heights[lowest] > near and not loops and lowest in (0, len(up) - 1):
-            continue
-        bound = near if heights[lowest] <= near else heights[lowest] + near
-        low = start + np.flatnonzero(heights[start:end] <= bound)
-        down[low[0] : low[-1] + 1] = True
-    return np.roll(down, begin)
-
-
-def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where runs of true values start, and where they have ended."""
-    edges = np.diff(mask.astype(int), prepend=0, append=0)
-    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+        max_height = near
+        if heights[lowest] > near:
+            if not loops and lowest in (0, len(swings) - 1):
+                continue
+            max_height = heights[lowest] + near
+        low_samples = start + np.flatnonzero(heights[start:end] <= max_height)
+        touches[low_samples[0] : low_samples[-1] + 1] = True
+    return np.roll(touches, begin)
 
 
 def find_foot_contacts(
-    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, least: float = MIN_RISE
+    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, min_rise: float = MIN_RISE
 ) -> tuple[list[FootContact], np.ndarray]:
     """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
 
@@ -119,18 +131,33 @@ def find_foot_contacts(
         heights: (samples, feet) of the soles, m.
         cycle: of the gait, s.
         loops: whether the motion is a loop; its last sample is its first one then, and has no events.
-        least: standing heights; a foot that rises less stays on the ground.
+        min_rise: standing heights; a foot that rises less stays on the ground.
     """
-    height, end = body.torso.standing_height, len(heights) - 1 if loops else len(heights)
-    found, swing = [], np.zeros(heights.shape, bool)
+    standing_height = body.torso.standing_height
+    sample_count = len(heights) - 1 if loops else len(heights)
+    bounce = _BOUNCE * cycle / motion.time_step  # samples
+    contacts = []
+    swings = np.zeros(heights.shape, bool)
 
     for leg, foot in enumerate(body.foot_names):
-        up = find_swings(heights[:end, leg], least * height, _BOUNCE * cycle / motion.time_step, loops)
-        down = find_touching(heights[:end, leg], up, _NEAR * height, loops)
-        before = np.roll(down, 1) if loops else np.concatenate([down[:1], down[:-1]])
-        for event, at in ((LIFT_OFF, ~down & before), (TOUCH_DOWN, down & ~before)):
-            samples = np.flatnonzero(at).tolist()
-            found += [FootContact(foot, event, sample, sample * motion.time_step) for sample in samples]
-        swing[:end, leg] = up
-    swing[end:] = swing[:1]
-    return sorted(found, key=lambda contact: (contact.sample, contact.foot, contact.event)), ~swing
+        foot_heights = heights[:sample_count, leg]
+        foot_swings = find_swings(foot_heights, min_rise * standing_height, bounce, loops)
+        touches = find_touching(foot_heights, foot_swings, _TOUCHING_HEIGHT * standing_height, loops)
+        touched_before = np.roll(touches, 1)
+        if not loops:
+            touched_before[0] = touches[0]
+        lifts_off = ~touches & touched_before
+        touches_down = touches & ~touched_before
+        for event, is_event in ((LIFT_OFF, lifts_off), (TOUCH_DOWN, touches_down)):
+            for sample in np.flatnonzero(is_event).tolist():
+                contacts.append(FootContact(foot, event, sample, time=sample * motion.time_step))
+        swings[:sample_count, leg] = foot_swings
+    swings[sample_count:] = swings[:1]
+    contacts.sort(key=lambda contact: (contact.sample, contact.foot, contact.event))
+    return contacts, ~swings
+
+
+def _find_runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first sample of each run of true values, and the sample after its last."""
+    edges = np.diff(mask.astype(int), prepend=0, append=0)
+    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)

@@ -1,12 +1,13 @@
 """Motions drawn over standing feet, from the pose at rest: breaths, looks, leans, blows, strikes.
 
 A gesture is a table of tracks. A track has keys of time and value; between keys the value is eased. Lengths are in
-standing heights h, times in sqrt(h / g).
+standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.NAMES`.
 """
 
 import itertools
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,58 +17,92 @@ from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
 
-_STAGES, _ROUNDS = 8, 6  # in which poses grow from rest, so that no leg folds the other way; searches in each
-_FASTEST = 7.0  # rad / sqrt(h / g), that a joint turns
-_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of a sole's place: legs of two joints slide rather than sink
-_ASTRAY = 0.0055  # standing heights, by which a sole may be from its place in a gesture at full size
-_SHARES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)  # of a gesture's size: the largest is taken that the legs can follow
-_DEEPER = (1.0, 1.6)  # times the height it sinks by, as stretched legs cannot follow a tilt
-_SINKS, _SLIDES = 0.01, 0.08  # standing heights, by which a sole may then miss its place in height and on the ground
-_SAMPLES = 4  # of a control step
-_SMOOTHING = 3  # rounds of a mean over three samples
+_HEIGHT = posture.NAMES.index("height")
+_LEFT = posture.NAMES.index("left")
+_ROLL = posture.NAMES.index("roll")
 
-_TURN, _OF_ROOM, _LEAST_TURN = 0.2, 0.8, 0.03  # rad, that a torso turns, at most a share of its room, and at least
-_EASE, _SHOWN = 3.0, 4.0  # durations of a turn, and of the pose after it
+_SAMPLES_PER_CONTROL_STEP = 4
+_SMOOTHING_ROUNDS = 3  # of a mean over three samples
 
-_BREATH, _PERIOD = 0.012, 12.0  # how far a torso sinks in a breath, and how long that takes
-_SWAY, _ROLL = 0.02, 0.012  # to the side, and rad about the forward axis, in two breaths
+# Inverse kinematics.
+_STAGES = 8  # in which poses grow from rest, so that no leg folds the other way
+_ITERATIONS_PER_STAGE = 6
+_SOLE_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a sole: legs of two joints slide rather than sink
 
-_LOOKS = {
+# A gesture that the legs cannot follow is made smaller. Each size is tried as it is, then with a torso that sinks
+# more, as stretched legs cannot follow a tilt.
+_SIZES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)
+_SINK_FACTORS = (1.0, 1.6)
+_MAX_SINK = 0.01  # h, by which a sole may miss its goal in height
+_MAX_SLIDE = 0.08  # h, by which a sole may miss its goal in x or y
+_MAX_JOINT_SPEED = 7.0  # rad / sqrt(h / g)
+
+# A breath, and weight that shifts to either side once in two breaths.
+_BREATH_DEPTH = 0.012  # h
+_BREATH_PERIOD = 12.0
+_SWAY = 0.02  # h, to the left
+_SWAY_ROLL = 0.012  # rad
+_MAX_IDLE_MISS = 0.0055  # h, by which a sole may miss its goal in idle at full size
+
+# A look around.
+_LOOK_DURATION = 24.0
+_LOOK_TRACKS = {
     "yaw": ((1.0, 0.0), (4.0, 0.24), (7.5, 0.24), (11.5, -0.24), (15.5, -0.24), (19.0, 0.0)),
     "roll": ((1.5, 0.0), (4.5, -0.05), (7.5, -0.03), (11.5, 0.05), (15.0, 0.03), (18.5, 0.0)),
     "pitch": ((3.0, 0.0), (5.5, 0.07), (8.5, 0.0), (12.0, -0.07), (14.0, 0.06), (16.0, 0.0)),
     "left": ((0.5, 0.0), (3.5, -0.03), (7.0, -0.03), (11.0, 0.03), (15.5, 0.03), (19.5, 0.0)),
 }
-_LOOK = 24.0
 
-# A weight that goes to the other feet, and a foot that rises and settles again, twice.
-_SETTLE = 24.0
-_LIFTS = ((3.0, 0.0), (4.6, 0.16), (5.0, 0.16), (6.6, 0.0))
-_SHIFT = ((0.5, 0.0), (2.8, 0.06), (6.6, 0.06), (9.0, -0.02), (11.5, 0.0))
+# A weight that shifts to the other feet, and a foot that rises and is set down again, twice.
+_SETTLE_DURATION = 24.0
+_SETTLE_LIFT_TRACK = ((3.0, 0.0), (4.6, 0.16), (5.0, 0.16), (6.6, 0.0))  # of the foot, h
+_SETTLE_SHIFT_TRACK = ((0.5, 0.0), (2.8, 0.06), (6.6, 0.06), (9.0, -0.02), (11.5, 0.0))  # of the torso, h
 
-_BLOW, _PEAK, _REBOUND = 7.0, 0.9, 0.3  # times of the whole and of the peak; share of the sway back
-_PITCH, _PUSH, _GIVE = 0.2, 0.07, 0.1  # rad, and how far a blow moves a torso along its way, and down
-HIT_DIRECTIONS = {
+# A blow.
+HIT_DIRECTIONS = {  # by the side that is hit: forward and left components of the torso's sway
     "front": (-1.0, 0.0),
     "back": (1.0, 0.0),
     "left": (0.0, -1.0),
     "right": (0.0, 1.0),
-}  # ways of the torso
+}
+_HIT_DURATION = 7.0
+_HIT_PEAK_TIME = 0.9
+_HIT_REBOUND = 0.3  # of the sway: how far the torso sways back
+_HIT_TILT = 0.2  # rad
+_HIT_PUSH = 0.07  # h
+_HIT_SINK = 0.1  # h
 
-_STRIKE = 9.0
-_RAISED = {  # of the torso, and of the foot ahead and upwards
+# A strike: the torso draws back, then leans into it.
+_STRIKE_DURATION = 9.0
+_STRIKE_TORSO_TRACKS = {
     "forward": ((0.3, 0.0), (2.2, -0.08), (3.0, -0.08), (3.8, 0.1), (4.6, 0.1), (7.5, 0.0)),
     "pitch": ((0.3, 0.0), (2.2, -0.14), (3.0, -0.15), (3.8, 0.12), (4.6, 0.1), (7.5, 0.0)),
     "height": ((0.3, 0.0), (2.0, -0.03), (3.0, 0.0), (3.8, -0.08), (4.6, -0.06), (7.5, 0.0)),
 }
-_AHEAD = ((0.8, 0.0), (2.4, 0.1), (3.0, 0.12), (3.8, 0.4), (4.8, 0.4), (6.6, 0.0))
-_UP = ((0.8, 0.0), (2.4, 0.7), (3.0, 0.72), (3.8, 0.0), (4.8, 0.0), (5.7, 0.15), (6.6, 0.0))
+_STRIKE_FOOT_FORWARD_TRACK = ((0.8, 0.0), (2.4, 0.1), (3.0, 0.12), (3.8, 0.4), (4.8, 0.4), (6.6, 0.0))
+_STRIKE_FOOT_UP_TRACK = ((0.8, 0.0), (2.4, 0.7), (3.0, 0.72), (3.8, 0.0), (4.8, 0.0), (5.7, 0.15), (6.6, 0.0))
+
+# A turn of the torso.
+_MAX_TURN = 0.2  # rad
+_MIN_TURN = 0.03  # rad
+_TURN_ROOM_SHARE = 0.8  # of the room that legs leave the torso
+_TURN_EASE_DURATION = 3.0  # to the turned pose, and back
+_TURN_HOLD_DURATION = 4.0
 
 
-def hold_pose(pose: Pose, samples: int, step: float) -> Motion:
-    """Return a pose held for a number of samples after the first one, with a root that stays."""
-    positions, quaternions, joints = (np.tile(values, (samples + 1, 1)) for values in pose)
-    return Motion(step, np.zeros((samples + 1, 3)), positions, quaternions, joints, np.zeros(3))
+# Gestures.
+
+
+def hold_pose(pose: Pose, samples: int, time_step: float) -> Motion:
+    """Return a pose that stays for a number of samples after the first one, with a root that stays."""
+    return Motion(
+        time_step=time_step,
+        root=np.zeros((samples + 1, 3)),
+        positions=np.tile(pose.position, (samples + 1, 1)),
+        quaternions=np.tile(pose.quaternion, (samples + 1, 1)),
+        joints=np.tile(pose.joints, (samples + 1, 1)),
+        twist=np.zeros(3),
+    )
 
 
 def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration: float) -> Motion:
@@ -83,7 +118,8 @@ def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    return _followed(body, rest, _poses(_times(body, duration), tracks), "move so")
+    poses = _poses_of_tracks(_sample_times(body, duration), tracks)
+    return _follow_with_legs(body, rest, poses, action="move so")
 
 
 def idle(body: Body, rest: Pose) -> Motion:
@@ -92,15 +128,17 @@ def idle(body: Body, rest: Pose) -> Motion:
     The torso sinks and rises, and goes to either side, while joints bend so that the soles stay where they are; less
     where legs have too few joints for that.
     """
-    times = _times(body, 2.0 * _PERIOD)
-    turn = 2.0 * np.pi * times / times[-1]
-    sway = np.sin(turn) * np.sin(0.5 * turn) ** 2  # at rest at both ends
-    poses = _poses(times, {}) + _breath(times)
-    poses[:, posture.NAMES.index("left")] = _SWAY * sway
-    poses[:, posture.NAMES.index("roll")] = -_ROLL * sway
-    _, astray = keep_feet_in_place(body, rest, poses)
-    poses *= min(1.0, _ASTRAY * body.torso.standing_height / max(astray.max(), 1e-9))
-    return _looped(_posed(body, rest, poses, keep_feet_in_place(body, rest, poses)[0]))
+    times = _sample_times(body, 2.0 * _BREATH_PERIOD)
+    phase = 2.0 * np.pi * times / times[-1]
+    sway = np.sin(phase) * np.sin(0.5 * phase) ** 2  # at rest at both ends
+    poses = _poses_of_tracks(times, {}) + _breathe(times)
+    poses[:, _LEFT] = _SWAY * sway
+    poses[:, _ROLL] = -_SWAY_ROLL * sway
+    _, misses = keep_feet_in_place(body, rest, poses)
+    max_miss = _MAX_IDLE_MISS * body.torso.standing_height
+    poses *= min(1.0, max_miss / max(misses.max(), 1e-9))
+    joints, _ = keep_feet_in_place(body, rest, poses)
+    return _close_loop(_make_motion(body, rest, poses, joints))
 
 
 def glance(body: Body, rest: Pose) -> Motion:
@@ -109,8 +147,9 @@ def glance(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times = _times(body, _LOOK)
-    return _looped(_followed(body, rest, _poses(times, _LOOKS) + _breath(times), "look around"))
+    times = _sample_times(body, _LOOK_DURATION)
+    poses = _poses_of_tracks(times, _LOOK_TRACKS) + _breathe(times)
+    return _close_loop(_follow_with_legs(body, rest, poses, action="look around"))
 
 
 def settle(body: Body, rest: Pose) -> Motion:
@@ -119,42 +158,47 @@ def settle(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times, feet = _times(body, _SETTLE), _feet(body, rest)
-    poses, lifts = _breath(times), np.zeros((len(times), len(feet), 3))
-    first = 0
-    last = int(np.linalg.norm(feet - feet[first], axis=-1).argmax())
-    for leg, start in ((first, 0.0), (last, 0.5 * _SETTLE)):
-        way = -feet[leg, :2] / np.linalg.norm(feet[leg, :2])
-        shift = _track(times - start, _SHIFT)
-        poses[:, 1:3] += shift[:, None] * way
-        poses[:, 3:5] += shift[:, None] * (-way[1], way[0])  # the torso leans to where its weight goes
-        lifts[:, leg, 2] = _track(times - start, _LIFTS)
-    return _looped(_followed(body, rest, poses, "shift its weight", lifts))
+    times = _sample_times(body, _SETTLE_DURATION)
+    feet = _feet_from_torso(body, rest)
+    poses = _breathe(times)
+    lifts = np.zeros((len(times), len(feet), 3))
+    first_leg = 0
+    farthest_leg = int(np.linalg.norm(feet - feet[first_leg], axis=-1).argmax())
+    for leg, start in ((first_leg, 0.0), (farthest_leg, 0.5 * _SETTLE_DURATION)):
+        away_from_foot = -feet[leg, :2] / np.linalg.norm(feet[leg, :2])
+        forward, left = away_from_foot
+        shift = _track_values(times - start, _SETTLE_SHIFT_TRACK)
+        poses[:, 1:3] += shift[:, None] * away_from_foot  # forward and left
+        poses[:, 3:5] += shift[:, None] * (-left, forward)  # roll and pitch: the torso leans where its weight goes
+        lifts[:, leg, 2] = _track_values(times - start, _SETTLE_LIFT_TRACK)
+    return _close_loop(_follow_with_legs(body, rest, poses, action="shift its weight", lifts=lifts))
 
 
 def hit(body: Body, rest: Pose, side: str) -> Motion:
-    """Return how a body sways under a blow over planted feet: pushed and tilted along its way, while the knees give.
+    """Return how a body sways under a blow over planted feet: pushed and tilted away from it, while the knees give.
 
     Args:
         body: the spec.
         rest: pose from which it sways.
-        side: from which the blow comes, of `HITS`.
+        side: from which the blow comes, of `HIT_DIRECTIONS`.
 
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times = _times(body, _BLOW)
+    times = _sample_times(body, _HIT_DURATION)
     forward, left = HIT_DIRECTIONS[side]
 
     def impulse(start):
-        share = (times - start).clip(0.0) / _PEAK
-        return share**2 * np.exp(2.0 - 2.0 * share)
+        peak_share = (times - start).clip(0.0) / _HIT_PEAK_TIME
+        return peak_share**2 * np.exp(2.0 - 2.0 * peak_share)  # 1 at the peak
 
-    sway = (impulse(0.0) - _REBOUND * impulse(2.0 * _PEAK)) * fade_out(times / _BLOW * 2.0 - 1.0)
-    give = (impulse(0.2 * _PEAK) + 0.3 * impulse(_PEAK)) * fade_out(times / _BLOW * 2.0 - 1.0)
-    poses = sway[:, None] * np.array((0.0, _PUSH * forward, _PUSH * left, -_PITCH * left, _PITCH * forward, 0.0))
-    poses[:, 0] = -_GIVE * give
-    return _followed(body, rest, poses, "sway")
+    ending = fade_out(times / _HIT_DURATION * 2.0 - 1.0)  # falls in the second half
+    sway = (impulse(0.0) - _HIT_REBOUND * impulse(2.0 * _HIT_PEAK_TIME)) * ending
+    sink = (impulse(0.2 * _HIT_PEAK_TIME) + 0.3 * impulse(_HIT_PEAK_TIME)) * ending
+    largest_sway = np.array((0.0, _HIT_PUSH * forward, _HIT_PUSH * left, -_HIT_TILT * left, _HIT_TILT * forward, 0.0))
+    poses = sway[:, None] * largest_sway
+    poses[:, _HEIGHT] = -_HIT_SINK * sink
+    return _follow_with_legs(body, rest, poses, action="sway")
 
 
 def strike(body: Body, rest: Pose) -> Motion:
@@ -163,11 +207,14 @@ def strike(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times, feet = _times(body, _STRIKE), _feet(body, rest)
-    leg = int(feet[:, 0].argmax())
+    times = _sample_times(body, _STRIKE_DURATION)
+    feet = _feet_from_torso(body, rest)
+    front_leg = int(feet[:, 0].argmax())
     lifts = np.zeros((len(times), len(feet), 3))
-    lifts[:, leg, 0], lifts[:, leg, 2] = _track(times, _AHEAD), _track(times, _UP)
-    return _followed(body, rest, _poses(times, _RAISED), "strike", lifts)
+    lifts[:, front_leg, 0] = _track_values(times, _STRIKE_FOOT_FORWARD_TRACK)
+    lifts[:, front_leg, 2] = _track_values(times, _STRIKE_FOOT_UP_TRACK)
+    poses = _poses_of_tracks(times, _STRIKE_TORSO_TRACKS)
+    return _follow_with_legs(body, rest, poses, action="strike", lifts=lifts)
 
 
 def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> Motion:
@@ -182,14 +229,20 @@ def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> Motion:
     Raises:
         ValueError: the legs have no room for it.
     """
-    bounds = posture.room(body, planted=False)[posture.NAMES.index(number)]
-    size = sign * min(_TURN, _OF_ROOM * abs(bounds[int(sign > 0.0)]))
-    if abs(size) < _LEAST_TURN:
+    lowest, highest = posture.room(body, planted=False)[posture.NAMES.index(number)]  # rad
+    room = abs(highest if sign > 0.0 else lowest)
+    turn = sign * min(_MAX_TURN, _TURN_ROOM_SHARE * room)
+    if abs(turn) < _MIN_TURN:
         raise ValueError(f"the legs leave the torso no room to {number}")
-    end = _EASE + _SHOWN
-    times = _times(body, end + _EASE)
-    poses = _poses(times, {number: ((0.0, 0.0), (_EASE, size), (end, size), (end + _EASE, 0.0))})
-    return _posed(body, rest, poses, keep_feet_in_place(body, rest, poses)[0])
+    hold_end = _TURN_EASE_DURATION + _TURN_HOLD_DURATION
+    duration = hold_end + _TURN_EASE_DURATION
+    track = ((0.0, 0.0), (_TURN_EASE_DURATION, turn), (hold_end, turn), (duration, 0.0))
+    poses = _poses_of_tracks(_sample_times(body, duration), {number: track})
+    joints, _ = keep_feet_in_place(body, rest, poses)
+    return _make_motion(body, rest, poses, joints)
+
+
+# Legs that follow the torso.
 
 
 def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
@@ -200,110 +253,167 @@ def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
         rest: pose from which it sinks.
         depths: (samples,) m.
     """
-    return keep_feet_in_place(body, rest, -depths[:, None] / body.torso.standing_height * np.eye(6)[0])[0]
+    height_only = np.eye(6)[_HEIGHT]
+    poses = -depths[:, None] / body.torso.standing_height * height_only
+    joints, _ = keep_feet_in_place(body, rest, poses)
+    return joints
 
 
-def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None):
-    """Return joint angles (samples, joints), rad, that hold feet under a posed torso, and how far they miss, m.
+class FollowingLegs(NamedTuple):
+    """Legs that follow the torso.
+
+    Attributes:
+        joints: (samples, joints) angles, rad.
+        misses: (samples, legs, 3) by which feet miss their goals along the root's axes, m; not negative.
+    """
+
+    joints: np.ndarray
+    misses: np.ndarray
+
+
+def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None) -> FollowingLegs:
+    """Return joint angles that hold feet in place under a torso that moves, and how far feet miss.
 
     Args:
         body: the spec.
         rest: pose from which the torso moves.
-        poses: (samples, 6) from there; see `posture`.
+        poses: (samples, 6) of the torso from there; see `posture`.
         lifts: (samples, legs, 3) by which feet leave their places, standing heights; None for feet that stay.
-
-    Returns:
-        Angles, and (samples, legs, 3) by which feet miss their places.
     """
-    height, frame = body.torso.standing_height, rotations.matrix(rest.quaternion)
-    legs = _legs(body)
-    angles = legs.by_leg(rest.joints)
+    standing_height = body.torso.standing_height
+    torso_rotation = rotations.matrix(rest.quaternion)
+    to_torso = torso_rotation  # turns rows of points from the root's axes into the torso's at rest
+    to_root = torso_rotation.T
+    legs = _legs_to_foot_centers(body)
+    rest_angles = legs.by_leg(rest.joints)
     # A joint at rest may be a little beyond its range, as limits are soft.
-    legs = legs._replace(low=np.minimum(legs.low, angles), high=np.maximum(legs.high, angles))
-    places, lifts = legs.soles(angles)[0] @ frame.T, height * (np.zeros(3) if lifts is None else lifts)
-    angles = np.tile(angles, (len(poses), 1, 1))
+    legs = legs._replace(low=np.minimum(legs.low, rest_angles), high=np.maximum(legs.high, rest_angles))
+    rest_feet = legs.soles(rest_angles)[0] @ to_root  # m, from the torso
+    lift_vectors = standing_height * (np.zeros(3) if lifts is None else lifts)  # m
+
+    angles = np.tile(rest_angles, (len(poses), 1, 1))
     for share in np.linspace(0.0, 1.0, _STAGES + 1)[1:]:
-        goals = posture.moved(places + share * lifts, share * poses, height) @ frame
-        angles = legs.reached(angles, goals, _WEIGHTS, posture.DAMPING * height, _ROUNDS)
-    missed = (legs.soles(angles)[0] - goals) @ frame.T @ posture.attitude(poses[:, 3:]).swapaxes(-1, -2)
-    return legs.by_joint(angles), abs(missed)
+        goals = posture.moved(rest_feet + share * lift_vectors, share * poses, standing_height) @ to_torso
+        angles = legs.reached(angles, goals, _SOLE_WEIGHTS, posture.DAMPING * standing_height, _ITERATIONS_PER_STAGE)
+    attitudes = posture.attitude(poses[:, 3:])
+    misses = (legs.soles(angles)[0] - goals) @ to_root @ attitudes.swapaxes(-1, -2)
+    return FollowingLegs(joints=legs.by_joint(angles), misses=abs(misses))
 
 
-def _followed(body: Body, rest: Pose, poses: np.ndarray, act: str, lifts: np.ndarray | None = None) -> Motion:
-    """Return a gesture as large as standing legs can follow; a ValueError, which names the act, if they cannot."""
-    height, lifts = body.torso.standing_height, np.zeros((1, len(body.legs), 3)) if lifts is None else lifts
-    stays, low = ~lifts.any(axis=-1, keepdims=True), lifts[..., 2:] == 0.0
-    bounds = height * np.where(np.concatenate([stays, stays, low], axis=-1), (_SLIDES, _SLIDES, _SINKS), np.inf)
-    fastest = _FASTEST * math.sqrt(sizing.GRAVITY / height) * _step(body)
-    for share, deeper in itertools.product(_SHARES, _DEEPER):
-        tried = share * poses * (deeper, 1.0, 1.0, 1.0, 1.0, 1.0)
-        joints, missed = keep_feet_in_place(body, rest, tried, share * lifts)
+def _follow_with_legs(
+    body: Body, rest: Pose, poses: np.ndarray, action: str, lifts: np.ndarray | None = None
+) -> Motion:
+    """Return a gesture that is as large as standing legs can follow.
+
+    Args:
+        body: the spec.
+        rest: pose from which the torso moves.
+        poses: (samples, 6) of the torso at full size.
+        action: what an error says that the body has no room to do.
+        lifts: (samples, legs, 3) of the feet at full size, standing heights; None for feet that stay.
+
+    Raises:
+        ValueError: the legs cannot follow the smallest size.
+    """
+    standing_height = body.torso.standing_height
+    if lifts is None:
+        lifts = np.zeros((1, len(body.legs), 3))
+    max_misses = standing_height * _allowed_misses(lifts)
+    max_joint_step = _MAX_JOINT_SPEED * math.sqrt(sizing.GRAVITY / standing_height) * _time_step(body)
+    for size, sink_factor in itertools.product(_SIZES, _SINK_FACTORS):
+        sized_poses = size * poses * (sink_factor, 1.0, 1.0, 1.0, 1.0, 1.0)
+        joints, misses = keep_feet_in_place(body, rest, sized_poses, size * lifts)
         joints = _smooth(joints)
-        if (missed <= bounds).all() and abs(np.diff(joints, axis=0)).max() <= fastest:
-            return _posed(body, rest, tried, joints)
-    raise ValueError(f"the legs leave the torso no room to {act}")
+        joint_steps = abs(np.diff(joints, axis=0))
+        if (misses <= max_misses).all() and joint_steps.max() <= max_joint_step:
+            return _make_motion(body, rest, sized_poses, joints)
+    raise ValueError(f"the legs leave the torso no room to {action}")
 
 
-def _posed(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> Motion:
+def _allowed_misses(lifts: np.ndarray) -> np.ndarray:
+    """Return by how much feet may miss their goals, (samples, legs, 3) h: infinitely where a foot is in the air."""
+    stays = ~lifts.any(axis=-1, keepdims=True)
+    is_on_ground = lifts[..., 2:] == 0.0
+    is_limited = np.concatenate([stays, stays, is_on_ground], axis=-1)
+    return np.where(is_limited, (_MAX_SLIDE, _MAX_SLIDE, _MAX_SINK), np.inf)
+
+
+def _make_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> Motion:
     """Return a motion of the torso (samples, 6) from rest, and of joints (samples, joints), rad."""
-    forward_left_up = body.torso.standing_height * poses[:, [1, 2, 0]]
-    quaternions, half = np.broadcast_to(rest.quaternion, (len(poses), 4)), 0.5 * poses[:, 3:]
+    up, forward, left = (poses[:, [number]] for number in range(3))
+    offsets = body.torso.standing_height * np.concatenate([forward, left, up], axis=-1)
+    quaternions = np.broadcast_to(rest.quaternion, (len(poses), 4))
+    half_angles = 0.5 * poses[:, 3:]  # of roll, pitch and yaw
     for axis in range(3):
-        turn = np.concatenate([np.cos(half[:, [axis]]), np.sin(half[:, [axis]]) * np.eye(3)[axis]], axis=-1)
-        quaternions = rotations.product(turn, quaternions)
-    motion = hold_pose(rest, len(poses) - 1, _step(body))
-    return motion._replace(positions=rest.position + forward_left_up, quaternions=quaternions, joints=joints)
+        half_angle = half_angles[:, [axis]]
+        turns = np.concatenate([np.cos(half_angle), np.sin(half_angle) * np.eye(3)[axis]], axis=-1)
+        quaternions = rotations.product(turns, quaternions)
+    motion = hold_pose(rest, len(poses) - 1, _time_step(body))
+    return motion._replace(positions=rest.position + offsets, quaternions=quaternions, joints=joints)
 
 
 def _smooth(joints: np.ndarray) -> np.ndarray:
     """Return joint angles (samples, joints) without jerks, such as of a leg that stretches; both ends stay."""
-    for _ in range(_SMOOTHING):
+    for _ in range(_SMOOTHING_ROUNDS):
         joints[1:-1] = 0.25 * (joints[:-2] + 2.0 * joints[1:-1] + joints[2:])
     return joints
 
 
-def _looped(motion: Motion) -> Motion:
+def _close_loop(motion: Motion) -> Motion:
+    """Return the motion with its first sample as its last one, too."""
     return motion.map_arrays(lambda values: np.concatenate([values[:-1], values[:1]]))
 
 
-def _legs(body: Body) -> Legs:
+def _legs_to_foot_centers(body: Body) -> Legs:
     """Return the legs with the centers of feet for soles, over which a torso tilts."""
     legs = Legs.of(body, used=1.0)
     return legs._replace(radii=np.zeros_like(legs.radii))
 
 
-def _feet(body: Body, rest: Pose) -> np.ndarray:
-    """Return the places (legs, 3) of the feet from the torso, in the root's axes, m."""
-    legs = _legs(body)
-    return legs.soles(legs.by_leg(rest.joints))[0] @ rotations.matrix(rest.quaternion).T
+def _feet_from_torso(body: Body, rest: Pose) -> np.ndarray:
+    """Return the positions (legs, 3) of the feet from the torso, in the root's axes, m."""
+    legs = _legs_to_foot_centers(body)
+    foot_positions, _ = legs.soles(legs.by_leg(rest.joints))
+    return foot_positions @ rotations.matrix(rest.quaternion).T
 
 
-def _times(body: Body, duration: float) -> np.ndarray:
-    """Return the times (samples,) of a duration, both ends included."""
-    step = _step(body) * math.sqrt(sizing.GRAVITY / body.torso.standing_height)
-    return np.linspace(0.0, duration, 1 + max(2, round(duration / step)))
+# Times and tracks.
 
 
-def _step(body: Body) -> float:
+def _time_step(body: Body) -> float:
     """Return the time between two samples, s."""
-    return sizing.control_timestep(body) / _SAMPLES
+    return sizing.control_timestep(body) / _SAMPLES_PER_CONTROL_STEP
 
 
-def _poses(times: np.ndarray, tracks: Mapping[str, tuple]) -> np.ndarray:
-    """Return poses (samples, 6) of the torso by tracks of their numbers."""
-    zero = ((0.0, 0.0),)
-    return np.stack([_track(times, tracks.get(name, zero)) for name in posture.NAMES], axis=-1)
+def _sample_times(body: Body, duration: float) -> np.ndarray:
+    """Return the times (samples,) of a duration, both in sqrt(h / g), both ends included."""
+    time_step = _time_step(body) * math.sqrt(sizing.GRAVITY / body.torso.standing_height)
+    return np.linspace(0.0, duration, 1 + max(2, round(duration / time_step)))
 
 
-def _breath(times: np.ndarray) -> np.ndarray:
+def _poses_of_tracks(times: np.ndarray, tracks: Mapping[str, tuple]) -> np.ndarray:
+    """Return poses (samples, 6) of the torso by tracks of their numbers; numbers without a track are 0."""
+    zero_track = ((0.0, 0.0),)
+    return np.stack([_track_values(times, tracks.get(name, zero_track)) for name in posture.NAMES], axis=-1)
+
+
+def _track_values(times: np.ndarray, track: tuple) -> np.ndarray:
+    """Return the values (samples,) of a track, whose keys are pairs of a time and a value."""
+    key_times, key_values = np.array(track).T
+    if len(key_times) > 2:
+        previous_keys = np.searchsorted(key_times[1:-1], times, side="right")
+    else:
+        previous_keys = np.zeros(len(times), int)
+    next_keys = np.minimum(previous_keys + 1, len(key_times) - 1)
+    key_intervals = np.maximum(key_times[next_keys] - key_times[previous_keys], 1e-9)
+    share = (times - key_times[previous_keys]) / key_intervals
+    previous_values = key_values[previous_keys]
+    next_values = key_values[next_keys]
+    return next_values + (previous_values - next_values) * fade_out(share)
+
+
+def _breathe(times: np.ndarray) -> np.ndarray:
     """Return poses (samples, 6) of a torso that sinks and rises in each breath."""
-    return -_BREATH * (0.5 - 0.5 * np.cos(2.0 * np.pi * times / _PERIOD))[:, None] * np.eye(6)[0]
-
-
-def _track(times: np.ndarray, keys: tuple) -> np.ndarray:
-    """Return the values (samples,) of a track."""
-    at, values = np.array(keys).T
-    before = np.searchsorted(at[1:-1], times, side="right") if len(at) > 2 else np.zeros(len(times), int)
-    after = np.minimum(before + 1, len(at) - 1)
-    share = (times - at[before]) / np.maximum(at[after] - at[before], 1e-9)
-    return values[after] + (values[before] - values[after]) * fade_out(share)
+    depths = 0.5 - 0.5 * np.cos(2.0 * np.pi * times / _BREATH_PERIOD)
+    height_only = np.eye(6)[_HEIGHT]
+    return -_BREATH_DEPTH * depths[:, None] * height_only

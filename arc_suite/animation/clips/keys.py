@@ -1,41 +1,49 @@
-"""Keys that straight lines and arcs between them need."""
+"""Keys of a track of an animation: the fewest samples between which lines and arcs replace the rest."""
 
 import numpy as np
 
+_MIN_SINE = 1e-6  # of the angle of an arc; shorter arcs are straight lines
 
-def select_keys(values: np.ndarray, bound: float) -> np.ndarray:
-    """Return the indices of keys with which a track stays within a bound of all its samples, both ends included.
 
-    Intervals are halved at their worst sample until they are within the bound (Ramer, "An iterative procedure for the
+def select_keys(values: np.ndarray, max_error: float) -> np.ndarray:
+    """Return the indices of keys with which a track stays near all its samples, both ends included.
+
+    Intervals are cut at their worst sample until all errors are small enough (Ramer, "An iterative procedure for the
     polygonal approximation of plane curves", 1972).
 
     Args:
-        values: (samples, 3) places, m, or (samples, 4) quaternions of continuous signs.
-        bound: m or rad.
+        values: (samples, 3) positions, m, or (samples, 4) quaternions of continuous signs.
+        max_error: m or rad.
     """
-    kept, waiting = {0, len(values) - 1}, [(0, len(values) - 1)]
-    while waiting:
-        first, last = waiting.pop()
+    keys = {0, len(values) - 1}
+    intervals = [(0, len(values) - 1)]
+    while intervals:
+        first, last = intervals.pop()
         if last - first < 2:
             continue
-        errors = _errors(values[first : last + 1])
+        errors = _interpolation_errors(values[first : last + 1])
         worst = int(errors.argmax())
-        if errors[worst] > bound:
-            kept.add(first + worst)
-            waiting += [(first, first + worst), (first + worst, last)]
-    return np.array(sorted(kept))
+        if errors[worst] > max_error:
+            key = first + worst
+            keys.add(key)
+            intervals.append((first, key))
+            intervals.append((key, last))
+    return np.array(sorted(keys))
 
 
-def _errors(values: np.ndarray) -> np.ndarray:
-    """Return how far samples are from the line or the arc between the first and the last."""
+def _interpolation_errors(values: np.ndarray) -> np.ndarray:
+    """Return how far samples are from the line, m, or the arc, rad, between the first and the last."""
     share = np.linspace(0.0, 1.0, len(values))[:, None]
-    first, last = values[0], values[-1]
-    if values.shape[-1] == 3:
+    first = values[0]
+    last = values[-1]
+    is_position = values.shape[-1] == 3
+    if is_position:
         return np.linalg.norm(values - (1.0 - share) * first - share * last, axis=-1)
     angle = np.arccos(np.clip(first @ last, -1.0, 1.0))
     sine = np.sin(angle)
-    if sine > 1e-6:
-        between = (np.sin((1.0 - share) * angle) * first + np.sin(share * angle) * last) / sine
+    if sine > _MIN_SINE:
+        interpolated = (np.sin((1.0 - share) * angle) * first + np.sin(share * angle) * last) / sine
     else:
-        between = (1.0 - share) * first + share * last
-    return 2.0 * np.arccos(np.clip(abs((values * between).sum(axis=-1)), 0.0, 1.0))
+        interpolated = (1.0 - share) * first + share * last
+    cosines = abs((values * interpolated).sum(axis=-1))
+    return 2.0 * np.arccos(np.clip(cosines, 0.0, 1.0))

@@ -2,17 +2,33 @@
 
 import collections
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from arc_suite.animation.clips.catalog import WalkLoop, clip_of
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
 from arc_suite.robots.spec import Body
 
+# By the name that users choose: whether the root moves, for each animation of a clip.
 ROOT_MOTIONS = {"both": (True, False), "moving": (True,), "in_place": (False,)}
 
-# Blend spaces by name: the metadata along both axes, and which component of their clips' commands is 0.
-_SPACES = {"turning": (("turn_rate", "forward_speed"), 1), "strafing": (("left_speed", "forward_speed"), 2)}
+
+class _BlendSpace(NamedTuple):
+    """A plane of two speeds, in which engines blend clips.
+
+    Attributes:
+        axes: names of the speeds in the metadata of clips.
+        zero_component: index of the component of a clip's command that is 0 in this plane.
+    """
+
+    axes: tuple[str, str]
+    zero_component: int
+
+
+_BLEND_SPACES = {
+    "turning": _BlendSpace(axes=("turn_rate", "forward_speed"), zero_component=1),
+    "strafing": _BlendSpace(axes=("left_speed", "forward_speed"), zero_component=2),
+}
 
 
 def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
@@ -23,13 +39,17 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
         clips: of one file.
         root_motion: that of the file; see `creatures.glb`.
     """
-    moving = ROOT_MOTIONS[root_motion]
+    roots_move = ROOT_MOTIONS[root_motion]
+    metadata_of_animation = {}
+    for clip in clips:
+        for animation in name_animations(clip, roots_move):
+            metadata_of_animation[animation] = clip_metadata(clip)
     return {
         "body": body.name,
         "units": {"length": "m", "time": "s", "angle": "rad"},
         "axes": {"up": "y", "forward": "z", "left": "x"},
-        "clips": {name: clip_metadata(clip) for clip in clips for name in name_animations(clip, moving)},
-        "blend": _spaces(clips, moving),
+        "clips": metadata_of_animation,
+        "blend": _make_blend_spaces(clips, roots_move),
     }
 
 
@@ -37,48 +57,73 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
     """Return the metadata of a clip.
 
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
-    `slip` is the path of a sole near the ground, m a meter of the root. `additive_to` is the animation whose first
-    frame is the reference of an additive clip, and `additive_over` names the clips that it can be added to: no sole
+    `slip` is the path of a foot in stance over the ground, m a meter of the root. `additive_to` is the animation whose
+    first frame is the reference of an additive clip. `additive_over` names the clips that it can be added to: no sole
     then sinks deeper than 0.03 standing heights.
     """
-    found: dict[str, Any] = {"seconds": clip.motion.seconds, "frames": len(clip.times)}
-    found |= {"loops": clip.loops, "cycles": clip.cycles}
-    speeds = zip(("forward_speed", "left_speed", "turn_rate"), clip.motion.twist.tolist(), strict=True)
-    found |= {name: round(speed, 6) for name, speed in speeds}
-    contacts = ({"foot": each.foot, "event": each.event, "time": round(each.time, 6)} for each in clip.foot_contacts)
-    found["foot_contacts"] = list(contacts)
+    forward_speed, left_speed, turn_rate = clip.motion.twist.tolist()  # m/s, m/s, rad/s
+    contacts = []
+    for contact in clip.foot_contacts:
+        contacts.append({"foot": contact.foot, "event": contact.event, "time": round(contact.time, 6)})
+    metadata: dict[str, Any] = {
+        "seconds": clip.motion.seconds,
+        "frames": len(clip.times),
+        "loops": clip.loops,
+        "cycles": clip.cycles,
+        "forward_speed": round(forward_speed, 6),
+        "left_speed": round(left_speed, 6),
+        "turn_rate": round(turn_rate, 6),
+        "foot_contacts": contacts,
+    }
     if clip.slip is not None:
-        found["slip"] = round(clip.slip, 3)
-    if clip.additive_over is not None:
-        return found | {"additive_to": "idle_loop", "additive_over": list(clip.additive_over)}
-    return found | ({"missing_steps": missing_steps(clip)} if clip.loops else {})
+        metadata["slip"] = round(clip.slip, 3)
+    is_additive = clip.additive_over is not None
+    if is_additive:
+        metadata["additive_to"] = "idle_loop"
+        metadata["additive_over"] = list(clip.additive_over)
+    elif clip.loops:
+        metadata["missing_steps"] = missing_steps(clip)
+    return metadata
 
 
 def missing_steps(clip: Clip) -> dict[str, int]:
     """Return the feet of a loop that touch down less often than once a cycle, and how many times less."""
-    downs = collections.Counter(contact.foot for contact in clip.foot_contacts if contact.event == TOUCH_DOWN)
-    return {foot: clip.cycles - downs[foot] for foot in clip.feet if downs[foot] < clip.cycles}
+    touchdowns = collections.Counter(contact.foot for contact in clip.foot_contacts if contact.event == TOUCH_DOWN)
+    return {foot: clip.cycles - touchdowns[foot] for foot in clip.feet if touchdowns[foot] < clip.cycles}
 
 
-def name_animations(clip: Clip, moving: Sequence[bool]) -> dict[str, bool]:
-    """Return the names of a clip's animations, and whether the root moves in them."""
-    end = "_loop" if clip.loops else ""
+def name_animations(clip: Clip, roots_move: Sequence[bool]) -> dict[str, bool]:
+    """Return the names of a clip's animations, and whether the root moves in them.
+
+    Args:
+        clip: any.
+        roots_move: of `ROOT_MOTIONS`: whether the root moves, for each animation of a clip that moves.
+    """
+    suffix = "_loop" if clip.loops else ""
     if not clip.moves:
-        return {f"{clip.name}{end}": False}
-    return {f"{clip.name}{'' if moves else '_in_place'}{end}": moves for moves in moving}
+        return {f"{clip.name}{suffix}": False}
+    animations = {}
+    for root_moves in roots_move:
+        in_place = "" if root_moves else "_in_place"
+        animations[f"{clip.name}{in_place}{suffix}"] = root_moves
+    return animations
 
 
-def _spaces(clips: Sequence[Clip], moving: Sequence[bool]) -> dict[str, Any]:
-    """Return the points of blend spaces: an animation for each place in the plane of two speeds."""
-    found = {}
-    for name, (axes, zero) in _SPACES.items():
+def _make_blend_spaces(clips: Sequence[Clip], roots_move: Sequence[bool]) -> dict[str, Any]:
+    """Return the points of blend spaces: an animation for each point in the plane of two speeds."""
+    spaces = {}
+    for name, space in _BLEND_SPACES.items():
         points = []
         for clip in clips:
-            spec = clip_of(clip.name)
-            walks = isinstance(spec, WalkLoop) and spec.failing is None and spec.command[zero] == 0.0
-            if walks or clip.name == "idle":
-                figures = clip_metadata(clip)
-                animation = next(iter(name_animations(clip, moving)))
-                points.append({"animation": animation, "at": [figures[axis] for axis in axes]})
-        found[name] = {"axes": list(axes), "points": points}
-    return found
+            if clip.name == "idle" or _is_sound_walk(clip, space.zero_component):
+                first_animation, *_ = name_animations(clip, roots_move)
+                metadata = clip_metadata(clip)
+                points.append({"animation": first_animation, "at": [metadata[axis] for axis in space.axes]})
+        spaces[name] = {"axes": list(space.axes), "points": points}
+    return spaces
+
+
+def _is_sound_walk(clip: Clip, zero_component: int) -> bool:
+    """Return whether a clip is a walk of a sound body with a component of its command at 0."""
+    kind = clip_of(clip.name)
+    return isinstance(kind, WalkLoop) and kind.failing is None and kind.command[zero_component] == 0.0

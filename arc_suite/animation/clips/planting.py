@@ -1,5 +1,7 @@
 """Planting: feet in stance stay where they touch down, and their soles on the ground, by inverse kinematics."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from arc_suite import rotations
@@ -7,25 +9,29 @@ from arc_suite.animation.clips.root_motion import Motion, fade_out, integrate_tw
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
 
-_STANDS = 0.01  # of the standing height: a lower sole is in stance
-_LIFTS = 0.1  # of a cycle: a sole that is higher for less time stays in stance
-_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of a foot's place: legs of two joints slide rather than sink
-_DAMPING = 0.005  # of the standing height
-_ROUNDS = 30  # of the search for joint angles
-_SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the correction on the ground: the largest is taken that a leg can follow
-_SINKS = 0.005  # of the standing height, and
-_FASTER = 6.0  # times the fastest joint of the leg unplanted: a leg that needs more does not follow
-_LANDS = 0.05  # of a swing, after and before which its height is as it was: near the ground a foot would still slide
-_SMOOTH = 0.036  # of a cycle, to either side, over which corrections are smoothed
+_STANCE_HEIGHT = 0.01  # standing heights: a lower sole is in stance
+_MIN_SWING = 0.1  # gait cycles: a sole that is higher for less time stays in stance
 _PASSES = 3  # in each, a foot stays in the middle of where the pass before could bring it
+_SMOOTHING_WIDTH = 0.036  # gait cycles, to either side, over which corrections are smoothed
+_LANDING_SHARE = 0.05  # of a swing: its height is corrected only so near its ends, as a foot slides near the ground
+
+# Inverse kinematics.
+_FOOT_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a foot: legs of two joints slide rather than sink
+_DAMPING = 0.005  # standing heights
+_ITERATIONS = 30
+
+# A leg follows a correction that it can: else a smaller share of it on the ground is tried.
+_CORRECTION_SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)
+_MAX_SINK = 0.005  # standing heights, by which a foot may miss its goal in height
+_MAX_SPEED_RATIO = 6.0  # of the fastest joint of a leg, with and without planting
 
 
 def plant_feet(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     """Return the motion with feet that neither slide nor sink in stance.
 
-    A foot in stance stays in the middle of its places. Between two stances the correction of one goes over into that of
-    the next. Feet at the ends of a motion that is no loop stay where they are there. A leg of two joints reaches its
-    goals in part, and a foot that stays down throughout a loop keeps its slide.
+    A foot in stance stays in the middle of its positions. Between two stances the correction of one changes over into
+    that of the next. Feet at the ends of a motion that is no loop stay where they are there. A leg of two joints
+    reaches its goals in part, and a foot that stays down throughout a loop keeps its slide.
 
     Args:
         body: the spec.
@@ -33,18 +39,257 @@ def plant_feet(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
         cycle: of the gait, s.
         loops: whether the last sample is the first one.
     """
-    legs, height = Legs.of(body, used=1.0), body.torso.standing_height
-    low = _feet(legs, _repeated(motion) if loops else motion)[..., 2] - legs.radii < _STANDS * height
-    longest = len(motion.joints) - 1 if loops else None
-    stances = [_stances(each, round(_LIFTS * cycle / motion.time_step), longest) for each in low.T]
-    angles = legs.by_leg(motion.joints)
-    # A joint may be a little beyond its range, as limits are soft.
-    legs = legs._replace(low=np.minimum(legs.low, angles.min(axis=0)), high=np.maximum(legs.high, angles.max(axis=0)))
-    fastest, before = _FASTER * _paces(angles), motion.joints
+    standing_height = body.torso.standing_height
+    cycle_samples = cycle / motion.time_step
+    legs = Legs.of(body, used=1.0)
+    unplanted_angles = legs.by_leg(motion.joints)
+    legs = _widen_ranges(legs, unplanted_angles)
+    stances = _find_stances_of_legs(legs, standing_height, motion, round(_MIN_SWING * cycle_samples), loops)
+    max_joint_steps = _MAX_SPEED_RATIO * _largest_joint_steps(unplanted_angles)
+    planted_motion = motion
     for _ in range(_PASSES):
-        motion = _nearer(legs, height, motion, stances, fastest, loops)
-    change = _smooth(motion.joints - before, round(_SMOOTH * cycle / motion.time_step), loops)
-    return motion._replace(joints=before + change)
+        planted_motion = _move_feet_nearer(legs, standing_height, planted_motion, stances, max_joint_steps, loops)
+    changes = planted_motion.joints - motion.joints
+    smooth_changes = _smooth(changes, round(_SMOOTHING_WIDTH * cycle_samples), loops)
+    return motion._replace(joints=motion.joints + smooth_changes)
+
+
+def slip(body: Body, motion: Motion) -> float | None:
+    """Return the mean path of a foot in stance over the ground, m a meter of the root; None if the root stays."""
+    legs = Legs.of(body)
+    max_height = _STANCE_HEIGHT * body.torso.standing_height
+    root_path = np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=-1).sum()
+    if root_path < max_height:
+        return None
+    feet = _foot_positions(legs, motion)
+    is_low = feet[..., 2] - legs.radii < max_height
+    stays_low = is_low[1:] & is_low[:-1]
+    foot_steps = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1)
+    foot_paths = (foot_steps * stays_low).sum(axis=0)
+    return float(foot_paths.mean() / root_path)
+
+
+# Legs and stances.
+
+
+def _widen_ranges(legs: Legs, angles: np.ndarray) -> Legs:
+    """Return the legs with joint ranges that hold angles (samples, legs, links); limits in the physics are soft."""
+    return legs._replace(low=np.minimum(legs.low, angles.min(axis=0)), high=np.maximum(legs.high, angles.max(axis=0)))
+
+
+def _to_foot_centers(legs: Legs) -> Legs:
+    """Return the legs with the centers of feet for soles."""
+    return legs._replace(radii=np.zeros_like(legs.radii))
+
+
+def _foot_positions(legs: Legs, motion: Motion) -> np.ndarray:
+    """Return the positions (samples, legs, 3) of the centers of feet in the world, m."""
+    poses = motion.poses()
+    torso_positions = poses[:, None, :3]
+    torso_rotations = rotations.matrix(poses[:, 3:7])[:, None]
+    feet, _ = _to_foot_centers(legs).soles(legs.by_leg(motion.joints))  # in the torso's frame
+    return (torso_rotations @ feet[..., None])[..., 0] + torso_positions
+
+
+def _largest_joint_steps(angles: np.ndarray) -> np.ndarray:
+    """Return the largest turn (legs,) of a joint of each leg between two of the samples (samples, legs, links), rad."""
+    return abs(np.diff(angles, axis=0)).max(axis=(0, 2))
+
+
+def _repeat_three_times(loop: Motion) -> Motion:
+    """Return a loop three times over, on one path of the root."""
+    loop_samples = len(loop.joints) - 1
+    samples = np.arange(3 * loop_samples + 1)
+    root = integrate_twist(loop.twist, loop.time_step * samples)
+    return loop.map_arrays(lambda values: values[samples % loop_samples])._replace(root=root)
+
+
+def _find_stances_of_legs(
+    legs: Legs, standing_height: float, motion: Motion, min_swing: int, loops: bool
+) -> list[list[tuple[int, int]]]:
+    """Return the stances of each leg; of a loop, those in three rounds.
+
+    Args:
+        legs: of the body.
+        standing_height: m.
+        motion: of the body.
+        min_swing: samples; a shorter swing does not end a stance.
+        loops: whether the last sample is the first one.
+    """
+    max_stance = None
+    if loops:
+        max_stance = len(motion.joints) - 1
+        motion = _repeat_three_times(motion)
+    is_low = _foot_positions(legs, motion)[..., 2] - legs.radii < _STANCE_HEIGHT * standing_height
+    return [_find_stances(foot_is_low, min_swing, max_stance) for foot_is_low in is_low.T]
+
+
+def _find_stances(is_low: np.ndarray, min_swing: int, max_stance: int | None) -> list[tuple[int, int]]:
+    """Return the stances of a foot: the first sample of each, and the sample after its last.
+
+    Args:
+        is_low: (samples,) whether the foot is low.
+        min_swing: samples; a shorter swing does not end a stance.
+        max_stance: samples; stances of so many samples or more are left out. None for no limit.
+    """
+    edges = np.flatnonzero(np.diff(is_low.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    stances: list[tuple[int, int]] = []
+    for start, end in edges.tolist():
+        if stances and start - stances[-1][1] < min_swing:
+            stances[-1] = (stances[-1][0], end)
+        else:
+            stances.append((start, end))
+    if max_stance is None:
+        return stances
+    return [(start, end) for start, end in stances if end - start < max_stance]
+
+
+# Corrections of feet.
+
+
+def _move_feet_nearer(
+    legs: Legs, standing_height: float, motion: Motion, stances, max_joint_steps: np.ndarray, loops: bool
+) -> Motion:
+    """Return the motion with feet in stance nearer to a point of the ground that is the same throughout the stance.
+
+    Args:
+        legs: of the body.
+        standing_height: m.
+        motion: to change.
+        stances: of each leg; of a loop, those in three rounds.
+        max_joint_steps: (legs,) rad, by which a joint of a leg may turn between two samples.
+        loops: whether the last sample is the first one.
+    """
+    samples = slice(None)  # of the motion
+    corrected_motion = motion
+    if loops:  # the corrections are those of the second of three rounds
+        loop_samples = len(motion.joints) - 1
+        samples = slice(loop_samples, 2 * loop_samples + 1)
+        corrected_motion = _repeat_three_times(motion)
+    feet = _foot_positions(legs, corrected_motion)
+    corrections = np.zeros_like(feet)
+    for leg, radius in enumerate(legs.radii):
+        corrections[:, leg] = _corrections(feet[:, leg], radius, stances[leg], keeps_ends=not loops)
+    poses = corrected_motion.poses()[samples]
+    angles = _solve_joint_angles(legs, standing_height, poses, feet[samples], corrections[samples], max_joint_steps)
+    joints = legs.by_joint(angles)
+    if loops:
+        joints[-1] = joints[0]
+    return motion._replace(joints=joints)
+
+
+def _solve_joint_angles(
+    legs: Legs, standing_height: float, poses, feet, corrections, max_joint_steps: np.ndarray
+) -> np.ndarray:
+    """Return the angles (samples, legs, links), rad, of legs with the largest share of a correction that they follow.
+
+    Args:
+        legs: of the body.
+        standing_height: m.
+        poses: (samples, 7 + joints) in the world.
+        feet: (samples, legs, 3) positions of their centers, m.
+        corrections: (samples, legs, 3) to be added, m.
+        max_joint_steps: (legs,) rad.
+    """
+    torso_rotations = rotations.matrix(poses[:, 3:7])[:, None]
+    torso_positions = poses[:, None, :3]
+    legs_to_centers = _to_foot_centers(legs)
+    start_angles = legs.by_leg(poses[:, 7:])
+    angles = start_angles
+    is_unsolved = np.ones(len(legs.radii), bool)
+    for share in _CORRECTION_SHARES:
+        goals = feet + corrections * (share, share, 1.0)
+        goals[..., 2] = np.maximum(goals[..., 2], legs.radii)
+        goals_in_torso = (torso_rotations.swapaxes(-1, -2) @ (goals - torso_positions)[..., None])[..., 0]
+        candidates = legs_to_centers.reached(
+            start_angles, goals_in_torso, _FOOT_WEIGHTS, _DAMPING * standing_height, _ITERATIONS
+        )
+        misses_in_torso = legs_to_centers.soles(candidates)[0] - goals_in_torso
+        height_misses = abs((torso_rotations @ misses_in_torso[..., None])[..., 2, 0]).max(axis=0)
+        is_near = height_misses <= _MAX_SINK * standing_height
+        is_slow = _largest_joint_steps(candidates) <= max_joint_steps
+        is_solved = is_unsolved & is_near & is_slow
+        angles = np.where(is_solved[:, None], candidates, angles)
+        is_unsolved &= ~is_solved
+        if not is_unsolved.any():
+            break
+    return angles
+
+
+class _Anchor(NamedTuple):
+    """A sample of a foot's path, and its correction (3,) there, m."""
+
+    sample: int
+    correction: np.ndarray
+
+
+def _corrections(positions: np.ndarray, radius: float, stances: list[tuple[int, int]], keeps_ends: bool) -> np.ndarray:
+    """Return what to add to the positions (samples, 3) of a foot's center, m.
+
+    Args:
+        positions: of the foot in the world, m.
+        radius: of the foot, m.
+        stances: see `_find_stances`.
+        keeps_ends: whether a stance at an end of the motion stays where it is there.
+    """
+    samples = len(positions)
+    corrections = np.zeros_like(positions)
+    stance_end = _Anchor(0, np.zeros(3))  # of the latest stance
+    for start, end in stances:
+        corrections[start:end] = _stance_corrections(
+            positions[start:end],
+            radius,
+            keeps_first=keeps_ends and start == 0,
+            keeps_last=keeps_ends and end == samples,
+        )
+        _bridge_swing(corrections, stance_end, _Anchor(start, corrections[start]))
+        stance_end = _Anchor(end - 1, corrections[end - 1])
+    _bridge_swing(corrections, stance_end, _Anchor(samples, np.zeros(3)))
+    return corrections
+
+
+def _stance_corrections(positions: np.ndarray, radius: float, keeps_first: bool, keeps_last: bool) -> np.ndarray:
+    """Return what to add to the positions (samples, 3) of a foot's center in one stance, m.
+
+    Args:
+        positions: of the foot in the world, m.
+        radius: of the foot, m.
+        keeps_first: whether the foot stays where it is in the first sample.
+        keeps_last: whether the foot stays where it is in the last sample.
+    """
+    samples = len(positions)
+    share = (np.arange(samples) / max(samples - 1, 1))[:, None]
+    first_weights = fade_out(share)
+    last_weights = fade_out(1.0 - share)
+    if keeps_first and keeps_last:  # the foot moves from its first position to its last
+        goal = first_weights * positions[0] + last_weights * positions[-1]
+    elif keeps_first:
+        goal = positions[0]
+    elif keeps_last:
+        goal = positions[-1]
+    else:
+        goal = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
+    corrections = goal - positions
+    corrections[:, 2] = radius - positions[:, 2]
+    if keeps_first:  # the foot comes to the ground during the stance
+        corrections[:, 2] *= 1.0 - first_weights[:, 0]
+    if keeps_last:
+        corrections[:, 2] *= 1.0 - last_weights[:, 0]
+    return corrections
+
+
+def _bridge_swing(corrections: np.ndarray, first: _Anchor, last: _Anchor) -> None:
+    """Fill in corrections between two samples; that of the height soon fades."""
+    samples = last.sample - first.sample
+    if samples <= 1:
+        return
+    share = (np.arange(1, samples) / samples)[:, None]
+    swing = slice(first.sample + 1, last.sample)
+    corrections[swing] = fade_out(share) * first.correction + (1.0 - fade_out(share)) * last.correction
+    after_liftoff = fade_out(share / _LANDING_SHARE)
+    before_touchdown = fade_out((1.0 - share) / _LANDING_SHARE)
+    height_corrections = after_liftoff * first.correction + before_touchdown * last.correction
+    corrections[swing, 2] = height_corrections[:, 2]
 
 
 def _smooth(values: np.ndarray, width: int, loops: bool) -> np.ndarray:
@@ -56,128 +301,11 @@ def _smooth(values: np.ndarray, width: int, loops: bool) -> np.ndarray:
         loops: whether the last sample is the first one.
     """
     if loops:
-        around = values[np.arange(-width, len(values) + width) % (len(values) - 1)]
-    else:
-        first, last = 2.0 * values[0] - values[width:0:-1], 2.0 * values[-1] - values[-2 : -width - 2 : -1]
-        around = np.concatenate([first, values, last])
-    weights = np.hanning(2 * width + 3)[1:-1]
-    return np.stack([np.convolve(each, weights / weights.sum(), "valid") for each in around.T], axis=-1)
-
-
-def slip(body: Body, motion: Motion) -> float | None:
-    """Return the path of a sole in stance, m a meter of the root, as a mean over the feet; None if the root stays."""
-    legs, path = Legs.of(body), np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=-1).sum()
-    if path < _STANDS * body.torso.standing_height:
-        return None
-    feet = _feet(legs, motion)
-    low = feet[..., 2] - legs.radii < _STANDS * body.torso.standing_height
-    paths = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1) * (low[1:] & low[:-1])
-    return float(paths.sum(axis=0).mean() / path)
-
-
-def _nearer(legs: Legs, height: float, motion: Motion, stances, fastest: np.ndarray, loops: bool) -> Motion:
-    """Return the motion with feet in stance nearer to a place on the ground that is the same throughout the stance.
-
-    Args:
-        legs: of the body.
-        height: at which the body stands, m.
-        motion: to change.
-        stances: of each foot, intervals of samples; in a loop, of three rounds.
-        fastest: (legs,) rad, by which a joint of a leg may turn between two samples.
-        loops: whether the last sample is the first one.
-    """
-    count, around = len(motion.joints) - 1, _repeated(motion) if loops else motion
-    feet = _feet(legs, around)
-    corrections = np.zeros_like(feet)
-    for leg, radius in enumerate(legs.radii):
-        corrections[:, leg] = _corrections(feet[:, leg], radius, stances[leg], not loops)
-    rows = slice(count, 2 * count + 1) if loops else slice(None)
-    feet, corrections, poses = feet[rows], corrections[rows], around.poses()[rows]
-    turns, places, angles = rotations.matrix(poses[:, 3:7]), poses[:, None, :3], legs.by_leg(poses[:, 7:])
-    centers, found, waits = _centers(legs), angles, np.ones(len(legs.radii), bool)
-    for share in _SHARES:
-        goals = feet + corrections * (share, share, 1.0)
-        goals[..., 2] = np.maximum(goals[..., 2], legs.radii)
-        seen = (turns.swapaxes(-1, -2)[:, None] @ (goals - places)[..., None])[..., 0]
-        reached = centers.reached(angles, seen, _WEIGHTS, _DAMPING * height, _ROUNDS)
-        missed = abs((turns[:, None] @ (centers.soles(reached)[0] - seen)[..., None])[..., 2, 0]).max(axis=0)
-        follows = waits & (missed <= _SINKS * height) & (_paces(reached) <= fastest)
-        found = np.where(follows[:, None], reached, found)
-        waits &= ~follows
-        if not waits.any():
-            break
-    joints = legs.by_joint(found)
-    if loops:
-        joints[-1] = joints[0]
-    return motion._replace(joints=joints)
-
-
-def _centers(legs: Legs) -> Legs:
-    """Return the legs with the centers of feet for soles."""
-    return legs._replace(radii=np.zeros_like(legs.radii))
-
-
-def _feet(legs: Legs, motion: Motion) -> np.ndarray:
-    """Return the places (samples, legs, 3) of the centers of feet in the world, m."""
-    poses = motion.poses()
-    places = _centers(legs).soles(legs.by_leg(motion.joints))[0]
-    return (rotations.matrix(poses[:, 3:7])[:, None] @ places[..., None])[..., 0] + poses[:, None, :3]
-
-
-def _paces(angles: np.ndarray) -> np.ndarray:
-    """Return the largest turn (legs,) of a joint of each leg between two of the samples (samples, legs, links), rad."""
-    return abs(np.diff(angles, axis=0)).max(axis=(0, 2))
-
-
-def _repeated(motion: Motion) -> Motion:
-    """Return a loop three times over, on one path of the root."""
-    count = len(motion.joints) - 1
-    root = integrate_twist(motion.twist, motion.time_step * np.arange(3 * count + 1))
-    return motion.map_arrays(lambda values: values[np.arange(3 * count + 1) % count])._replace(root=root)
-
-
-def _stances(low: np.ndarray, least: int, longest: int | None) -> list[tuple[int, int]]:
-    """Return the intervals of samples in which a foot is low, those apart by less than `least` as one."""
-    edges = np.flatnonzero(np.diff(low.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    joined: list[tuple[int, int]] = []
-    for start, end in edges.tolist():
-        if joined and start - joined[-1][1] < least:
-            joined[-1] = joined[-1][0], end
-        else:
-            joined.append((start, end))
-    return [(start, end) for start, end in joined if longest is None or end - start < longest]
-
-
-def _corrections(places: np.ndarray, radius: float, intervals: list[tuple[int, int]], keeps_ends: bool) -> np.ndarray:
-    """Return what to add to the places (samples, 3) of a foot, m."""
-    count = len(places)
-    found = np.zeros_like(places)
-    before: tuple[int, np.ndarray] = (0, np.zeros(3))  # the end of the latest stance, and its correction there
-    for start, end in intervals:
-        share = (np.arange(end - start) / max(end - start - 1, 1))[:, None]
-        weights = [fade_out(share), fade_out(1.0 - share)]  # of the motion's own first and last places
-        kept = [keeps_ends and start == 0, keeps_ends and end == count]
-        anchors = [places[start], places[end - 1]]
-        if kept == [False, False]:
-            held = 0.5 * (places[start:end].min(axis=0) + places[start:end].max(axis=0))
-        elif all(kept):  # the foot goes over from one to the other
-            held = weights[0] * anchors[0] + weights[1] * anchors[1]
-        else:
-            held = anchors[kept.index(True)]
-        found[start:end] = held - places[start:end]
-        found[start:end, 2] = radius - places[start:end, 2]
-        for weight in (weight for weight, keeps in zip(weights, kept, strict=True) if keeps):
-            found[start:end, 2] *= 1.0 - weight[:, 0]  # the foot comes to the ground during the stance
-        _bridge(found, *before, start, found[start])
-        before = end - 1, found[end - 1]
-    _bridge(found, *before, count, np.zeros(3))
-    return found
-
-
-def _bridge(found: np.ndarray, start: int, at_start: np.ndarray, end: int, at_end: np.ndarray) -> None:
-    """Fill in corrections between two samples; that of the height soon fades."""
-    if end > start + 1:
-        share = (np.arange(1, end - start) / (end - start))[:, None]
-        found[start + 1 : end] = fade_out(share) * at_start + (1.0 - fade_out(share)) * at_end
-        height = fade_out(share / _LANDS) * at_start + fade_out((1.0 - share) / _LANDS) * at_end
-        found[start + 1 : end, 2] = height[:, 2]
+        padded = values[np.arange(-width, len(values) + width) % (len(values) - 1)]
+    else:  # reflected at both ends, so that these stay
+        before = 2.0 * values[0] - values[width:0:-1]
+        after = 2.0 * values[-1] - values[-2 : -width - 2 : -1]
+        padded = np.concatenate([before, values, after])
+    window = np.hanning(2 * width + 3)[1:-1]
+    weights = window / window.sum()
+    return np.stack([np.convolve(column, weights, "valid") for column in padded.T], axis=-1)

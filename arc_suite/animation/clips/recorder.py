@@ -1,4 +1,4 @@
-"""Recordings of one body under one policy: walks under commands, a stop and a start, showcases of presets."""
+"""Recordings of one body under one policy: walks under commands, a stop and a start, turns, showcases of presets."""
 
 from typing import NamedTuple
 
@@ -13,13 +13,17 @@ from arc_suite.models import posture
 from arc_suite.policies import policy as named_policy
 from arc_suite.tasks.fitting import velocity_units
 
-_SETTLE = 200  # control steps, after which starts and changes of command are forgotten
-_LONG = 700  # control steps without a command: a speed that varies is that of most of an episode
-_CYCLES = 20  # of the gait in a recording under a command, to choose loops from
-_UNDRAWN = {"poses": 0.0, "gaits": ()}  # of a task whose pose and gait are by command
-_OF_ROOM, _LEAST_CROUCH = 0.7, 0.05  # share of the room in which a body crouches, and least crouch, standing heights
-_TRIES, _LEAST_TURN = 3, 0.25  # recordings of a turn, for one by the angle; its least share of the angle
-_BEFORE, _REST, _AFTER = 2, 5, 4  # gait cycles before a stop, at rest, and after the start
+_SETTLE_STEPS = 200  # control steps, after which starts and changes of command are forgotten
+_STEPS_WITHOUT_COMMAND = 700  # control steps of a recording: a speed that varies is that of most of an episode
+_CYCLES_UNDER_COMMAND = 20  # gait cycles of a recording, to choose loops from
+_CYCLES_BEFORE_STOP = 2  # gait cycles of a recording of a stop and a start
+_CYCLES_AT_REST = 5
+_CYCLES_AFTER_START = 4
+_CROUCH_ROOM_SHARE = 0.7  # of the room that legs leave the torso: as deep as a body crouches
+_MIN_CROUCH = 0.05  # standing heights
+_MAX_TURN_TRIES = 3  # recordings of a turn, each corrected by the one before
+_MIN_TURN_SHARE = 0.25  # of the desired angle: a policy that turns less does not turn
+_FIXED_POSE_AND_GAIT = {"poses": 0.0, "gaits": ()}  # settings of a task that else draws commands of pose and gait
 
 
 class GaitRecording(NamedTuple):
@@ -36,40 +40,55 @@ class GaitRecording(NamedTuple):
     cycle: float
     phase: float | None = None
 
-    def wait(self, sample: int) -> int:
+    def samples_to_touchdown(self, sample: int) -> int:
         """Return the samples from a sample to the next touchdown of the first foot that the clock schedules."""
-        cycle = self.cycle / self.recording.time_step
-        return round((-self.phase * cycle - sample) % cycle) % round(cycle)
+        cycle_samples = self.cycle / self.recording.time_step
+        samples = round((-self.phase * cycle_samples - sample) % cycle_samples)
+        return samples % round(cycle_samples)
 
 
 class TransitionRecording(NamedTuple):
     """A body that walks, stops, stands, starts and walks.
 
     Attributes:
-        recorded: the recording.
+        gait: the recording.
         stop: first sample of the stop, at a scheduled touchdown of the first foot.
         start: sample in which the command starts the body.
-        late: samples from a scheduled touchdown to the command's change.
+        delay: samples from a scheduled touchdown to the command's change.
     """
 
-    recorded: GaitRecording
+    gait: GaitRecording
     stop: int
     start: int
-    late: int
+    delay: int
 
 
 class TurnRecording(NamedTuple):
     """A body that stands, turns on the spot, and stands.
 
     Attributes:
-        recorded: the recording.
-        first: sample at which it begins to turn.
+        gait: the recording.
+        first: sample at which the body begins to turn.
         samples: until it stands again.
     """
 
-    recorded: GaitRecording
+    gait: GaitRecording
     first: int
     samples: int
+
+
+class _Clock(NamedTuple):
+    """The gait clock of a task.
+
+    Attributes:
+        cycle: s.
+        offset: phase of the first foot at the start of an episode, cycles.
+        control_timestep: s.
+    """
+
+    cycle: float
+    offset: float
+    control_timestep: float
 
 
 class Recorder:
@@ -77,7 +96,7 @@ class Recorder:
 
     Attributes:
         body: of the recordings.
-        has_command: whether the task has a command.
+        has_command: whether the task has a command of velocities.
         velocity_units: (3,) of commands: forward and left, m/s, turning, rad/s; None without a command.
     """
 
@@ -97,16 +116,20 @@ class Recorder:
             OSError: a file cannot be read.
         """
         task = setup.definition
-        named_policy(policy, setup.body, preset, task=task)  # errors of the policy are no errors of a clip
-        self.body, self._policy, self._preset = setup.body, policy, preset
+        named_policy(policy, setup.body, preset, task=task)  # raises errors of the policy, which are none of a clip
+        self.body = setup.body
+        self._policy = policy
+        self._preset = preset
         self.has_command = task.commands.get("command") == 3 and task.parameters is not None
-        if self.has_command and "gait_frequency" not in setup.task_kwargs:
-            step = task.scene.control_timestep
-            steps = max(1, round(1.0 / (task.parameters.gait_frequency * step)))
-            setup = _changed(setup, gait_frequency=1.0 / (steps * step))
-        self.velocity_units = velocity_units(self.body, task.parameters.target_velocity) if self.has_command else None
+        self.velocity_units = None
+        if self.has_command:
+            self.velocity_units = velocity_units(self.body, task.parameters.target_velocity)
+            if "gait_frequency" not in setup.task_kwargs:
+                control_timestep = task.scene.control_timestep
+                steps_in_cycle = max(1, round(1.0 / (task.parameters.gait_frequency * control_timestep)))
+                setup = _with_settings(setup, gait_frequency=1.0 / (steps_in_cycle * control_timestep))
         if "pose" in task.commands:
-            setup = _changed(setup, **_UNDRAWN)
+            setup = _with_settings(setup, **_FIXED_POSE_AND_GAIT)
         self._setup = setup
 
     def record_walk(
@@ -121,14 +144,20 @@ class Recorder:
                 the task `directed`.
 
         Raises:
-            ValueError: the episode ends, the task has no command, or nobody crouches.
+            ValueError: the episode ends, the task has no command, or the body or policy cannot crouch.
         """
-        setup, held = self._setup if failing is None else _changed(self._setup, actuator_failure=failing), {}
+        setup = self._setup
+        fixed_commands = {}
+        if failing is not None:
+            setup = _with_settings(setup, actuator_failure=failing)
         if crouch:
-            setup, held = self._directed(), {"pose": (-self._crouch(crouch), *(0.0,) * 5)}
-        cycle, offset, step = self._gait()
-        recording = self._recorded(setup, _SETTLE, round(_CYCLES * cycle / step), [(0, command)], **held)
-        return GaitRecording(recording, cycle, (_SETTLE * step / cycle + offset) % 1.0)
+            setup = self._setup_with_pose_command()
+            fixed_commands["pose"] = (-self._limit_crouch(crouch), 0.0, 0.0, 0.0, 0.0, 0.0)
+        clock = self._clock()
+        steps = round(_CYCLES_UNDER_COMMAND * clock.cycle / clock.control_timestep)
+        recording = self._record(setup, _SETTLE_STEPS, steps, [(0, command)], **fixed_commands)
+        phase = (_SETTLE_STEPS * clock.control_timestep / clock.cycle + clock.offset) % 1.0
+        return GaitRecording(recording, clock.cycle, phase)
 
     def record_without_command(self) -> GaitRecording:
         """Return a recording of the policy in a task without a command.
@@ -136,7 +165,7 @@ class Recorder:
         Raises:
             ValueError: the episode ends, or the pose does not return.
         """
-        return _periodic(self._recorded(self._setup, _SETTLE, _LONG))
+        return _find_gait(self._record(self._setup, _SETTLE_STEPS, _STEPS_WITHOUT_COMMAND))
 
     def record_showcase(self, preset: str) -> GaitRecording:
         """Return a recording of a preset of the demonstrator that walks straight ahead in the task walk.
@@ -147,8 +176,8 @@ class Recorder:
         if preset not in presets_of(self.body):
             raise ValueError(f"{self.body.name} has no preset {preset}")
         environment = Setup.of(self.body).load(seed=0)
-        actor = named_policy("cpg", self.body, preset, task=environment.task.definition)
-        return _periodic(record(environment, actor, _SETTLE, _LONG))
+        policy = named_policy("cpg", self.body, preset, task=environment.task.definition)
+        return _find_gait(record(environment, policy, _SETTLE_STEPS, _STEPS_WITHOUT_COMMAND))
 
     def record_transition(self, command: tuple[float, float, float]) -> TransitionRecording:
         """Return a recording of a stop from a command, and of a start into it.
@@ -156,21 +185,26 @@ class Recorder:
         Raises:
             ValueError: the episode ends, or the task has no command.
         """
-        cycle, offset, step = self._gait()
-        steps = cycle / step
+        clock = self._clock()
+        steps_in_cycle = clock.cycle / clock.control_timestep
 
-        def phase(count):  # of the first foot, cycles
-            return (count / steps + offset) % 1.0
+        def phase_at(step):  # of the first foot, cycles
+            return (step / steps_in_cycle + clock.offset) % 1.0
 
-        least = _SETTLE + round(_BEFORE * steps)
-        stop = min(range(least, least + round(steps)), key=phase)
-        start = stop + round(_REST * steps)
-        commands = [(0, command), (stop, (0.0, 0.0, 0.0)), (start, command)]
-        recording = self._recorded(self._setup, _SETTLE, start + round(_AFTER * steps) - _SETTLE, commands)
+        earliest_stop = _SETTLE_STEPS + round(_CYCLES_BEFORE_STOP * steps_in_cycle)
+        stop_step = min(range(earliest_stop, earliest_stop + round(steps_in_cycle)), key=phase_at)
+        start_step = stop_step + round(_CYCLES_AT_REST * steps_in_cycle)
+        end_step = start_step + round(_CYCLES_AFTER_START * steps_in_cycle)
+        commands = [(0, command), (stop_step, (0.0, 0.0, 0.0)), (start_step, command)]
+        recording = self._record(self._setup, _SETTLE_STEPS, end_step - _SETTLE_STEPS, commands)
         substeps = recording.substeps
-        late = round(substeps * steps * phase(stop))
-        stop, start = (substeps * (count - _SETTLE) for count in (stop, start))
-        return TransitionRecording(GaitRecording(recording, cycle, phase(_SETTLE)), stop - late, start, late)
+        delay = round(substeps * steps_in_cycle * phase_at(stop_step))
+        return TransitionRecording(
+            gait=GaitRecording(recording, clock.cycle, phase_at(_SETTLE_STEPS)),
+            stop=substeps * (stop_step - _SETTLE_STEPS) - delay,
+            start=substeps * (start_step - _SETTLE_STEPS),
+            delay=delay,
+        )
 
     def record_turn(self, angle: float) -> TurnRecording:
         """Return a recording of a turn on the spot by about an angle, rad.
@@ -178,60 +212,77 @@ class Recorder:
         Raises:
             ValueError: the episode ends, the task has no command, or the policy does not turn.
         """
-        cycle, _, step = self._gait()
-        around, rest = round(cycle / step), round(_REST * cycle / step)
-        rate = float(np.copysign(self.velocity_units[2], angle))
-        count = round(angle / rate / step)
-        for _ in range(_TRIES):
-            commands = [(0, (0.0, 0.0, 0.0)), (_SETTLE + around, (0.0, 0.0, np.sign(angle)))]
-            commands.append((_SETTLE + around + count, (0.0, 0.0, 0.0)))
-            recording = self._recorded(self._setup, _SETTLE, 2 * around + count + rest, commands)
-            first, samples = recording.substeps * around, recording.substeps * (count + rest)
-            turned = np.ptp(np.unwrap(rotations.yaw(recording.poses[first : first + samples + 1, 3:7]))[[0, -1]])
-            if turned < _LEAST_TURN * abs(angle):
-                turned, least = np.degrees((turned, _LEAST_TURN * abs(angle)))
-                raise ValueError(f"the policy turns by {turned:.0f} degrees, less than {least:.0f}")
-            missing = round((abs(angle) - turned) / abs(rate) / step)
-            if not missing:
+        clock = self._clock()
+        cycle_steps = round(clock.cycle / clock.control_timestep)
+        rest_steps = round(_CYCLES_AT_REST * clock.cycle / clock.control_timestep)
+        turn_rate = float(np.copysign(self.velocity_units[2], angle))  # rad/s
+        turn_steps = round(angle / turn_rate / clock.control_timestep)
+        begin_step = _SETTLE_STEPS + cycle_steps
+        for _ in range(_MAX_TURN_TRIES):
+            commands = [
+                (0, (0.0, 0.0, 0.0)),
+                (begin_step, (0.0, 0.0, np.sign(angle))),
+                (begin_step + turn_steps, (0.0, 0.0, 0.0)),
+            ]
+            steps = 2 * cycle_steps + turn_steps + rest_steps
+            recording = self._record(self._setup, _SETTLE_STEPS, steps, commands)
+            first = recording.substeps * cycle_steps
+            samples = recording.substeps * (turn_steps + rest_steps)
+            yaw = np.unwrap(rotations.yaw(recording.poses[first : first + samples + 1, 3:7]))
+            reached_angle = abs(yaw[-1] - yaw[0])
+            if reached_angle < _MIN_TURN_SHARE * abs(angle):
+                reached_degrees = np.degrees(reached_angle)
+                min_degrees = np.degrees(_MIN_TURN_SHARE * abs(angle))
+                raise ValueError(f"the policy turns by {reached_degrees:.0f} degrees, less than {min_degrees:.0f}")
+            missing_steps = round((abs(angle) - reached_angle) / abs(turn_rate) / clock.control_timestep)
+            if not missing_steps:
                 break
-            count += missing
-        return TurnRecording(GaitRecording(recording, cycle), first, samples)
+            turn_steps += missing_steps
+        return TurnRecording(GaitRecording(recording, clock.cycle), first, samples)
 
-    def _directed(self) -> Setup:
-        """The setup with a pose by command."""
+    def _setup_with_pose_command(self) -> Setup:
+        """Return the setup, or for demonstrators that of the task `directed`, which takes a pose by command."""
         if "pose" in self._setup.definition.commands:
             return self._setup
         if self._policy != "cpg":
             raise ValueError(f"the policy {self._policy} takes no pose")
-        return Setup.of(self.body, "directed", self._setup.task_kwargs | _UNDRAWN)
+        return Setup.of(self.body, "directed", self._setup.task_kwargs | _FIXED_POSE_AND_GAIT)
 
-    def _crouch(self, depth: float) -> float:
-        room = _OF_ROOM * abs(posture.room(self.body, planted=False)[0, 0])
-        if room < _LEAST_CROUCH:
-            raise ValueError(f"the legs fold by {room:.2f} of their height; a crouch takes {_LEAST_CROUCH:g}")
+    def _limit_crouch(self, depth: float) -> float:
+        """Return a depth, standing heights, or as far as the legs fold."""
+        lowest_height = posture.room(self.body, planted=False)[0, 0]  # from rest, standing heights
+        room = _CROUCH_ROOM_SHARE * abs(lowest_height)
+        if room < _MIN_CROUCH:
+            raise ValueError(f"the legs fold by {room:.2f} of their height; a crouch takes {_MIN_CROUCH:g}")
         return min(depth, room)
 
-    def _gait(self) -> tuple[float, float, float]:
-        """The cycle, s, the offset of the first foot, cycles, and the control step, s; ValueError without a command."""
+    def _clock(self) -> _Clock:
+        """Return the gait clock of the task; a ValueError without a command."""
         if not self.has_command:
             raise ValueError(f"the task {self._setup.kind.name} has no command")
-        task, gait = self._setup.definition, self._setup.definition.parameters
-        return 1.0 / gait.gait_frequency, gait.phase_offsets[0] / (2.0 * np.pi), task.scene.control_timestep
+        task = self._setup.definition
+        return _Clock(
+            cycle=1.0 / task.parameters.gait_frequency,
+            offset=task.parameters.phase_offsets[0] / (2.0 * np.pi),
+            control_timestep=task.scene.control_timestep,
+        )
 
-    def _recorded(self, setup: Setup, settle: int, steps: int, commands=(), **held) -> Recording:
+    def _record(self, setup: Setup, settle: int, steps: int, commands=(), **fixed_commands) -> Recording:
+        """Return a recording of the policy in a setup; arguments as of `recordings.record`."""
         environment = setup.load(seed=0)
-        actor = named_policy(self._policy, self.body, self._preset, task=environment.task.definition)
-        return record(environment, actor, settle, steps, commands, **held)
+        policy = named_policy(self._policy, self.body, self._preset, task=environment.task.definition)
+        return record(environment, policy, settle, steps, commands, **fixed_commands)
 
 
-def _periodic(recording: Recording) -> GaitRecording:
+def _find_gait(recording: Recording) -> GaitRecording:
+    """Return a recording with the cycle of its gait; a ValueError if the pose does not return."""
     cycle = loops.period(recording)
     if cycle is None:
-        seconds = len(recording.poses) * recording.time_step / 2.0
-        raise ValueError(f"the pose does not return within {seconds:.3g} s")
+        searched_seconds = len(recording.poses) * recording.time_step / 2.0
+        raise ValueError(f"the pose does not return within {searched_seconds:.3g} s")
     return GaitRecording(recording, cycle)
 
 
-def _changed(setup: Setup, **settings) -> Setup:
+def _with_settings(setup: Setup, **settings) -> Setup:
     """Return the setup with other settings of its task."""
     return Setup.of(setup.body, setup.task, setup.task_kwargs | settings)

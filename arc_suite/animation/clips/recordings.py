@@ -12,7 +12,7 @@ from arc_suite.policies import Policy, alone
 from arc_suite.simulation.episode_loop import play_episode
 from arc_suite.tasks.readings import pose
 
-_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
 class Recording(NamedTuple):
@@ -36,21 +36,20 @@ def record(
     settle: int,
     steps: int,
     commands: Iterable[tuple[int, tuple]] = (),
-    **held,
+    **fixed_commands,
 ) -> Recording:
     """Play a policy and record it, once it has settled.
 
-    Control steps are taken in the environment; their substeps are then run again from the state in which
-    the recording begins, with the controls that were applied, which is bit-exact.
+    Control steps are taken in the environment. Their substeps are then run again from the state in which the recording
+    begins, with the same controls, which is bit-exact.
 
     Args:
         environment: of `arc_suite.load`; its next episode is played.
         policy: made for one environment.
         settle: control steps before the recording.
         steps: control steps to record.
-        commands: pairs of a control step, counted from the start, and the value that the task's `command`
-            takes there.
-        held: values of its other commands by name, from the start on.
+        commands: pairs of a control step, counted from the start, and the value that the task's `command` takes there.
+        fixed_commands: values of the task's other commands by name, from the start on.
 
     Returns:
         A pose for every substep, and the first one.
@@ -58,26 +57,28 @@ def record(
     Raises:
         ValueError: the episode ends before.
     """
-    commands = dict(commands)
-    model, data = environment.physics.model.ptr, environment.physics.data.ptr
-    controls = []
-    for count, timestep in enumerate(play_episode(environment, alone(policy), max_steps=settle + steps)):
+    command_at_step = dict(commands)
+    model = environment.physics.model.ptr
+    data = environment.physics.data.ptr
+    control_of_step = []
+    for step, timestep in enumerate(play_episode(environment, alone(policy), max_steps=settle + steps)):
         if timestep.last():
-            raise ValueError(f"the episode ends after {count} control steps, {settle + steps} are needed")
+            raise ValueError(f"the episode ends after {step} control steps, {settle + steps} are needed")
         if timestep.first():
-            for name, value in held.items():
+            for name, value in fixed_commands.items():
                 environment.command(name, value)
         else:
-            controls.append(data.ctrl.copy())
-        if count in commands:
-            environment.command("command", commands[count])
-        if count == settle:
-            state = np.empty(mujoco.mj_stateSize(model, _STATE))
-            mujoco.mj_getState(model, data, state, _STATE)
-            start, warmstart = data.qpos.copy(), data.qacc_warmstart.copy()
+            control_of_step.append(data.ctrl.copy())
+        if step in command_at_step:
+            environment.command("command", command_at_step[step])
+        if step == settle:
+            first_state = np.empty(mujoco.mj_stateSize(model, _FULL_STATE))
+            mujoco.mj_getState(model, data, first_state, _FULL_STATE)
+            first_qpos = data.qpos.copy()
+            warmstart = data.qacc_warmstart.copy()
     scene = environment.task.definition.scene
-    controls = np.repeat(controls[settle:], scene.substeps, axis=0)
-    states, _ = rollout.rollout(model, mujoco.MjData(model), state, controls[None], initial_warmstart=warmstart)
-    # Of the full state, time comes first and then the positions.
-    qpos = np.concatenate([start[None], states[0, :, 1 : 1 + model.nq]])
+    controls = np.repeat(control_of_step[settle:], scene.substeps, axis=0)
+    states, _ = rollout.rollout(model, mujoco.MjData(model), first_state, controls[None], initial_warmstart=warmstart)
+    later_qpos = states[0, :, 1 : 1 + model.nq]  # in a full state, time comes first and then the positions
+    qpos = np.concatenate([first_qpos[None], later_qpos])
     return Recording(model.opt.timestep, scene.substeps, pose(qpos, scene.layout))

@@ -352,7 +352,7 @@ def test_what_is_played_from_rest_begins_or_ends_with_idle():
 
 @pytest.mark.slow
 def test_what_is_too_far_from_the_walk_is_left_out(monkeypatch):
-    monkeypatch.setattr(drafts, "_FAR", 1e-6)
+    monkeypatch.setattr(drafts, "_MAX_MEETING_SEAM", 1e-6)
     with pytest.warns(UserWarning, match="^tick, clip stop is left out: its pose is 0 degrees from that of the walk"):
         (walk,) = export.clips(Setup.of("tick", "steer"), ["walk", "stop"])
     assert walk.name == "walk"

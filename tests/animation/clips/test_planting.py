@@ -64,7 +64,7 @@ def test_corrections_hold_a_stance_and_bridge_swings():
     count = 100
     heights = np.where((np.arange(count) % 50) < 30, 0.1, 0.3)
     places = np.stack([0.001 * np.arange(count), np.zeros(count), heights], axis=-1)
-    intervals = planting._stances(heights < 0.2, 5, None)
+    intervals = planting._find_stances(heights < 0.2, 5, None)
     assert intervals == [(0, 30), (50, 80)]
     held = places + planting._corrections(places, 0.1, intervals, True)
     assert np.ptp(held[:30], axis=0).max() < 1e-12 and np.ptp(held[50:80], axis=0).max() < 1e-12
@@ -75,5 +75,5 @@ def test_corrections_hold_a_stance_and_bridge_swings():
 def test_a_short_lift_is_no_end_of_a_stance():
     low = np.ones(60, bool)
     low[20:23], low[40:50] = False, False
-    assert planting._stances(low, 5, None) == [(0, 40), (50, 60)]
-    assert planting._stances(low, 5, 30) == [(50, 60)]
+    assert planting._find_stances(low, 5, None) == [(0, 40), (50, 60)]
+    assert planting._find_stances(low, 5, 30) == [(50, 60)]
