@@ -1,8 +1,9 @@
 """Critics of XQC (Palenicek et al., "XQC: Well-conditioned optimization accelerates deep RL", 2025).
 
-A critic gives the logits of a distribution over returns (Bellemare et al., 2017). Its hidden layers have a batch norm,
-whose statistics are those of the batch's actions and of the policy's next actions together (Bhatt et al., 2024). After
-each step the weights of a unit are projected on the unit sphere. Running statistics serve the policy's loss.
+A critic gives the logits of a distribution over fixed returns (Bellemare et al., 2017). Its hidden layers have a batch
+norm. In the critics' loss the statistics of the norm are those of the batch's actions and of the policy's next actions
+together (Bhatt et al., 2024); in the policy's loss they are running means. After each step the weights of every unit
+are projected onto the unit sphere.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,86 +15,137 @@ import numpy as np
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.replay import Transitions
 
-RETURN_COUNT = 101  # of returns with a probability, as published
-MAX_RETURN = 5.0  # of a return after `reward_scale`, as published
+RETURN_COUNT = 101  # fixed returns that have a probability, as published
+MAX_RETURN = 5.0  # the highest of them and minus the lowest, after `reward_scale`, as published
 MOMENTUM = 0.99  # of the running statistics
 
 
 def draw_critic(random: np.random.Generator, sizes: Sequence[int]) -> tuple:
     """Draw a critic for the sizes of the input and of the hidden layers."""
-    *hidden, last = networks.mlp(random, (*sizes, RETURN_COUNT), layer_norm=True)
-    for layer in hidden:  # the norm takes a bias away
-        bias = layer.pop("bias")
-        layer |= {"mean": bias, "variance": np.ones_like(bias)}
-    return _projected((*hidden, last))
+    *hidden_layers, last_layer = networks.mlp(random, (*sizes, RETURN_COUNT), layer_norm=True)
+    for layer in hidden_layers:
+        zeros = layer.pop("bias")  # a batch norm would remove any bias
+        layer["mean"] = zeros
+        layer["variance"] = np.ones_like(zeros)
+    return _project_weights((*hidden_layers, last_layer))
 
 
 def mean_return(logits):
-    """Return the mean of the distribution with logits (..., COUNT), shape (...)."""
-    return jax.nn.softmax(logits) @ _returns()
+    """Return the mean (...) of the distribution with logits (..., RETURN_COUNT)."""
+    return jax.nn.softmax(logits) @ _fixed_returns()
 
 
-def target_distribution(hp, critics, batch: Transitions, next_actions, bonus, kept):
-    """Return the distribution that critics learn, (batch, COUNT): that of the least critic, a control step before."""
-    both = _both(batch, next_actions)
-    least = jnp.stack([_joint(hp, critic, both)[0][len(next_actions) :] for critic in critics])
-    least = jnp.take_along_axis(least, mean_return(least).argmin(axis=0)[None, :, None], axis=0)[0]
-    ahead = (hp.discount * batch.goes_on)[:, None] * (_returns() - bonus[:, None])
-    return project_distribution(jax.nn.softmax(least), batch.rewards[:, None] + ahead)
+def target_distribution(hp, target_networks, batch: Transitions, next_actions, bonus, dropout_masks):
+    """Return the distributions (batch, RETURN_COUNT) that critics learn.
+
+    Of the distributions that the target networks give to the next actions, that with the lowest mean is moved back by
+    a control step.
+
+    Args:
+        hp: hyperparameters.
+        target_networks: one for each critic.
+        batch: transitions.
+        next_actions: of the policy at the next observations.
+        bonus: (batch,) the logarithm of the density of these actions times the temperature; it is subtracted.
+        dropout_masks: not used, as categorical critics have no dropout.
+    """
+    inputs = _joint_inputs(batch, next_actions)
+    next_logits = jnp.stack([_joint_logits(hp, network, inputs)[0][len(next_actions) :] for network in target_networks])
+    lowest = mean_return(next_logits).argmin(axis=0)
+    lowest_logits = jnp.take_along_axis(next_logits, lowest[None, :, None], axis=0)[0]
+    discounted = (hp.discount * batch.goes_on)[:, None] * (_fixed_returns() - bonus[:, None])
+    return project_distribution(jax.nn.softmax(lowest_logits), batch.rewards[:, None] + discounted)
 
 
 def project_distribution(probabilities, returns):
-    """Return probabilities (batch, COUNT) of the fixed returns, from those of returns (batch, COUNT) between them.
+    """Return probabilities (batch, RETURN_COUNT) of the fixed returns.
 
-    A probability goes to the two fixed returns around its own, in proportion to their closeness.
+    Each probability goes to the two fixed returns around its own return, in proportion to their closeness.
+
+    Args:
+        probabilities: (batch, RETURN_COUNT)
+        returns: (batch, RETURN_COUNT) that have these probabilities.
     """
-    places = (returns.clip(-MAX_RETURN, MAX_RETURN) + MAX_RETURN) * ((RETURN_COUNT - 1) / (2.0 * MAX_RETURN))
-    below = jnp.floor(places).astype(jnp.int32)
-    share, rows = places - below, jnp.arange(len(places))[:, None]
-    found = jnp.zeros_like(probabilities).at[rows, below].add(probabilities * (1.0 - share))
-    return found.at[rows, (below + 1).clip(max=RETURN_COUNT - 1)].add(probabilities * share)
+    positions = (returns.clip(-MAX_RETURN, MAX_RETURN) + MAX_RETURN) * ((RETURN_COUNT - 1) / (2.0 * MAX_RETURN))
+    below = jnp.floor(positions).astype(jnp.int32)
+    above = (below + 1).clip(max=RETURN_COUNT - 1)
+    share_above = positions - below
+    transitions = jnp.arange(len(positions))[:, None]
+    projected = jnp.zeros_like(probabilities).at[transitions, below].add(probabilities * (1.0 - share_above))
+    return projected.at[transitions, above].add(probabilities * share_above)
 
 
-def cross_entropy_loss(hp, critics, batch: Transitions, next_actions, target, kept):
-    """Return the sum over the critics of the mean cross-entropy; the mean value, and layers with statistics."""
-    both, size = _both(batch, next_actions), len(next_actions)
-    logits, layers = zip(*(_joint(hp, critic, both) for critic in critics), strict=True)
-    losses = [-(target * jax.nn.log_softmax(each[:size])).sum(axis=-1).mean() for each in logits]
-    return sum(losses), (jnp.mean(mean_return(jnp.stack(logits)[:, :size])), layers)
+def cross_entropy_loss(hp, critics, batch: Transitions, next_actions, target, dropout_masks):
+    """Return the loss of the critics, and a pair: their mean value, and hidden layers with the batch's statistics.
+
+    The loss is the sum over the critics of the mean cross-entropy. `dropout_masks` are not used.
+    """
+    inputs = _joint_inputs(batch, next_actions)
+    size = len(next_actions)
+    outputs = [_joint_logits(hp, critic, inputs) for critic in critics]
+    logits = [critic_logits for critic_logits, _ in outputs]
+    batch_layers = tuple(layers for _, layers in outputs)
+    losses = [-(target * jax.nn.log_softmax(critic_logits[:size])).sum(axis=-1).mean() for critic_logits in logits]
+    mean_value = jnp.mean(mean_return(jnp.stack(logits)[:, :size]))
+    return sum(losses), (mean_value, batch_layers)
 
 
-def finish_step(critics, layers):
-    """Return the critics after a step: weights on the unit sphere, statistics moved towards those of the batch."""
+def finish_step(critics, batch_layers):
+    """Return the critics after a step: weights on the unit sphere, and statistics moved towards those of the batch.
 
-    def moved(layer: Mapping, batch: Mapping) -> dict:
-        return {**layer, **{k: MOMENTUM * layer[k] + (1.0 - MOMENTUM) * batch[k] for k in ("mean", "variance")}}
+    Args:
+        critics: after a step of Adam.
+        batch_layers: of each critic the hidden layers with the batch's statistics, as `cross_entropy_loss` returns.
+    """
+    finished_critics = []
+    for critic, layers_of_batch in zip(critics, batch_layers, strict=True):
+        *hidden_layers, last_layer = critic
+        hidden_layers = [
+            _move_statistics(layer, batch_layer)
+            for layer, batch_layer in zip(hidden_layers, layers_of_batch, strict=True)
+        ]
+        finished_critics.append(_project_weights((*hidden_layers, last_layer)))
+    return tuple(finished_critics)
 
-    hidden = [map(moved, critic[:-1], found) for critic, found in zip(critics, layers, strict=True)]
-    return tuple(_projected((*layers, critic[-1])) for critic, layers in zip(critics, hidden, strict=True))
+
+def _move_statistics(layer: Mapping, batch_layer: Mapping) -> dict:
+    """Return a layer whose running statistics have moved towards those of a batch."""
+    statistics = {name: MOMENTUM * layer[name] + (1.0 - MOMENTUM) * batch_layer[name] for name in ("mean", "variance")}
+    return {**layer, **statistics}
 
 
-def _returns():
-    """Returns with a probability, (COUNT,)."""
+def _fixed_returns():
+    """Return the returns that have a probability, (RETURN_COUNT,)."""
     return jnp.linspace(-MAX_RETURN, MAX_RETURN, RETURN_COUNT)
 
 
-def _both(batch: Transitions, next_actions):
-    """Inputs of critics, (2 batch, ..., size + joints): of the batch, then of the policy's next actions."""
-    now, after = (batch.observations, batch.actions), (batch.next_observations, next_actions)
-    return jnp.concatenate([jnp.concatenate(each, axis=-1) for each in (now, after)])
+def _joint_inputs(batch: Transitions, next_actions):
+    """Return inputs of critics (2 batch, ..., size + joints): of the batch, then of the policy's next actions."""
+    inputs = jnp.concatenate([batch.observations, batch.actions], axis=-1)
+    next_inputs = jnp.concatenate([batch.next_observations, next_actions], axis=-1)
+    return jnp.concatenate([inputs, next_inputs])
 
 
-def _joint(hp, critic: Sequence[Mapping], x):
-    """Logits for inputs x that are normalized together, and the hidden layers with the statistics of this batch."""
-    found, axes, legs = [], range(x.ndim - 1), hp.network == "legs"
-    for layer in critic[:-1]:
+def _joint_logits(hp, critic: Sequence[Mapping], x):
+    """Return the logits for inputs x that are normalized together, and the hidden layers with their statistics."""
+    legs = hp.network == "legs"
+    batch_axes = range(x.ndim - 1)
+    *hidden_layers, last_layer = critic
+    batch_layers = []
+    for index, layer in enumerate(hidden_layers):
         x = networks.linear(layer, x)
-        found.append({**layer, "mean": x.mean(axis=axes), "variance": x.var(axis=axes)})
-        x = networks.normalize_and_activate(found[-1], x, "relu")
-        x = networks.share_between_legs(x) if legs and len(found) == 1 else x
-    return networks.body_outputs(networks.linear(critic[-1], x), legs), found
+        batch_layer = {**layer, "mean": x.mean(axis=batch_axes), "variance": x.var(axis=batch_axes)}
+        batch_layers.append(batch_layer)
+        x = networks.normalize_and_activate(batch_layer, x, "relu")
+        if legs and index == 0:
+            x = networks.share_between_legs(x)
+    return networks.body_outputs(networks.linear(last_layer, x), legs), batch_layers
 
 
-def _projected(critic: Sequence[Mapping]) -> tuple:
-    """Layers whose weights have norm 1 over the inputs of each unit."""
-    return tuple({**layer, "weight": layer["weight"] / ((layer["weight"] ** 2).sum(axis=0) ** 0.5)} for layer in critic)
+def _project_weights(critic: Sequence[Mapping]) -> tuple:
+    """Return layers whose weights have norm 1 over the inputs of each unit."""
+    layers = []
+    for layer in critic:
+        norms = (layer["weight"] ** 2).sum(axis=0) ** 0.5
+        layers.append({**layer, "weight": layer["weight"] / norms})
+    return tuple(layers)

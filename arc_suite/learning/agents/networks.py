@@ -1,8 +1,8 @@
 """Networks as plain pytrees of JAX: a network is a tuple of layers, a layer a dictionary of arrays.
 
-A layer has `weight` (inputs, outputs) and `bias` (outputs,), and `scale` and `offset` (outputs,) where a norm follows:
-a batch norm if it has `mean` and `variance` (outputs,), too, and no bias, else a layer norm. NumPy draws the weights,
-so they depend on a seed alone.
+A layer has `weight` (inputs, outputs) and `bias` (outputs,). A layer with a norm also has `scale` and `offset`
+(outputs,). The norm is a batch norm if the layer has `mean` and `variance` (outputs,); such a layer has no bias.
+Otherwise it is a layer norm. NumPy draws the weights, so they depend on a seed alone.
 """
 
 import math
@@ -12,8 +12,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-EPSILON = 1e-5  # of a norm
-ACTIVATION = "elu"  # of networks that act
+EPSILON = 1e-5  # added to the variance in a norm
+ACTIVATION = "elu"  # of the networks of ppo, dagger and bc
 
 ACTIVATIONS = {"relu": jax.nn.relu, "elu": jax.nn.elu}
 
@@ -26,37 +26,15 @@ def xavier(random: np.random.Generator, inputs: int, outputs: int, gain: float =
 
 def orthogonal(random: np.random.Generator, inputs: int, outputs: int, gain: float = 1.0) -> np.ndarray:
     """Draw a weight (inputs, outputs) whose shorter side is orthonormal, times gain (Saxe et al., 2014)."""
-    q, r = np.linalg.qr(random.standard_normal((max(inputs, outputs), min(inputs, outputs))))
+    longer_side = max(inputs, outputs)
+    shorter_side = min(inputs, outputs)
+    q, r = np.linalg.qr(random.standard_normal((longer_side, shorter_side)))
     q = q * np.sign(np.diagonal(r))
-    return (gain * (q if inputs >= outputs else q.T)).astype(np.float32)
+    weight = q if inputs >= outputs else q.T
+    return (gain * weight).astype(np.float32)
 
 
 INITIALIZERS = {"xavier": xavier, "orthogonal": orthogonal}
-
-
-def make_layer(weight: np.ndarray, layer_norm: bool = False) -> dict[str, np.ndarray]:
-    """Return a layer of a weight (inputs, outputs), with biases 0."""
-    outputs = weight.shape[1]
-    norm = {"scale": np.ones(outputs, np.float32), "offset": np.zeros(outputs, np.float32)} if layer_norm else {}
-    return {"weight": weight, "bias": np.zeros(outputs, np.float32), **norm}
-
-
-def make_linear_layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:
-    """Return a layer of a weight (inputs, outputs) and biases (outputs,)."""
-    return {"weight": weight, "bias": bias}
-
-
-def equalizing_scale(sizes: Sequence[int]) -> np.ndarray:
-    """Return factors of normalized numbers with which the variances of all parts have the same sum, float32.
-
-    Their mean square is 1, so that gains of first weights hold.
-
-    Args:
-        sizes: of the parts, in order.
-    """
-    counts = [count for count in sizes if count]
-    squares = [sum(counts) / (len(counts) * count) for count in counts]
-    return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
 
 
 def mlp(
@@ -67,72 +45,53 @@ def mlp(
     gain: float = 1.0,
     last_gain: float = 1.0,
 ) -> tuple[dict[str, np.ndarray], ...]:
-    """Draw a multilayer perceptron: for each layer its weight (inputs, outputs), bias (outputs,) and norm, if any.
+    """Draw the layers of a multilayer perceptron.
 
     Args:
-        random: to draw from.
+        random: generator to draw from.
         sizes: of the input, the hidden layers and the output.
-        initial: of the weights, a name of `INITIAL`.
-        layer_norm: whether hidden layers have one.
-        gain: of hidden layers.
-        last_gain: of the output.
+        initial: distribution of the weights, a name of `INITIALIZERS`.
+        layer_norm: whether hidden layers have a layer norm.
+        gain: of the weights of hidden layers.
+        last_gain: of the weights of the output layer.
     """
-    draw = INITIALIZERS[initial]
-    *pairs, last = zip(sizes[:-1], sizes[1:], strict=True)
-    hidden = [make_layer(draw(random, *pair, gain), layer_norm) for pair in pairs]
-    return *hidden, make_layer(draw(random, *last, last_gain))
+    draw_weight = INITIALIZERS[initial]
+    *hidden_shapes, last_shape = zip(sizes[:-1], sizes[1:], strict=True)
+    hidden_layers = [
+        make_layer(draw_weight(random, inputs, outputs, gain), layer_norm) for inputs, outputs in hidden_shapes
+    ]
+    last_inputs, last_outputs = last_shape
+    last_layer = make_layer(draw_weight(random, last_inputs, last_outputs, last_gain))
+    return *hidden_layers, last_layer
 
 
-def linear(layer: Mapping, x):
-    """Return weight and bias, if there is one, applied to x (..., inputs)."""
-    return x @ layer["weight"] + layer.get("bias", 0.0)
+def make_layer(weight: np.ndarray, layer_norm: bool = False) -> dict[str, np.ndarray]:
+    """Return a layer with a weight (inputs, outputs), biases 0, and maybe a layer norm that changes no scale."""
+    outputs = weight.shape[1]
+    layer = {"weight": weight, "bias": np.zeros(outputs, np.float32)}
+    if layer_norm:
+        layer["scale"] = np.ones(outputs, np.float32)
+        layer["offset"] = np.zeros(outputs, np.float32)
+    return layer
 
 
-def apply_hidden_layers(
-    layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0, legs: bool = False
-):
-    """Return the output of hidden layers for x (..., inputs): linear, dropout, layer norm if it has one, activation.
+def make_linear_layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:
+    """Return a layer with a weight (inputs, outputs) and biases (outputs,)."""
+    return {"weight": weight, "bias": bias}
+
+
+def equalizing_scale(sizes: Sequence[int]) -> np.ndarray:
+    """Return factors of normalized numbers that give each part of a vector the same total variance, float32.
+
+    The mean square of the factors is 1, so the gain of the first weights stays as it was drawn.
 
     Args:
-        layers: of the network.
-        x: (..., inputs)
-        activation: a name of `ACTIVATIONS`.
-        kept: booleans (layers, ..., outputs), the units that dropout keeps; None for no dropout.
-        dropout: share of the units that it drops.
-        legs: whether legs, the axis before the last, share what the first layer finds.
+        sizes: of the parts, in order; empty parts do not count.
     """
-    for index, each in enumerate(layers):
-        x = linear(each, x)
-        if kept is not None:
-            x = drop_units(x, kept[index], dropout)
-        x = normalize_and_activate(each, x, activation)
-        x = share_between_legs(x) if legs and index == 0 else x
-    return x
-
-
-def share_between_legs(x):
-    """Return units (..., legs, units) of which the second half is the mean over legs."""
-    own, common = jnp.split(x, [x.shape[-1] // 2], axis=-1)
-    return jnp.concatenate([own, jnp.broadcast_to(common.mean(axis=-2, keepdims=True), common.shape)], axis=-1)
-
-
-def body_outputs(outputs, legs: bool):
-    """Return the outputs (..., outputs) of a body; if they are those of its legs (..., legs, outputs), their means."""
-    return outputs.mean(axis=-2) if legs else outputs
-
-
-def drop_units(x, kept, dropout: float):
-    """Return x with 0 where units are not kept, and the others divided by 1 - dropout."""
-    return jnp.where(kept, x * (1.0 / (1.0 - dropout)), 0.0)
-
-
-def normalize_and_activate(layer: Mapping, x, activation: str):
-    """Return x (..., outputs) after a layer's norm, if it has one, and an activation."""
-    if "scale" in layer:
-        x = x - (layer["mean"] if "mean" in layer else x.mean(axis=-1, keepdims=True))
-        variance = layer["variance"] if "mean" in layer else (x * x).mean(axis=-1, keepdims=True)
-        x = x * jax.lax.rsqrt(variance + EPSILON) * layer["scale"] + layer["offset"]
-    return ACTIVATIONS[activation](x)
+    part_sizes = [size for size in sizes if size]
+    total = sum(part_sizes)
+    squares = [total / (len(part_sizes) * size) for size in part_sizes]
+    return np.sqrt(np.repeat(squares, part_sizes)).astype(np.float32)
 
 
 def forward(layers: Sequence[Mapping], x, activation: str = "relu"):
@@ -140,29 +99,99 @@ def forward(layers: Sequence[Mapping], x, activation: str = "relu"):
     return linear(layers[-1], apply_hidden_layers(layers[:-1], x, activation))
 
 
+def apply_hidden_layers(
+    layers: Sequence[Mapping],
+    x,
+    activation: str = "relu",
+    dropout_masks=None,
+    dropout: float = 0.0,
+    legs: bool = False,
+):
+    """Return the output of hidden layers for x (..., inputs).
+
+    Each layer is linear; then come dropout, the norm if the layer has one, and the activation.
+
+    Args:
+        layers: of the network.
+        x: (..., inputs)
+        activation: a name of `ACTIVATIONS`.
+        dropout_masks: booleans (layers, ..., outputs), True for the units that dropout keeps; None for no dropout.
+        dropout: share of the units that it drops.
+        legs: whether the axis before the last is that of legs, which share half of the first layer's units.
+    """
+    for index, layer in enumerate(layers):
+        x = linear(layer, x)
+        if dropout_masks is not None:
+            x = drop_units(x, dropout_masks[index], dropout)
+        x = normalize_and_activate(layer, x, activation)
+        if legs and index == 0:
+            x = share_between_legs(x)
+    return x
+
+
+def linear(layer: Mapping, x):
+    """Return x (..., inputs) times the weight of a layer, plus its bias if it has one."""
+    return x @ layer["weight"] + layer.get("bias", 0.0)
+
+
+def drop_units(x, mask, dropout: float):
+    """Return x where the mask is True, divided by 1 - dropout, and 0 elsewhere."""
+    return jnp.where(mask, x * (1.0 / (1.0 - dropout)), 0.0)
+
+
+def normalize_and_activate(layer: Mapping, x, activation: str):
+    """Return x (..., outputs) after a layer's norm, if it has one, and an activation."""
+    if "scale" in layer:
+        is_batch_norm = "mean" in layer
+        mean = layer["mean"] if is_batch_norm else x.mean(axis=-1, keepdims=True)
+        x = x - mean
+        variance = layer["variance"] if is_batch_norm else (x * x).mean(axis=-1, keepdims=True)
+        x = x * jax.lax.rsqrt(variance + EPSILON) * layer["scale"] + layer["offset"]
+    return ACTIVATIONS[activation](x)
+
+
+def share_between_legs(x):
+    """Return units (..., legs, units) whose second half is replaced by its mean over legs."""
+    leg_units, common_units = jnp.split(x, [x.shape[-1] // 2], axis=-1)
+    means = common_units.mean(axis=-2, keepdims=True)
+    return jnp.concatenate([leg_units, jnp.broadcast_to(means, common_units.shape)], axis=-1)
+
+
+def body_outputs(outputs, legs: bool):
+    """Return the outputs (..., outputs) of a body.
+
+    Args:
+        outputs: (..., outputs) of the body; with `legs`, (..., legs, outputs), which are averaged over legs.
+        legs: whether the axis before the last is that of legs.
+    """
+    return outputs.mean(axis=-2) if legs else outputs
+
+
 def flatten_tree(prefix: str, tree) -> dict[str, np.ndarray]:
-    """Return the arrays of a pytree by name, prefix/path/to/array: part of a checkpoint."""
+    """Return the arrays of a pytree by name, prefix/path/to/array, as a checkpoint holds them."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
-    return {f"{prefix}{_text(path)}": np.asarray(leaf) for path, leaf in leaves}
+    return {f"{prefix}{_path_text(path)}": np.asarray(leaf) for path, leaf in leaves}
 
 
 def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
-    """Return a pytree like the template with the arrays that `flatten_tree` gave.
+    """Return a pytree with the structure of the template and the arrays that `flatten_tree` named.
 
     Raises:
         KeyError, ValueError: an array is missing or has another shape.
     """
-    leaves, structure = jax.tree_util.tree_flatten_with_path(template)
-    values = []
-    for path, leaf in leaves:
-        value, like = arrays[f"{prefix}{_text(path)}"], np.asarray(leaf)
-        if (value.shape, value.dtype) != (like.shape, like.dtype):
-            raise ValueError(f"{prefix}{_text(path)}: expected {like.dtype} {like.shape}")
-        values.append(jnp.asarray(value))
-    return jax.tree_util.tree_unflatten(structure, values)
+    template_leaves, structure = jax.tree_util.tree_flatten_with_path(template)
+    leaves = []
+    for path, template_leaf in template_leaves:
+        name = f"{prefix}{_path_text(path)}"
+        array = arrays[name]
+        expected = np.asarray(template_leaf)
+        if (array.shape, array.dtype) != (expected.shape, expected.dtype):
+            raise ValueError(f"{name}: expected {expected.dtype} {expected.shape}")
+        leaves.append(jnp.asarray(array))
+    return jax.tree_util.tree_unflatten(structure, leaves)
 
 
-def _text(path) -> str:
+def _path_text(path) -> str:
     return "/" + jax.tree_util.keystr(path, simple=True, separator="/")
 
 

@@ -157,7 +157,7 @@ def test_the_policys_next_actions_are_cached_in_a_phase(learner):
     agent = learner("sope", small("sope"), evaluate_every=100)
     agent.advance()
     for source, (mean, log_std) in zip(agent.sources, agent.phase.next_actions, strict=True):
-        expected = sac.action_distribution(agent.core, agent.state.policy, every(source).next_observations)
+        expected = sac.action_distribution(agent.update_hp, agent.state.policy, every(source).next_observations)
         assert np.allclose(mean, expected[0], atol=1e-6)
         assert np.allclose(log_std, expected[1], atol=1e-6)
 

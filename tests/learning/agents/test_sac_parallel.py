@@ -83,7 +83,7 @@ def test_its_policy_takes_whole_observations(learner, name, network):
     agent = learner(name, small(name, network=network))
     found = agent.until(50)
     observations = agent.buffer.transitions_at(np.arange(50)).observations
-    mean, _ = sac.action_distribution(agent.core, agent.state.policy, agent.inputs(observations))
+    mean, _ = sac.action_distribution(agent.update_hp, agent.state.policy, agent.inputs(observations))
     assert_allclose(found.policy(observations), agent.inputs.body_actions(np.tanh(mean)), atol=1e-5)
 
 
