@@ -2,6 +2,7 @@
 
 With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`),
 unless the network treats left and right alike.
+
 A time limit bootstraps: the episode is worth the value of its last observation. Environments start at different
 ages, so their time limits fall on different steps. A step that begins another command bootstraps from the observation
 before it (`VectorEnv.resampled`).
@@ -25,6 +26,8 @@ from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.policies.network import Network
 
+_TINY_STD = 1e-8  # added to the standard deviation of advantages, which may be 0
+
 
 def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     """Learn; see `arc_suite.learning.agents`.
@@ -37,20 +40,24 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     """
     if hp.value_warm_up and not hp.start:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
-    seed, collector = context.seed, _environments(hp, context)
-    task, architecture = collector.task, collector.architecture
-    augmented = hp.symmetry_augmentation and not architecture.symmetric
-    symmetry = critic_blocks.mirror_maps(task, hp.critic_blocks) if augmented else None
-    moments, policy = Moments.empty(architecture.inputs), None
+    seed = context.seed
+    collector = _make_collector(hp, context)
+    task = collector.task
+    architecture = collector.architecture
+    symmetry = None
+    if hp.symmetry_augmentation and not architecture.symmetric:
+        symmetry = critic_blocks.mirror_maps(task, hp.critic_blocks)
+    moments = Moments.empty(architecture.inputs)
     normalize = architecture.normalize(moments)
+    policy = None
     if hp.start and context.checkpoint is None:
-        (mean, factor, limit), policy = _read(hp, context, task, architecture)
-        more = normalize.mean[len(mean) :], normalize.factor[len(mean) :]  # of privileged blocks, in units of about 1
-        normalize = Normalizer(np.append(mean, more[0]), np.append(factor, more[1]), limit)
+        start_normalizer, policy = _read_start(hp, context, task, architecture)
+        normalize = _extend_normalizer(start_normalizer, normalize)
     state = ppo.begin(hp, architecture, generator(seed, "networks", 0), policy)
     iterations = 0
 
-    if (saved := context.checkpoint) is not None:
+    saved = context.checkpoint
+    if saved is not None:
         with learner.restoring():
             state = networks.restore_tree("state", state, saved)
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
@@ -61,9 +68,9 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     while True:
         # Schedules over the length of the run.
         step = iterations * hp.num_envs * hp.horizon
-        done = min(step / context.steps, 1.0)
-        std = hp.initial_std * (hp.final_std / hp.initial_std) ** done
-        desired_kl = hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** done
+        progress = min(step / context.steps, 1.0)
+        std = hp.initial_std * (hp.final_std / hp.initial_std) ** progress
+        desired_kl = hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** progress
         with_policy = iterations * hp.horizon >= hp.value_warm_up
 
         # Act for the horizon.
@@ -71,24 +78,26 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
         # Learn from it, in epochs of minibatches.
         batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
-        count = len(batch.returns)
-        random = generator(seed, "orders", iterations)
-        orders = np.concatenate([random.permutation(count) for _ in range(hp.epochs)])
-        orders = orders.reshape(hp.epochs, count)[:, : count // hp.minibatch * hp.minibatch].reshape(-1, hp.minibatch)
-        schedules = np.float32(std), np.float32(desired_kl)
+        orders = _draw_orders(hp, generator(seed, "orders", iterations), len(batch.returns))
+        schedules = (np.float32(std), np.float32(desired_kl))
         state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, schedules, with_policy)
         iterations += 1
 
         # Update the normalizer.
-        if not hp.start and done < hp.normalize_until:
+        if not hp.start and progress < hp.normalize_until:
             moments = moments.with_vectors(architecture.seen(rollout["observations"]))
             if symmetry is not None:
                 moments = moments.with_vectors(architecture.seen(symmetry.observation(rollout["observations"])))
             normalize = architecture.normalize(moments)
 
-        metrics = {"reward": rollout["rewards"].mean(), "falls": rollout["terminated"].sum(), "std": std}
-        metrics |= {"kl": kl, "policy_rate": state.rate, "value_loss": value_loss}
-        metrics = {name: float(metric) for name, metric in metrics.items()}
+        metrics = {
+            "reward": float(rollout["rewards"].mean()),
+            "falls": float(rollout["terminated"].sum()),
+            "std": float(std),
+            "kl": float(kl),
+            "policy_rate": float(state.rate),
+            "value_loss": float(value_loss),
+        }
         graph = architectures.policy_graph(architecture, normalize, state.policy)
         checkpoint = {
             **networks.flatten_tree("state", state),
@@ -100,7 +109,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         yield Slice(iterations * hp.num_envs * hp.horizon, metrics, graph, checkpoint)
 
 
-def _environments(hp: ProximalPolicy, context: RunContext):
+def _make_collector(hp: ProximalPolicy, context: RunContext):
+    """Return what the policy acts in: `EnvironmentRollouts`, or `WorldRollouts` on JAX's device."""
     if context.setup.several and hp.network != "legs":
         raise ValueError(f"network: expected legs with several bodies, got {hp.network}")
     if hp.critic_blocks and context.setup.several:
@@ -112,52 +122,99 @@ def _environments(hp: ProximalPolicy, context: RunContext):
     return world_rollouts.WorldRollouts(hp, context)
 
 
+def _draw_orders(hp: ProximalPolicy, random: np.random.Generator, count: int) -> np.ndarray:
+    """Draw the indices (updates, minibatch) of transitions; a permutation of all `count` transitions in each epoch."""
+    permutations = np.stack([random.permutation(count) for _ in range(hp.epochs)])
+    transitions_of_epoch = count // hp.minibatch * hp.minibatch  # in complete minibatches
+    return permutations[:, :transitions_of_epoch].reshape(-1, hp.minibatch)
+
+
 def batch_of(
     hp: ProximalPolicy, architecture: Architecture, rollout: Mapping[str, Any], values, normalize: Normalizer, symmetry
 ) -> ppo.Horizon:
-    """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
-    size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
+    """Return the transitions of a rollout as a batch, with advantages and returns.
+
+    Args:
+        hp: hyperparameters.
+        architecture: of the networks.
+        rollout: arrays (horizon, num_envs, ...), as a collector returns them.
+        values: parameters of the value network.
+        normalize: normalizer of observations.
+        symmetry: mirror maps of observations and actions; the batch has mirrored transitions at its end. None for no
+            mirrored transitions.
+    """
+    size = rollout["observations"].shape[-1]
+    xp = rollout["observations"].__array_namespace__()
     observations = normalize(rollout["observations"])
-    here = numpy.asarray(ppo.predict_values(architecture, values, observations))
-    after = normalize(rollout["next_observations"])
-    there = numpy.asarray(ppo.predict_values(architecture, values, after))
-    rewards = (1.0 - hp.discount) * rollout["rewards"]
-    advantages = ppo.estimate_advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
-    returns = (advantages + here).ravel()
-    advantages = ((advantages - advantages.mean()) / (advantages.std() + 1e-8)).ravel()
+    values_before = xp.asarray(ppo.predict_values(architecture, values, observations))
+    next_observations = normalize(rollout["next_observations"])
+    values_after = xp.asarray(ppo.predict_values(architecture, values, next_observations))
+    rewards = (1.0 - hp.discount) * rollout["rewards"]  # so that returns are about as large as rewards
+    advantages = ppo.estimate_advantages(
+        hp, rewards, values_before, values_after, rollout["terminated"], rollout["ended"]
+    )
+    returns = (advantages + values_before).ravel()
+    advantages = ((advantages - advantages.mean()) / (advantages.std() + _TINY_STD)).ravel()
     observations = observations.reshape(-1, size)
-    actions, means = (rollout[name].reshape(len(returns), -1) for name in ("actions", "means"))
+    actions = rollout["actions"].reshape(len(returns), -1)
+    means = rollout["means"].reshape(len(returns), -1)
     if symmetry is not None:
-        mirror, mirror_action = symmetry
-        mirrored = normalize(mirror(rollout["observations"]).reshape(-1, size))
-        observations = numpy.concatenate([observations, mirrored])
+        mirror_observation, mirror_action = symmetry
+        mirrored_observations = normalize(mirror_observation(rollout["observations"]).reshape(-1, size))
+        observations = xp.concatenate([observations, mirrored_observations])
         # The mirrored action is as probable as the action was. Under the policy's own mean for the mirrored
         # observation, where the policy is not symmetric, its probability would be almost 0 and its gradient huge.
-        actions, means = (numpy.concatenate([each, mirror_action(each)]) for each in (actions, means))
-        advantages, returns = numpy.tile(advantages, 2), numpy.tile(returns, 2)
-    arrays = (observations, actions, means, advantages, returns)
-    return ppo.Horizon(*(jnp.asarray(array, jnp.float32) for array in arrays))
+        actions = xp.concatenate([actions, mirror_action(actions)])
+        means = xp.concatenate([means, mirror_action(means)])
+        advantages = xp.tile(advantages, 2)
+        returns = xp.tile(returns, 2)
+    return ppo.Horizon(
+        observations=jnp.asarray(observations, jnp.float32),
+        actions=jnp.asarray(actions, jnp.float32),
+        means=jnp.asarray(means, jnp.float32),
+        advantages=jnp.asarray(advantages, jnp.float32),
+        returns=jnp.asarray(returns, jnp.float32),
+    )
 
 
-def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Normalizer, tuple]:
-    """The normalizer and the network of the policy that learning starts from."""
-    several, path = context.setup.several, hp.start
-    found = universal.load(path) if several else policies.policy(Path(path), context.setup.body, task=task)
-    if not isinstance(found, Network):
+def _read_start(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Normalizer, tuple]:
+    """Return the normalizer and the network of the policy that learning starts from."""
+    if context.setup.several:
+        start_policy = universal.load(hp.start)
+    else:
+        start_policy = policies.policy(Path(hp.start), context.setup.body, task=task)
+    if not isinstance(start_policy, Network):
         raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
-    for name in {**found.blocks, **task.sizes}:
-        there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.sizes))
-        if there != here:
-            other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
-            raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
+    for name in {**start_policy.blocks, **task.sizes}:
+        policy_size = start_policy.blocks.get(name, 0)
+        task_size = task.sizes.get(name, 0)
+        if policy_size != task_size:
+            kind = start_policy.setup.kind.name
+            raise ValueError(
+                f"{hp.start}: a policy of {kind} for other observations than those of {task.name}: "
+                f"{name} has {policy_size} numbers, and not {task_size}"
+            )
     try:
-        normalize, policy = architectures.read_policy_graph(architecture, found.graph)
+        normalize, policy = architectures.read_policy_graph(architecture, start_policy.graph)
     except ValueError as error:
         raise ValueError(f"{hp.start}: expected {error}, {hp.network}") from None
+    expected_policy = architecture.drawn(np.random.default_rng(0), hp.hidden)
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
-    expected = [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]
-    if len(shapes) != len(expected):
-        raise ValueError(f"{hp.start}: expected the {len(expected)} arrays of a {hp.network}, got {len(shapes)}")
-    if shapes != expected:
-        raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
+    expected_shapes = [leaf.shape for leaf in jax.tree.leaves(expected_policy)]
+    if len(shapes) != len(expected_shapes):
+        raise ValueError(f"{hp.start}: expected the {len(expected_shapes)} arrays of a {hp.network}, got {len(shapes)}")
+    if shapes != expected_shapes:
+        first_bias_shape = shapes[0]
+        raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {first_bias_shape[0]}")
     return normalize, policy
+
+
+def _extend_normalizer(start: Normalizer, fresh: Normalizer) -> Normalizer:
+    """Return the normalizer of a start policy, extended by the privileged numbers that follow its own.
+
+    The privileged numbers, which are in units of about 1, keep the mean and the factor of the fresh normalizer.
+    """
+    size = len(start.mean)
+    mean = np.append(start.mean, fresh.mean[size:])
+    factor = np.append(start.factor, fresh.factor[size:])
+    return Normalizer(mean, factor, start.limit)

@@ -15,8 +15,13 @@ import optax
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 
-_MOST_RATE, _LEAST_RATE = 1e-2, 1e-6  # of the policy
-_STEP = 1.5  # factor by which it follows the divergence
+# The learning rate of the policy rises where the policy moves too little in an iteration, and falls where too much.
+_MAX_POLICY_RATE = 1e-2
+_MIN_POLICY_RATE = 1e-6
+_RATE_FACTOR = 1.5  # of one change of the rate
+_KL_TOLERANCE = 2.0  # factor between divergence and desired divergence, beyond which the rate changes
+
+_TINY_NORM = 1e-12  # added to the norm of a gradient, which may be 0
 
 
 class PpoState(NamedTuple):
@@ -25,7 +30,7 @@ class PpoState(NamedTuple):
     Attributes:
         policy: network of normalized observations to mean actions.
         values: network of normalized observations to the discounted return.
-        moments: of Adam, of policy and values.
+        moments: states of Adam, of policy and values.
         rate: () learning rate of the policy.
     """
 
@@ -36,14 +41,14 @@ class PpoState(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """Transitions of a horizon; leading axis (steps,).
+    """Transitions of a horizon; leading axis (transitions,).
 
     Attributes:
-        observations: (steps, size), normalized.
-        actions: (steps, joints), not clipped.
-        means: (steps, joints) mean actions of the acting policy.
-        advantages: (steps,) mean 0, standard deviation 1.
-        returns: (steps,) targets of the value function.
+        observations: (transitions, size), normalized.
+        actions: (transitions, joints), not clipped.
+        means: (transitions, joints) mean actions of the acting policy.
+        advantages: (transitions,) mean 0, standard deviation 1.
+        returns: (transitions,) targets of the value function.
     """
 
     observations: Any
@@ -56,17 +61,33 @@ class Horizon(NamedTuple):
 def begin(
     hp: ProximalPolicy, architecture: Architecture, random: np.random.Generator, policy: tuple | None = None
 ) -> PpoState:
-    """Draw the networks; with a given policy only that of values."""
-    drawn = architecture.drawn(random, hp.hidden, last_gain=0.01)
-    policy = drawn if policy is None else policy
+    """Draw the networks, and return the state before the first update.
+
+    Args:
+        hp: hyperparameters.
+        architecture: of the networks.
+        random: generator to draw from.
+        policy: parameters of the policy to start from; None for drawn ones.
+    """
+    drawn_policy = architecture.drawn(random, hp.hidden, last_gain=0.01)
+    if policy is None:
+        policy = drawn_policy
     values = architecture.drawn_values(random, hp.hidden)
     adam = optax.scale_by_adam()
-    moments = adam.init(policy), adam.init(values)
+    moments = (adam.init(policy), adam.init(values))
     return jax.tree.map(jnp.asarray, PpoState(policy, values, moments, np.float32(hp.policy_rate)))
 
 
-predict_mean_actions = jax.jit(lambda architecture, policy, x: architecture.actions(policy, x), static_argnums=0)
-predict_values = jax.jit(lambda architecture, values, x: architecture.values(values, x), static_argnums=0)
+@functools.partial(jax.jit, static_argnums=0)
+def predict_mean_actions(architecture: Architecture, policy, observations):
+    """Return the mean actions (..., joints) of a policy for normalized observations (..., size)."""
+    return architecture.actions(policy, observations)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def predict_values(architecture: Architecture, values, observations):
+    """Return the predicted returns (...) of normalized observations (..., size)."""
+    return architecture.values(values, observations)
 
 
 def estimate_advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, ended):
@@ -76,18 +97,19 @@ def estimate_advantages(hp: ProximalPolicy, rewards, values, next_values, termin
         hp: hyperparameters, for `discount` and `gae_lambda`.
         rewards: (steps, num_envs)
         values: (steps, num_envs) of the observations before the step.
-        next_values: (steps, num_envs) of the observations after the step, also after an episode's last; of those
-            before a step that began another command.
+        next_values: (steps, num_envs) of the observations after the step, also after the last step of an episode. If
+            the step began another command, of the observation before it.
         terminated: (steps, num_envs) booleans: the return after the step is 0.
         ended: (steps, num_envs) booleans: the next step is of another episode, or follows another command.
     """
-    numpy = rewards.__array_namespace__()
-    surprise = rewards + hp.discount * numpy.where(terminated, 0.0, next_values) - values
-    found, last = [], 0.0
-    for step in reversed(range(len(surprise))):
-        last = surprise[step] + hp.discount * hp.gae_lambda * numpy.where(ended[step], 0.0, last)
-        found.append(last)
-    return numpy.stack(found[::-1])
+    xp = rewards.__array_namespace__()
+    errors = rewards + hp.discount * xp.where(terminated, 0.0, next_values) - values  # of temporal differences
+    advantages = []  # from the last step to the first
+    advantage = 0.0
+    for step in reversed(range(len(errors))):
+        advantage = errors[step] + hp.discount * hp.gae_lambda * xp.where(ended[step], 0.0, advantage)
+        advantages.append(advantage)
+    return xp.stack(advantages[::-1])
 
 
 @functools.partial(jax.jit, static_argnums=(0, 1, 6), donate_argnums=2)
@@ -105,7 +127,7 @@ def update(
     Args:
         hp: hyperparameters.
         architecture: of the networks.
-        state: before.
+        state: before the updates.
         batch: transitions.
         orders: (updates, minibatch) indices of transitions.
         schedules: standard deviation of actions, and desired divergence.
@@ -115,43 +137,57 @@ def update(
         The state, the Kullback-Leibler divergence of the policy from the acting policy, and the mean value loss.
     """
     std, desired_kl = schedules
-    adam = optax.scale_by_adam()
 
-    def divergence(policy, part: Horizon):
-        apart = architecture.actions(policy, part.observations) - part.means
-        return (apart**2).sum(axis=-1).mean() / (2.0 * std**2)
-
-    def policy_loss(policy, part: Horizon):
-        means = architecture.actions(policy, part.observations)
-        nearer = ((part.actions - part.means) ** 2 - (part.actions - means) ** 2).sum(axis=-1)
-        ratio = jnp.exp(nearer / (2.0 * std**2))
-        clipped = ratio.clip(1.0 - hp.clip, 1.0 + hp.clip)
-        return -jnp.minimum(ratio * part.advantages, clipped * part.advantages).mean()
-
-    def value_loss(values, part: Horizon):
-        return ((architecture.values(values, part.observations) - part.returns) ** 2).mean()
-
-    def stepped(network, gradient, moments, rate):
-        length = jnp.sqrt(sum((leaf**2).sum() for leaf in jax.tree.leaves(gradient)))
-        shorter = jnp.minimum(1.0, hp.gradient_norm / (length + 1e-12))
-        gradient = jax.tree.map(lambda leaf: leaf * shorter, gradient)
-        direction, moments = adam.update(gradient, moments)
-        return jax.tree.map(lambda weight, step: weight - rate * step, network, direction), moments
-
-    def once(state, order):
-        part = jax.tree.map(lambda array: array[order], batch)
-        of_policy, of_values = state.moments
+    def update_once(state: PpoState, order):
+        minibatch = jax.tree.map(lambda array: array[order], batch)
         policy = state.policy
+        policy_moments, value_moments = state.moments
         if with_policy:
-            policy, of_policy = stepped(policy, jax.grad(policy_loss)(policy, part), of_policy, state.rate)
-        loss, gradient = jax.value_and_grad(value_loss)(state.values, part)
-        values, of_values = stepped(state.values, gradient, of_values, hp.value_rate)
-        return PpoState(policy, values, (of_policy, of_values), state.rate), loss
+            policy_gradient = jax.grad(_policy_loss, argnums=2)(hp, architecture, policy, minibatch, std)
+            policy, policy_moments = _adam_step(hp, policy, policy_gradient, policy_moments, state.rate)
+        value_loss, value_gradient = jax.value_and_grad(_value_loss, argnums=1)(architecture, state.values, minibatch)
+        values, value_moments = _adam_step(hp, state.values, value_gradient, value_moments, hp.value_rate)
+        return PpoState(policy, values, (policy_moments, value_moments), state.rate), value_loss
 
-    state, losses = jax.lax.scan(once, state, orders)
-    # Without the mirrored transitions at the end, which no policy has acted in.
-    kl = divergence(state.policy, jax.tree.map(lambda array: array[: hp.num_envs * hp.horizon], batch))
+    state, value_losses = jax.lax.scan(update_once, state, orders)
+
+    # Mirrored transitions, at the end of the batch, do not count: no policy has acted in them.
+    acted = jax.tree.map(lambda array: array[: hp.num_envs * hp.horizon], batch)
+    kl = _mean_divergence(architecture, state.policy, acted, std)
     if with_policy:
-        factor = jnp.where(kl > 2.0 * desired_kl, 1.0 / _STEP, jnp.where(kl < 0.5 * desired_kl, _STEP, 1.0))
-        state = state._replace(rate=(state.rate * factor).clip(_LEAST_RATE, _MOST_RATE))
-    return state, kl, losses.mean()
+        moved_too_far = kl > _KL_TOLERANCE * desired_kl
+        moved_too_little = kl < desired_kl / _KL_TOLERANCE
+        factor = jnp.where(moved_too_far, 1.0 / _RATE_FACTOR, jnp.where(moved_too_little, _RATE_FACTOR, 1.0))
+        state = state._replace(rate=(state.rate * factor).clip(_MIN_POLICY_RATE, _MAX_POLICY_RATE))
+    return state, kl, value_losses.mean()
+
+
+def _policy_loss(hp: ProximalPolicy, architecture: Architecture, policy, minibatch: Horizon, std):
+    """Return minus the mean of the clipped objective."""
+    means = architecture.actions(policy, minibatch.observations)
+    # Of normal distributions with the same standard deviation, the ratio of probabilities depends on squared distances.
+    acting_distances = (minibatch.actions - minibatch.means) ** 2
+    distances = (minibatch.actions - means) ** 2
+    ratio = jnp.exp((acting_distances - distances).sum(axis=-1) / (2.0 * std**2))
+    clipped_ratio = ratio.clip(1.0 - hp.clip, 1.0 + hp.clip)
+    return -jnp.minimum(ratio * minibatch.advantages, clipped_ratio * minibatch.advantages).mean()
+
+
+def _value_loss(architecture: Architecture, values, minibatch: Horizon):
+    """Return the mean squared error of the predicted returns."""
+    return ((architecture.values(values, minibatch.observations) - minibatch.returns) ** 2).mean()
+
+
+def _adam_step(hp: ProximalPolicy, parameters, gradient, moments, rate):
+    """Return parameters after a step of Adam, with a gradient whose norm is limited, and the moments."""
+    norm = jnp.sqrt(sum((leaf**2).sum() for leaf in jax.tree.leaves(gradient)))
+    factor = jnp.minimum(1.0, hp.gradient_norm / (norm + _TINY_NORM))
+    gradient = jax.tree.map(lambda leaf: leaf * factor, gradient)
+    direction, moments = optax.scale_by_adam().update(gradient, moments)
+    return jax.tree.map(lambda weight, step: weight - rate * step, parameters, direction), moments
+
+
+def _mean_divergence(architecture: Architecture, policy, batch: Horizon, std):
+    """Return the mean Kullback-Leibler divergence of a policy from the acting policy."""
+    differences = architecture.actions(policy, batch.observations) - batch.means
+    return (differences**2).sum(axis=-1).mean() / (2.0 * std**2)
