@@ -1,8 +1,8 @@
 """Architectures of networks: what maps vectors of observations to actions and to values.
 
-An architecture is a value with the methods of `Perceptron`: how networks view observations, and how they give actions
-(..., joints) and values (...). Learners draw its parameters, normalize what it views and apply it. JAX compiles for
-each value: equal ones must compute the same.
+An architecture is a value with the methods of `Perceptron`. They say how networks view observations, and how networks
+give actions (..., joints) and values (...). Learners draw its parameters, normalize its views and apply it. JAX
+compiles for each architecture: equal ones must compute the same.
 """
 
 import dataclasses
@@ -23,6 +23,8 @@ from arc_suite.policies.graph import Graph
 from arc_suite.policies.tracing import perceptron, traced
 from arc_suite.tasks import Task
 
+_GAIN = 2**0.5  # of the weights of hidden layers
+
 
 @dataclasses.dataclass(frozen=True)
 class Perceptron:
@@ -33,11 +35,11 @@ class Perceptron:
 
     Attributes:
         blocks: sizes of the observation's blocks, in order.
-        joints: of an action.
-        privileged: sizes of blocks that follow those of the observation, and that values alone depend on.
-        size: of an observation.
-        own: numbers of a view that actions depend on, which are its first.
-        inputs: numbers whose moments normalize views, privileged ones counted.
+        joints: numbers of an action.
+        privileged: sizes of the privileged blocks after the observation, which only values depend on.
+        size: numbers of an observation.
+        own: numbers of a view that actions depend on; they come first.
+        inputs: numbers of a view, privileged ones counted; the size of the moments that normalize it.
         symmetric: whether the networks treat left and right alike, whatever their parameters.
     """
 
@@ -46,8 +48,21 @@ class Perceptron:
     privileged: tuple[int, ...] = ()
 
     symmetric = False
-    size = own = property(lambda self: sum(self.blocks))
-    inputs = property(lambda self: self.size + sum(self.privileged))
+
+    @property
+    def size(self) -> int:
+        """Numbers of an observation."""
+        return sum(self.blocks)
+
+    @property
+    def own(self) -> int:
+        """Numbers of a view that actions depend on; they come first."""
+        return sum(self.blocks)
+
+    @property
+    def inputs(self) -> int:
+        """Numbers of a view, privileged ones counted."""
+        return self.size + sum(self.privileged)
 
     @classmethod
     def of(cls, task: Task, critic_blocks: Iterable[str] = (), symmetric: bool = False) -> Self:
@@ -62,30 +77,30 @@ class Perceptron:
         return cls(tuple(task.sizes.values()), len(task.scene.body.joint_names), privileged)
 
     def viewed(self, observations):
-        """Return observations (..., size), privileged blocks after them, as networks view them."""
+        """Return observations (..., size), with privileged blocks after them, as networks view them."""
         return observations
 
     def drawn(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""
         sizes = (self.size, hidden, hidden, self.joints)
-        return networks.mlp(random, sizes, "orthogonal", gain=2**0.5, last_gain=last_gain)
+        return networks.mlp(random, sizes, "orthogonal", gain=_GAIN, last_gain=last_gain)
 
     def drawn_values(self, random, hidden):
         """Draw the parameters of a network of values."""
-        return networks.mlp(random, (self.inputs, hidden, hidden, 1), "orthogonal", gain=2**0.5)
+        return networks.mlp(random, (self.inputs, hidden, hidden, 1), "orthogonal", gain=_GAIN)
 
     def actions(self, parameters, views):
         """Return the actions (..., joints) for normalized views (..., own or more)."""
         return networks.forward(parameters, views[..., : self.size] * self.scale, ACTIVATION)
 
     def values(self, parameters, views):
-        """Return the values (...) of normalized views."""
+        """Return the values (...) of normalized views (..., inputs)."""
         scale = networks.equalizing_scale(self.blocks + self.privileged)
         return networks.forward(parameters, views * scale, ACTIVATION)[..., 0]
 
     @property
     def scale(self) -> np.ndarray:
-        """(size,) factors of normalized numbers; their mean square is 1, so that gains of first weights hold."""
+        """(size,) factors of normalized numbers; see `networks.equalizing_scale`."""
         return networks.equalizing_scale(self.blocks)
 
     def seen(self, views):
@@ -93,31 +108,44 @@ class Perceptron:
         return views
 
     def normalize(self, moments: Moments) -> Normalizer:
-        """Return what normalizes views, from the moments of what was seen."""
+        """Return the normalizer of views, from the moments of the vectors of `seen`."""
         return moments.normalizer()
 
     def exported(self, parameters, x):
         """Write the nodes of the actions (1, joints) for a normalized observation (1, size)."""
-        first, *others = parameters
-        return perceptron(x, ({**first, "weight": first["weight"] * self.scale[:, None]}, *others), ACTIVATION)
+        first_layer, *later_layers = parameters
+        scaled_layer = {**first_layer, "weight": first_layer["weight"] * self.scale[:, None]}
+        return perceptron(x, (scaled_layer, *later_layers), ACTIVATION)
 
     def imported(self, weights):
         """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order.
 
         Raises:
-            ValueError: others.
+            ValueError: they are of another network.
         """
-        first, *others = map(networks.make_linear_layer, weights[::2], weights[1::2])
-        return {**first, "weight": first["weight"] / self.scale[:, None]}, *others
+        scaled_layer, *later_layers = map(networks.make_linear_layer, weights[::2], weights[1::2])
+        first_layer = {**scaled_layer, "weight": scaled_layer["weight"] / self.scale[:, None]}
+        return first_layer, *later_layers
 
 
 Architecture = Perceptron | Legs | AnyLegs
 
 
-# What learners use of an architecture.
+# Attributes and methods that learners use of an architecture.
 _ATTRIBUTES = (
-    *("symmetric", "size", "own", "inputs", "viewed", "seen", "normalize"),
-    *("drawn", "drawn_values", "actions", "values", "exported", "imported"),
+    "symmetric",
+    "size",
+    "own",
+    "inputs",
+    "viewed",
+    "seen",
+    "normalize",
+    "drawn",
+    "drawn_values",
+    "actions",
+    "values",
+    "exported",
+    "imported",
 )
 
 
@@ -135,42 +163,70 @@ def of(
     Raises:
         ValueError: an unknown network, or a function that returns no architecture.
     """
-    architecture = registry.find("network", network, NETWORKS)(task, critic_blocks, symmetric)
-    if missing := [name for name in _ATTRIBUTES if not hasattr(architecture, name)]:
+    make_architecture = registry.find("network", network, NETWORKS)
+    architecture = make_architecture(task, critic_blocks, symmetric)
+    missing = [name for name in _ATTRIBUTES if not hasattr(architecture, name)]
+    if missing:
         raise ValueError(f"network {network!r}: has no {' and no '.join(missing)}, which architectures have")
     return architecture
 
 
-def of_environment(environment: VectorEnv | BodiesEnv, *options, **more) -> Architecture:
-    """Return the architecture for environments: `AnyLegs` for several bodies, else what `of` returns."""
-    return AnyLegs() if isinstance(environment, BodiesEnv) else of(environment.task.definition, *options, **more)
+def of_environment(
+    environment: VectorEnv | BodiesEnv,
+    network: str = "perceptron",
+    critic_blocks: Iterable[str] = (),
+    symmetric: bool = True,
+) -> Architecture:
+    """Return the architecture for environments: `AnyLegs` for several bodies, otherwise that of `of`."""
+    if isinstance(environment, BodiesEnv):
+        return AnyLegs()
+    return of(environment.task.definition, network, critic_blocks, symmetric)
 
 
 def policy_graph(architecture: Architecture, normalize: Normalizer, parameters) -> Graph:
     """Return the graph of a policy: a normalizer and a network of actions."""
-    mean, factor, limit = normalize
-    own = Normalizer(mean[: architecture.own], factor[: architecture.own], limit)
+    action_inputs = architecture.own
+    normalize_action_inputs = Normalizer(
+        normalize.mean[:action_inputs], normalize.factor[:action_inputs], normalize.limit
+    )
 
-    def actions(x):
-        return architecture.exported(parameters, own(architecture.viewed(x))).clip(-1.0, 1.0)
+    def trace_actions(observation):
+        view = normalize_action_inputs(architecture.viewed(observation))
+        return architecture.exported(parameters, view).clip(-1.0, 1.0)
 
-    return traced(actions, architecture.size)
+    return traced(trace_actions, architecture.size)
 
 
 def read_policy_graph(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
-    """Return the normalizer and the parameters of a graph that `policy_graph` gave.
+    """Return the normalizer and the parameters of a graph that `policy_graph` made.
 
     Raises:
         ValueError: another graph.
     """
     try:
-        first = [node.operator for node in graph.nodes].index("Sub")
-        normalize = Normalizer(*(graph.arrays[str(node.inputs[-1])] for node in graph.nodes[first : first + 3]))
-        names = [node.inputs[1:] for node in graph.nodes if node.operator in ("Linear", "Product")]
-        parameters = architecture.imported([graph.arrays[str(name)] for own in names for name in own])
-        same = policy_graph(architecture, normalize, parameters).nodes == graph.nodes
+        normalize = _read_normalizer(graph)
+        parameters = architecture.imported(_layer_arrays(graph))
+        is_same_graph = policy_graph(architecture, normalize, parameters).nodes == graph.nodes
     except (KeyError, TypeError, ValueError):
-        same = False
-    if not same:
+        is_same_graph = False
+    if not is_same_graph:
         raise ValueError("a policy of dagger, bc or ppo, of the same network")
     return normalize, parameters
+
+
+def _read_normalizer(graph: Graph) -> Normalizer:
+    """Return the normalizer of a graph: its first difference, and the product and the clip after it."""
+    operators = [node.operator for node in graph.nodes]
+    first = operators.index("Sub")
+    mean, factor, limit = (graph.arrays[str(node.inputs[-1])] for node in graph.nodes[first : first + 3])
+    return Normalizer(mean, factor, limit)
+
+
+def _layer_arrays(graph: Graph) -> list[np.ndarray]:
+    """Return the weights and biases of a graph's layers, in order."""
+    arrays = []
+    for node in graph.nodes:
+        if node.operator in ("Linear", "Product"):
+            _, *array_names = node.inputs
+            arrays += [graph.arrays[str(name)] for name in array_names]
+    return arrays

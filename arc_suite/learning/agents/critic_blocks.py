@@ -1,4 +1,4 @@
-"""Privileged blocks behind an observation, for critics: their places, and mirror maps of both."""
+"""Privileged blocks that critics see after an observation: their columns, and mirror maps of both."""
 
 from collections.abc import Iterable, Sequence
 
@@ -11,24 +11,24 @@ from arc_suite.tasks.mirrors import Symmetry
 
 
 def mirror_maps(task: Task, critic_blocks: Iterable[str] = ()) -> Symmetry | None:
-    """Return the mirror maps of a task, with privileged blocks after its observation; None where there are none."""
+    """Return the mirror maps of a task, with privileged blocks after its observation; None for an asymmetric task."""
     try:
-        own = task.symmetry
-        image = mirror.image(task.scene.body)
-        more = [task.privileged_blocks[name].mirror(image) for name in critic_blocks]
+        symmetry = task.symmetry
+        body_mirror = mirror.image(task.scene.body)
+        privileged_mirrors = [task.privileged_blocks[name].mirror(body_mirror) for name in critic_blocks]
     except ValueError:
         return None
-    return own._replace(observation=mirrors.join([own.observation, *more]))
+    return symmetry._replace(observation=mirrors.join([symmetry.observation, *privileged_mirrors]))
 
 
 def privileged_columns(task: Task, critic_blocks: Sequence[str]) -> np.ndarray:
-    """Return the places of blocks in the privileged observation of a task.
+    """Return the indices of blocks in the privileged observation of a task.
 
     Raises:
         ValueError: the task has no such block.
     """
     if not critic_blocks:
         return np.arange(0)
-    there = blocks.places(privileged.sizes(task))
-    names = checks.names("critic_blocks", critic_blocks, there, "block")
-    return np.concatenate([np.arange(there[name].start, there[name].stop) for name in names])
+    slices = blocks.places(privileged.sizes(task))
+    names = checks.names("critic_blocks", critic_blocks, slices, "block")
+    return np.concatenate([np.arange(slices[name].start, slices[name].stop) for name in names])

@@ -1,4 +1,4 @@
-"""Inputs of the networks of soft actor-critic: observations, normalized; as legs see them; and mirrored transitions."""
+"""Inputs of the networks of soft actor-critic: observations as legs see them, normalized; and mirrored transitions."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
@@ -16,18 +16,18 @@ from arc_suite.tasks.mirrors import Mirror, Symmetry
 
 
 class NetworkInputs(NamedTuple):
-    """How networks see the observations of a task, and what they do.
+    """How networks see the observations of a task, and how their outputs become actions.
 
     Attributes:
-        observed: size of an observation.
-        size: of what a network sees, of a leg if legs share it.
-        joints: shape of what it does: (joints,), or (legs, joints of a leg).
-        moments: of what it sees, which normalize it; None for raw numbers.
+        observation_size: numbers of an observation.
+        size: numbers of a network's input; of a leg's, if legs share the network.
+        joints: shape of a network's output: (joints,), or (legs, joints of a leg).
+        moments: of the inputs, which normalize them; None for no normalization.
         symmetry: mirror maps of the task; None for no mirrored transitions.
-        legs: what legs see and do, if they share a network.
+        legs: architecture of legs that share a network; None for a perceptron of the body.
     """
 
-    observed: int
+    observation_size: int
     size: int
     joints: tuple[int, ...]
     moments: Moments | None
@@ -48,61 +48,81 @@ class NetworkInputs(NamedTuple):
         Raises:
             ValueError: legs with different numbers of joints cannot share a network.
         """
-        size, joints, legs = task.size, (len(task.scene.body.joint_names),), None
+        size = task.size
+        joints = (len(task.scene.body.joint_names),)
+        legs = None
         if network == "legs":
             legs = Legs.of(task, symmetric=symmetry_augmentation)
-            size, joints = legs.features, (legs.legs, legs.views.most)
-            if legs.joints < legs.legs * legs.views.most:
+            joints_of_a_leg = legs.views.most
+            size = legs.features
+            joints = (legs.legs, joints_of_a_leg)
+            if legs.joints < legs.legs * joints_of_a_leg:
                 raise ValueError("network: expected perceptron for legs with different numbers of joints, got legs")
-        mirrored = symmetry_augmentation and not (legs and legs.symmetric)
-        symmetry = critic_blocks.mirror_maps(task) if mirrored else None
-        return cls(task.size, size, joints, Moments.empty(size) if normalize else None, symmetry, legs)
+        is_network_symmetric = legs is not None and legs.symmetric
+        symmetry = None
+        if symmetry_augmentation and not is_network_symmetric:
+            symmetry = critic_blocks.mirror_maps(task)
+        moments = Moments.empty(size) if normalize else None
+        return cls(task.size, size, joints, moments, symmetry, legs)
 
     def __call__(self, observations: np.ndarray) -> np.ndarray:
-        """Return what networks see (..., size), or (..., legs, size), of observations (..., observed)."""
-        seen = self._seen(observations)
-        seen = seen if self.moments is None else self.moments.normalizer()(seen)
-        return seen if self.legs is None else seen * self.legs.scale
+        """Return the inputs of networks for observations (..., observation_size).
+
+        Returns:
+            (..., size); or (..., legs, size), if legs share the network.
+        """
+        views = self._view(observations)
+        if self.moments is not None:
+            normalize = self.moments.normalizer()
+            views = normalize(views)
+        return views if self.legs is None else views * self.legs.scale
 
     def with_observations(self, observations: np.ndarray) -> Self:
-        """Return the inputs with more observations (..., observed), and their mirror images, in the moments."""
+        """Return the inputs with more observations (..., observation_size) in the moments, mirrored ones too."""
         if self.moments is None:
             return self
-        moments = self.moments.with_vectors(self._seen(observations))
+        moments = self.moments.with_vectors(self._view(observations))
         if self.symmetry is not None:
-            moments = moments.with_vectors(self._seen(self.symmetry.observation(observations)))
+            moments = moments.with_vectors(self._view(self.symmetry.observation(observations)))
         return self._replace(moments=moments)
 
     def transform_batch(self, batch: Transitions) -> Transitions:
-        """Return a batch of transitions as networks see and do them, every other transition mirrored."""
-        seen = {name: getattr(batch, name) for name in ("observations", "next_observations")}
+        """Return a batch of transitions as inputs and outputs of networks; every other transition is mirrored."""
+        observations = batch.observations
+        actions = batch.actions
+        next_observations = batch.next_observations
         if self.symmetry is not None:
-            mirror_observation, mirror_action = self.symmetry
-            seen = {name: _every_other(mirror_observation, observations) for name, observations in seen.items()}
-            batch = batch._replace(actions=_every_other(mirror_action, batch.actions))
+            observations = _mirror_every_other(self.symmetry.observation, observations)
+            actions = _mirror_every_other(self.symmetry.action, actions)
+            next_observations = _mirror_every_other(self.symmetry.observation, next_observations)
         if self.legs is not None:
-            batch = batch._replace(actions=self.legs.leg_actions(batch.actions))
-        return batch._replace(**{name: self(observations) for name, observations in seen.items()})
+            actions = self.legs.leg_actions(actions)
+        return batch._replace(
+            observations=self(observations), actions=actions, next_observations=self(next_observations)
+        )
 
-    def body_actions(self, actions: np.ndarray) -> np.ndarray:
-        """Return the actions (..., joints) of a body that are what a network does."""
-        return actions if self.legs is None else self.legs.body_actions(actions)
+    def body_actions(self, outputs: np.ndarray) -> np.ndarray:
+        """Return the actions (..., joints) of the body for the outputs of a network."""
+        return outputs if self.legs is None else self.legs.body_actions(outputs)
 
     def policy_graph(self, layers: Sequence[Mapping]) -> Graph:
-        """Return the policy, from the layers of an actor."""
-        if self.legs is not None:
-            return traced(
-                lambda x: self.body_actions(leg_networks.trace_shared_layers(self(x), layers).node("Tanh")),
-                self.observed,
-            )
-        return traced(lambda x: perceptron(self(x), layers).node("Tanh"), self.observed)
+        """Return the graph of a policy, from the layers of its network."""
 
-    def _seen(self, observations):
+        def trace_body(observation):
+            return perceptron(self(observation), layers).node("Tanh")
+
+        def trace_legs(observation):
+            return self.body_actions(leg_networks.trace_shared_layers(self(observation), layers).node("Tanh"))
+
+        return traced(trace_body if self.legs is None else trace_legs, self.observation_size)
+
+    def _view(self, observations):
+        """Return observations as networks see them, before normalization."""
         return observations if self.legs is None else self.legs.seen(self.legs.viewed(observations))
 
 
-def _every_other(mirrored: Mirror, vectors: np.ndarray) -> np.ndarray:
+def _mirror_every_other(mirror: Mirror, vectors: np.ndarray) -> np.ndarray:
     """Return a copy of vectors (batch, ...), every other one mirrored."""
     vectors = vectors.copy()
-    vectors[1::2] = mirrored(vectors[1::2])
+    vectors[1::2] = mirror(vectors[1::2])
     return vectors

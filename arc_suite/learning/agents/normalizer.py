@@ -4,12 +4,12 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-LIMIT = 5.0  # of a normalized number
-_LEAST = 1e-3  # lower bound of the standard deviation, for near-constant inputs
+LIMIT = 5.0  # bound of a normalized number, in standard deviations
+_MIN_DEVIATION = 1e-3  # lower bound of the standard deviation, for near-constant inputs
 
 
 class Normalizer(NamedTuple):
-    """What normalizes vectors of NumPy, of JAX or of a traced graph: (x - mean) * factor, within +-limit.
+    """Normalizes vectors of NumPy, of JAX or of a traced graph: (x - mean) * factor, within +-limit.
 
     Attributes:
         mean: (size,)
@@ -30,7 +30,7 @@ class Moments(NamedTuple):
     """Moments of vectors.
 
     Attributes:
-        count: () of the vectors.
+        count: () number of the vectors.
         mean: (size,)
         squares: (size,) sum of the squared deviations from the mean.
     """
@@ -47,18 +47,19 @@ class Moments(NamedTuple):
     def with_vectors(self, vectors: np.ndarray) -> Self:
         """Return the moments with more vectors (..., size) (Chan, Golub and LeVeque, 1979)."""
         vectors = vectors.reshape(-1, vectors.shape[-1])
-        mean = np.asarray(vectors.mean(axis=0, dtype=float), float)  # of NumPy or JAX
-        squares = np.asarray(((vectors - mean) ** 2).sum(axis=0), float)
-        count = self.count + len(vectors)
-        apart = mean - self.mean
+        new_count = len(vectors)
+        new_mean = np.asarray(vectors.mean(axis=0, dtype=float), float)  # of NumPy or JAX
+        new_squares = np.asarray(((vectors - new_mean) ** 2).sum(axis=0), float)
+        count = self.count + new_count
+        difference = new_mean - self.mean
         return Moments(
             count,
-            self.mean + apart * (len(vectors) / count),
-            self.squares + squares + apart**2 * (self.count * len(vectors) / count),
+            self.mean + difference * (new_count / count),
+            self.squares + new_squares + difference**2 * (self.count * new_count / count),
         )
 
     def normalizer(self) -> Normalizer:
-        """Return what normalizes observations, float32."""
+        """Return the normalizer of such vectors, float32; before the first vector its factors are 1."""
         deviation = np.sqrt(self.squares / max(self.count, 1.0))
-        factor = 1.0 / np.maximum(deviation, _LEAST) if self.count else np.ones_like(deviation)
-        return Normalizer(*(each.astype(np.float32) for each in (self.mean, factor, np.array(LIMIT))))
+        factor = 1.0 / np.maximum(deviation, _MIN_DEVIATION) if self.count else np.ones_like(deviation)
+        return Normalizer(self.mean.astype(np.float32), factor.astype(np.float32), np.array(LIMIT, np.float32))
