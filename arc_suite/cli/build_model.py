@@ -21,7 +21,7 @@ from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
-from arc_suite.cli.flags import custom_body, define_body, define_task, task_from_flags
+from arc_suite.cli.flags import DEFAULT_LINKS, custom_body, define_body, define_task, task_from_flags
 from arc_suite.cli.summary import body_summary
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import spec_files
@@ -56,29 +56,36 @@ def main() -> None:
     """Build the body and write it."""
     if FLAGS.render is not None:
         checks.extension(FLAGS.render, [".png"])
-    body = _body()
-    arena = _arena(body)
+    body = _body_from_flags()
+    arena = _arena_from_flags(body)
     with contextlib.ExitStack() as stack:
         if FLAGS.output is not None:
-            stack.enter_context(files.writing(FLAGS.output)).write_text(_text(body, arena), encoding="utf-8")
+            output = stack.enter_context(files.writing(FLAGS.output))
+            output.write_text(_text(body, arena), encoding="utf-8")
         elif not FLAGS.summary and FLAGS.render is None:
             print(_text(body, arena), end="")
         if FLAGS.render is not None:
-            path = stack.enter_context(files.writing(FLAGS.render))
+            picture_path = stack.enter_context(files.writing(FLAGS.render))
             physics = Physics.from_body(body, arena)
             physics.forward()
-            imageio.imwrite(path, physics.render(camera_id="portrait", quality="still"))
+            imageio.imwrite(picture_path, physics.render(camera_id="portrait", quality="still"))
         if FLAGS.summary:
             print(body_summary(body))
-    for path in filter(None, (FLAGS.output, FLAGS.render)):
-        print(f"wrote {path}")
+    for path in (FLAGS.output, FLAGS.render):
+        if path:
+            print(f"wrote {path}")
 
 
-def _body() -> Body:
+def _body_from_flags() -> Body:
+    """Return the body that flags name or describe.
+
+    Raises:
+        ValueError: no such body, or flags that do not go together.
+    """
     sources = [name for name in ("robot", "spec", "legs", "seed") if FLAGS[name].value is not None]
     if sources not in (["robot"], ["spec"], ["legs"], ["seed"], ["legs", "seed"]):
-        given = " and ".join(f"--{name}" for name in sources) or "none"
-        raise ValueError(f"expected one of --robot, --spec, --legs and --seed (or the last two), got {given}")
+        source_flags = " and ".join(f"--{name}" for name in sources) or "none"
+        raise ValueError(f"expected one of --robot, --spec, --legs and --seed (or the last two), got {source_flags}")
     if sources in (["robot"], ["spec"]):
         for name in ("links", "layout"):
             if FLAGS[name].value is not None:
@@ -87,20 +94,25 @@ def _body() -> Body:
     elif "seed" in sources:
         body = sound_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
     else:
-        body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links, FLAGS.layout)
-    return body if FLAGS.scale is None else generator.scaled(body, FLAGS.scale)
+        links = DEFAULT_LINKS if FLAGS.links is None else FLAGS.links
+        body = generator.generate(FLAGS.legs, links, FLAGS.layout)
+    if FLAGS.scale is None:
+        return body
+    return generator.scaled(body, FLAGS.scale)
 
 
-def _arena(body: Body) -> Arena:
+def _arena_from_flags(body: Body) -> Arena:
     """Return the arena of the task that flags name; the floor if they name none."""
     if not (FLAGS["task"].present or FLAGS["set"].present):
         return FLAT
     if FLAGS.no_arena:
         raise ValueError("--no_arena: goes without --task and --set, which bring an arena")
-    return Setup.of(body, *task_from_flags()).definition.scene.arena
+    task, settings = task_from_flags()
+    return Setup.of(body, task, settings).definition.scene.arena
 
 
 def _text(body: Body, arena: Arena) -> str:
+    """Return the spec of a body as JSON, or its model as MJCF."""
     if FLAGS.json:
         return spec_files.body_to_json(body)
     return models.text(body, None if FLAGS.no_arena else arena, decorated=FLAGS.visuals)

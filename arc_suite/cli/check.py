@@ -29,8 +29,8 @@ define_task()
 flags.DEFINE_bool("walk", False, "Let the demonstrator walk a body, whatever its flaws are, if any walk is possible.")
 flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}.")
 
-
-_FLAWS = {"touch": "drags its torso", "slow": "is slow"}  # by the names of failures, except falls
+_GOOD_QUALITY = 2  # of a walk that counts as walking; see `cures.FirstWalk`
+_FAILURE_TEXTS = {"touch": "drags its torso", "slow": "is slow"}  # by the failures of a walk, except falls
 
 
 def main(spec: str | None = None) -> int:
@@ -39,47 +39,64 @@ def main(spec: str | None = None) -> int:
         raise ValueError("expected a spec file or --task; see --help")
     if FLAGS.walk and spec is None:
         raise ValueError("--walk: expected a spec file, got --task")
-    return _check_task() if spec is None else _check_body(spec)
+    is_sound = _check_task() if spec is None else _check_body(spec)
+    return 0 if is_sound else 1
 
 
-def _check_body(spec: str) -> int:
+def _check_body(spec: str) -> bool:
+    """Print the flaws of the body in a spec file, with --walk also those of its walk; return whether it has none."""
     body = registry.body_of(spec)
-    found = flaws(body)
-    for flaw in found:
+    body_flaws = flaws(body)
+    for flaw in body_flaws:
         print(f"{spec}: {flaw.text}")
-    if not found:
+    if not body_flaws:
         print(f"{spec}: {body.name} stands and can take steps")
-    walked = _check_walk(spec, body) if FLAGS.walk and not any(flaw.hopeless for flaw in found) else 0
-    return int(bool(found) or walked)
+    walks_well = True
+    can_walk = not any(flaw.hopeless for flaw in body_flaws)
+    if FLAGS.walk and can_walk:
+        walks_well = _check_walk(spec, body)
+    return walks_well and not body_flaws
 
 
-def _check_walk(spec: str, body: Body) -> int:
-    tried = cures.walk(body)
-    if tried.quality == 2:
-        print(f"{spec}: {_said(tried)}")
-        return 0
-    cure = cures.left_out(body, tried.quality)
-    advice, given = "", cures.given_fields(body)
-    if cure is not None:
-        advice = f": leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
-    elif given:
-        advice = f": leaving out {', '.join(given)} of its joints does not help"
-    if tried.verdict.fell:
-        flaw = f"falls after {tried.length} control steps"
+def _check_walk(spec: str, body: Body) -> bool:
+    """Print how the demonstrator walks a body, and what would help; return whether it walks well."""
+    walk = cures.walk(body)
+    if walk.quality == _GOOD_QUALITY:
+        print(f"{spec}: {_describe_walk(walk)}")
+        return True
+    if walk.verdict.fell:
+        problem = f"falls after {walk.length} control steps"
     else:
-        flaw = f"{' and '.join(_FLAWS[failure] for failure in tried.verdict.failures)}: {_said(tried)}"
-    print(f"{spec}: {body.name} {flaw}{advice}")
-    return 1
+        failures = " and ".join(_FAILURE_TEXTS[failure] for failure in walk.verdict.failures)
+        problem = f"{failures}: {_describe_walk(walk)}"
+    print(f"{spec}: {body.name} {problem}{_advice(body, walk)}")
+    return False
 
 
-def _said(tried: cures.FirstWalk) -> str:
-    speed = f"{tried.speed:.2f} m/s ({tried.verdict.speed:.2f} of the target {tried.target:.2f})"
-    return f"walks {tried.length} control steps at {speed}"
+def _advice(body: Body, walk: cures.FirstWalk) -> str:
+    """Return which fields of the joints to leave out, so that the body walks better; empty if it has none of them."""
+    fields = cures.given_fields(body)
+    cure = cures.left_out(body, walk.quality)
+    if cure is not None:
+        cure_fields, cured_walk = cure
+        return f": leave out {' and '.join(cure_fields)} of its joints: it then {_describe_walk(cured_walk)}"
+    if fields:
+        return f": leaving out {', '.join(fields)} of its joints does not help"
+    return ""
 
 
-def _check_task() -> int:
-    setup = Setup.of(FLAGS.robot, *task_from_flags())
-    found = conformance.difference(setup)
-    same = f"a batch of environments equals each of them alone over {conformance.STEPS} steps"
-    print(f"{setup}: {same}" if found is None else f"{setup}: a batch of environments differs from one alone: {found}")
-    return int(found is not None)
+def _describe_walk(walk: cures.FirstWalk) -> str:
+    speed = f"{walk.speed:.2f} m/s ({walk.verdict.speed:.2f} of the target {walk.target:.2f})"
+    return f"walks {walk.length} control steps at {speed}"
+
+
+def _check_task() -> bool:
+    """Print whether a batch of environments computes what each computes alone, and return it."""
+    task, settings = task_from_flags()
+    setup = Setup.of(FLAGS.robot, task, settings)
+    difference = conformance.difference(setup)
+    if difference is None:
+        print(f"{setup}: a batch of environments equals each of them alone over {conformance.STEPS} steps")
+        return True
+    print(f"{setup}: a batch of environments differs from one alone: {difference}")
+    return False

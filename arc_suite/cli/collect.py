@@ -14,6 +14,7 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
 """
 
 import pathlib
+from collections.abc import Sequence
 
 import numpy as np
 from absl import flags
@@ -31,6 +32,7 @@ from arc_suite.cli.flags import (
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
 from arc_suite.cpg.selection import check_preset_name
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
@@ -78,50 +80,57 @@ def main() -> None:
         from arc_suite import data
     except ImportError as error:
         raise ValueError(str(error)) from None
-    asked = setups_from_flags()
+    setups = setups_from_flags()
     if FLAGS.verify is not None:
-        setup = next(iter(asked.values()))
-        body = setup.body if FLAGS["robot"].present or custom_body() else None
-        task = setup.task if FLAGS["task"].present else None
+        any_setup = next(iter(setups.values()))
+        body = any_setup.body if FLAGS["robot"].present or custom_body() else None
+        task = any_setup.task if FLAGS["task"].present else None
         count = data.verify(FLAGS.verify, body, FLAGS.num_envs, FLAGS.threads, progress, task)
         print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")
         return
-    if FLAGS.id is not None and len(asked) > 1:
-        raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(asked)}")
+    if FLAGS.id is not None and len(setups) > 1:
+        raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(setups)}")
     for name in FLAGS.preset or ():
         check_preset_name(name)
-    policy, label = chosen()
-    for setup in asked.values():
-        presets = FLAGS.preset if FLAGS.policy == "cpg" else ()
-        if presets is None:
-            presets = [suited_preset(setup.definition)]
-        settings = data.DatasetSettings(setup, policy, tuple(presets), FLAGS.noise, FLAGS.seed, FLAGS.steps)
+    policy, label = policy_and_label()
+    for setup in setups.values():
+        presets = tuple(presets_for(setup))
+        settings = data.DatasetSettings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = settings.dataset_id(label) if FLAGS.id is None else FLAGS.id
-        missing = data.collect(
+        collected_episodes = data.collect(
             dataset_id,
             settings,
             FLAGS.episodes,
-            FLAGS.num_envs,
-            FLAGS.threads,
-            FLAGS.overwrite,
-            progress,
-            FLAGS.author,
-            FLAGS.code_permalink,
+            num_envs=FLAGS.num_envs,
+            threads=FLAGS.threads,
+            overwrite=FLAGS.overwrite,
+            progress=progress,
+            author=FLAGS.author,
+            code_permalink=FLAGS.code_permalink,
         )
         dataset = data.open(dataset_id)
-        if not missing:
+        if not collected_episodes:
             print(f"{dataset_id}: has its {len(dataset)} episodes already")
             continue
-        returns, lengths = zip(
-            *((summary["return"], summary["length"]) for summary in dataset.summaries()), strict=True
-        )
+        summaries = list(dataset.summaries())
+        returns = [summary["return"] for summary in summaries]
+        lengths = [summary["length"] for summary in summaries]
         print(
             f"{dataset_id}: {len(dataset)} episodes, return {np.mean(returns):.1f} +- {np.std(returns):.1f}, "
             f"length {np.mean(lengths):.1f}, {dataset.metadata['dataset_size']} MB in {dataset.path}"
         )
 
 
-def chosen() -> tuple[str, str]:
+def presets_for(setup: Setup) -> Sequence[str]:
+    """Return the presets of the demonstrator in a setup; empty for other policies."""
+    if FLAGS.policy != "cpg":
+        return ()
+    if FLAGS.preset is None:
+        return [suited_preset(setup.definition)]
+    return FLAGS.preset
+
+
+def policy_and_label() -> tuple[str, str]:
     """Return the policy and its label in the dataset's id, "" for the policy's name.
 
     Raises:
@@ -131,10 +140,12 @@ def chosen() -> tuple[str, str]:
         return policy_name(FLAGS.policy), ""
     if FLAGS.checkpoint is not None and FLAGS.quality is not None:
         raise ValueError("expected one of --checkpoint and --quality, got both")
-    run = pathlib.Path(FLAGS.policy)
+    run_folder = pathlib.Path(FLAGS.policy)
     if FLAGS.checkpoint is not None:
-        policy, label = str(checkpoints.at(run, FLAGS.checkpoint)), str(FLAGS.checkpoint)
+        policy = str(checkpoints.at(run_folder, FLAGS.checkpoint))
+        label = str(FLAGS.checkpoint)
     else:
-        policy, label = checkpoints.of_quality(run, FLAGS.quality), FLAGS.quality
-    agent = checkpoints.agents(run / checkpoints.FOLDER)[-1]
+        policy = checkpoints.of_quality(run_folder, FLAGS.quality)
+        label = FLAGS.quality
+    agent = checkpoints.agents(run_folder / checkpoints.FOLDER)[-1]
     return policy, f"{agent.algorithm}-{agent.seed}-{label}"

@@ -31,49 +31,58 @@ flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with e
 
 def main() -> None:
     """Print the table and write the JSON."""
-    asked = setups_from_flags()
+    setups = setups_from_flags()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
-    chosen, seeds = policy_name(FLAGS.policy), range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
-    training_seeds = provenance.training_seeds(chosen, seeds)
-    players = [reports.player(chosen, setup, FLAGS.preset) for setup in asked.values()]
-    with files.writing_json(FLAGS.json) as file:
-        found = played(players, seeds)
-        if "cost_of_transport" in found[0].progress and (text := transport_footnote(each.setup.body for each in found)):
-            print(text)
+    policy = policy_name(FLAGS.policy)
+    seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
+    training_seeds = provenance.training_seeds(policy, seeds)
+    players = [reports.player(policy, setup, FLAGS.preset) for setup in setups.values()]
+    with files.writing_json(FLAGS.json) as json_content:
+        reports_of_robots = print_reports(players, seeds)
+        any_report = reports_of_robots[0]  # all are of one task
+        if "cost_of_transport" in any_report.progress:
+            footnote = transport_footnote(report.setup.body for report in reports_of_robots)
+            if footnote:
+                print(footnote)
         if training_seeds is None:
-            print(f"policy {chosen}: {provenance.UNKNOWN}")
-        file.update(
-            task=found[0].setup.task,
-            task_kwargs=found[0].setup.task_kwargs,
-            policy=chosen,
-            policy_sha256=provenance.policy_sha256(chosen),
+            print(f"policy {policy}: {provenance.UNKNOWN}")
+        json_content.update(
+            task=any_report.setup.task,
+            task_kwargs=any_report.setup.task_kwargs,
+            policy=policy,
+            policy_sha256=provenance.policy_sha256(policy),
             training_seeds=seed_ranges.to_json(training_seeds),
             seed=FLAGS.seed,
-            robots={name: each.to_json() for name, each in zip(asked, found, strict=True)},
+            robots={name: report.to_json() for name, report in zip(setups, reports_of_robots, strict=True)},
             versions=versions.dependency_versions(),
         )
-        if len(found) > 1 and all(each.expert is not None for each in found):
-            file["return_over_expert"] = total = over_all(found)
-            if any(each.of_the_paper for each in found):
+        all_have_experts = all(report.expert is not None for report in reports_of_robots)
+        if len(reports_of_robots) > 1 and all_have_experts:
+            overall_share = share_of_expert_returns(reports_of_robots)
+            json_content["return_over_expert"] = overall_share
+            if any(report.of_the_paper for report in reports_of_robots):
                 text = "all          IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]"
-                print(text.format(total["iqm"], *total["interval"]))
+                print(text.format(overall_share["iqm"], *overall_share["interval"]))
 
 
-def played(players: list[reports.Player], seeds: range) -> list[evaluation.Report]:
-    """Play the episodes behind progress bars, print a row for each body, and return the reports."""
-    found, width = [], max(reports.LABEL, *(len(reports.label(each.setup, each.preset)) for each in players))
+def print_reports(players: list[reports.Player], seeds: range) -> list[evaluation.Report]:
+    """Play the episodes behind progress bars, print a line for each body, and return the reports."""
+    label_width = max(reports.LABEL, *(len(reports.label(player.setup, player.preset)) for player in players))
+    reports_of_robots: list[evaluation.Report] = []
     for player in players:
         bar = functools.partial(progress, desc=player.setup.body.name, unit="episode", leave=False)
-        found.append(reports.report(player, seeds, bar))
-        if len(found) == 1:
-            heading = found[0].heading(width)
+        report = reports.report(player, seeds, bar)
+        is_first = not reports_of_robots
+        if is_first:
+            heading = report.heading(label_width)
             print(heading, "-" * len(heading), sep="\n")
-        print(found[-1].line(width), flush=True)
-    return found
+        print(report.line(label_width), flush=True)
+        reports_of_robots.append(report)
+    return reports_of_robots
 
 
-def over_all(found: list[evaluation.Report]) -> dict:
+def share_of_expert_returns(reports_of_robots: list[evaluation.Report]) -> dict:
     """Return the returns of all robots as shares of the paper's demonstrators', with robots as strata."""
-    shares = [[episode.total / each.expert for episode in each.episodes] for each in found]
+    shares = [[episode.total / report.expert for episode in report.episodes] for report in reports_of_robots]
     iqm, interval = evaluation.iqm_and_interval(shares)
     return {"iqm": iqm, "interval": interval}

@@ -19,6 +19,7 @@ from arc_suite.tasks import TASKS
 FLAGS = flags.FLAGS
 
 MAX_COUNT = 100_000  # episodes, or bodies: more than anyone waits for
+DEFAULT_LINKS = 3  # of each leg of a body made to order
 ROBOT_HELP = (
     f"{', '.join(registry.robot_words())}; a file in JSON, MJCF or URDF; module:name of one that another package has"
 )
@@ -29,7 +30,7 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
 
     Args:
         robot: default of --robot.
-        more: end of its help.
+        more: text at the end of the help of --robot.
     """
     flags.DEFINE_string("robot", robot, f"{ROBOT_HELP}{more}.")
     examples = ", ".join(spec_files.EXAMPLES)
@@ -38,7 +39,10 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     )
     flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
     flags.DEFINE_integer(
-        "links", None, "Actuated links of each leg of a body made to order. [default: 3]", *generator.LINKS
+        "links",
+        None,
+        f"Actuated links of each leg of a body made to order. [default: {DEFAULT_LINKS}]",
+        *generator.LINKS,
     )
     flags.DEFINE_multi_string(
         "length",
@@ -90,13 +94,13 @@ def policy_name(name: str) -> str:
         return name
     policy_file = other_libraries.find(name)
     if policy_file is None or policy_file.extension != zips.EXTENSION:
-        given = f"--vecnormalize={checks.quote(FLAGS.vecnormalize)}"
-        raise ValueError(f"{given}: goes with a zip of stable-baselines3, got {checks.preview(name)}")
+        flag = f"--vecnormalize={checks.quote(FLAGS.vecnormalize)}"
+        raise ValueError(f"{flag}: goes with a zip of stable-baselines3, got {checks.preview(name)}")
     return other_libraries.with_further_file(name, FLAGS.vecnormalize)
 
 
 def custom_body() -> Body | None:
-    """Return the body that --spec or --legs ask for, as --length and --palette shape it, or None.
+    """Return the body of --spec or --legs, as --length and --palette change it; None without these flags.
 
     Raises:
         ValueError: both are given, or --links, --length or --palette without them, or no body in the file.
@@ -114,10 +118,12 @@ def custom_body() -> Body | None:
     if FLAGS.spec is not None:
         body = registry.body_of(FLAGS.spec)
     else:
-        body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
+        body = generator.generate(FLAGS.legs, DEFAULT_LINKS if FLAGS.links is None else FLAGS.links)
     if FLAGS.length:
         body = shaping.shaped(body, links=named_values("length", FLAGS.length))
-    return body if FLAGS.palette is None else body.replace(palette=palettes.parse(FLAGS.palette))
+    if FLAGS.palette is not None:
+        body = body.replace(palette=palettes.parse(FLAGS.palette))
+    return body
 
 
 def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy: str = policies.HELP) -> None:
@@ -125,7 +131,7 @@ def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy
 
     Args:
         robot: default of --robot.
-        more: end of its help.
+        more: text at the end of the help of --robot.
         task: default of --task.
         policy: help of --policy.
     """
@@ -136,38 +142,38 @@ def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy
 
 
 def bodies_from_flags(near: Iterable[str] = ("all",)) -> dict[str, Body]:
-    """Return bodies by name: the one made, or those that --robot names, which may be "all".
+    """Return bodies by name: the body of `custom_body`, or those that --robot names, which may be "all".
 
-    For names see `registry.bodies_of`. Flaws of the body of --spec, such as feet in the floor, are warned of with the
-    values that fit, as `arc-suite check` has them.
+    For names see `registry.bodies_of`. Warnings name the flaws of a body of --spec or --length, such as feet in the
+    floor, as `arc-suite check` does.
 
     Args:
         near: other values of --robot that an unknown robot may mean.
 
     Raises:
-        ValueError: as `custom_body`, or an unknown robot, or a robot and a body.
+        ValueError: as `custom_body`, or an unknown robot, or both a robot and a custom body.
         OSError: as `custom_body`.
     """
-    body, robot = custom_body(), FLAGS["robot"]
-    if body is None:
-        return dict(ROBOTS) if robot.value == "all" else _named(robot.value, near)
-    if robot.present:
-        raise ValueError(f"--robot={checks.quote(robot.value)}: expected no robot with --spec or --legs")
-    for flaw in flaws(body) if FLAGS.spec is not None or FLAGS.length else ():
-        warnings.warn(f"{checks.quote(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=2)
-    return {body.name: body}
-
-
-def _named(robot: str, near: Iterable[str]) -> dict[str, Body]:
-    found = registry.bodies_of(robot, near)
-    named = {body.name: body for body in found}
-    if len(named) < len(found):
-        raise ValueError(f"--robot={checks.quote(robot)}: expected a name for each body, got two of one name")
-    return named
+    body = custom_body()
+    if body is not None:
+        if FLAGS["robot"].present:
+            raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected no robot with --spec or --legs")
+        may_have_flaws = FLAGS.spec is not None or FLAGS.length
+        if may_have_flaws:
+            for flaw in flaws(body):
+                warnings.warn(f"{checks.quote(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=2)
+        return {body.name: body}
+    if FLAGS.robot == "all":
+        return dict(ROBOTS)
+    bodies = registry.bodies_of(FLAGS.robot, near)
+    bodies_by_name = {body.name: body for body in bodies}
+    if len(bodies_by_name) < len(bodies):
+        raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected a name for each body, got two of one name")
+    return bodies_by_name
 
 
 def only_body() -> Body:
-    """Return the body of a program that takes one alone; see `bodies_from_flags`.
+    """Return the body of a program that takes one body; see `bodies_from_flags`.
 
     Raises:
         ValueError: as `bodies_from_flags`, or several bodies.
@@ -176,64 +182,97 @@ def only_body() -> Body:
     return _only(bodies_from_flags(near=()))
 
 
-def _only(found: dict[str, Any]) -> Any:
-    first, *others = found.values()
-    if others:
+def _only(values_by_name: dict[str, Any]) -> Any:
+    """Return the value of the only body.
+
+    Raises:
+        ValueError: several bodies.
+    """
+    if len(values_by_name) > 1:
         raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected one robot")
-    return first
+    (value,) = values_by_name.values()
+    return value
 
 
 def setups_from_flags(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
     """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
 
-    A trained policy, or a file of tracks, brings what the flags leave open, and a line says what: its body; without
-    --task its task and settings, which --set changes. A curriculum is for training, and is left out.
+    Where the flags leave something open, it comes from the setup in which a policy was trained, or tracks were stored:
+    the body; without --task also the task and its settings, which --set changes. A curriculum is left out, as it is for
+    training. A line says in what a policy was trained.
 
     Args:
-        stored: the setup of tracks; None for that of --policy.
+        stored: the setup of tracks; None for the setup of --policy.
         near: see `bodies_from_flags`.
 
     Raises:
         ValueError: as `bodies_from_flags`, `task_from_flags` and `policies.setup_of`.
         OSError: as `bodies_from_flags` and `policies.setup_of`.
     """
-    # First: this imports the modules that flags name.
-    named = bodies_from_flags(near)
-    name, settings = task_from_flags()
-    own = stored or policy_setup()
-    name, settings = complete_task(own, name, settings)
-    found = {body.name: Setup.of(body, name, settings) for body in choose_bodies(own, named).values()}
-    fitting = [each for each in found.values() if own and (own.several or each.body == own.body)]
-    if fitting and not stored:
-        others = [each for each in fitting if (each.task, each.task_kwargs) != (own.task, own.task_kwargs)]
-        print(f"{FLAGS.policy}: trained on {own}" + "".join(f"; plays in {each}" for each in others))
-    return found
+    # First: these import the modules that flags name.
+    bodies = bodies_from_flags(near)
+    task, settings = task_from_flags()
+    trained = policy_setup() if stored is None else None
+    origin = trained if stored is None else stored
+    bodies = choose_bodies(origin, bodies)
+    task, settings = complete_task(origin, task, settings)
+    setups = {body.name: Setup.of(body, task, settings) for body in bodies.values()}
+    if trained is not None:
+        _print_training_setup(trained, setups)
+    return setups
+
+
+def _print_training_setup(trained: Setup, setups: Mapping[str, Setup]) -> None:
+    """Print in which setup a policy was trained, and in which others it plays; nothing if no body suits it."""
+    suitable_setups = [setup for setup in setups.values() if trained.several or setup.body == trained.body]
+    if not suitable_setups:
+        return
+    line = f"{FLAGS.policy}: trained on {trained}"
+    for setup in suitable_setups:
+        if (setup.task, setup.task_kwargs) != (trained.task, trained.task_kwargs):
+            line += f"; plays in {setup}"
+    print(line)
 
 
 def policy_setup(policy: str | None = None) -> Setup | None:
-    """Return the setup that judges a policy, see `Setup.judging`; None for one that is no file.
+    """Return the setup that judges a policy, see `Setup.judging`; None for a policy that is no file.
 
     Args:
-        policy: of a program without --policy; None for that of --policy.
+        policy: of a program without --policy; None for the policy of --policy.
 
     Raises:
         ValueError: as `policies.setup_of`.
         OSError: as `policies.setup_of`.
     """
-    own = policies.setup_of(policy_name(FLAGS.policy if policy is None else policy))
-    return own and own.judging()
+    training_setup = policies.setup_of(policy_name(FLAGS.policy if policy is None else policy))
+    if training_setup is None:
+        return None
+    return training_setup.judging()
 
 
-def choose_bodies(own: Setup | None, named: dict[str, Body]) -> dict[str, Body]:
-    """Return the body of a policy or of tracks by name where no flag names one, else those of the flags."""
-    if own is None or own.several or FLAGS["robot"].present or custom_body():
-        return named
-    return {own.body.name: own.body}
+def choose_bodies(stored: Setup | None, bodies: dict[str, Body]) -> dict[str, Body]:
+    """Return the bodies of flags, or that of a policy or of tracks where no flag names a body.
+
+    Args:
+        stored: the setup of a policy or of tracks; None without one.
+        bodies: of `bodies_from_flags`.
+    """
+    if stored is None or stored.several or FLAGS["robot"].present or custom_body():
+        return bodies
+    return {stored.body.name: stored.body}
 
 
-def complete_task(own: Setup | None, name: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Return task and settings of the flags; without --task those of a policy or of tracks, which --set changes."""
-    return (name, settings) if own is None or FLAGS["task"].present else (own.task, own.task_kwargs | settings)
+def complete_task(stored: Setup | None, task: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return the task and the settings of flags; without --task those of a policy or of tracks, which --set changes.
+
+    Args:
+        stored: the setup of a policy or of tracks; None without one.
+        task: of `task_from_flags`.
+        settings: of `task_from_flags`.
+    """
+    if stored is None or FLAGS["task"].present:
+        return task, settings
+    return stored.task, stored.task_kwargs | settings
 
 
 def only_setup() -> Setup:
@@ -249,10 +288,11 @@ def only_setup() -> Setup:
 def task_from_flags() -> tuple[str, dict[str, Any]]:
     """Return the name of the task and its settings, `task_kwargs` of `arc_suite.load`.
 
-    The modules that the flags name are imported. What settings a task has is checked where an environment is opened.
+    The modules that the flags name are imported. Whether the task has these settings is checked where an environment is
+    opened.
 
     Raises:
-        ValueError: an unknown task, a setting without a value, or `random`.
+        ValueError: an unknown task, a setting without a value, or the setting `random`.
     """
     registry.task_of(FLAGS.task)
     settings = named_values("set", FLAGS["set"].value)
@@ -266,34 +306,38 @@ def task_from_flags() -> tuple[str, dict[str, Any]]:
     return FLAGS.task, settings
 
 
-def check_flags_suit_file(extension: str, own: Mapping[str, Iterable[str]]) -> None:
-    """Check that no flag is given that is for other files.
+def check_flags_suit_file(extension: str, extensions_of_flags: Mapping[str, Iterable[str]]) -> None:
+    """Check that all flags of the command line suit the file to write.
 
     Args:
         extension: of the file to write.
-        own: by flag, the extensions that it is for.
+        extensions_of_flags: by flag, the extensions of the files that have the option.
 
     Raises:
-        ValueError: one is.
+        ValueError: a flag is for other files.
     """
-    for flag, extensions in own.items():
+    for flag, extensions in extensions_of_flags.items():
         if FLAGS[flag].present and extension not in extensions:
             raise ValueError(f"--{flag}: it is for {', '.join(extensions)}, not for {extension}")
 
 
 def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
-    """Return what texts name=value of a flag say; values are JSON where they parse, else text.
+    """Return the values of a flag that is repeated with texts name=value, by name.
+
+    Args:
+        flag: its name, for errors.
+        texts: of the command line; values are JSON where they parse, else text.
 
     Raises:
-        ValueError: a text without a name or a value.
+        ValueError: a text without a name or without =.
     """
-    found = {}
+    values: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name and equals):
             raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value")
         try:
-            found[name] = json.loads(value)
+            values[name] = json.loads(value)
         except ValueError:
-            found[name] = value
-    return found
+            values[name] = value
+    return values

@@ -6,88 +6,102 @@ from collections.abc import Iterable
 
 from absl import flags
 
-# Headings in their order, each with its flags. Any other flag belongs to the run.
-GROUPS = {
-    "Body": (
-        *("robot", "spec", "legs", "links", "length", "palette", "layout", "scale"),
-        *("family", "families", "around", "amount"),
-    ),
-    "Policy": (
-        *("policy", "preset", "vecnormalize", "algorithm", "hp", "prior", "checkpoint", "quality", "noise"),
-        *("compare", "compare_preset", "policies"),
-    ),
+_BODY_FLAGS = ("robot", "spec", "legs", "links", "length", "palette", "layout", "scale")
+_BODY_FAMILY_FLAGS = ("family", "families", "around", "amount")
+_POLICY_FLAGS = ("policy", "preset", "vecnormalize", "algorithm", "hp", "prior", "checkpoint", "quality", "noise")
+_COMPARISON_FLAGS = ("compare", "compare_preset", "policies")
+_FILE_FLAGS = ("output", "json", "page", "pages", "save", "picture", "render", "summary", "visuals", "no_arena")
+_REPORT_FLAGS = ("report", "results", "runs", "name", "id", "author", "code_permalink", "overwrite", "tensorboard")
+_CLIP_FLAGS = ("clips", "rig", "root_motion", "straight", "plant", "triangles", "uv", "reduce")
+_FILM_FLAGS = ("fps", "loop", "size", "transparent", "turntable", "directions")
+
+# Flags by the heading of their group, in the order of the help. Other flags belong to the group "Run".
+FLAGS_BY_GROUP = {
+    "Body": _BODY_FLAGS + _BODY_FAMILY_FLAGS,
+    "Policy": _POLICY_FLAGS + _COMPARISON_FLAGS,
     "Task": ("task", "set", "train_set", "goal"),
     "Run": (),
-    "Output": (
-        *("output", "json", "page", "pages", "save", "picture", "render", "summary", "visuals", "no_arena", "report"),
-        *("results", "runs", "name", "id", "author", "code_permalink", "overwrite", "tensorboard"),
-        *("clips", "rig", "root_motion", "straight", "plant", "triangles", "uv", "reduce"),
-        *("fps", "loop", "size", "transparent", "turntable", "directions"),
-    ),
+    "Output": _FILE_FLAGS + _REPORT_FLAGS + _CLIP_FLAGS + _FILM_FLAGS,
     "Help": ("help", "version"),
 }
 
-_GROUP_OF = {name: heading for heading, names in GROUPS.items() for name in names}
-_VALUES = {"int": "N", "float": "X", "comma separated list of strings": "A,B"}  # by absl's name; others are TEXT
-_NOISE = re.compile(r"^<[^>]*>: |;\n    repeat this option to specify a list of values$")  # which absl adds
-_DEFAULT = re.compile(r"\s*\[default: (.*)\]$", re.DOTALL)
-_INDENT = 23  # columns before a text; a longer flag has a line of its own
+_GROUP_OF_FLAG = {name: heading for heading, names in FLAGS_BY_GROUP.items() for name in names}
+_VALUE_OF_TYPE = {"int": "N", "float": "X", "comma separated list of strings": "A,B"}  # other types have a TEXT
+_ABSL_ADDITIONS = re.compile(r"^<[^>]*>: |;\n    repeat this option to specify a list of values$")  # to the help
+_DEFAULT_NOTE = re.compile(r"\s*\[default: (.*)\]$", re.DOTALL)
+_INDENT = 23  # columns before the help of a flag; a longer flag has a line of its own
 
 
-def help_text(docstring: str, shown: Iterable[flags.Flag]) -> str:
+def help_text(docstring: str, program_flags: Iterable[flags.Flag]) -> str:
     """Return a program's docstring and its flags, as text of several lines."""
-    listed = {heading: [] for heading in GROUPS}
-    for flag in sorted(shown, key=lambda flag: _order(flag.name)):
-        listed[_GROUP_OF.get(flag.name, "Run")].append(_entry(flag))
-    parts = ["\n".join([f"{heading}:", *entries]) for heading, entries in listed.items() if entries]
-    return "\n\n".join([docstring.strip(), *parts])
+    entries_by_group: dict[str, list[str]] = {heading: [] for heading in FLAGS_BY_GROUP}
+    for flag in sorted(program_flags, key=_sort_key):
+        entries_by_group[_group_of(flag)].append(_entry(flag))
+    groups = ["\n".join([f"{heading}:", *entries]) for heading, entries in entries_by_group.items() if entries]
+    return "\n\n".join([docstring.strip(), *groups])
 
 
-def _order(name: str) -> tuple[int, str]:
-    """Return the place of a flag in its group: that of the table, else by the alphabet."""
-    names = GROUPS[_GROUP_OF.get(name, "Run")]
-    return (names.index(name) if name in names else 0), name
+def _group_of(flag: flags.Flag) -> str:
+    return _GROUP_OF_FLAG.get(flag.name, "Run")
+
+
+def _sort_key(flag: flags.Flag) -> tuple[int, str]:
+    """Return the place of a flag in its group: by the table of groups, or else by the alphabet."""
+    names = FLAGS_BY_GROUP[_group_of(flag)]
+    index = names.index(flag.name) if flag.name in names else 0
+    return index, flag.name
 
 
 def _entry(flag: flags.Flag) -> str:
-    """Return the lines of a flag."""
-    first, indent = f"  {_usage(flag)} ", " " * _INDENT
-    lines = textwrap.wrap(_text(flag), flags.get_help_width() - _INDENT, break_on_hyphens=False)
-    if len(first) <= _INDENT:
-        first = first.ljust(_INDENT) + lines.pop(0)
-    return "\n".join([first.rstrip(), *(indent + line for line in lines)])
+    """Return the lines of a flag: its usage, and its help after an indent."""
+    usage = f"  {_usage(flag)} "
+    lines = textwrap.wrap(_help_with_notes(flag), flags.get_help_width() - _INDENT, break_on_hyphens=False)
+    if len(usage) <= _INDENT:
+        usage = usage.ljust(_INDENT) + lines.pop(0)
+    return "\n".join([usage.rstrip(), *(" " * _INDENT + line for line in lines)])
 
 
 def _usage(flag: flags.Flag) -> str:
     """Return a flag and its value, such as "-o, --output=TEXT"."""
-    short = f"-{flag.short_name}, " if flag.short_name else ""
+    short_name = f"-{flag.short_name}, " if flag.short_name else ""
     if flag.boolean:
-        return f"{short}--{'[no]' if flag.default else ''}{flag.name}"
-    return f"{short}--{flag.name}={_VALUES.get(flag.flag_type(), 'TEXT')}"
+        negation = "[no]" if flag.default else ""
+        return f"{short_name}--{negation}{flag.name}"
+    value = _VALUE_OF_TYPE.get(flag.flag_type(), "TEXT")
+    return f"{short_name}--{flag.name}={value}"
 
 
-def _text(flag: flags.Flag) -> str:
+def _help_with_notes(flag: flags.Flag) -> str:
     """Return the help of a flag; notes in brackets say which values it takes, and the default."""
-    text = _NOISE.sub("", flag.help)
-    said = _DEFAULT.search(text)
-    default = said[1] if said else _default(flag.default)
-    repeatable = "repeatable" if isinstance(flag, flags.MultiFlag) else ""
-    notes = [_values(flag.parser), repeatable, default and f"default: {default}"]
-    text = _DEFAULT.sub("", text)
-    return f"{text} [{'; '.join(filter(None, notes))}]" if any(notes) else text
+    text = _ABSL_ADDITIONS.sub("", flag.help)
+    default_note = _DEFAULT_NOTE.search(text)
+    default = default_note[1] if default_note else _default_text(flag.default)
+    text = _DEFAULT_NOTE.sub("", text)
+    notes = []
+    values = _values_text(flag.parser)
+    if values:
+        notes.append(values)
+    if isinstance(flag, flags.MultiFlag):
+        notes.append("repeatable")
+    if default:
+        notes.append(f"default: {default}")
+    return f"{text} [{'; '.join(notes)}]" if notes else text
 
 
-def _values(parser: flags.ArgumentParser) -> str:
+def _values_text(parser: flags.ArgumentParser) -> str:
     """Return the names that a flag takes, or the numbers, such as "4 to 12"; "" for any."""
     if isinstance(parser, flags.EnumParser):
         return " or ".join(parser.enum_values)
-    low, high = (getattr(parser, name, None) for name in ("lower_bound", "upper_bound"))
+    low = getattr(parser, "lower_bound", None)
+    high = getattr(parser, "upper_bound", None)
     if low is None:
         return ""
-    return f"{low:.10g} or more" if high is None else f"{low:.10g} to {high:.10g}"
+    if high is None:
+        return f"{low:.10g} or more"
+    return f"{low:.10g} to {high:.10g}"
 
 
-def _default(value) -> str:
+def _default_text(value) -> str:
     """Return a default as one types it; "" for none."""
     match value:
         case None | False | []:

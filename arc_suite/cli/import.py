@@ -28,13 +28,15 @@ def main(robot: str | None = None) -> None:
     """Import the robot, write the body, and print a line for each thing to know."""
     if robot is None:
         raise ValueError("expected a file in MJCF or URDF; see --help")
+    feet = [name for name in FLAGS.feet if name]
     with contextlib.ExitStack() as stack:
+        output_path = None
         if FLAGS.output is not None:
             checks.extension(FLAGS.output, [".json"])
-            output = stack.enter_context(files.writing(FLAGS.output))
-        body, notes = imported(robot, FLAGS.home, [foot for foot in FLAGS.feet if foot])
-        if FLAGS.output is not None:
-            output.write_text(body_to_json(body), encoding="utf-8")
+            output_path = stack.enter_context(files.writing(FLAGS.output))
+        body, notes = imported(robot, FLAGS.home, feet)
+        if output_path is not None:
+            output_path.write_text(body_to_json(body), encoding="utf-8")
     print(f"{robot}: {body.name}")
     for note in notes:
         print(f"  {note}")

@@ -9,41 +9,52 @@ from arc_suite.cli import program
 from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, installed_programs, usage
 
 
-def main(*given: str) -> None:
-    """Run the program of the first argument, with the other arguments as its flags.
+def main(*arguments: str) -> None:
+    """Run the program of the first argument, with the other arguments as its flags, and exit.
 
     Args:
-        *given: arguments before those of the command line.
+        *arguments: before those of the command line.
     """
     # Modules that flags name may lie in the current folder. It comes last: no file there hides an installed module.
     sys.path.append("")
-    first, *others = [*given, *sys.argv[1:]] or ["--help"]
-    if first in PROGRAMS:
-        # Imported here and alone: a program defines its flags when it is imported, and some define the same.
-        try:
-            module = importlib.import_module(f"{PROGRAMS[first]}.{first}")
-        except versions.MissingExtra as error:
-            sys.exit(f"arc-suite {first}: {error}")
-        program.run(module.main, f"arc-suite {first}", others)
-    if first in ("--help", "-h", "--version"):
-        program.guard(lambda: print(program.VERSION if first == "--version" else usage()), "arc-suite")
-    module = _program_of_another_package(first)
-    program.run(module.main, f"arc-suite {first}", others)
+    program_name, *program_arguments = [*arguments, *sys.argv[1:]] or ["--help"]
+    if program_name == "--version":
+        program.guard(lambda: print(program.VERSION), "arc-suite")
+    elif program_name in ("--help", "-h"):
+        program.guard(lambda: print(usage()), "arc-suite")
+    elif program_name in PROGRAMS:
+        module = _import_program(program_name)
+    else:
+        module = _program_of_another_package(program_name)
+    program.run(module.main, f"arc-suite {program_name}", program_arguments)
+
+
+def _import_program(name: str) -> ModuleType:
+    """Return the module of a program of the suite; exit where it needs packages that are not installed.
+
+    No other program is imported: programs define their flags when they are imported, and some define the same flags.
+    """
+    try:
+        return importlib.import_module(f"{PROGRAMS[name]}.{name}")
+    except versions.MissingExtra as error:
+        sys.exit(f"arc-suite {name}: {error}")
 
 
 def _program_of_another_package(name: str) -> ModuleType:
     """Return the module of a program by `module:name`, or by the name of an entry point; exit where there is none."""
     try:
-        points = installed_programs()
+        entry_points = installed_programs()
         if name in FORMER_PROGRAMS:
             raise ValueError(f"{name} is no program any more; {FORMER_PROGRAMS[name]}")
-        if name in points:
-            name = f"{points[name].value}:{name}"
-        elif ":" not in name:
-            checks.name(name, [*PROGRAMS, *points], "program")
-        module = registry.find("program", name, PROGRAMS)
+        if name in entry_points:
+            full_name = f"{entry_points[name].value}:{name}"
+        elif ":" in name:
+            full_name = name
+        else:
+            full_name = checks.name(name, [*PROGRAMS, *entry_points], "program")
+        module = registry.find("program", full_name, PROGRAMS)
         if not callable(getattr(module, "main", None)) or not module.__doc__:
-            raise ValueError(f"program {name!r}: expected a module with a docstring and a function main")
+            raise ValueError(f"program {full_name!r}: expected a module with a docstring and a function main")
     except ValueError as error:
         sys.exit(f"arc-suite: {error}")
     return module

@@ -1,4 +1,4 @@
-"""What all programs share: flags parsed, errors of one line, help, progress bars."""
+"""What all programs share: they parse flags, print errors as one line, and show help and progress bars."""
 
 import contextlib
 import inspect
@@ -23,13 +23,14 @@ from arc_suite.cli.help_text import help_text
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
 
+INTERRUPTED = 130  # exit status of a program that Ctrl-C has ended, as shells count it
 TERMINATED = 143  # exit status of a program that SIGTERM has ended, as shells count it
 
 VERSION = f"arc_suite {arc_suite.__version__}"
 
-_LONG = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # the name of a flag
-_PAUSE = 30.0  # s between two lines of progress in a log
-_CONTROL = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
+_FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")
+_LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
+_CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
 _VERSION = flags.DEFINE_bool("version", False, "Print the version of the package and exit.")
@@ -40,11 +41,18 @@ class Terminated(KeyboardInterrupt):
 
 
 def progress(*args, **kwargs) -> tqdm:
-    """Return a progress bar of tqdm; where standard error is no terminal, a line in half a minute, for logs."""
+    """Return a progress bar of tqdm, or one that prints a line every half minute if standard error is no terminal."""
     if sys.stderr.isatty():
         return tqdm(*args, **kwargs)
-    pauses = dict.fromkeys(("delay", "mininterval", "maxinterval"), _PAUSE)
-    return tqdm(*args, file=_Log(sys.stderr), ncols=0, **pauses, **kwargs)
+    return tqdm(
+        *args,
+        file=_Log(sys.stderr),
+        ncols=0,
+        delay=_LOG_INTERVAL,
+        mininterval=_LOG_INTERVAL,
+        maxinterval=_LOG_INTERVAL,
+        **kwargs,
+    )
 
 
 def say(line: str) -> None:
@@ -54,33 +62,30 @@ def say(line: str) -> None:
 
 
 @contextlib.contextmanager
-def resumable(place) -> Iterator[None]:
-    """Say of an interruption, by Ctrl-C or SIGTERM, that the same command resumes the work in a folder."""
+def resumable(folder: str | os.PathLike) -> Iterator[None]:
+    """Run work in a folder; when Ctrl-C or SIGTERM interrupts it, say that the same command resumes it."""
 
     def terminate(*_):
         raise Terminated
 
-    before = signal.signal(signal.SIGTERM, terminate)
+    previous_handler = signal.signal(signal.SIGTERM, terminate)
     try:
         yield
     except KeyboardInterrupt as interrupt:
-        raise type(interrupt)(f"interrupted; the same command resumes {place}") from None
+        raise type(interrupt)(f"interrupted; the same command resumes {folder}") from None
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGTERM, previous_handler)
 
 
 @contextlib.contextmanager
 def watch_for_termination() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns whether SIGTERM has come.
-
-    The signal does not end the process meanwhile.
-    """
-    came = threading.Event()
-    before = signal.signal(signal.SIGTERM, lambda *_: came.set())
+    """Yield a function that returns whether SIGTERM has come; meanwhile the signal does not end the process."""
+    termination = threading.Event()
+    previous_handler = signal.signal(signal.SIGTERM, lambda *_: termination.set())
     try:
-        yield came.is_set
+        yield termination.is_set
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGTERM, previous_handler)
 
 
 def run(main: Callable[..., int | None], name: str | None = None, arguments: Sequence[str] | None = None) -> NoReturn:
@@ -89,68 +94,72 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
     `--help` prints the docstring of the module of `main`, and the flags of that module and of packages `cli`.
 
     Args:
-        main: reads `absl.flags.FLAGS`; takes what is no flag, each with a default, and returns an exit
-            status or None.
+        main: reads `absl.flags.FLAGS`. It takes the arguments that are no flags, each with a default, and returns an
+            exit status or None.
         name: how errors name the program; None for the file name of the running script.
         arguments: to parse; None for those of the command line.
     """
-    script, *given = sys.argv
-    arguments = given if arguments is None else arguments
+    script = sys.argv[0]
+    if arguments is None:
+        arguments = sys.argv[1:]
+    module = sys.modules[main.__module__]
 
-    def work():
-        _, *rest = _parsed([script, *arguments], sys.modules[main.__module__])
+    def parse_and_call():
+        _, *positional_arguments = _parse([script, *arguments], module)
         if _HELP.value:
-            module = sys.modules[main.__module__]
-            return print(help_text(module.__doc__, _flags(module)))
+            print(help_text(module.__doc__, _flags_of(module)))
+            return None
         if _VERSION.value:
-            return print(VERSION)
-        places = len(inspect.signature(main).parameters)
-        if len(rest) > places:
-            raise ValueError(f"unexpected argument {checks.preview(rest[places])}; {_meant(rest[places])}see --help")
-        return main(*rest)
+            print(VERSION)
+            return None
+        max_arguments = len(inspect.signature(main).parameters)
+        if len(positional_arguments) > max_arguments:
+            unexpected = positional_arguments[max_arguments]
+            suggestion = _suggest_flag(unexpected)
+            raise ValueError(f"unexpected argument {checks.preview(unexpected)}; {suggestion}see --help")
+        return main(*positional_arguments)
 
-    guard(work, name or Path(script).name)
+    guard(parse_and_call, name or Path(script).name)
 
 
 def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     """Call `work` and exit the process with the status that it returns.
 
-    A wrong flag, a ValueError, an OSError and a RenderingUnavailable become one line on standard
-    error and exit status 1, Ctrl-C one line and exit status 130, SIGTERM in work that
-    can be resumed one line and 143; any other exception is a mistake of
-    ours and keeps its traceback. A warning is one line on standard error, too. Where nobody reads the
-    output any more, as in `program | head`, the work goes on without it, so that its files are written.
+    - A wrong flag, a ValueError, an OSError and a RenderingUnavailable become one line on standard error and exit
+      status 1. Ctrl-C becomes one line and exit status 130; SIGTERM in `resumable` work becomes one line and 143.
+    - Any other exception is a mistake of the suite, and keeps its traceback.
+    - A warning becomes one line on standard error.
+    - Where nobody reads the output any more, as in `program | head`, the work goes on without it, so that its files are
+      written.
 
     Args:
         work: takes nothing, returns an exit status or None.
-        name: the program's, with which the line begins.
+        name: of the program, with which the line begins.
     """
 
-    def say(reason, *_, **__):
+    def print_reason(reason, *_, **__):
         print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr)
 
-    def fail(reason, status):
-        say(reason)
-        return status
-
     # A stream that was closed before the start is None.
-    output, errors = (_Output(stream or io.StringIO()) for stream in (sys.stdout, sys.stderr))
+    output = _Output(sys.stdout or io.StringIO())
+    errors = _Output(sys.stderr or io.StringIO())
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors), warnings.catch_warnings():
-        warnings.showwarning = say
+        warnings.showwarning = print_reason
         try:
             status = work()
         except (flags.Error, ValueError, OSError, RenderingUnavailable) as error:
-            status = fail(error, 1)
+            print_reason(error)
+            status = 1
         except KeyboardInterrupt as interrupt:
-            status = TERMINATED if isinstance(interrupt, Terminated) else 130  # as shells count what SIGINT ends
-            fail(str(interrupt) or "interrupted", status)
+            print_reason(str(interrupt) or "interrupted")
+            status = TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED
         finally:
             output.flush()
     sys.exit(status)
 
 
-def _parsed(arguments: Sequence[str], module: ModuleType) -> list[str]:
-    """Parse arguments into absl's flags, and return those that are none.
+def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
+    """Parse arguments into absl's flags, and return the arguments that are no flags.
 
     A flag of several words may be written with dashes, too.
 
@@ -158,44 +167,51 @@ def _parsed(arguments: Sequence[str], module: ModuleType) -> list[str]:
         ValueError: a flag that the program does not have, or a value that its flag does not take.
         flags.Error: a flag without its value.
     """
+    with_underscores = [_FLAG_NAME.sub(lambda match: match[0].replace("-", "_"), text) for text in arguments]
     try:
-        return flags.FLAGS([_LONG.sub(lambda flag: flag[0].replace("-", "_"), text) for text in arguments])
+        return flags.FLAGS(with_underscores)
     except flags.UnrecognizedFlagError as error:
-        checks.name(error.flagname, sorted({flag.name for flag in _flags(module)}), "flag")
+        names = sorted({flag.name for flag in _flags_of(module)})
+        checks.name(error.flagname, names, "flag")  # raises a ValueError that suggests a name
         raise
     except flags.IllegalFlagValueError as error:
-        given = str(error).removesuffix(f": {error.__context__}")  # flag --NAME=VALUE
-        parser = flags.FLAGS[given.removeprefix("flag --").partition("=")[0]].parser
+        flag_and_value = str(error).removesuffix(f": {error.__context__}")  # flag --NAME=VALUE
+        name = flag_and_value.removeprefix("flag --").partition("=")[0]
+        parser = flags.FLAGS[name].parser
         choices = getattr(parser, "enum_values", ("true", "false"))
-        raise ValueError(f"{checks.quote(given)}: expected {parser.syntactic_help or ' or '.join(choices)}") from None
+        expected = parser.syntactic_help or " or ".join(choices)
+        raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}") from None
 
 
-def _meant(argument: str) -> str:
-    """Return the flag that an argument without one may belong to, for an error; "" where none takes it."""
-    guesses = {
-        "robot": registry.robot_words(),
-        "task": TASKS,
-        "policy": [*policies.POLICIES, *filter(os.path.exists, [argument])],
+def _suggest_flag(argument: str) -> str:
+    """Return a question for the flag that an argument may be the value of; "" if the program has no such flag."""
+    flag_takes_argument = {
+        "robot": argument in registry.robot_words(),
+        "task": argument in TASKS,
+        "policy": argument in policies.POLICIES or os.path.exists(argument),
     }
-    fitting = (flag for flag, names in guesses.items() if flag in flags.FLAGS and argument in names)
-    return next((f"did you mean --{flag}={argument}? " for flag in fitting), "")
+    for flag, takes_argument in flag_takes_argument.items():
+        if takes_argument and flag in flags.FLAGS:
+            return f"did you mean --{flag}={argument}? "
+    return ""
 
 
-def _flags(module: ModuleType) -> Iterator[flags.Flag]:
-    """Yield the flags of a program, of this package, and of a program of the suite that it is made from."""
-    for name, defined in flags.FLAGS.flags_by_module_dict().items():
-        if name in (module.__name__, sys.argv[0]) or "cli" in name.split("."):
-            yield from defined
+def _flags_of(module: ModuleType) -> Iterator[flags.Flag]:
+    """Yield the flags of a program, and those that packages `cli` of the suite define for it."""
+    for module_name, module_flags in flags.FLAGS.flags_by_module_dict().items():
+        if module_name in (module.__name__, sys.argv[0]) or "cli" in module_name.split("."):
+            yield from module_flags
 
 
 class _Log:
-    """A stream that bars are written to as lines."""
+    """A stream that turns progress bars into lines."""
 
     def __init__(self, stream):
         self._stream = stream
 
     def write(self, text: str) -> None:
-        if line := _CONTROL.sub("", text).strip():
+        line = _CURSOR_MOVES.sub("", text).strip()
+        if line:
             self._stream.write(f"{line}\n")
 
     def flush(self) -> None:
@@ -203,7 +219,7 @@ class _Log:
 
 
 class _Output:
-    """A stream that goes nowhere once its reader has gone."""
+    """A stream that drops what is written once its reader has gone."""
 
     def __init__(self, stream):
         self._stream = stream
@@ -212,19 +228,19 @@ class _Output:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        with self._enduring():
+        with self._without_broken_pipe():
             self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
-        with self._enduring():
+        with self._without_broken_pipe():
             self._stream.flush()
 
     @contextlib.contextmanager
-    def _enduring(self):
+    def _without_broken_pipe(self):
         try:
             yield
         except BrokenPipeError:
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())  # what is in the stream's buffer goes there too, at exit
-            os.close(nowhere)
+            null_device = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null_device, self._stream.fileno())  # drops the buffer of the stream, too, at exit
+            os.close(null_device)

@@ -4,10 +4,10 @@ import ast
 from importlib import metadata
 from pathlib import Path
 
-# Entry points of installed packages: the name of a program, and the module whose import registers it.
+# Group of entry points, by which installed packages name a program and the module whose import registers it.
 ENTRY_POINT_GROUP = "arc_suite.programs"
 
-# The package of each program: the core's own, and those of the wings, which nothing else of the core names.
+# The package of each program. Nothing else of the core names packages of animation and learning.
 PROGRAMS = {
     "build_model": "arc_suite.cli",
     "import": "arc_suite.cli",
@@ -29,7 +29,7 @@ PROGRAMS = {
     "doctor": "arc_suite.cli",
 }
 
-# Names of former programs: what to run in place of each.
+# Former programs, and what to run in place of each.
 FORMER_PROGRAMS = {
     "survey": "a clone has python tools/survey.py",
     "tune_cpg": "a clone has python tools/tune_cpg.py",
@@ -48,18 +48,22 @@ arc-suite MODULE:NAME runs a program that another package registers."""
 def usage() -> str:
     """Return the help of `arc-suite`; no program is imported for it."""
     summaries = {name: program_summary(name) for name in PROGRAMS}
-    summaries |= {name: f"of the package {point.dist.name}" for name, point in installed_programs().items()}
-    width = max(map(len, summaries))
-    return _USAGE.format(programs="\n".join(f"  {name:<{width}}  {text}" for name, text in summaries.items()))
+    for name, entry_point in installed_programs().items():
+        summaries[name] = f"of the package {entry_point.dist.name}"
+    width = max(len(name) for name in summaries)
+    lines = [f"  {name:<{width}}  {text}" for name, text in summaries.items()]
+    return _USAGE.format(programs="\n".join(lines))
 
 
 def installed_programs() -> dict[str, metadata.EntryPoint]:
-    """Return the entry points of programs of installed packages by name, without those that have a program's name."""
-    return {point.name: point for point in metadata.entry_points(group=ENTRY_POINT_GROUP) if point.name not in PROGRAMS}
+    """Return the entry points of programs of installed packages by name; those of the suite's names are left out."""
+    entry_points = metadata.entry_points(group=ENTRY_POINT_GROUP)
+    return {entry_point.name: entry_point for entry_point in entry_points if entry_point.name not in PROGRAMS}
 
 
 def program_summary(name: str) -> str:
     """Return the first line of a program's docstring, read from its source without importing it."""
-    folder = Path(__file__).parents[2].joinpath(*PROGRAMS[name].split("."))
+    top_folder = Path(__file__).parents[2]  # that of the package arc_suite
+    folder = top_folder.joinpath(*PROGRAMS[name].split("."))
     source = (folder / f"{name}.py").read_text(encoding="utf-8")
     return ast.get_docstring(ast.parse(source)).splitlines()[0]

@@ -13,7 +13,7 @@ import pytest
 
 import arc_suite
 from arc_suite.cli import main
-from arc_suite.cli.help_text import GROUPS
+from arc_suite.cli.help_text import FLAGS_BY_GROUP
 from arc_suite.cli.programs import FORMER_PROGRAMS, program_summary
 from arc_suite.policies import POLICIES
 
@@ -148,7 +148,7 @@ def test_help_of_a_program(program):
     assert f"\n  arc-suite {program}" in text
     names = re.findall(r"^  (?:-., )?(--\w+)", text, re.MULTILINE)
     headings = re.findall(r"^(\w+):$", text, re.MULTILINE)
-    assert headings == [each for each in GROUPS if each in headings] and "--version" in names
+    assert headings == [each for each in FLAGS_BY_GROUP if each in headings] and "--version" in names
     assert ("\n  -o, --output=TEXT" in text) == (program in WRITING)
     assert "\n  --output" not in text
     assert not re.search(r"repeat this option|\(default|integer", text)

@@ -231,7 +231,7 @@ def test_what_a_kill_left_is_deleted_by_the_next_that_writes_the_file(tmp_path):
 
 
 def test_long_work_writes_a_line_in_half_a_minute_into_a_log(monkeypatch, capsys):
-    monkeypatch.setattr(program, "_PAUSE", 0.0)  # in place of 30 s
+    monkeypatch.setattr(program, "_LOG_INTERVAL", 0.0)  # in place of 30 s
     with program.progress(total=4, desc="training", unit="step") as bar:
         for returned in (1.5, 2.5):
             bar.set_postfix_str(f"return {returned}", refresh=False)
