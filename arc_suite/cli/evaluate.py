@@ -67,7 +67,8 @@ def main() -> None:
 
 def print_reports(players: list[reports.Player], seeds: range) -> list[evaluation.Report]:
     """Play the episodes behind progress bars, print a line for each body, and return the reports."""
-    label_width = max(reports.LABEL, *(len(reports.label(player.setup, player.preset)) for player in players))
+    labels = [reports.label(player.setup, player.preset) for player in players]
+    label_width = max(reports.LABEL, *(len(label) for label in labels))  # of the first column
     reports_of_robots: list[evaluation.Report] = []
     for player in players:
         bar = functools.partial(progress, desc=player.setup.body.name, unit="episode", leave=False)

@@ -198,8 +198,8 @@ def setups_from_flags(stored: Setup | None = None, near: Iterable[str] = ("all",
     """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
 
     Where the flags leave something open, it comes from the setup in which a policy was trained, or tracks were stored:
-    the body; without --task also the task and its settings, which --set changes. A curriculum is left out, as it is for
-    training. A line says in what a policy was trained.
+    the body; without --task also the task and its settings, which --set changes. A curriculum is left out, as it serves
+    training only. A line says in which setup a policy was trained.
 
     Args:
         stored: the setup of tracks; None for the setup of --policy.
@@ -213,7 +213,7 @@ def setups_from_flags(stored: Setup | None = None, near: Iterable[str] = ("all",
     bodies = bodies_from_flags(near)
     task, settings = task_from_flags()
     trained = policy_setup() if stored is None else None
-    origin = trained if stored is None else stored
+    origin = trained if stored is None else stored  # of what the flags leave open
     bodies = choose_bodies(origin, bodies)
     task, settings = complete_task(origin, task, settings)
     setups = {body.name: Setup.of(body, task, settings) for body in bodies.values()}
@@ -250,29 +250,29 @@ def policy_setup(policy: str | None = None) -> Setup | None:
     return training_setup.judging()
 
 
-def choose_bodies(stored: Setup | None, bodies: dict[str, Body]) -> dict[str, Body]:
+def choose_bodies(origin: Setup | None, bodies: dict[str, Body]) -> dict[str, Body]:
     """Return the bodies of flags, or that of a policy or of tracks where no flag names a body.
 
     Args:
-        stored: the setup of a policy or of tracks; None without one.
+        origin: the setup of a policy or of tracks, of one body or of several; None without one.
         bodies: of `bodies_from_flags`.
     """
-    if stored is None or stored.several or FLAGS["robot"].present or custom_body():
+    if origin is None or origin.several or FLAGS["robot"].present or custom_body():
         return bodies
-    return {stored.body.name: stored.body}
+    return {origin.body.name: origin.body}
 
 
-def complete_task(stored: Setup | None, task: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+def complete_task(origin: Setup | None, task: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return the task and the settings of flags; without --task those of a policy or of tracks, which --set changes.
 
     Args:
-        stored: the setup of a policy or of tracks; None without one.
+        origin: the setup of a policy or of tracks; None without one.
         task: of `task_from_flags`.
         settings: of `task_from_flags`.
     """
-    if stored is None or FLAGS["task"].present:
+    if origin is None or FLAGS["task"].present:
         return task, settings
-    return stored.task, stored.task_kwargs | settings
+    return origin.task, origin.task_kwargs | settings
 
 
 def only_setup() -> Setup:

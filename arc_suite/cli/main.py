@@ -18,6 +18,7 @@ def main(*arguments: str) -> None:
     # Modules that flags name may lie in the current folder. It comes last: no file there hides an installed module.
     sys.path.append("")
     program_name, *program_arguments = [*arguments, *sys.argv[1:]] or ["--help"]
+    # `guard` and `run` exit the process.
     if program_name == "--version":
         program.guard(lambda: print(program.VERSION), "arc-suite")
     elif program_name in ("--help", "-h"):

@@ -28,7 +28,7 @@ TERMINATED = 143  # exit status of a program that SIGTERM has ended, as shells c
 
 VERSION = f"arc_suite {arc_suite.__version__}"
 
-_FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")
+_FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
@@ -197,7 +197,10 @@ def _suggest_flag(argument: str) -> str:
 
 
 def _flags_of(module: ModuleType) -> Iterator[flags.Flag]:
-    """Yield the flags of a program, and those that packages `cli` of the suite define for it."""
+    """Yield the flags of a program, and those that packages `cli` of the suite define for it.
+
+    Absl calls the module of a running script by the path of the script.
+    """
     for module_name, module_flags in flags.FLAGS.flags_by_module_dict().items():
         if module_name in (module.__name__, sys.argv[0]) or "cli" in module_name.split("."):
             yield from module_flags
@@ -238,6 +241,7 @@ class _Output:
 
     @contextlib.contextmanager
     def _without_broken_pipe(self):
+        """Send the stream to the null device if nobody reads it any more."""
         try:
             yield
         except BrokenPipeError:

@@ -75,7 +75,7 @@ class ProportionGenes:
             (-1.0, 0.0, 1.0),
             (numbers["reach_rear"], numbers["reach_middle"], numbers["reach_front"]),
         )
-        profile = [
+        profile = [  # share of the leg's length, and elevation in degrees, of each link
             (share * numbers[f"share_{link}"], elevation + numbers[f"elevation_{link}"])
             for link, (share, elevation) in enumerate(generator.PROFILES[links], 1)
         ]
@@ -152,7 +152,8 @@ def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: st
     size_share = space.size_share(genes)
     largest_factor = min(budget.span / float(extent(shape).max()), budget.height / shape.torso.standing_height)
     factor = min(largest_factor, 1.0) if size_share is None else size_share * largest_factor
-    # The density comes before the scale: small parts of the shape's own density could be too light to be allowed.
+    # The density comes before the scale: small parts of the shape's own density could be too light to be allowed. The
+    # scale multiplies masses by its third power.
     ballast = sum(weight.mass for weight in shape.ballast)  # kg, does not depend on the density
     density = shape.density * (budget.mass / factor**3 - ballast) / (standing(shape).mass - ballast)
     body = shape.replace(density=density)

@@ -20,10 +20,11 @@ def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
     """
     sketch = creature.sketch
     setup = creature.setup
+    task_class = setup.kind
     task = creature.environment.task.definition
     typed_settings = sketches.settings_field(sketch)  # settings of the text field replace those of other widgets
     has_target_velocity = task.target_velocity is not None or task.parameters is not None
-    takes_velocity = task.commands.get("command") == 3
+    takes_velocity = task.commands.get("command") == 3  # numbers: forward, left, turn
     is_imported = setup.body.source is not None
 
     idle: list[str] = []
@@ -37,7 +38,7 @@ def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
         idle.append("gait")
     if "target_velocity" in typed_settings or not has_target_velocity:
         idle.append("speed")
-    if "arena" in typed_settings or setup.kind.own_arena:
+    if "arena" in typed_settings or task_class.own_arena:
         idle.append("ground")
     if "kicks" in typed_settings:
         idle.append("kicks")

@@ -79,7 +79,8 @@ class Figure:
         Returns:
             The position (3,) of the torso, m.
         """
-        pose = readings.pose(qpos, self.creature.environment.task.definition.scene.layout)
+        layout = self.creature.environment.task.definition.scene.layout
+        pose = readings.pose(qpos, layout)  # (7 + joints,): position and quaternion of the torso, joint angles
         torso_position = pose[:3]
         torso_quaternion = pose[3:7]
         hinge_angles = pose[7:][self._hinge_joints]  # (hinges,) rad, from the standing pose

@@ -149,7 +149,7 @@ def _handle_if(is_acceptable: Callable[[Any], bool], handler: Callable) -> Calla
 def _admit_and_process(process_request: Callable, host: str, token: str) -> Callable:
     """Return a function that passes admitted requests on to viser's `process_request`, and refuses the rest."""
 
-    def process_admitted(connection: websockets.ServerConnection, request: Request) -> Response | None:
+    def refuse_or_process(connection: websockets.ServerConnection, request: Request) -> Response | None:
         if not admits(request, host, token):
             refusal = "refused: open the address that the studio has printed\n"
             return connection.respond(http.HTTPStatus.FORBIDDEN, refusal)
@@ -159,7 +159,7 @@ def _admit_and_process(process_request: Callable, host: str, token: str) -> Call
             response.headers["Set-Cookie"] = f"{cookie}; Path=/; HttpOnly; SameSite=Strict"
         return response
 
-    return process_admitted
+    return refuse_or_process
 
 
 def admits(request: Request, host: str, token: str) -> bool:

@@ -48,18 +48,18 @@ class History:
             return
         environment = self._episodes.environment
         data = environment.physics.data
-        run = environment.task
-        task = run.definition
+        running_task = environment.task
+        task = running_task.definition
         weights = task.settings.weights
         stance = None
         schedule = None
-        gait = task.leg_phases(run.memory)
+        gait = task.leg_phases(running_task.memory)
         if gait is not None:
             phases, duty_factor = gait  # rad, and the share of a cycle that a foot stands
             stance = task.read(data).foot_heights < task.parameters.stance_threshold
             schedule = (phases % TWO_PI < TWO_PI * duty_factor) | self._is_at_stop()
         moment = Moment(
-            terms={name: weights[name] * float(value) for name, value in run.terms.items()},
+            terms={name: weights[name] * float(value) for name, value in running_task.terms.items()},
             stance=stance,
             schedule=schedule,
             position=data.qpos[:2].copy(),

@@ -42,14 +42,14 @@ class _Key(NamedTuple):
     """A key that changes the velocity by command.
 
     Attributes:
-        label: of what it does.
-        key: its letter.
+        label: says what it does.
+        letter: on the key.
         field: of the command.
         change: of the field.
     """
 
     label: str
-    key: str
+    letter: str
     field: str
     change: float
 
@@ -77,7 +77,7 @@ def serve(session: Session, host: str, port: int, report: Callable[[str], None])
         ValueError: nothing can listen on the address.
     """
     try:
-        socket.create_server((host, 0)).close()  # viser would wait forever
+        socket.create_server((host, 0)).close()  # raises an error now, where viser would wait forever
     except OSError as error:
         raise ValueError(f"host {host}: cannot listen there: {(error.strerror or str(error)).lower()}") from None
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
@@ -202,9 +202,9 @@ class Page:
             self._widgets |= layout.add_pose(gui)
             gui.add_button("Upright").on_click(lambda event: self._stand_upright())
         for key in _KEYS:
-            command = gui.add_command(key.label, hotkey=key.key)
+            command = gui.add_command(key.label, hotkey=key.letter)
             command.on_trigger(functools.partial(self._press, key))
-        key_texts = [f"{key.key} {key.label.lower()}" for key in _KEYS]
+        key_texts = [f"{key.letter} {key.label.lower()}" for key in _KEYS]
         gui.add_html(texts.paragraph(f"Keys: {', '.join(key_texts)}"))
         gui.add_button("Kick").on_click(lambda event: self._session.kick(random.uniform(-math.pi, math.pi)))
         gui.add_button("Restart").on_click(lambda event: self._session.restart())
@@ -250,7 +250,7 @@ class Page:
             self._flaw_widgets = [self._gui.add_html(texts.flaws(creature))]
             for flaw in creature.flaws:
                 if flaw.cure is not None:
-                    advice = flaw.text.rpartition(": ")[2]
+                    advice = flaw.text.rpartition(": ")[2]  # of PROBLEM: ADVICE
                     button = self._gui.add_button(f"Apply: {advice}")
                     button.on_click(functools.partial(self._apply_cure, open_body(creature.sketch, flaw.cure)))
                     self._flaw_widgets.append(button)
@@ -341,7 +341,7 @@ class Page:
         """
         state = from_json(text)
         for field in ("task", "policy"):
-            checks.name(state.value(field), self._widgets[field].options, field)
+            checks.name(state.value(field), self._widgets[field].options, field)  # raises a ValueError for other names
         # The session replaces a gait that does not suit the body, and reduces a pose to the body's room.
         commands = [field.name for field in dataclasses.fields(VisitorCommand)]
         for name in commands:

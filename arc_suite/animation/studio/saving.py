@@ -66,9 +66,9 @@ def make_clips(creature: Creature, qpos: np.ndarray, commands: Commands) -> byte
     """
     sketch = creature.sketch
     preset = sketches.chosen_preset(sketch)
-    movements = clips.clips(creature.setup, clips.DEFAULT, sketch.policy, preset)
+    default_clips = clips.clips(creature.setup, clips.DEFAULT, sketch.policy, preset)
     version = versions.version_of("arc_suite") or ""
-    return clips.glb(creature.setup.body, movements, generator=f"arc_suite {version}".strip())
+    return clips.glb(creature.setup.body, default_clips, generator=f"arc_suite {version}".strip())
 
 
 def make_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:

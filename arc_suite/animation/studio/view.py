@@ -101,38 +101,38 @@ class View:
             companion_qpos: (nq,) positions of the companion; None without one.
         """
         with self._server.atomic():
-            torso = self._figure.pose(qpos, shown_position=lambda position: position)
+            torso_position = self._figure.pose(qpos, shown_position=lambda position: position)
             if self._companion is not None:
-                self._companion.pose(companion_qpos, functools.partial(self._place_companion, torso))
-            self._ground.follow(torso)
-            floor = self._ground.height(torso) / self._unit
+                self._companion.pose(companion_qpos, functools.partial(self._place_companion, torso_position))
+            self._ground.follow(torso_position)
+            floor = self._ground.height(torso_position) / self._unit
             self._shown_floor += _FLOOR_FOLLOWING * (floor - self._shown_floor)
-            center = (torso + 0.5 * self._lane) / self._unit  # between the creature and its companion
+            center = (torso_position + 0.5 * self._lane) / self._unit  # between the creature and its companion
             self._world.position = (-center[0], -center[1], -self._shown_floor)
-            self._markers.show(markers, torso)
+            self._markers.show(markers, torso_position)
 
     def show_handles(self, on_drag: Callable[[str, np.ndarray], None] | None) -> None:
         """Show balls to drag the creature's links by, or hide them; see `Figure.show_handles`."""
         with self._server.atomic():
             self._figure.show_handles(on_drag)
 
-    def _place_companion(self, torso: np.ndarray, companion_torso: np.ndarray) -> np.ndarray:
+    def _place_companion(self, torso_position: np.ndarray, companion_position: np.ndarray) -> np.ndarray:
         """Return where the scene shows the companion's torso, (3,) m.
 
-        The companion walks as far as it does. Where it would leave the picture, it is shown next to the creature again.
+        The companion moves as in its own episode. Where it would leave the picture, it comes back next to the creature.
 
         Args:
-            torso: (3,) position of the creature's torso, m.
-            companion_torso: (3,) position of the companion's torso in its own episode, m.
+            torso_position: (3,) of the creature, m.
+            companion_position: (3,) of the companion's torso in its own episode, m.
         """
-        lane_error = np.linalg.norm(companion_torso + self._companion_shift - torso - self._lane)
+        lane_error = np.linalg.norm(companion_position + self._companion_shift - torso_position - self._lane)
         is_in_picture = lane_error < self._lane[1]
         if not is_in_picture:
-            self._companion_shift = (torso + self._lane - companion_torso) * (1.0, 1.0, 0.0)
-        shown_position = companion_torso + self._companion_shift
+            self._companion_shift = (torso_position + self._lane - companion_position) * (1.0, 1.0, 0.0)
+        shown_position = companion_position + self._companion_shift
         arena = self._companion.creature.environment.task.definition.scene.arena
         shown_floor = self._ground.height(shown_position)
-        companion_floor = float(arena.height(*companion_torso[:2]))
+        companion_floor = float(arena.height(*companion_position[:2]))
         return shown_position + (0.0, 0.0, shown_floor - companion_floor)
 
 
@@ -157,9 +157,9 @@ class _Ground:
         """Return the height of the ground under a position (3,), m."""
         return float(self._arena.height(*position[:2]))
 
-    def follow(self, torso: np.ndarray) -> None:
-        """Draw the ground again if the torso, at (3,) m, is near its edge, or if obstacles have moved."""
-        walked_distance = abs(torso[:2] - self._center).max() / self._unit
+    def follow(self, torso_position: np.ndarray) -> None:
+        """Draw the ground again if the torso is near its edge, or if obstacles have moved."""
+        walked_distance = abs(torso_position[:2] - self._center).max() / self._unit
         is_near_edge = walked_distance > _GROUND_EXTENT - _GROUND_MARGIN and not self._is_endless
         if is_near_edge or not np.array_equal(self._obstacles, self._obstacle_positions()):
             self._draw()
@@ -255,14 +255,14 @@ class _Markers:
         self._arrows: viser.ArrowsHandle | None = None
         self._cylinders: dict[_CylinderStyle, viser.CylinderHandle] = {}
 
-    def show(self, markers: list[Marker], torso: np.ndarray) -> None:
+    def show(self, markers: list[Marker], torso_position: np.ndarray) -> None:
         """Move the markers, or draw them again if they are other ones.
 
         Args:
             markers: of the task.
-            torso: (3,) its position, m.
+            torso_position: (3,) m.
         """
-        anchor = torso / self._unit * (1.0, 1.0, 0.0)
+        anchor = torso_position / self._unit * (1.0, 1.0, 0.0)
         self._anchor.position = anchor
         self._show_arrows([marker for marker in markers if marker.shape == "arrow"], anchor)
         self._show_cylinders([marker for marker in markers if marker.shape == "cylinder"], anchor)
