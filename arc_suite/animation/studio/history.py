@@ -57,7 +57,9 @@ class History:
         if gait is not None:
             phases, duty_factor = gait  # rad, and the share of a cycle that a foot stands
             stance = task.read(data).foot_heights < task.parameters.stance_threshold
-            schedule = (phases % TWO_PI < TWO_PI * duty_factor) | self._is_at_stop()
+            schedule = phases % TWO_PI < TWO_PI * duty_factor
+            if self._is_at_stop():
+                schedule = np.ones_like(schedule)
         moment = Moment(
             terms={name: weights[name] * float(value) for name, value in running_task.terms.items()},
             stance=stance,

@@ -94,9 +94,9 @@ def make_playable_page(creature: Creature, qpos: np.ndarray, commands: Commands)
         ValueError: the scripts of pages have not been built, or the policy does not run in a page.
     """
     sketch = creature.sketch
-    return play_pages.page(
-        [play_pages.creature(creature.setup.body, sketch.policy, sketches.chosen_preset(sketch))]
-    ).encode()
+    preset = sketches.chosen_preset(sketch)
+    playable_creature = play_pages.creature(creature.setup.body, sketch.policy, preset)
+    return play_pages.page([playable_creature]).encode()
 
 
 def make_picture(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
