@@ -157,8 +157,8 @@ def write_body(path: pathlib.Path) -> None:
 def write_studio_state(path: pathlib.Path) -> None:
     """Write what the widgets of the studio say, as the page saves it."""
     sketch = Sketch(legs=6, length=1.2, lengths=(("lower", 1.1),), task="steer", gait="tripod", kicks=0.5, palette="7")
-    command = states.Command(forward=0.5, turn=-0.2, height=-0.1)
-    path.write_text(states.to_json(states.State(sketch, command)), encoding="utf-8")
+    command = states.VisitorCommand(forward=0.5, turn=-0.2, height=-0.1)
+    path.write_text(states.to_json(states.PageState(sketch, command)), encoding="utf-8")
 
 
 def write_tracks(path: pathlib.Path) -> None:

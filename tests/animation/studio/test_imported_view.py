@@ -7,7 +7,7 @@ import pytest
 
 from arc_suite import rotations
 from arc_suite.animation.studio.creature import open_creature
-from arc_suite.animation.studio.sketch import Sketch, apply_cure
+from arc_suite.animation.studio.sketch import Sketch, open_body
 from arc_suite.models.standing import stood
 from arc_suite.tasks import readings
 
@@ -24,7 +24,7 @@ def server():
 
 @pytest.mark.parametrize("body", [imports.hexapod(), imports.with_arm()], ids=["six legs", "an arm"])
 def test_frames_are_where_the_simulation_has_the_feet(server, body):
-    view, creature = View(server), open_creature(apply_cure(Sketch(task="steer"), body))
+    view, creature = View(server), open_creature(open_body(Sketch(task="steer"), body))
     view.show(creature)
     physics, layout = creature.environment.physics, creature.environment.task.definition.scene.layout
     model, data = physics.model.ptr, physics.data.ptr
