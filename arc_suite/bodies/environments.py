@@ -159,8 +159,8 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         if seed is not None:
             seeds = self._checked_seeds(seed)
             for group, indices, _ in self._places:
-                group._seed([seeds[index] for index in indices], np.ones(len(indices), bool))
-        self._made = __name__
+                group._begin_streams([seeds[index] for index in indices], np.ones(len(indices), bool))
+        self._sealed_by = __name__
 
     @one_thread_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
@@ -302,7 +302,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             own["steps"] = steps[place.indices] if steps.shape == (self.num_envs,) else steps
             checked.append(place.group._checked_snapshot(own))
         for place, snapshot in zip(self._places, checked, strict=True):
-            place.group._put(snapshot)
+            place.group._restore_state(*snapshot)
         self._begun = True
 
     @one_thread_at_a_time

@@ -2,7 +2,8 @@
 
 import functools
 import threading
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,20 +19,28 @@ _UNREAL_KINDS = "cOSUMmT"
 class KnownAttributes:
     """An object that refuses new public attributes once it is complete: a misspelled name would have no effect.
 
-    A class sets `_made` to its module's name at the end of `__init__`. Classes of other modules that inherit from it
-    may have new attributes.
+    A class sets `_sealed_by` to its module's name at the end of `__init__`. Classes of other modules that inherit from
+    it may have new attributes.
     """
+
+    # Attributes' names in pickles of earlier versions -> their present names.
+    _FORMER_NAMES: ClassVar[Mapping[str, str]] = {"_made": "_sealed_by"}
 
     def __setattr__(self, name: str, value: Any):
         is_public = name[0] != "_"
-        is_complete = "_made" in self.__dict__
+        is_complete = "_sealed_by" in self.__dict__
         if is_public and is_complete:
             self._check_known(name)
         super().__setattr__(name, value)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            self.__dict__[self._FORMER_NAMES.get(name, name)] = value
+
     def _check_known(self, name: str) -> None:
         """Raise AttributeError for a name that no attribute has."""
-        if name not in self.__dict__ and not hasattr(type(self), name) and type(self).__module__ == self._made:
+        is_known = name in self.__dict__ or hasattr(type(self), name)
+        if not is_known and type(self).__module__ == self._sealed_by:
             raise AttributeError(
                 f"cannot set {checks.preview(name)}: there is no such attribute; "
                 "change_settings of the environment changes settings"

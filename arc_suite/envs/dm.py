@@ -1,8 +1,7 @@
-"""Tasks as dm_env environments: dm_control's `Environment` around any task of the contract."""
+"""Tasks as dm_env environments: dm_control's `Environment` for any task of the suite's contract."""
 
 import collections
 import functools
-import math
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -32,8 +31,8 @@ from arc_suite.tasks.contract import CURRICULUM
 
 _FLAT = "observations"  # dm_control's name of a flat observation
 
-# What `dm_control.suite.load` hands on to an environment and this suite fixes, and why.
-_FIXED = {
+# Settings of dm_control's environments that this suite refuses, and why.
+_REFUSED_SETTINGS = {
     "control_timestep": "reward and observation are made for the body's own control steps",
     "n_sub_steps": "reward and observation are made for the body's own control steps",
     "legacy_step": "observed contact forces and foot heights stand one substep behind the state",
@@ -52,16 +51,16 @@ def load(
 
     Args:
         domain_name: a robot: queen, bastion, tick or leaper; one of another package, as `module:name`
-            where that has not been imported yet; or any body; see `registry.body_of`.
+            if the module has not been imported yet; or any body; see `registry.body_of`.
         task_name: walk, steer, or a task of another package as `module:name`.
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
             or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
             reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers`;
             for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.WalkSettings`.
-        environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Of what
-            else dm_control's environments take, steps and substeps are part of the benchmark and are
-            refused, and `time_limit` is a setting of the task.
-        visualize_reward: let rendered pictures show the reward as a color.
+        environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Other settings of
+            dm_control's environments are refused: steps and substeps are part of the benchmark, and `time_limit` is a
+            setting of the task.
+        visualize_reward: whether rendered pictures show the reward as a color.
 
     Returns:
         An `Environment`, which is a `dm_control.rl.control.Environment`.
@@ -72,11 +71,12 @@ def load(
     """
     settings = dict(checks.mapping("task_kwargs", task_kwargs))
     options = checks.mapping("environment_kwargs", environment_kwargs)
-    random, on_divergence = settings.pop("random", None), settings.pop("on_divergence", "raise")
+    random = settings.pop("random", None)
+    on_divergence = settings.pop("on_divergence", "raise")
     task, _ = prepare_task(domain_name, task_name, settings)
     for name in options:
-        if name in _FIXED:
-            raise ValueError(f"environment setting {name!r}: {_FIXED[name]}")
+        if name in _REFUSED_SETTINGS:
+            raise ValueError(f"environment setting {name!r}: {_REFUSED_SETTINGS[name]}")
         checks.name(name, ["flat_observation"], "environment setting")
     run = TaskRun(task, random, on_divergence, options.get("flat_observation", False))
     run.visualize_reward = visualize_reward
@@ -86,42 +86,44 @@ def load(
 class Environment(KnownAttributes, control.Environment):
     """A task in a simulation; steps, resets and specs are those of dm_control.
 
-    While one thread is in a step or reset, another's is refused with a RuntimeError. Any thread may set commands.
+    While one thread is in a step or reset, those of other threads raise RuntimeError. Any thread may set commands.
 
     Attributes:
         task_kwargs: the settings with which `load` opened the task.
     """
 
     def __init__(self, physics: Physics, run: "TaskRun", task_kwargs: Mapping[str, Any]):
-        """Put a task's run and its simulation together; `load` makes both."""
+        """Combine a task's run and its simulation; `load` makes both."""
         self.task_kwargs = task_kwargs
         self._lock = Lock()
-        limit, scene = run.definition.step_limit, run.definition.scene
-        run.simulated_by(physics)
+        step_limit = run.definition.step_limit
+        scene = run.definition.scene
+        # Half a step less than the limit, so that rounding adds none; infinite if the limit is.
+        time_limit = (step_limit - 0.5) * scene.control_timestep
+        run.set_physics(physics)
         super().__init__(
             physics,
             run,
-            # Half a step short, so that rounding adds none.
-            time_limit=math.inf if limit == math.inf else (limit - 0.5) * scene.control_timestep,
+            time_limit=time_limit,
             n_sub_steps=scene.substeps,
-            legacy_step=False,  # which would move the contact forces and foot heights one substep on
+            legacy_step=False,  # True would shift the contact forces and foot heights by one substep
         )
-        self._made = __name__
+        self._sealed_by = __name__
 
     step = one_thread_at_a_time(control.Environment.step)
 
     @one_thread_at_a_time
     def change_model(self, fields: Mapping[str, Any]) -> None:
-        """Set fields of the model from the next step on; they stay over resets.
+        """Set fields of the model from the next step on. Resets do not undo it.
 
-        What the task would draw of a changed field, as modifiers draw friction and mass, gives way to it.
+        Modifiers draw friction, mass and other fields for each episode. A field that was set here keeps its value.
 
         Args:
-            fields: values by name of `simulation.model.FIELDS`, the fields of `MjModel` and `gravity`; what broadcasts
-                to the field's shape.
+            fields: values by name of the field: one of `simulation.model.FIELDS`, which are fields of `MjModel` and
+                `gravity`. A value must broadcast to the field's shape.
 
         Raises:
-            ValueError: no such field, one without effect, or a value that does not fit.
+            ValueError: an unknown field, one without effect, or a value that does not fit.
         """
         self.physics.change_model(checked_fields(self.physics.model.ptr, fields), lasting=True)
 
@@ -129,8 +131,8 @@ class Environment(KnownAttributes, control.Environment):
     def change_settings(self, settings: Mapping[str, Any]) -> None:
         """Set settings of the task from the next reset on.
 
-        They replace values of `task_kwargs` and of earlier calls. What changes the arena, the observation, or whether
-        there are kicks and other modifiers is refused. `level` begins the curriculum again at that level.
+        They replace values of `task_kwargs` and of earlier calls. A setting is refused if it would change the arena,
+        the observation, or the presence of kicks and other modifiers. `level` restarts the curriculum at that level.
 
         Args:
             settings: some of `task_kwargs`.
@@ -144,7 +146,7 @@ class Environment(KnownAttributes, control.Environment):
 
     @one_thread_at_a_time
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return the state as arrays by name, from which `restore` goes on, or a `VectorEnv` of one environment.
+        """Return the state as arrays by name, for `restore` of this environment or of a `VectorEnv` of one.
 
         Raises:
             RuntimeError: before the first reset.
@@ -155,24 +157,25 @@ class Environment(KnownAttributes, control.Environment):
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on, bit-exact, from the snapshot of an environment of the same task.
+        """Continue, bit-exactly, from the snapshot of an environment of the same task.
 
         Raises:
-            ValueError: an array is missing or does not fit; none has been used.
+            ValueError: an array is missing or does not fit; the state has not changed.
         """
         run = self.task
         if run.memory is None:
             super().reset()
-        like = self._state()
-        check = functools.partial(self.physics.checked, fields=run.definition.reads)
-        state, tasks = snapshots.from_arrays(like, run.definition, check, arrays, [run.opened], self.task_kwargs)
+        check_simulations = functools.partial(self.physics.checked, fields=run.definition.reads)
+        state, ((task,), (next_task,)) = snapshots.from_arrays(
+            self._state(), run.definition, check_simulations, arrays, [run.opened], self.task_kwargs
+        )
         self.physics.restore(state.simulations)
-        run.restore(state, *(each for (each,) in tasks))
-        own = {name: array[0] for name, array in state.environment_arrays.items()}
-        self._step_count, self._reset_next_step = int(own["steps"]), bool(own["ended"])
+        run.restore(state, task, next_task)
+        self._step_count = int(state.environment_arrays["steps"][0])
+        self._reset_next_step = bool(state.environment_arrays["ended"][0])
 
     def _state(self) -> snapshots.State:
-        """The state, with a leading axis as that of a `VectorEnv` of one environment."""
+        """Return the state, with a leading axis as that of a `VectorEnv` of one environment."""
         simulations = self.physics.snapshot(self.task.definition.reads)
         return self.task.state(simulations, self.physics, self._step_count, self._reset_next_step)
 
@@ -181,11 +184,11 @@ class Environment(KnownAttributes, control.Environment):
         """Start an episode.
 
         Args:
-            seed: starts a new stream of random numbers, in which this is the first episode; None
+            seed: starts a new stream of random numbers with this episode; None
                 for the next episode of the present stream.
 
         Raises:
-            ValueError: not a seed.
+            ValueError: the seed is not valid.
             RuntimeError: another thread is at work in the environment.
         """
         if seed is not None:
@@ -193,16 +196,17 @@ class Environment(KnownAttributes, control.Environment):
         return super().reset()
 
     def command(self, name: str, value) -> None:
-        """Set a command of the task from the next step on, as a player's stick does, until the next episode.
+        """Set a command of the task from the next step on, until the next episode. A player's stick, for example, does.
 
-        Any thread may call it while another is in a step, which goes on with the command before.
+        Any thread may call it while another is in a step, which still uses the earlier command.
 
         Args:
             name: one of the task's `commands`.
-            value: (size,) numbers; None, or NaN in some, for what the task itself would do.
+            value: (size,) numbers, or a name that the command has for them. None and NaN leave the command, or some of
+                its numbers, to the task itself.
 
         Raises:
-            ValueError: no such command, or a value of another size.
+            ValueError: an unknown command, or a value of another size.
         """
         self.task.set_command(name, value)
 
@@ -212,65 +216,81 @@ class Environment(KnownAttributes, control.Environment):
 
 
 class _Now:
-    """What every step sets, in an object of its own: setting an attribute of a `TaskRun` is checked, and slower.
+    """The values that change in every step of a `TaskRun`.
+
+    They are in an object of their own, as setting an attribute of a `TaskRun` is slower: it is checked.
 
     Attributes:
         memory: of the present episode; None before the first.
-        readings: of the latest step; None where they are to be taken anew.
-        terms: unweighted, of the latest reward by name.
+        readings: of the present state; None if they have to be read from the simulation.
+        terms: unweighted terms of the latest reward by name.
     """
 
     def __init__(self):
         """Start before the first episode."""
-        self.memory, self.readings, self.terms = None, None, {}
+        self.memory = None
+        self.readings = None
+        self.terms = {}
 
 
 class TaskRun(TaskView, KnownAttributes, control.Task):
-    """A task in one simulation, episode after episode, as dm_control's `Task`: it keeps the memory.
+    """A task in one simulation, episode after episode, as dm_control's `Task`. It stores the memory between steps.
 
     Attributes:
-        definition: the task of the present episode, a value of the contract.
-        opened: the task before `Environment.change_settings`.
-        next_changes: JSON of the settings that differ in the next episode.
-        memory: of the present episode, as the next step will find it; None before the first.
+        definition: the task of the present episode, see `tasks.contract.Task`.
+        opened: the task with the settings with which the environment was opened.
+        next_changes: JSON of the settings of the next episode that differ from those.
+        memory: of the present episode with the live commands, as the next step will use it; None before the first.
         visualize_reward: whether rendered pictures show the reward as a color.
     """
+
+    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {
+        "_next": "_next_task",
+        "_changes": "_present_changes",
+        "_starting": "_is_starting",
+        "_motors": "_action_shape",
+    }
 
     def __init__(self, task: Task, random=None, on_divergence: str = "raise", flat: bool = False):
         """Prepare to run.
 
         Args:
-            task: what to do.
-            random: a `RandomState`, or what one is seeded with.
-            on_divergence: what a step does whose physics diverges: "raise" an error, or "terminate"
+            task: the definition of the task.
+            random: a `RandomState`, or a seed of one; None for a random seed.
+            on_divergence: what a step does if its physics diverges: "raise" an error, or "terminate"
                 the episode with reward 0.
             flat: whether observations are one vector.
 
         Raises:
-            ValueError: an unknown `on_divergence`, or not a seed.
+            ValueError: an unknown `on_divergence`, or a seed that is not valid.
         """
         if not isinstance(random, np.random.RandomState):
             random = np.random.RandomState(None if random is None else checks.seed(random))
-        self.definition = self.opened = self._next = task
-        self._changes = self.next_changes = "{}"
-        self._now, self._stream = _Now(), None
+        self.definition = task
+        self.opened = task
+        self._next_task = task
+        self._present_changes = "{}"  # JSON of changed settings, as `next_changes` but of the present episode
+        self.next_changes = "{}"
+        self._now = _Now()
+        self._stream = None  # state of the stream with which the present episode has started
         self._commands = LiveCommands()
         self.visualize_reward = False
         self.random = random
         self._on_divergence = checks.name(on_divergence, ("raise", "terminate"), "on_divergence")
         self._flat = flat
-        self._starting = False  # between a reset and its observation
-        self._motors = (len(task.scene.body.joint_names),)
-        self._made = __name__
+        self._is_starting = False  # True between a reset and its observation
+        self._action_shape = (len(task.scene.body.joint_names),)
+        self._sealed_by = __name__
 
     @property
     def random(self) -> np.random.RandomState:
-        """What starts of episodes are drawn from; a new one begins a new stream of episodes."""
+        """The generator of the starts of episodes; setting a new one begins a new stream of episodes."""
         return self._random
 
     @random.setter
     def random(self, value: np.random.RandomState):
-        self._random, self._stream_begins = value, True
+        self._random = value
+        self._stream_begins = True  # with the next episode
 
     @property
     def terms(self) -> Mapping[str, Any]:
@@ -288,31 +308,32 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     @property
     def progress(self) -> dict[str, float]:
-        """How well the episode has gone so far, figures by name.
+        """How well the episode has gone so far, metrics by name.
 
         Raises:
             RuntimeError: before the first reset.
         """
         self._check_begun()
-        return {name: float(figure) for name, figure in self.definition.progress(self._now.memory).items()}
+        return {name: float(metric) for name, metric in self.definition.progress(self._now.memory).items()}
 
-    def simulated_by(self, physics: Physics) -> None:
-        """Remember the simulation, in which privileged observations are looked up."""
+    def set_physics(self, physics: Physics) -> None:
+        """Set the simulation, from which privileged observations are read."""
         self._physics = physics
 
     @property
     def privileged(self) -> dict[str, np.ndarray]:
-        """What no policy observes, by the names of `definition.privileged_blocks`, now.
+        """The present privileged observation, by the names of `definition.privileged_blocks`.
 
         Raises:
             RuntimeError: before the first reset.
         """
         self._check_begun()
-        found = self.definition.privileged(self.memory, self._physics.data.ptr)
-        return found | self.definition.read_back(found, self._physics.lasting)
+        blocks = self.definition.privileged(self.memory, self._physics.data.ptr)
+        changed_blocks = self.definition.read_back(blocks, self._physics.lasting)  # those that `change_model` has set
+        return blocks | changed_blocks
 
     def privileged_vector(self) -> np.ndarray:
-        """Return the same as one vector (size,) float32."""
+        """Return the present privileged observation as one vector (size,) float32."""
         return privileged.vector(self.definition, self.privileged)
 
     def _check_begun(self) -> None:
@@ -323,7 +344,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """Set a live command; see `Environment.command`.
 
         Raises:
-            ValueError: no such command, a value that does not fit, or no episode has begun.
+            ValueError: an unknown command, a value that does not fit, or no episode has begun.
         """
         value = checked_command(self.definition, name, value)
         if self._now.memory is None:
@@ -332,8 +353,8 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     def action_spec(self, physics):
         """Return the spec of one control in [-1, 1] for each motor or servo of the legs."""
-        joints = (len(self.body.joint_names),)
-        return specs.BoundedArray(joints, float, -np.ones(joints), np.ones(joints))
+        shape = self._action_shape
+        return specs.BoundedArray(shape, float, -np.ones(shape), np.ones(shape))
 
     def observation_spec(self, physics):
         """Return the specs of the observation's blocks by name, or of the flat vector."""
@@ -341,33 +362,42 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         return collections.OrderedDict((name, specs.Array((size,), float, name)) for name, size in sizes.items())
 
     def initialize_episode(self, physics):
-        """Draw how the episode starts, and write it."""
-        self._take_commands()
-        self._stream = self._next.first() if self._stream_begins else self.definition.stream_state(self._now.memory)
+        """Draw the start of an episode, and write it into the simulation."""
+        self._consume_commands()
+        if self._stream_begins:
+            self._stream = self._next_task.first()
+        else:
+            self._stream = self.definition.stream_state(self._now.memory)
         self._stream_begins = False
-        self.definition, self._changes = self._next, self.next_changes
+        self.definition = self._next_task
+        self._present_changes = self.next_changes
         start = self.definition.start(self._random, self._stream)
         if start.model:
             physics.change_model(start.model)
         data = physics.data.ptr
-        data.qpos[:], data.qvel[:] = start.qpos, start.qvel
+        data.qpos[:] = start.qpos
+        data.qvel[:] = start.qvel
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
-        physics.shown_reward, physics.marker, physics.failed_legs = None, self.markers, self.failed_legs
-        self._now.memory, self._starting = start.memory, True
+        physics.shown_reward = None
+        physics.marker = self.markers
+        physics.failed_legs = self.failed_legs
+        self._now.memory = start.memory
+        self._is_starting = True
 
     def before_step(self, action, physics):
         """Apply the action, clipped to [-1, 1].
 
         Raises:
-            ValueError: the action has another shape or holds NaN; nothing has changed then.
+            ValueError: the action has another shape or contains NaN; nothing has changed then.
         """
-        action = checked_action(action, self._motors)
-        self._now.memory, inputs = self.definition.before(
-            self._commands.consume(self.definition, self._now.memory), action
-        )
+        action = checked_action(action, self._action_shape)
+        memory = self._commands.consume(self.definition, self._now.memory)
+        self._now.memory, inputs = self.definition.before(memory, action)
+        # Set in every step, as a copy of the simulation lacks both.
+        physics.marker = self.markers
+        physics.failed_legs = self.failed_legs
         data = physics.data.ptr
-        physics.marker, physics.failed_legs = self.markers, self.failed_legs  # which a copy of the simulation has not
         data.ctrl[: inputs.ctrl.shape[-1]] = inputs.ctrl
         if inputs.kick is not None:
             data.qvel[:] += inputs.kick
@@ -375,10 +405,10 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             data.xfrc_applied[self.definition.scene.layout.torso, :3] = inputs.force
 
     def after_step(self, physics):
-        """Take the readings, and what is to be remembered of the step.
+        """Read the simulation after the step, and update the memory.
 
         Raises:
-            PhysicsError: the physics diverged and is not to terminate the episode.
+            PhysicsError: the physics has diverged, and `on_divergence` is "raise".
         """
         if physics.divergence is not None and self._on_divergence == "raise":
             raise control.PhysicsError(f"{self.body.name}: {physics.divergence}")
@@ -386,89 +416,119 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._now.memory = self.definition.after(self._now.memory, self._now.readings)
 
     def get_reward(self, physics):
-        """Return the reward of the latest step, whose terms stay in `terms`."""
-        task, weights = self.definition, self.definition.settings.weights
-        raw = task.terms(self._now.memory, self._latest(physics))
+        """Return the reward of the latest step; `terms` returns its terms from then on."""
+        task = self.definition
+        weights = task.settings.weights
+        raw_terms = task.terms(self._now.memory, self._readings(physics))
         if physics.divergence is not None:
-            raw = dict.fromkeys(raw, np.float64(0.0))
-        self._now.terms, reward = terms.reward(raw, weights, task.cost_limit)
+            raw_terms = dict.fromkeys(raw_terms, np.float64(0.0))
+        self._now.terms, reward = terms.reward(raw_terms, weights, task.cost_limit)
         if self.visualize_reward:
-            physics.shown_reward = reward / (terms.greatest(weights) or 1.0)
+            greatest_reward = terms.greatest(weights)
+            physics.shown_reward = reward / (greatest_reward or 1.0)
         return reward
 
     def get_observation(self, physics):
-        """Return the observation's blocks by name; or one vector of them, as `observations`."""
-        readings = self._begin(physics) if self._starting else self._latest(physics)
+        """Return the observation's blocks by name, or a dictionary with one vector of them, `observations`."""
+        readings = self._begin(physics) if self._is_starting else self._readings(physics)
         blocks = self.definition.observe(self._now.memory, readings)
-        return {_FLAT: self.definition.vector(blocks)} if self._flat else self.definition.named(blocks)
+        if self._flat:
+            return {_FLAT: self.definition.vector(blocks)}
+        return self.definition.named(blocks)
 
     def get_termination(self, physics):
-        """Return 0 where the task is failed or the physics has diverged, 1 where it cuts the episode off, else None."""
+        """Return the discount at the end of an episode: 0 if terminated or diverged, 1 if truncated; else None."""
         if physics.divergence is not None:
             return 0.0
-        terminated, truncated = self.definition.ended(self._now.memory, self._latest(physics))
-        self._now.readings = None  # stale as soon as the simulation moves
-        return 0.0 if terminated else 1.0 if truncated else None
+        terminated, truncated = self.definition.ended(self._now.memory, self._readings(physics))
+        self._now.readings = None  # the simulation moves next
+        if terminated:
+            return 0.0
+        return 1.0 if truncated else None
 
     def markers(self, physics):
-        """Return what pictures show of what the task asks for now."""
-        return self.definition.markers(self.memory, self._latest(physics))
+        """Return the debug markers of the task's present command, for pictures."""
+        return self.definition.markers(self.memory, self._readings(physics))
 
     def failed_legs(self) -> tuple[str, ...]:
         """Return the names of the legs whose motors have failed."""
         return self.definition.failed_legs(self._now.memory)
 
     def put_changes(self, changes: str, task: Task, restart: bool) -> None:
-        """Let a task with changed settings, and JSON of these, hold from the next episode on.
+        """Change settings from the next episode on.
 
-        With `restart` that episode starts as the first of a stream.
+        Args:
+            changes: JSON of all changed settings.
+            task: with these settings.
+            restart: whether the next episode starts as the first of a stream.
         """
-        self.next_changes, self._next = changes, task
+        self.next_changes = changes
+        self._next_task = task
         self._stream_begins |= restart
 
     def state(self, simulations: Mapping[str, np.ndarray], physics, steps: int, ended: bool) -> snapshots.State:
-        """Return the state of an environment, with a leading axis, given that of its simulation."""
-        self._take_commands()
+        """Return the state of the environment, with a leading axis of 1.
+
+        Args:
+            simulations: arrays of the simulation by name, with this axis.
+            physics: the simulation.
+            steps: of the present episode.
+            ended: whether the episode has ended.
+        """
+        self._consume_commands()
         task = self.definition
         observation = task.vector(task.observe(self._now.memory, task.read(physics.data.ptr)), np.float32)
-        values = (-1, self._stream_begins, steps, ended, False, observation)
+        environment_values = {
+            "stream_seeds": -1,  # unknown
+            "streams_begin": self._stream_begins,
+            "steps": steps,
+            "ended": ended,
+            "resting": False,
+            "observation": observation,
+        }
         return snapshots.State(
             simulations=simulations,
             memory=trees.map_leaves(lambda leaf: np.asarray(leaf)[None], self._now.memory),
             streams=[self._stream],
             randoms=[self._random.get_state()],
-            environment_arrays={
-                name: np.asarray(value)[None] for name, value in zip(snapshots.ENVIRONMENT_ARRAYS, values, strict=True)
-            },
-            settings=([self._changes], [self.next_changes]),
+            environment_arrays={name: np.asarray(value)[None] for name, value in environment_values.items()},
+            settings=([self._present_changes], [self.next_changes]),
         )
 
     def restore(self, state: snapshots.State, task: Task, next_task: Task) -> None:
-        """Go on from a state, given the task of its episode and that of the next."""
+        """Continue from a state, given the task of its episode and that of the next."""
         self._now.memory = trees.map_leaves(
-            lambda leaf, like: snapshots.number(leaf[0], like), state.memory, self._now.memory
+            lambda array, present_leaf: snapshots.number(array[0], present_leaf), state.memory, self._now.memory
         )
-        (self._stream,), (self._changes,), (self.next_changes,) = state.streams, *state.settings
-        self.definition, self._next, self._now.readings, self._starting = task, next_task, None, False
+        self._now.readings = None
+        self._is_starting = False
+        self.definition = task
+        self._next_task = next_task
+        (self._stream,) = state.streams
+        present_texts, next_texts = state.settings
+        self._present_changes = present_texts[0]
+        self.next_changes = next_texts[0]
         self._random.set_state(state.randoms[0])
         self._stream_begins = bool(state.environment_arrays["streams_begin"][0])
 
-    def _take_commands(self) -> None:
+    def _consume_commands(self) -> None:
         if self._now.memory is not None:
             self._now.memory = self._commands.consume(self.definition, self._now.memory)
 
-    def _latest(self, physics):
-        """The readings of the latest step."""
+    def _readings(self, physics):
+        """Return the readings of the present state."""
         return self._now.readings or self.definition.read(physics.data.ptr)
 
     def _begin(self, physics):
-        """Return the readings of the start, from which the memory keeps what the first step needs."""
-        self._starting, data = False, physics.data.ptr
+        """Lift the body out of the ground at the start of an episode, begin the memory, and return the readings."""
+        self._is_starting = False
+        data = physics.data.ptr
         readings = self.definition.read(data)
-        lifted = self.definition.clear_spawn(self._now.memory, readings)
-        if lifted is not None:
-            data.qpos[:] = lifted
+        clear_qpos = self.definition.clear_spawn(self._now.memory, readings)
+        if clear_qpos is not None:
+            data.qpos[:] = clear_qpos
             physics.after_reset()
             readings = self.definition.read(data)
-        self._now.memory, self._now.readings = self.definition.begin(self._now.memory, readings), None
+        self._now.memory = self.definition.begin(self._now.memory, readings)
+        self._now.readings = None
         return readings

@@ -1,4 +1,4 @@
-"""The suite as Gymnasium environments: shimmy's adapter, with what Gymnasium's users rely on."""
+"""The suite as Gymnasium environments: shimmy's adapter for dm_control, with everything else that Gymnasium defines."""
 
 import sys
 import types
@@ -27,25 +27,30 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
     """One task of the suite, made by `gymnasium.make("arc_suite/<robot>-<task>-v0", ...)`.
 
     Observations are the flat vector of the dm_env rounded to float32, actions are float32 in
-    [-1, 1]. A step's info holds plain floats: the task's unweighted terms, `reward_forward` and so
-    on, and figures of how well the episode has gone so far, such as `progress_speed`; a
-    reset's info is empty, since nothing has been rewarded yet. With `privileged=True` both also hold the
+    [-1, 1]. A step's info contains floats: the task's unweighted terms, `reward_forward` and so
+    on, and metrics of how well the episode has gone so far, such as `progress_speed`. A
+    reset's info is empty, since no step has been rewarded yet. With `privileged=True` both also contain the
     privileged observation, `privileged` (size,); see `arc_suite.tasks.privileged`.
 
-    An episode is truncated at the task's own time limit, 1000 steps unless `task_kwargs` says
-    otherwise, and terminated when the dm_env's discount is 0, which never happens at the time
+    An episode is truncated at the task's own time limit, 1000 steps unless `task_kwargs` has another.
+    It is terminated when the dm_env's discount is 0, which never happens at the time
     limit. Longer episodes need both `task_kwargs={"time_limit": seconds}` and `max_episode_steps`.
 
-    `reset(seed=s)` starts the episode of `load(..., task_kwargs={"random": s})`; further resets
-    continue its stream of random numbers; `np_random` is a view of it.
+    `reset(seed=s)` starts the same episode as `load(..., task_kwargs={"random": s})`. Further resets
+    continue its stream of random numbers, of which `np_random` is a view.
 
-    Pickles and copies carry on bit for bit, without whatever was opened for rendering.
+    Pickles and copies continue bit for bit, without the resources that were opened for rendering.
     """
 
-    # What `gymnasium.make` may ask for; an instance's own metadata has what works here.
+    # Modes for which `gymnasium.make` may ask; an instance's own metadata has those that work on this machine.
     metadata = {"render_modes": [*_HEADLESS_MODES, "human"], "render_fps": 20}
 
-    _np_random_seed = -1  # Gymnasium's sign for a stream of unknown seed, here until a seed is given
+    _np_random_seed = -1  # until a seed is given: Gymnasium's sign for a stream of unknown seed
+
+    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {
+        "_tells": "_has_privileged_info",
+        "_stepping": "_episode_is_running",
+    }
 
     def __init__(
         self,
@@ -70,40 +75,43 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             width: of a picture, pixels; a window has its own size.
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
-            privileged: whether infos hold the privileged observation, `privileged` (size,) float32.
+            privileged: whether infos contain the privileged observation, `privileged` (size,) float32.
 
         Raises:
             ValueError: an unknown name, or a value that does not fit.
         """
-        modes = [*_HEADLESS_MODES, *(["human"] if opengl.has_display() else [])]
+        modes = [*_HEADLESS_MODES]
+        if opengl.has_display():
+            modes.append("human")
         if render_mode == "human" and render_mode not in modes:
             raise ValueError(f"render_mode 'human' needs a display, and there is none; use {' or '.join(modes)}")
         if render_mode is not None:
             checks.name(render_mode, modes, "render_mode")
         pictures.check_size(height, width)
         environment = load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
-        if (limit := _limit_of_make(sys._getframe(1))) is not None:
+        limit = _step_limit_of_make(caller=sys._getframe(1))
+        if limit is not None:
             checked_limit(limit, environment.task.definition)
         pictures.check_camera(environment.physics.model.ptr, camera_id)
-        self.metadata = {"render_modes": modes}  # before shimmy writes a rate into the class's
+        self.metadata = {"render_modes": modes}  # else shimmy would write a rate into the class's dictionary
         super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
         self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
         self.render_mode = render_mode
-        self._tells = checks.boolean("privileged", privileged)
-        size = environment.observation_spec()["observations"].shape
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
+        self._has_privileged_info = checks.boolean("privileged", privileged)
+        shape = environment.observation_spec()["observations"].shape
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, environment.action_spec().shape, np.float32)
         self._lock = environment._lock
         self._window: Window | None = None
-        self._stepping = False  # between a reset and the end of its episode
+        self._episode_is_running = False
         self._closed = False
         random = (task_kwargs or {}).get("random")
         if random is not None and not isinstance(random, np.random.RandomState):
             self._np_random_seed = checks.seed(random)
-        self._made = __name__
+        self._sealed_by = __name__
 
     def set_wrapper_attr(self, name: str, value: Any, **options) -> bool:
-        """Set an attribute that there is, as vector environments of Gymnasium do.
+        """Set an existing attribute; vector environments of Gymnasium call this.
 
         Raises:
             AttributeError: there is no such attribute.
@@ -119,7 +127,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
     @property
     def np_random(self) -> np.random.Generator:
-        """Draws from the stream that resets draw from."""
+        """A generator of the stream of random numbers from which resets draw."""
         return np.random.Generator(self._env.task.random._bit_generator)
 
     @np_random.setter
@@ -149,9 +157,9 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             )
         observation = self._env.reset(seed).observation
         gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))
-        self._stepping = True
+        self._episode_is_running = True
         self._show()
-        return _flat(observation), self._privileged()
+        return _to_vector(observation), self._privileged_info()
 
     def step(self, action):
         """Advance by one control step.
@@ -170,15 +178,15 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("step")
-        if not self._stepping:
+        if not self._episode_is_running:
             raise ResetNeeded("cannot step: the episode has ended or has not begun; call reset first")
         timestep = self._env.step(action)
         observation, reward, terminated, truncated, _ = dm_env_step2gym_step(timestep)
-        self._stepping = not timestep.last()
+        self._episode_is_running = not timestep.last()
         self._show()
-        run = self._env.task
-        info = _floats("reward", run.terms) | _floats("progress", run.progress) | self._privileged()
-        return _flat(observation), float(reward), terminated, truncated, info
+        task = self._env.task
+        info = _to_floats("reward", task.terms) | _to_floats("progress", task.progress) | self._privileged_info()
+        return _to_vector(observation), float(reward), terminated, truncated, info
 
     def command(self, name: str, value) -> None:
         """Set a command of the task from now on, until the next episode; see `arc_suite.envs.dm.Environment.command`.
@@ -203,7 +211,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return the state as arrays by name, from which `restore` goes on.
 
-        Wrappers around this environment, such as `TimeLimit`, keep a state of their own.
+        The state of wrappers around this environment, such as `TimeLimit`, is not part of it.
 
         Raises:
             ResetNeeded: before the first reset.
@@ -215,21 +223,22 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         return self._env.snapshot() | {"stream_seeds": np.array([self._np_random_seed])}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on, bit-exact, from the snapshot of an environment of the same task.
+        """Continue, bit-exactly, from the snapshot of an environment of the same task.
 
         Raises:
-            ValueError: an array is missing or does not fit; none has been used.
+            ValueError: an array is missing or does not fit; the state has not changed.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
         self._env.restore(arrays)
-        self._np_random_seed, self._stepping = int(arrays["stream_seeds"][0]), not arrays["ended"][0]
+        self._np_random_seed = int(arrays["stream_seeds"][0])
+        self._episode_is_running = not arrays["ended"][0]
 
     def render(self):
-        """Return a picture of the present state in the mode and size chosen at the start.
+        """Return a picture of the present state, in the mode and size that were chosen at the start.
 
         Returns:
-            rgb_array: (height, width, 3) uint8. depth_array: (height, width) float32, m. Else None.
+            In the mode rgb_array (height, width, 3) uint8; in depth_array (height, width) float32, m; else None.
 
         Raises:
             RenderingUnavailable: no OpenGL here.
@@ -240,7 +249,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
     @one_thread_at_a_time
     def close(self):
-        """Free the simulation and what it was rendered with; once more does nothing.
+        """Free the simulation and the resources of rendering; a second call does nothing.
 
         Raises:
             RuntimeError: another thread is at work in the environment.
@@ -251,46 +260,48 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             self._window: Window | None = None
         super().close()
 
-    def _privileged(self) -> dict[str, np.ndarray]:
-        return {"privileged": self._env.task.privileged_vector()} if self._tells else {}
+    def _privileged_info(self) -> dict[str, np.ndarray]:
+        """Return the part of an info with the privileged observation; empty unless it was asked for."""
+        return {"privileged": self._env.task.privileged_vector()} if self._has_privileged_info else {}
 
-    def _check_open(self, call: str) -> None:
+    def _check_open(self, action: str) -> None:
+        """Raise ClosedEnvironmentError after `close`; `action` says in the error what was called."""
         if self._closed:
-            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
+            raise ClosedEnvironmentError(f"cannot {action}: the environment is closed; make a new one")
 
     def _show(self) -> None:
-        """In human mode: brings the window up to date, at the pace of the simulated time."""
+        """In the mode human, show the present state in the window, at the pace of the simulated time."""
         if self.render_mode != "human":
             return
         decorated = self._env.physics.decorated()
         if self._window is None:
             self._window = Window(decorated, self.render_kwargs["camera_id"])
-            weakref.finalize(self, self._window.close)  # before the interpreter takes GLFW apart
+            weakref.finalize(self, self._window.close)  # at the latest before the interpreter unloads GLFW
         self._window.show(self.dt, decorated.markers)
 
     def __getstate__(self):
         return self.__dict__ | {"_window": None}
 
-    def __setstate__(self, state):
-        self.__dict__.update(state)
 
+def _step_limit_of_make(caller: types.FrameType) -> int | None:
+    """Return the step limit with which `gymnasium.make` was called, from the frame of that call; None for no limit.
 
-def _limit_of_make(caller: types.FrameType) -> int | None:
-    """The step limit that `gymnasium.make` was asked for, from its frame.
-
-    `make` tells it to `TimeLimit` alone: the environment's own spec has None. Additional wrappers of the spec
-    would see it, but `make_vec` refuses specs that have both those and a vector entry point.
+    `make` hands the limit to `TimeLimit` alone: the environment's own spec has None. An additional wrapper of the spec
+    would get it, too, but `make_vec` refuses specs that have both such wrappers and a vector entry point.
     """
     if caller.f_code is not gymnasium.make.__code__:
         return None
-    limit, spec = caller.f_locals.get("max_episode_steps"), caller.f_locals.get("env_spec")
-    limit = getattr(spec, "max_episode_steps", None) if limit is None else limit
-    return None if limit == -1 else limit  # Gymnasium's word for no limit of its own
+    limit = caller.f_locals.get("max_episode_steps")
+    if limit is None:
+        spec = caller.f_locals.get("env_spec")
+        limit = getattr(spec, "max_episode_steps", None)
+    return None if limit == -1 else limit  # -1 is Gymnasium's value for no limit
 
 
-def _floats(kind: str, figures: Mapping[str, Any]) -> dict[str, float]:
-    return {f"{kind}_{name}": float(figure) for name, figure in figures.items()}
+def _to_floats(prefix: str, values: Mapping[str, Any]) -> dict[str, float]:
+    return {f"{prefix}_{name}": float(value) for name, value in values.items()}
 
 
-def _flat(observation) -> np.ndarray:
+def _to_vector(observation) -> np.ndarray:
+    """Return the flat observation of a dm_env as Gymnasium's float32."""
     return observation["observations"].astype(np.float32)

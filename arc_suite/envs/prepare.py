@@ -1,4 +1,4 @@
-"""Prepares tasks: a body, an arena and their compiled model, for any driver."""
+"""Preparation of tasks for environments: the task with its body and arena, and the compiled model of both."""
 
 import json
 import math
@@ -33,94 +33,123 @@ def prepare_task(
         ValueError: an unknown name, or a value that does not fit.
         OSError: a file that cannot be read.
     """
-    body, kind = registry.body_of(domain_name), registry.task_of(task_name)
-    settings = dict(checks.mapping("task_kwargs", task_kwargs))
-    time_limit, arena = settings.pop("time_limit", None), settings.pop("arena", None)
-    if arena is not None and kind.own_arena:
-        raise ValueError(f"arena: task {kind.name} has a ground of its own, expected none")
-    changes = kind.modifiers | _take_modifiers(settings)
-    settings = kind.settings_for(body, settings)
-    arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
+    body = registry.body_of(domain_name)
+    task_class = registry.task_of(task_name)
+    task_settings = dict(checks.mapping("task_kwargs", task_kwargs))
+    time_limit = task_settings.pop("time_limit", None)
+    chosen_arena = task_settings.pop("arena", None)
+    if chosen_arena is not None and task_class.own_arena:
+        raise ValueError(f"arena: task {task_class.name} has a ground of its own, expected none")
+    modifier_settings = task_class.modifiers | _take_modifier_settings(task_settings)
+    settings = task_class.settings_for(body, task_settings)
+    arena = task_class.arena(body, settings) if chosen_arena is None else registry.arena_of(chosen_arena, body)
+
     model = compiled(body, arena)
     substeps = simulation(body).substeps
-    step = substeps * model.opt.timestep
+    control_timestep = substeps * model.opt.timestep
     scene = Scene(
         body=body,
         arena=arena,
         layout=layout(model, body),
         standing=stood(model),
-        control_timestep=step,
+        control_timestep=control_timestep,
         substeps=substeps,
         model={name: getattr(model, name).copy() for name in CHANGEABLE},
     )
-    task = kind(scene, settings, _step_limit(time_limit, step))
-    return modified_task.add_modifiers(task, changes) if changes else task, model
+    task = task_class(scene, settings, _step_limit(time_limit, control_timestep))
+    if modifier_settings:
+        task = modified_task.add_modifiers(task, modifier_settings)
+    return task, model
 
 
-def _take_modifiers(settings: dict[str, Any]) -> dict[str, Any]:
-    """Remove the settings of modifiers from others, and return them by name."""
-    names = {name: registry.modifier_setting(name) for name in settings}
-    return {setting: settings.pop(name) for name, setting in names.items() if setting is not None}
+def _take_modifier_settings(settings: dict[str, Any]) -> dict[str, Any]:
+    """Remove the settings of modifiers from the settings of a task, and return them by their bare names."""
+    modifier_settings = {}
+    for name in list(settings):
+        bare_name = registry.modifier_setting(name)
+        if bare_name is not None:
+            modifier_settings[bare_name] = settings.pop(name)
+    return modifier_settings
 
 
-# What an environment keeps from its opening on, and what to do instead.
-_KEPT = {
+def _step_limit(time_limit, control_timestep: float) -> float:
+    """Return how many control steps fill a time limit, s: at least 1, and none that is needed only by rounding."""
+    if time_limit is None:
+        return STEPS
+    if time_limit == math.inf:
+        return math.inf
+    return max(1, math.ceil(parameters.positive("time_limit", time_limit) / control_timestep - 1e-6))
+
+
+# Settings that an environment never changes, and what to do in place of a change.
+_CONSTANT_SETTINGS = {
     "arena": "open another environment",
     "time_limit": "open another environment",
     "random": "reset(seed=...) begins a stream",
     "on_divergence": "open another environment",
 }
 
-_KEPT_OF_TASKS = {
+# Properties of a task that a change of its settings must not change, by their name in errors.
+_CONSTANT_PROPERTIES = {
     "motors, senses or kicks": lambda task: (type(task), task.structure),
     "ground": lambda task: task.scene.arena,
     "observation": lambda task: task.sizes,
 }
 
 
-def checked_changes(task: Task, settings: Mapping[str, Any], before: str, changes: Any) -> tuple[str, Task]:
-    """Return changed settings as JSON, and the task with them, for the simulation of a task.
+def checked_changes(task: Task, settings: Mapping[str, Any], earlier_changes: str, changes: Any) -> tuple[str, Task]:
+    """Return all changed settings of an environment as JSON, and the task with them.
 
     Args:
-        task: as the environment was opened.
-        settings: with which it was.
-        before: JSON of the settings that have been changed already.
+        task: the task with the settings with which the environment was opened.
+        settings: these settings.
+        earlier_changes: JSON of the settings that have been changed already.
         changes: further settings by name.
 
     Raises:
         ValueError: an unknown name, a value that does not fit, or a setting that changes more than numbers of the task.
     """
-    text = checks.json_text("settings", {**json.loads(before), **checks.mapping("settings", changes)})
+    all_changes = {**json.loads(earlier_changes), **checks.mapping("settings", changes)}
+    text = checks.json_text("settings", all_changes)
     return text, with_changes(task, settings, text)
 
 
 def with_changes(task: Task, settings: Mapping[str, Any], text: str) -> Task:
-    """Return a task with changed settings, JSON of `checked_changes`.
+    """Return a task with changed settings.
+
+    Args:
+        task: as in `checked_changes`.
+        settings: as in `checked_changes`.
+        text: JSON of all changed settings.
 
     Raises:
         ValueError: as `checked_changes`.
     """
     changes = checks.mapping("settings", json.loads(text))
     registry.check_stored_settings(changes)  # a snapshot may have come from a file
-    for name in changes.keys() & _KEPT.keys():
-        raise ValueError(f"setting {name!r}: environments keep it; {_KEPT[name]}")
+    for name in changes.keys() & _CONSTANT_SETTINGS.keys():
+        raise ValueError(f"setting {name!r}: environments keep it; {_CONSTANT_SETTINGS[name]}")
     if not changes:
         return task
-    changed, _ = prepare_task(task.scene.body, task.name, {**settings, **changes})
-    for what, kept in _KEPT_OF_TASKS.items():
-        if kept(task) != kept(changed):
+    changed_task, _ = prepare_task(task.scene.body, task.name, {**settings, **changes})
+    for property_name, read_property in _CONSTANT_PROPERTIES.items():
+        if read_property(task) != read_property(changed_task):
             raise ValueError(
-                f"settings {', '.join(map(repr, changes))}: they would change the {what}, which environments keep; "
-                "open another environment with them"
+                f"settings {', '.join(map(repr, changes))}: they would change the {property_name}, "
+                "which environments keep; open another environment with them"
             )
-    return changed
+    return changed_task
 
 
 def checked_limit(max_episode_steps: Any, task: Task) -> int:
-    """Return the step at which Gymnasium truncates episodes, if the task goes on until then.
+    """Return the control step at which Gymnasium truncates episodes.
+
+    Args:
+        max_episode_steps: the checked value.
+        task: whose episodes must last so long, unless the limit is at most the default of Gymnasium's ids.
 
     Raises:
-        ValueError: no integer from 1, or more steps than an episode has and than every id has by default.
+        ValueError: no integer from 1, or a step after the end of the task's episodes.
     """
     limit = checks.integer("max_episode_steps", max_episode_steps, 1)
     if limit > max(STEPS, task.step_limit):
@@ -144,16 +173,8 @@ def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         task_kwargs: as in `load`.
 
     Raises:
-        ValueError: the body, the gait or the task is not symmetric, or see `load`.
-        OSError: a file that cannot be read.
+        ValueError: the body, the gait or the task is not symmetric, or as `load`.
+        OSError: as `load`.
     """
-    return prepare_task(domain_name, task_name, task_kwargs)[0].symmetry
-
-
-def _step_limit(time_limit, step: float) -> float:
-    """Control steps that fill a time limit, s; a step that rounding alone would add is not taken."""
-    if time_limit is None:
-        return STEPS
-    if time_limit == math.inf:
-        return math.inf
-    return max(1, math.ceil(parameters.positive("time_limit", time_limit) / step - 1e-6))
+    task, _ = prepare_task(domain_name, task_name, task_kwargs)
+    return task.symmetry

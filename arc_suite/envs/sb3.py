@@ -13,7 +13,7 @@ from arc_suite import checks
 from arc_suite.envs.setup import ATTRIBUTE, Setup
 from arc_suite.envs.vector import VectorEnv
 
-_MASKED = ("change_model", "change_settings", "command")  # methods that take a mask
+_METHODS_WITH_MASK = ("change_model", "change_settings", "command")
 
 
 class VecEnv(vec_env.VecEnv):
@@ -22,12 +22,12 @@ class VecEnv(vec_env.VecEnv):
     `VecEnv(gymnasium.make_vec("arc_suite/queen-walk-v0", num_envs=16, autoreset_mode="SameStep"))`
     gives the same bits as a `DummyVecEnv` of as many single environments, on all cores.
 
-    Agents save their spaces. This observation space has an attribute with robot, task and settings, so that the zip of
-    an agent tells what it was trained for.
+    The observation space has an attribute with robot, task and settings. Agents save their spaces, so the zip file of
+    an agent contains them, too.
     """
 
     def __init__(self, environments: VectorEnv):
-        """Take over the environments.
+        """Wrap a vector environment.
 
         Args:
             environments: with `autoreset_mode` SameStep, as stable-baselines3 resets at once.
@@ -37,23 +37,23 @@ class VecEnv(vec_env.VecEnv):
         """
         mode = getattr(environments, "autoreset_mode", None)
         if not isinstance(environments, VectorEnv) or mode is not AutoresetMode.SAME_STEP:
+            mode_text = "" if mode is None else f" in the mode {mode.value}"
             raise ValueError(
                 "stable-baselines3 resets at once: expected a vector environment of this suite with "
-                "autoreset_mode='SameStep', "
-                f"got {checks.preview(environments)}{'' if mode is None else f' in the mode {mode.value}'}"
+                f"autoreset_mode='SameStep', got {checks.preview(environments)}{mode_text}"
             )
         self.environments = environments
-        self._actions: np.ndarray | None = None
-        observations = copy.copy(environments.single_observation_space)
-        with contextlib.suppress(ValueError):  # settings that files cannot hold
-            setattr(observations, ATTRIBUTE, Setup.of(*environments.arguments).to_dict())
-        super().__init__(environments.num_envs, observations, environments.single_action_space)
+        self._actions: np.ndarray | None = None  # of the next `step_wait`
+        observation_space = copy.copy(environments.single_observation_space)
+        with contextlib.suppress(ValueError):  # without the attribute if a setting cannot be written to files
+            setattr(observation_space, ATTRIBUTE, Setup.of(*environments.arguments).to_dict())
+        super().__init__(environments.num_envs, observation_space, environments.single_action_space)
 
     def reset(self) -> np.ndarray:
-        """Start an episode in every environment, from the seeds of the latest `seed` if that was not used yet.
+        """Start an episode in every environment; after a call of `seed` from its seeds, once.
 
         Raises:
-            ValueError: options were set; there are none.
+            ValueError: `set_options` has set options, of which there are none.
         """
         if any(self._options):
             raise ValueError(f"options of reset: expected none, got {checks.quote(self._options)}")
@@ -64,7 +64,7 @@ class VecEnv(vec_env.VecEnv):
         return observations
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Take the actions (num_envs, motors) of the next `step_wait`."""
+        """Store the actions (num_envs, motors) for the next `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
@@ -73,17 +73,18 @@ class VecEnv(vec_env.VecEnv):
         Returns:
             Observations (num_envs, size), rewards (num_envs,) float32, whether episodes ended
             (num_envs,), and an info for each environment: that of a single environment's step with
-            `TimeLimit.truncated`, and `terminal_observation` where an episode ended.
+            `TimeLimit.truncated`, and with `terminal_observation` if its episode ended.
         """
         observations, rewards, terminated, truncated, info = self.environments.step(self._actions)
-        infos = [{"TimeLimit.truncated": cut} for cut in (truncated & ~terminated).tolist()]
-        last, final = info.pop("final_obs", None), info.pop("final_info", {})
-        _hand_out(info, infos)
-        _hand_out(final, infos)
-        ended = terminated | truncated
-        for index in np.flatnonzero(ended):
-            infos[index]["terminal_observation"] = last[index]
-        return observations, rewards.astype(np.float32), ended, infos
+        infos = [{"TimeLimit.truncated": is_cut_off} for is_cut_off in (truncated & ~terminated).tolist()]
+        last_observations = info.pop("final_obs", None)
+        info_of_ends = info.pop("final_info", {})
+        _distribute(info, infos)
+        _distribute(info_of_ends, infos)
+        has_ended = terminated | truncated
+        for index in np.flatnonzero(has_ended):
+            infos[index]["terminal_observation"] = last_observations[index]
+        return observations, rewards.astype(np.float32), has_ended, infos
 
     def close(self) -> None:
         """Free the simulations."""
@@ -102,40 +103,48 @@ class VecEnv(vec_env.VecEnv):
         """Set an attribute that the environments share.
 
         Raises:
-            ValueError: of some environments alone.
+            ValueError: the indices are not those of all environments.
         """
         self._check_all(attr_name, indices)
         self.environments.set_attr(attr_name, value)
 
     def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list:
-        """Call a method of all environments, see `VectorEnv.call`, or one with a mask of some.
+        """Call a method of all environments, see `VectorEnv.call`; a method with a mask also of some.
 
         Raises:
-            ValueError: of some environments alone, where the method has no mask.
+            ValueError: the indices are not those of all environments, and the method has no mask.
         """
-        if indices is not None and method_name in _MASKED:
+        if indices is not None and method_name in _METHODS_WITH_MASK:
             mask = np.zeros(self.num_envs, bool)
             mask[list(self._get_indices(indices))] = True
-            return [self.environments.call(method_name, *method_args, mask=mask, **method_kwargs)[0]] * int(mask.sum())
+            results = self.environments.call(method_name, *method_args, mask=mask, **method_kwargs)
+            return [results[0]] * int(mask.sum())  # one for each index; all are the same
         self._check_all(method_name, indices)
         return list(self.environments.call(method_name, *method_args, **method_kwargs))
 
     def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
-        """Return False for every environment: nothing is around it."""
+        """Return False for every environment: none has a wrapper."""
         return [False for _ in self._get_indices(indices)]
 
     def _check_all(self, name: str, indices) -> None:
+        """Raise ValueError if indices are not those of all environments; `name` says what they share."""
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
             raise ValueError(
                 f"{name}: environments share it; expected all {self.num_envs}, got {checks.preview(indices)}"
             )
 
 
-def _hand_out(info: Mapping[str, Any], infos: list[dict[str, Any]]) -> None:
-    """Add what an info tells of environments to their own infos."""
+def _distribute(info: Mapping[str, Any], infos: list[dict[str, Any]]) -> None:
+    """Add the entries of a vector environment's info to the infos of its environments.
+
+    Args:
+        info: arrays by name, and by `_name` the mask (num_envs,) of the environments that have the entry.
+        infos: of each environment; changed in place.
+    """
     for name, values in info.items():
-        if not name.startswith("_"):
-            mask = info[f"_{name}"]
-            chosen = values[mask] if values.ndim > 1 else values[mask].tolist()
-            for index, value in zip(np.flatnonzero(mask).tolist(), chosen, strict=True):
-                infos[index][name] = value
+        if name.startswith("_"):
+            continue
+        mask = info[f"_{name}"]
+        selected_values = values[mask] if values.ndim > 1 else values[mask].tolist()
+        for index, value in zip(np.flatnonzero(mask).tolist(), selected_values, strict=True):
+            infos[index][name] = value

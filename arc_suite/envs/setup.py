@@ -1,4 +1,4 @@
-"""`Setup`: a body or several, a task and its settings as one value, which opens environments and goes into files."""
+"""`Setup`: a body or several, a task and its settings as one value. It opens environments and is stored in files."""
 
 import dataclasses
 import functools
@@ -21,16 +21,16 @@ from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tasks.contract import STEPS, Task
 
-ATTRIBUTE = "arc_suite"  # of an observation space: the setup that an agent was trained in, as `Setup.to_dict`
-HELD_OUT = 100_000  # first seed of the bodies of a family that validate what others trained
+ATTRIBUTE = "arc_suite"  # name of an observation space's attribute with `to_dict` of the setup of an agent's training
+HELD_OUT = 100_000  # first seed of the bodies of a family that serve for validation alone
 
 
 @dataclasses.dataclass(frozen=True)
 class Setup:
-    """A body or several in a task with settings; make it by `Setup.of`, which checks names.
+    """A body or several in a task with settings. `Setup.of` makes one and checks the names.
 
-    Equal setups have equal content, however their tasks and settings were written. Several bodies share one policy:
-    joints take positions, and environments are those of `arc_suite.bodies`.
+    Setups of equal content are equal, in whatever form their tasks and settings were written. Several bodies share one
+    policy: actions are positions of joints, and environments are those of `arc_suite.bodies`.
 
     Attributes:
         domain: the body, or the text that names several: `family:first-last`, or names with commas.
@@ -44,42 +44,47 @@ class Setup:
 
     @classmethod
     def of(cls, domain_name, task_name: str = "walk", task_kwargs: Mapping[str, Any] | None = None) -> "Setup":
-        """Return the setup of what `arc_suite.load` takes, or of several bodies; modules that names give are imported.
+        """Return the setup for arguments of `arc_suite.load`, or for several bodies.
 
-        Values of settings are checked where the task is prepared or an environment opened.
+        Modules in names are imported. Values of settings are checked later: by `prepare`, or when an environment is
+        opened.
 
         Args:
             domain_name: a body, see `registry.body_of`, or a text that names several, see `registry.bodies_of`.
             task_name: see `registry.task_of`.
-            task_kwargs: settings of the task that JSON can hold, without `random`.
+            task_kwargs: settings of the task that JSON can represent, without `random`.
 
         Raises:
-            ValueError: an unknown name, a setting that JSON cannot hold, or actions of several bodies other than
+            ValueError: an unknown name, a setting that JSON cannot represent, or actions of several bodies other than
                 positions.
             OSError: a file that cannot be read.
         """
-        made = cls._checked(domain_name, task_name, task_kwargs)
-        _ = made.bodies  # finds out at once whether there are such bodies
-        return made
+        setup = cls._make(domain_name, task_name, task_kwargs)
+        _ = setup.bodies  # makes the bodies, which raises an error for a name without a body
+        return setup
 
     @classmethod
-    def _checked(cls, domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None) -> "Setup":
-        several, settings = registry.names_several_bodies(domain_name), checks.mapping("task_kwargs", task_kwargs)
-        domain, task = domain_name if several else registry.body_of(domain_name), registry.task_of(task_name)
+    def _make(cls, domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None) -> "Setup":
+        """Return the setup for arguments of `of`, without making several bodies."""
+        has_several_bodies = registry.names_several_bodies(domain_name)
+        settings = checks.mapping("task_kwargs", task_kwargs)
+        domain = domain_name if has_several_bodies else registry.body_of(domain_name)
+        task = registry.task_of(task_name)
         if "random" in settings:
             random = checks.preview(settings["random"])
             raise ValueError(f"setting 'random': expected none, as every episode has a seed, got {random}")
-        if several:
+        if has_several_bodies:
             checks.name(settings.get("actions", "position"), ["position"], "actions of different bodies")
-        named = {registry.importable_name("modifier", name): value for name, value in settings.items()}
-        text = checks.json_text("task_kwargs", named)
-        if isinstance(arena := settings.get("arena"), str):
-            registry.arena_maker(arena)
-        return cls(domain, registry.importable_name("task", task.name), text)
+        importable_settings = {registry.importable_name("modifier", name): value for name, value in settings.items()}
+        settings_json = checks.json_text("task_kwargs", importable_settings)
+        arena = settings.get("arena")
+        if isinstance(arena, str):
+            registry.arena_maker(arena)  # raises an error for an unknown name
+        return cls(domain, registry.importable_name("task", task.name), settings_json)
 
     @property
     def several(self) -> bool:
-        """Whether the setup is of several bodies."""
+        """Whether the setup has several bodies."""
         return isinstance(self.domain, str)
 
     @functools.cached_property
@@ -98,10 +103,10 @@ class Setup:
 
     @property
     def robot(self) -> str:
-        """The bodies as files name them.
+        """The text by which files name the bodies.
 
-        Name of the robot, with the module for one of another package; the JSON text of another body; the text that
-        names several.
+        The name of a robot, as `module:name` for one of another package; the JSON text of any other body; the text that
+        names several bodies.
         """
         if isinstance(self.domain, str):
             return self.domain
@@ -111,11 +116,12 @@ class Setup:
 
     @property
     def name(self) -> str:
-        """Name of the bodies in names of files."""
+        """Name of the bodies for the names of files."""
         return self._label.replace(":", ".").replace(",", "+")
 
     @property
     def _label(self) -> str:
+        """Name of the bodies for people."""
         return self.domain if isinstance(self.domain, str) else self.domain.name
 
     @property
@@ -141,15 +147,16 @@ class Setup:
 
     @property
     def definition(self) -> Task:
-        """The task, ready to run; of several bodies that of the first.
+        """The task, ready to run; of several bodies that of the first body.
 
         Raises:
             ValueError: a setting that does not fit.
         """
-        return self.prepare()[0]
+        task, _ = self.prepare()
+        return task
 
     def prepare(self) -> tuple[Task, mujoco.MjModel]:
-        """Return the task, ready to run, and the compiled model; of several bodies those of the first.
+        """Return the task, ready to run, and the compiled model; of several bodies those of the first body.
 
         Raises:
             ValueError: a setting that does not fit.
@@ -158,28 +165,34 @@ class Setup:
         return prepare_task(first.domain, first.task, first.task_kwargs)
 
     def members(self) -> tuple["Setup", ...]:
-        """Return the setup of each body; of several bodies with positions as actions."""
-        shared = self.with_settings({"actions": "position"} if self.several else {})
-        return tuple(dataclasses.replace(shared, domain=body) for body in self.bodies)
+        """Return the setup of each body; if there are several, with positions as actions."""
+        setup = self.with_settings({"actions": "position"} if self.several else {})
+        return tuple(dataclasses.replace(setup, domain=body) for body in self.bodies)
 
     def with_settings(self, changes: Mapping[str, Any], dropped: Iterable[str] = ()) -> "Setup":
-        """Return the setup with some settings changed, and without others.
+        """Return the setup with some settings changed, and without those that are dropped.
 
         Raises:
-            ValueError: a setting that JSON cannot hold.
+            ValueError: a setting that JSON cannot represent.
         """
-        kept = {name: value for name, value in self.task_kwargs.items() if name not in dropped}
-        return Setup._checked(self.domain, self.task, kept | dict(changes))
+        settings = {name: value for name, value in self.task_kwargs.items() if name not in dropped}
+        return Setup._make(self.domain, self.task, settings | dict(changes))
 
     def validation(self, count: int) -> "Setup":
-        """Return the setup that evaluates a policy while it learns.
+        """Return the setup for evaluations of a policy while it learns.
 
-        Several bodies of families become at most `count` of seeds from 100,000 on; others their first `count`.
+        Several bodies of families are replaced by at most `count` bodies of these families that training never has.
+        Of several other bodies the first `count` remain.
         """
-        return dataclasses.replace(self, domain=_held_out(self.domain, count)) if isinstance(self.domain, str) else self
+        if not isinstance(self.domain, str):
+            return self
+        return dataclasses.replace(self, domain=_validation_bodies(self.domain, count))
 
     def judging(self) -> "Setup":
-        """Return the setup that judges a policy of this one: with all blocks, as a policy leaves out the others."""
+        """Return the setup for the evaluation of a policy of this one.
+
+        It has all blocks of the observation; the policy itself leaves out those that it was trained without.
+        """
         return self.with_settings({}, dropped=["exclude_blocks"])
 
     def load(self, seed: int | None = None, **options) -> dm.Environment:
@@ -189,7 +202,7 @@ class Setup:
             seed: of the stream of episodes; None for a random one.
             options: see `arc_suite.load`.
         """
-        return dm.load(self.body, self.task, self._seeded(seed), **options)
+        return dm.load(self.body, self.task, self._task_kwargs_with(seed), **options)
 
     def make(self, **options) -> gymnasium.Env:
         """Open a Gymnasium environment; for the options see `gymnasium.make`."""
@@ -199,68 +212,79 @@ class Setup:
         """Open a `VectorEnv`; of several bodies a `BodiesEnv` with flat observations.
 
         Args:
-            num_envs: number of environments; environment i has body i, and so on from the first after the last.
-            seed: of the first environment's stream of episodes; the others count on. None for random ones.
+            num_envs: number of environments; environment i has body i modulo the number of bodies.
+            seed: of the first environment's stream of episodes; environment i has seed + i. None for random seeds.
             options: see `arc_suite.envs.vector.VectorEnv`.
         """
-        options["task_kwargs"] = self._seeded(seed)
+        options["task_kwargs"] = self._task_kwargs_with(seed)
         if self.several:
-            return registry.resolve(registry.BODIES_ENV)(self.task, num_envs, self.bodies, flat=True, **options)
+            bodies_env_class = registry.resolve(registry.BODIES_ENV)
+            return bodies_env_class(self.task, num_envs, self.bodies, flat=True, **options)
         return VectorEnv(self.domain, self.task, num_envs, **options)
 
     def spec(self, max_episode_steps: int = STEPS) -> EnvSpec:
-        """Return the spec by which Gymnasium makes the environment anew, in another process too."""
-        kwargs = {"domain_name": self.robot, "task_name": self.task}
+        """Return the spec from which Gymnasium makes the environment, in other processes, too."""
+        kwargs: dict[str, Any] = {"domain_name": self.robot, "task_name": self.task}
+        if self.task_kwargs:
+            kwargs["task_kwargs"] = self.task_kwargs
         return EnvSpec(
             id=self.env_id,
             entry_point="arc_suite.envs.gym:Env",
             vector_entry_point="arc_suite.envs.vector:VectorEnv",
             max_episode_steps=max_episode_steps,
-            kwargs=kwargs | ({"task_kwargs": self.task_kwargs} if self.task_kwargs else {}),
+            kwargs=kwargs,
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the setup as files hold it, JSON-able: `robot`, `task`, `task_kwargs`."""
+        """Return the setup as files contain it, JSON-able: `robot`, `task`, `task_kwargs`."""
         return {"robot": self.robot, "task": self.task, "task_kwargs": self.task_kwargs}
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> "Setup":
-        """Return the setup that a file holds; nothing is imported, and no file opened.
+        """Return the setup in a file. No module is imported, and no other file is opened.
 
         Args:
-            fields: those of `to_dict`, of any values; others are ignored.
+            fields: those of `to_dict`, with unchecked values; other fields are ignored.
 
         Raises:
-            ValueError: a field is missing, of another type, an unknown name, or a name whose module has not been
+            ValueError: a field is missing, has another type, is an unknown name, or a name whose module has not been
                 imported.
         """
         for name, kind in (("robot", str), ("task", str), ("task_kwargs", dict)):
             if not isinstance(fields.get(name), kind):
                 raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.preview(fields.get(name))}")
-        robot, task, settings = registry.check_stored_robot(fields["robot"]), fields["task"], fields["task_kwargs"]
-        registry.refuse_import("task", task)
+        robot = registry.check_stored_robot(fields["robot"])
+        task = registry.refuse_import("task", fields["task"])
+        settings = fields["task_kwargs"]
         registry.check_stored_settings(settings)
-        return cls._checked(robot, task, settings)  # draws no body of several
+        return cls._make(robot, task, settings)
 
     def provenance(self) -> dict[str, Any]:
-        """Return, JSON-able, `to_dict` with the task's version, and hashes and versions of all that computes.
+        """Return, JSON-able, everything that results depend on.
 
-        Several bodies have no hash of a model.
+        It is `to_dict` with the task's version, hashes of bodies and model, and versions of packages. Several bodies
+        have no hash of a model.
 
         Raises:
             ValueError: a setting that does not fit.
         """
         texts = "".join(map(body_to_json, self.bodies))
-        known = self.to_dict() | {"task_version": self.kind.version, "body_sha256": _sha256(texts.encode())}
+        fields = self.to_dict()
+        fields["task_version"] = self.kind.version
+        fields["body_sha256"] = _sha256(texts.encode())
         if not self.several:
-            model = self.prepare()[1]
+            _, model = self.prepare()
             buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
             mujoco.mj_saveModel(model, None, buffer)
-            known["model_sha256"] = _sha256(buffer.data)
-        return known | {"versions": versions.dependency_versions()}
+            fields["model_sha256"] = _sha256(buffer.data)
+        fields["versions"] = versions.dependency_versions()
+        return fields
 
-    def _seeded(self, seed: int | None) -> dict[str, Any]:
-        return self.task_kwargs | ({} if seed is None else {"random": seed})
+    def _task_kwargs_with(self, seed: int | None) -> dict[str, Any]:
+        """Return the settings of the task, with the seed of an environment unless it is None."""
+        if seed is None:
+            return self.task_kwargs
+        return self.task_kwargs | {"random": seed}
 
     def __str__(self) -> str:
         settings = "" if self.settings_json == "{}" else f", {self.settings_json}"
@@ -271,11 +295,16 @@ def _sha256(content) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _held_out(robot: str, count: int) -> str:
-    """Text of at most `count` bodies that validate what several learned with."""
+def _validation_bodies(robot: str, count: int) -> str:
+    """Return the text that names at most `count` bodies for validation, given the text that names several bodies."""
     parts = robot.split(",")
-    families = list(dict.fromkeys(family for part in parts if (family := part.rpartition(":")[0])))[:count]
+    families = []
+    for part in parts:
+        family, _, _ = part.rpartition(":")
+        if family and family not in families:
+            families.append(family)
+    families = families[:count]
     if not families:
         return ",".join(parts[:count])
-    each = count // len(families)
-    return ",".join(f"{family}:{HELD_OUT}-{HELD_OUT + each - 1}" for family in families)
+    last_seed = HELD_OUT + count // len(families) - 1
+    return ",".join(f"{family}:{HELD_OUT}-{last_seed}" for family in families)

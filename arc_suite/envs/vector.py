@@ -32,7 +32,7 @@ from arc_suite.simulation.model import checked_fields
 from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM, Inputs
 
-_MOST_THREADS = 1 << 10
+_MAX_THREADS = 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
 
 
@@ -40,8 +40,9 @@ class VectorTask(TaskView, KnownAttributes):
     """The task of a vector environment; terms and metrics are (num_envs,)."""
 
     def __init__(self, environment: "VectorEnv"):
-        """View a vector environment that has prepared its task."""
-        self._environment, self._made = environment, __name__
+        """View the task of a vector environment, which it has prepared."""
+        self._environment = environment
+        self._sealed_by = __name__
 
     @property
     def definition(self) -> Task:
@@ -55,7 +56,7 @@ class VectorTask(TaskView, KnownAttributes):
 
     @property
     def progress(self) -> Mapping[str, np.ndarray]:
-        """Metrics of the episodes so far by name.
+        """How well the episodes have gone so far, metrics by name.
 
         Raises:
             ResetNeeded: before the first reset.
@@ -64,7 +65,7 @@ class VectorTask(TaskView, KnownAttributes):
 
     @property
     def privileged(self) -> Mapping[str, np.ndarray]:
-        """What no policy observes, (num_envs, size) each, by the names of `definition.privileged_blocks`, now.
+        """The present privileged observations, (num_envs, size) each, by the names of `definition.privileged_blocks`.
 
         Raises:
             ResetNeeded: before the first reset.
@@ -81,26 +82,34 @@ class VectorTask(TaskView, KnownAttributes):
 class VectorEnv(KnownAttributes, BaseVectorEnv):
     """Environments of one task, made by `gymnasium.make_vec("arc_suite/<robot>-<task>-v0", num_envs=n, ...)`.
 
-    An environment seeded s is bit-equal to `arc_suite.envs.gym.Env` seeded s, from step to step and from episode
-    to episode, whatever the number of threads. Spaces, observations and infos are that environment's,
-    batched as `SyncVectorEnv` does. Arrays handed out are the caller's own.
+    An environment with seed s is bit-equal to `arc_suite.envs.gym.Env` with seed s, in all steps and
+    episodes, for any number of threads. Spaces, observations and infos are those of that environment,
+    batched as `SyncVectorEnv` does. The environment keeps no references to arrays that it returns.
 
-    A step's info holds the task's unweighted terms, `reward_forward` and so on, and figures of how
-    well the episodes have gone so far, such as `progress_speed`: (num_envs,) floats, with
-    the mask of the environments that have them under the same name after an underscore.
+    A step's info contains the task's unweighted terms, `reward_forward` and so on, and metrics of how
+    well the episodes have gone so far, such as `progress_speed`: (num_envs,) floats. The mask of the
+    environments that have an entry is in the info under the same name after an underscore.
 
-    Pickles and copies carry on bit for bit. While one thread is in a call, another's is refused, except `command`.
+    Pickles and copies continue bit for bit. While one thread is in a call, calls of other threads raise RuntimeError,
+    except `command`.
 
-    Where the physics of an environment diverges, its episode is terminated with reward 0 and `info` has
-    `diverged`; the others notice nothing.
+    If the physics of an environment diverges, its episode is terminated with reward 0 and `info` has
+    `diverged`; this has no effect on the other environments.
 
     Attributes:
         arguments: robot, task and its settings, as `Setup.of` takes them.
         autoreset_mode: what happens to an environment whose episode has ended.
-        batch: the simulations. Writing their state is for experiments.
+        batch: the simulations; None after `close`. Writing their state is for experiments.
         step_limit: control steps after which every episode is over, may be infinite.
-        task: what the environments do; its `split` gives an observation's blocks by name.
+        task: the task of the environments; its `split` returns an observation's blocks by name.
     """
+
+    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {
+        "_tells": "_has_privileged_info",
+        "_opened": "_opened_tasks",
+        "_next": "_next_tasks",
+        "_picture": "_picture_options",
+    }
 
     def __init__(
         self,
@@ -123,10 +132,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             domain_name: a robot or another body; see `arc_suite.load`.
             task_name: as in `arc_suite.load`.
             num_envs: number of environments.
-            num_threads: on which to simulate; None for as many as this process has cores.
-            autoreset_mode: NextStep or SameStep: an environment whose episode has ended starts the next one in
-                the step after or at once; Disabled: it rests, with reward 0, until a reset whose
-                `reset_mask` has it.
+            num_threads: number of threads that simulate; None for one for each core that this process may use.
+            autoreset_mode: when an environment whose episode has ended starts the next one: NextStep, in the next
+                step; SameStep, at once; Disabled, in a reset whose `reset_mask` has it, and until then it rests with
+                reward 0.
             max_episode_steps: truncates episodes, as `gymnasium.make` does, in addition to the task's time limit.
             task_kwargs: as in `arc_suite.load`; `random=s` seeds environment i with s + i, and
                 `on_divergence` can only be "terminate".
@@ -134,29 +143,32 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             width: of a picture, pixels.
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
-            privileged: whether infos hold the privileged observations, `privileged` (num_envs, size) float32.
+            privileged: whether infos contain the privileged observations, `privileged` (num_envs, size) float32.
 
         Raises:
             ValueError: an unknown name, or a value that does not fit.
         """
-        self._lock, self.batch = Lock(), None  # first, as Gymnasium closes also what could not be made
+        # Set first, as Gymnasium also closes an environment whose `__init__` has raised.
+        self._lock = Lock()
+        self.batch = None
+
         task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
         seed = task_kwargs.pop("random", None)
         checks.name(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of many environments")
-        mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
-        modes = [mode.value for mode in AutoresetMode]
-        self.autoreset_mode = AutoresetMode(checks.name(mode, modes, "autoreset_mode"))
+        mode_name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
+        valid_modes = [mode.value for mode in AutoresetMode]
+        self.autoreset_mode = AutoresetMode(checks.name(mode_name, valid_modes, "autoreset_mode"))
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
-        self._tells = checks.boolean("privileged", privileged)
+        self._has_privileged_info = checks.boolean("privileged", privileged)
         pictures.check_size(height, width)
-        threads = min(usable_cores(), _MOST_THREADS) if num_threads is None else num_threads
-        threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
+        threads = min(usable_cores(), _MAX_THREADS) if num_threads is None else num_threads
+        threads = checks.integer("num_threads", threads, 1, _MAX_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
         self._tasks, model = self._prepare_tasks()
-        self._task = _one(self._tasks)
+        self._task = _join_tasks(self._tasks)
         pictures.check_camera(model if isinstance(model, mujoco.MjModel) else model[0], camera_id)
         self.step_limit = self._task.step_limit
         if max_episode_steps is not None:
@@ -166,19 +178,23 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.batch = Batch(model, self.num_envs, threads, self._task.reads)
         self.task = VectorTask(self)
         self._terms = {}  # of the latest step
-        self._memory = None  # of all environments, with a leading axis
+        self._memory = None  # of all environments, with a leading axis; None before the first reset
         self._commands = LiveCommands()
-        self._opened, self._next = list(self._tasks), list(self._tasks)  # tasks as opened, and of the next episodes
-        self._changes, self._next_changes = (np.full(self.num_envs, "{}", object) for _ in range(2))  # JSON of settings
+        # Tasks of each environment with the settings with which it was opened, and with those of the next episodes.
+        self._opened_tasks = list(self._tasks)
+        self._next_tasks = list(self._tasks)
+        # JSON of the changed settings of each environment: in the present episodes, and in the next ones.
+        self._changes = np.full(self.num_envs, "{}", object)
+        self._next_changes = np.full(self.num_envs, "{}", object)
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
-        self._streams = [task.first() for task in self._tasks]  # states, as the present episodes began
+        self._streams = [task.first() for task in self._tasks]  # states with which the present episodes have started
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
         self._streams_begin = np.ones(self.num_envs, bool)  # environments whose next episode is the first of its stream
         if seed is not None:
-            self._seed(self._checked_seeds(seed), np.ones(self.num_envs, bool))
+            self._begin_streams(self._checked_seeds(seed), np.ones(self.num_envs, bool))
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
-        self._ended = np.zeros(self.num_envs, bool)  # environments whose episode has ended and whose next has not begun
-        self._resting = np.zeros(self.num_envs, bool)
+        self._ended = np.zeros(self.num_envs, bool)  # environments between the end of an episode and the next start
+        self._resting = np.zeros(self.num_envs, bool)  # environments that stand still; see `rest`
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
@@ -186,7 +202,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
-        self._picture: dict[str, Any] = {
+        self._picture_options: dict[str, Any] = {
             "width": width,
             "height": height,
             "camera_id": camera_id,
@@ -198,7 +214,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (joints,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._made = __name__
+        self._sealed_by = __name__
 
     @one_thread_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
@@ -207,7 +223,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         Args:
             seed: s to seed environment i with s + i, one seed for each environment, or None to continue their
                 streams of random numbers; single seeds may be None, too.
-            options: `reset_mask`, (num_envs,) booleans, limits seeding and restart to some environments.
+            options: `reset_mask`, (num_envs,) booleans, selects the environments that get seeds and start.
 
         Returns:
             Observations (num_envs, size) float32 of all environments, and an info that is empty or has `privileged`.
@@ -222,10 +238,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         if self._memory is None and not mask.all():
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         if seed is not None:
-            self._seed(self._checked_seeds(seed), mask)
-        self._take_commands()
-        self._begin(mask, self._observation)
-        return self._observation.copy(), self._privileged(mask)
+            self._begin_streams(self._checked_seeds(seed), mask)
+        self._consume_commands()
+        self._start_episodes(mask, self._observation)
+        return self._observation.copy(), self._privileged_info(mask)
 
     @one_thread_at_a_time
     def step(self, actions):
@@ -236,9 +252,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         Returns:
             Observations (num_envs, size) float32; rewards (num_envs,); terminated and truncated,
-            (num_envs,) booleans; and an info as Gymnasium defines it: `reward_<term>` and
-            `progress_<figure>`, of environments that diverged also `diverged`, and in the mode SameStep
-            `final_obs` and `final_info` of environments whose episode ended.
+            (num_envs,) booleans; and an info as Gymnasium defines it. It has `reward_<term>` and
+            `progress_<metric>`, for environments that diverged also `diverged`, and in the mode SameStep
+            `final_obs` and `final_info` for environments whose episode has ended.
 
         Raises:
             ValueError: actions of another shape, or NaN in one; nothing has moved then.
@@ -248,51 +264,53 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._check_open("step")
         if self._memory is None:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
-        self._take_commands()
-        task, before, data = self._task, self._memory, self.batch.data
-        waiting = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
-        stepping, restarting = ~(self._ended | self._resting), self._ended & ~(self._resting | waiting)
-        memory, inputs = task.before(before, checked_action(actions, self.action_space.shape))
-        self._write(inputs, stepping)
-        diverged = self.batch.step(task.scene.substeps, stepping)
-        readings = task.read(data)
-        self._memory = memory = trees.where(stepping, task.after(memory, readings), before)
+        self._consume_commands()
+        task = self._task
+        earlier_memory = self._memory
+        must_wait = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
+        is_stepping = ~(self._ended | self._resting)
+        is_starting = self._ended & ~(self._resting | must_wait)  # environments that start an episode in this step
+
+        memory, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
+        self._write_inputs(inputs, is_stepping)
+        has_diverged = self.batch.step(task.scene.substeps, is_stepping)
+        readings = task.read(self.batch.data)
+        memory = trees.where(is_stepping, task.after(memory, readings), earlier_memory)
+        self._memory = memory
         self._steps += 1
 
-        raw = task.terms(memory, readings)
-        if diverged.any():
-            raw = {name: np.where(diverged, 0.0, term) for name, term in raw.items()}
-        self._terms, reward = terms.reward(raw, task.settings.weights, task.cost_limit)
-        reward = np.where(stepping, reward, 0.0)
+        raw_terms = task.terms(memory, readings)
+        if has_diverged.any():
+            raw_terms = {name: np.where(has_diverged, 0.0, term) for name, term in raw_terms.items()}
+        self._terms, reward = terms.reward(raw_terms, task.settings.weights, task.cost_limit)
+        reward = np.where(is_stepping, reward, 0.0)
         observation = task.vector(task.observe(memory, readings), np.float32)
-        failed, cut = task.ended(memory, readings)
+        has_failed, is_cut_off = task.ended(memory, readings)
         time_is_up = self._steps >= task.step_limit
-        terminated = stepping & (diverged | failed) & ~time_is_up
-        truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self.step_limit))
-        self._ended = waiting | terminated | truncated
+        terminated = is_stepping & (has_diverged | has_failed) & ~time_is_up
+        truncated = is_stepping & ((is_cut_off & ~terminated) | time_is_up | (self._steps >= self.step_limit))
+        self._ended = must_wait | terminated | truncated
 
         info = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
-            restarting, stepping = self._ended, stepping & ~self._ended
-            last = _by_environment(observation, restarting)
-            final = {
-                "final_obs": last,
-                "final_info": self._info(restarting, diverged) | self._privileged(restarting),
-            }
-            info |= _marked(final, restarting)
-        info |= self._info(stepping, diverged)
-        if restarting.any():
-            self._begin(restarting, observation)
-        info |= self._privileged(stepping | restarting)
+            is_starting = self._ended
+            is_stepping = is_stepping & ~self._ended
+            final_info = self._step_info(is_starting, has_diverged) | self._privileged_info(is_starting)
+            final = {"final_obs": _to_objects(observation, is_starting), "final_info": final_info}
+            info |= _with_masks(final, is_starting)
+        info |= self._step_info(is_stepping, has_diverged)
+        if is_starting.any():
+            self._start_episodes(is_starting, observation)
+        info |= self._privileged_info(is_stepping | is_starting)
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
     def resampled(self) -> np.ndarray:
-        """Return in which environments (num_envs,) the latest step began another command of the schedule.
+        """Return whether the latest step began another command of the schedule, (num_envs,) booleans.
 
         The change does not depend on the action, so it adds noise to returns (Mao et al., "Variance reduction for
-        reinforcement learning in input-driven environments", 2019). `ppo` bootstraps there from the observation
-        before the step. Environments that rest, or whose episode ended or began in the step, have False.
+        reinforcement learning in input-driven environments", 2019). In these environments `ppo` bootstraps from the
+        observation before the step. Environments that rest, or whose episode ended or began in the step, have False.
         """
         if self._memory is None:
             return np.zeros(self.num_envs, bool)
@@ -301,43 +319,44 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
     def command(self, name: str, value, mask=None) -> None:
         """Set a command of the task in some environments from the next step on, until their next episodes.
 
-        Any thread may call it while another is in a step, which goes on with the command before.
+        Any thread may call it while another is in a step, which still uses the earlier command.
 
         Args:
             name: one of the task's `commands`.
-            value: (size,) numbers for all environments of the mask, or (num_envs, size), where only rows of
-                the mask count; None, or NaN in some, for the task's own command.
-            mask: (num_envs,) booleans, the environments that it goes to; None for all.
+            value: (size,) numbers for all environments of the mask, or (num_envs, size), of which those of environments
+                outside the mask are ignored. None and NaN leave the command, or some of its numbers, to the task.
+            mask: (num_envs,) booleans, the environments that get the command; None for all.
 
         Raises:
-            ValueError: no such command, or a value or mask that does not fit.
+            ValueError: an unknown command, or a value or mask that does not fit.
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("command")
-        mask, value = self._checked_mask(mask, "mask"), checked_command(self._task, name, value, (self.num_envs,))
+        mask = self._checked_mask(mask, "mask")
+        value = checked_command(self._task, name, value, (self.num_envs,))
         if self._memory is None:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
         self._commands.put(name, value, mask)
 
     @one_thread_at_a_time
     def change_model(self, fields: Mapping[str, Any], mask=None) -> None:
-        """Set fields of the models of some environments from the next step on; they stay over resets.
+        """Set fields of the models of some environments from the next step on. Resets do not undo it.
 
-        What a task would draw of a changed field, as modifiers draw friction and mass, gives way to it.
+        Modifiers draw friction, mass and other fields for each episode. A field that was set here keeps its value.
 
         Args:
-            fields: values by name of `simulation.model.FIELDS`, the fields of `MjModel` and `gravity`: what broadcasts
-                to the field's shape, or to that with a leading axis of num_envs.
-            mask: (num_envs,) booleans, the environments that it goes to; None for all.
+            fields: values by name of the field: one of `simulation.model.FIELDS`, which are fields of `MjModel` and
+                `gravity`. A value must broadcast to the field's shape, or to it with a leading axis of num_envs.
+            mask: (num_envs,) booleans, the environments whose models change; None for all.
 
         Raises:
-            ValueError: no such field, one without effect, or a value or mask that does not fit.
+            ValueError: an unknown field, one without effect, or a value or mask that does not fit.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("change the model")
-        mask, fields = self._checked_mask(mask, "mask"), self._checked_fields(fields)
-        self.batch.change_model(fields, mask)
+        mask = self._checked_mask(mask, "mask")
+        self.batch.change_model(self._checked_fields(fields), mask)
 
     def _checked_fields(self, fields: Any) -> dict[str, np.ndarray]:
         return checked_fields(self.batch.models[0], fields, self.num_envs)
@@ -346,42 +365,55 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
     def change_settings(self, settings: Mapping[str, Any], mask=None) -> None:
         """Set settings of the task of some environments, from their next reset on.
 
-        They replace values of `task_kwargs` and of earlier calls. What changes the arena, the observation, or whether
-        there are kicks and other modifiers is refused. `level` begins the curriculum again at that level.
+        They replace values of `task_kwargs` and of earlier calls. A setting is refused if it would change the arena,
+        the observation, or the presence of kicks and other modifiers. `level` restarts the curriculum at that level.
 
         Args:
             settings: some of `task_kwargs`.
-            mask: (num_envs,) booleans, the environments that it goes to; None for all.
+            mask: (num_envs,) booleans, the environments whose settings change; None for all.
 
         Raises:
             ValueError: an unknown name, a setting that cannot be changed, or a value or mask that does not fit.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("change settings")
-        self._put_changes(self._checked_mask(mask, "mask"), self._checked_changes(settings), CURRICULUM[1] in settings)
+        mask = self._checked_mask(mask, "mask")
+        self._put_changes(mask, self._checked_changes(settings), restart=CURRICULUM[1] in settings)
 
     def _checked_changes(self, settings: Any) -> list[tuple[str, Task]]:
-        """For each environment, the JSON of its changed settings, and its next task."""
-        found: dict[tuple[int, str], tuple[str, Task]] = {}
-        keys = [(id(task), text) for task, text in zip(self._opened, self._next_changes, strict=True)]
-        for key, task in zip(keys, self._opened, strict=True):
-            if key not in found:
-                found[key] = checked_changes(task, self.arguments[2], key[1], settings)
-                if stacked.kind(task) is None:
-                    raise ValueError(f"task {task.name}: without from_body environments cannot differ in settings")
-        return [found[key] for key in keys]
+        """Return for each environment the JSON of all changed settings, and the task with them."""
+        _, _, task_kwargs = self.arguments
+        found_changes: dict[tuple[int, str], tuple[str, Task]] = {}  # equal changes of one task give one task
+        changes = []
+        for opened_task, earlier_changes in zip(self._opened_tasks, self._next_changes, strict=True):
+            key = (id(opened_task), earlier_changes)
+            if key not in found_changes:
+                found_changes[key] = checked_changes(opened_task, task_kwargs, earlier_changes, settings)
+                if stacked.kind(opened_task) is None:
+                    raise ValueError(
+                        f"task {opened_task.name}: without from_body environments cannot differ in settings"
+                    )
+            changes.append(found_changes[key])
+        return changes
 
     def _put_changes(self, mask: np.ndarray, changes: Sequence[tuple[str, Task]], restart: bool) -> None:
+        """Change the settings of the next episodes of some environments.
+
+        Args:
+            mask: (num_envs,) booleans, the environments.
+            changes: of each environment, JSON of all changed settings and the task with them.
+            restart: whether the next episodes start as the first ones of a stream.
+        """
         for index in np.flatnonzero(mask).tolist():
-            self._next_changes[index], self._next[index] = changes[index]
+            self._next_changes[index], self._next_tasks[index] = changes[index]
         self._streams_begin |= mask & restart
 
     @one_thread_at_a_time
     def rest(self, mask) -> None:
-        """Let environments, and no others, stand still until they are reset; meanwhile they cost next to nothing.
+        """Let some environments stand still until they are reset, and no others. They are not simulated meanwhile.
 
         Args:
-            mask: (num_envs,) booleans, at least one of them true.
+            mask: (num_envs,) booleans, the environments that stand still; at least one of them is true.
 
         Raises:
             ValueError: a mask that does not fit.
@@ -392,7 +424,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
     @one_thread_at_a_time
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return the state of all environments as arrays by name, from which `restore` goes on.
+        """Return the state of all environments as arrays by name, for `restore`.
 
         Raises:
             ResetNeeded: before the first reset.
@@ -401,45 +433,45 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._check_open("take a snapshot")
         if self._memory is None:
             raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
-        self._take_commands()
+        self._consume_commands()
         return snapshots.to_arrays(self._state())
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on, bit-exact, from the snapshot of an environment of the same size and task.
+        """Continue, bit-exactly, from the snapshot of an environment of the same num_envs and task.
 
         Raises:
-            ValueError: an array is missing or does not fit; none has been used.
+            ValueError: an array is missing or does not fit; the state has not changed.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
-        self._put(self._checked_snapshot(arrays))
+        self._restore_state(*self._checked_snapshot(arrays))
 
     @one_thread_at_a_time
     def render(self, indices: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
-        """Return pictures of the present states, in the mode and size chosen at the start.
+        """Return pictures of the present states, in the mode and size that were chosen at the start.
 
         Args:
             indices: of the environments; None for all.
 
         Returns:
-            A picture for each environment. rgb_array: (height, width, 3) uint8. depth_array: (height, width)
-            float32, m. None without a render mode.
+            A picture for each environment: in the mode rgb_array (height, width, 3) uint8, in depth_array
+            (height, width) float32, m. None without a render mode.
 
         Raises:
-            ValueError: no such environment.
+            ValueError: an index of no environment.
             RenderingUnavailable: no OpenGL here.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("render")
         if self.render_mode is None:
             return None
-        self._take_commands()
+        self._consume_commands()
         return tuple(self._picture_of(index) for index in self._checked_indices(indices))
 
     @one_thread_at_a_time
     def close(self, **kwargs) -> None:
-        """Free the simulations; once more does nothing.
+        """Free the simulations; a second call does nothing.
 
         Raises:
             RuntimeError: another thread is at work in the environment.
@@ -450,100 +482,142 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """Free the simulations; `close` calls it."""
         self.batch = None
 
-    @property  # type: ignore[misc]  # of Gymnasium, which can be set and is of one environment
+    @property  # type: ignore[misc]  # Gymnasium's own has a setter, and is a single generator
     def np_random(self) -> tuple[np.random.Generator, ...]:
-        """Draw, for each environment, from the stream that its resets draw from."""
+        """For each environment, a generator of the stream of random numbers from which its resets draw."""
         return tuple(np.random.Generator(random._bit_generator) for random in self._randoms)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:
-        """The seed of each environment's stream of random numbers; -1 where none was given."""
+        """The seed of each environment's stream of random numbers; -1 if it is unknown."""
         return tuple(self._stream_seeds.tolist())
 
     def _prepare_tasks(self) -> tuple[list[Task], mujoco.MjModel | list[mujoco.MjModel]]:
-        """The task of each environment, and the model of all, or that of each."""
+        """Return the task of each environment, and one model for all or a list of one for each."""
         task, model = prepare_task(*self.arguments)
         return [task] * self.num_envs, model
 
     def _state(self) -> snapshots.State:
-        own = {name: getattr(self, f"_{name}").copy() for name in snapshots.ENVIRONMENT_ARRAYS}
-        settings = self._changes.tolist(), self._next_changes.tolist()
-        randoms = [random.get_state() for random in self._randoms]
-        return snapshots.State(self.batch.snapshot(), self._memory, self._streams, randoms, own, settings)
-
-    def _checked_snapshot(self, arrays: Mapping[str, np.ndarray]) -> tuple[snapshots.State, list[list[Task]]]:
-        """A snapshot that fits, and the tasks of its episodes and of the next ones; episodes have begun then."""
-        if self._memory is None:
-            self._begin(np.ones(self.num_envs, bool), self._observation)
-        self._take_commands()
-        return snapshots.from_arrays(
-            self._state(), self._task, self.batch.checked, arrays, self._opened, self.arguments[2]
+        return snapshots.State(
+            simulations=self.batch.snapshot(),
+            memory=self._memory,
+            streams=self._streams,
+            randoms=[random.get_state() for random in self._randoms],
+            environment_arrays={name: getattr(self, f"_{name}").copy() for name in snapshots.ENVIRONMENT_ARRAYS},
+            settings=(self._changes.tolist(), self._next_changes.tolist()),
         )
 
-    def _put(self, snapshot: tuple[snapshots.State, list[list[Task]]]) -> None:
-        state, (self._tasks, self._next) = snapshot
+    def _checked_snapshot(self, arrays: Mapping[str, np.ndarray]) -> tuple[snapshots.State, list[list[Task]]]:
+        """Return the state of a snapshot, and the tasks of its episodes and of the next ones.
+
+        If no episode has begun yet, episodes begin, so that there is a state to compare with.
+        """
+        if self._memory is None:
+            self._start_episodes(np.ones(self.num_envs, bool), self._observation)
+        self._consume_commands()
+        _, _, task_kwargs = self.arguments
+        return snapshots.from_arrays(
+            self._state(), self._task, self.batch.checked, arrays, self._opened_tasks, task_kwargs
+        )
+
+    def _restore_state(self, state: snapshots.State, tasks: list[list[Task]]) -> None:
+        """Continue from a state, given the tasks of its episodes and of the next ones."""
         self.batch.restore(state.simulations)
-        self._task, self._memory, self._streams = _one(self._tasks), state.memory, state.streams
-        self._changes, self._next_changes = (np.array(texts, object) for texts in state.settings)
+        self._tasks, self._next_tasks = tasks
+        self._task = _join_tasks(self._tasks)
+        self._memory = state.memory
+        self._streams = state.streams
+        present_changes, next_changes = state.settings
+        self._changes = np.array(present_changes, object)
+        self._next_changes = np.array(next_changes, object)
         for name, array in state.environment_arrays.items():
             setattr(self, f"_{name}", array)
-        for random, each in zip(self._randoms, state.randoms, strict=True):
-            random.set_state(each)
+        for random, random_state in zip(self._randoms, state.randoms, strict=True):
+            random.set_state(random_state)
 
-    def _take_commands(self) -> None:
+    def _consume_commands(self) -> None:
         self._memory = self._commands.consume(self._task, self._memory)
 
     def _picture_of(self, index: int) -> np.ndarray:
-        task, scene, shown = self._tasks[index], self._tasks[index].scene, {}
+        """Return a picture of an environment."""
+        task = self._tasks[index]
+        details = {}  # of the episode, if one has begun
         if self._memory is not None:
             memory = trees.entry(self._memory, index)
-            shown["markers"] = task.markers(memory, task.read(self.batch.part(index)))
-            shown["failed_legs"] = task.failed_legs(memory)
-        qpos, mocap_pos = self.batch.data.qpos[index], self.batch.mocap_pos[index]
-        return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, **shown, **self._picture)
+            details["markers"] = task.markers(memory, task.read(self.batch.part(index)))
+            details["failed_legs"] = task.failed_legs(memory)
+        return pictures.picture(
+            task.scene.body,
+            task.scene.arena,
+            self.batch.data.qpos[index],
+            mocap_pos=self.batch.mocap_pos[index],
+            **details,
+            **self._picture_options,
+        )
 
-    def _begin(self, mask: np.ndarray, observation: np.ndarray) -> None:
-        """Start episodes in some environments, (num_envs,) booleans, and put their observations among the others."""
-        starts = []
-        for index in np.flatnonzero(mask).tolist():
-            own = self._next[index]
-            if self._streams_begin[index]:
-                self._streams[index] = own.first()
-            else:
-                self._streams[index] = self._tasks[index].stream_state(trees.entry(self._memory, index))
-            starts.append(own.start(self._randoms[index], self._streams[index]))
+    def _start_episodes(self, mask: np.ndarray, observation: np.ndarray) -> None:
+        """Start episodes in some environments, and write their first observations.
+
+        Args:
+            mask: (num_envs,) booleans, the environments.
+            observation: (num_envs, size) of all environments; changed in place.
+        """
+        starts = [self._draw_start(index) for index in np.flatnonzero(mask).tolist()]
         self._streams_begin &= ~mask
-        self._take_settings(mask)
-        qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
-        mocap = None if mocap[0] is None else np.stack(mocap)
-        self.batch.reset(mask, np.stack(qpos), np.stack(qvel), mocap, models)
-        memory, task, part = trees.map_leaves(lambda *fields: np.stack(fields), *memories), self._task, mask
-        if task is not self._tasks[0]:  # a stacked one, which takes all environments
+        self._take_over_settings(mask)
+        qpos, qvel, memories, mocap_positions, models = zip(*starts, strict=True)
+        mocap_pos = None if mocap_positions[0] is None else np.stack(mocap_positions)
+        self.batch.reset(mask, np.stack(qpos), np.stack(qvel), mocap_pos, models)
+
+        # A task that is the same for all environments works on those of the mask alone. A stacked one needs all.
+        task = self._task
+        memory = trees.map_leaves(lambda *leaves: np.stack(leaves), *memories)
+        part = mask  # the environments on which the task works
+        if task is not self._tasks[0]:
             part = np.ones(self.num_envs, bool)
-            memory = memory if self._memory is None else _scattered(mask, memory, self._memory)
-        readings, begun = task.read(self.batch.part(part)), mask[part]
-        lifted = task.clear_spawn(memory, readings)
-        if lifted is not None:
-            self.batch.place(mask, lifted[begun])
+            if self._memory is not None:
+                memory = _replace_entries(self._memory, mask, memory)
+        is_starting = mask[part]  # which of these start an episode
+
+        readings = task.read(self.batch.part(part))
+        clear_qpos = task.clear_spawn(memory, readings)
+        if clear_qpos is not None:
+            self.batch.place(mask, clear_qpos[is_starting])
             readings = task.read(self.batch.part(part))
         memory = task.begin(memory, readings)
-        observation[mask] = task.vector(task.observe(memory, readings), np.float32)[begun]
-        # Before the first step there is nothing to keep, as all environments begin.
-        some = memory if begun.all() else trees.map_leaves(lambda leaf: leaf[begun], memory)
-        self._memory = memory if self._memory is None else _scattered(mask, some, self._memory)
+        observation[mask] = task.vector(task.observe(memory, readings), np.float32)[is_starting]
+
+        if not is_starting.all():
+            memory = trees.map_leaves(lambda leaf: leaf[is_starting], memory)
+        if self._memory is not None:  # in the first reset all environments start
+            memory = _replace_entries(self._memory, mask, memory)
+        self._memory = memory
         self._steps[mask] = 0
-        self._ended, self._resting = self._ended & ~mask, self._resting & ~mask
+        self._ended = self._ended & ~mask
+        self._resting = self._resting & ~mask
 
-    def _take_settings(self, mask: np.ndarray) -> None:
-        """Let changed settings hold in some environments, (num_envs,) booleans."""
-        if (changed := mask & (self._changes != self._next_changes)).any():
-            self._changes[changed] = self._next_changes[changed]
-            pairs = zip(self._tasks, self._next, strict=True)
-            self._tasks = [pair[there] for pair, there in zip(pairs, changed.tolist(), strict=True)]
-            self._task = _one(self._tasks)
+    def _draw_start(self, index: int):
+        """Return the `Start` of an environment's next episode."""
+        next_task = self._next_tasks[index]
+        if self._streams_begin[index]:
+            self._streams[index] = next_task.first()
+        else:
+            self._streams[index] = self._tasks[index].stream_state(trees.entry(self._memory, index))
+        return next_task.start(self._randoms[index], self._streams[index])
 
-    def _write(self, inputs: Inputs, mask: np.ndarray) -> None:
-        """Write what a control step needs into some environments."""
+    def _take_over_settings(self, mask: np.ndarray) -> None:
+        """Make the settings of the next episodes those of the present ones in some environments (num_envs,)."""
+        is_changing = mask & (self._changes != self._next_changes)
+        if is_changing.any():
+            self._changes[is_changing] = self._next_changes[is_changing]
+            tasks = list(self._tasks)
+            for index in np.flatnonzero(is_changing).tolist():
+                tasks[index] = self._next_tasks[index]
+            self._tasks = tasks
+            self._task = _join_tasks(self._tasks)
+
+    def _write_inputs(self, inputs: Inputs, mask: np.ndarray) -> None:
+        """Write the inputs of a control step into the simulations of some environments (num_envs,)."""
         data = self.batch.data
         np.copyto(data.ctrl[:, : inputs.ctrl.shape[-1]], inputs.ctrl, where=mask[:, None])
         if inputs.kick is not None:
@@ -551,69 +625,90 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         if inputs.force is not None:
             self.batch.xfrc_applied[mask, self._task.scene.layout.torso, :3] = inputs.force[mask]
 
-    def _info(self, mask: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
-        """What the latest step tells of some environments."""
+    def _step_info(self, mask: np.ndarray, has_diverged: np.ndarray) -> dict[str, Any]:
+        """Return the info of the latest step for some environments (num_envs,)."""
         info = {}
         if mask.any():
             metrics = {f"reward_{name}": term for name, term in self._terms.items()}
             metrics |= {f"progress_{name}": metric for name, metric in self._task.progress(self._memory).items()}
-            info |= _marked({name: np.where(mask, metric, 0.0) for name, metric in metrics.items()}, mask)
-        diverged = diverged & mask
+            info |= _with_masks({name: np.where(mask, metric, 0.0) for name, metric in metrics.items()}, mask)
+        diverged = has_diverged & mask
         if diverged.any():
-            info |= _marked({"diverged": diverged}, diverged)
+            info |= _with_masks({"diverged": diverged}, diverged)
         return info
 
-    def _privileged(self, mask: np.ndarray) -> dict[str, np.ndarray]:
-        """The privileged observations of some environments, as an info."""
-        if not (self._tells and mask.any()):
+    def _privileged_info(self, mask: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the part of an info with the privileged observations of some environments (num_envs,).
+
+        It is empty unless they were asked for.
+        """
+        if not (self._has_privileged_info and mask.any()):
             return {}
-        return _marked({"privileged": np.where(mask[:, None], self._privileged_vectors(), np.float32(0.0))}, mask)
+        vectors = np.where(mask[:, None], self._privileged_vectors(), np.float32(0.0))
+        return _with_masks({"privileged": vectors}, mask)
 
     def _privileged_vectors(self) -> np.ndarray:
         return privileged.vector(self._task, self._privileged_blocks(self._task, self._memory))
 
     def _privileged_blocks(self, definition: Task, memory: Any) -> dict[str, np.ndarray]:
-        """The privileged observations by block; what `change_model` has set holds in place of what was drawn."""
-        found = definition.privileged(memory, self.batch.data)
-        for index, task in enumerate(self._tasks if self.batch.changed else ()):
-            fields = self.batch.lasting(index)
-            own = task.read_back({name: block[index] for name, block in found.items()}, fields) if fields else {}
-            for name, block in own.items():
-                found[name] = found[name].copy()  # of the memory
-                found[name][index] = block
-        return found
+        """Return the privileged observations by block, with what `change_model` has set in place of what was drawn."""
+        blocks = definition.privileged(memory, self.batch.data)
+        if not self.batch.changed:
+            return blocks
+        for index, task in enumerate(self._tasks):
+            changed_fields = self.batch.lasting(index)
+            if not changed_fields:
+                continue
+            own_blocks = {name: block[index] for name, block in blocks.items()}
+            for name, changed_block in task.read_back(own_blocks, changed_fields).items():
+                blocks[name] = blocks[name].copy()  # it may be an array of the memory
+                blocks[name][index] = changed_block
+        return blocks
 
-    def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
-        """Start new streams of random numbers in some environments, except those whose seed is None."""
+    def _begin_streams(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
+        """Start new streams of random numbers in some environments (num_envs,), except those whose seed is None."""
         for index in np.flatnonzero(mask).tolist():
             if seeds[index] is not None:
                 self._randoms[index] = np.random.RandomState(seeds[index])
-                self._stream_seeds[index], self._streams_begin[index] = seeds[index], True
+                self._stream_seeds[index] = seeds[index]
+                self._streams_begin[index] = True
 
 
-def _one(tasks: Sequence[Task]) -> Task:
-    """One task for all environments, of the tasks of each."""
-    return tasks[0] if all(task is tasks[0] for task in tasks) else stacked.stack_tasks(tasks)
+def _join_tasks(tasks: Sequence[Task]) -> Task:
+    """Return one task for all environments, given the task of each."""
+    if all(task is tasks[0] for task in tasks):
+        return tasks[0]
+    return stacked.stack_tasks(tasks)
 
 
-def _scattered(mask: np.ndarray, some, memory):
-    """A memory with the values of `some` in the environments of a mask (num_envs,)."""
+def _replace_entries(memory, mask: np.ndarray, entries):
+    """Return a memory with other entries in the environments of a mask.
 
-    def scattered(new, old):
-        copied = old.copy()
-        copied[mask] = new
-        return copied
+    Args:
+        memory: of all environments.
+        mask: (num_envs,) booleans.
+        entries: memory of the environments of the mask alone.
+    """
 
-    return trees.map_leaves(scattered, some, memory)
+    def replace_in_leaf(leaf, leaf_entries):
+        changed_leaf = leaf.copy()
+        changed_leaf[mask] = leaf_entries
+        return changed_leaf
+
+    return trees.map_leaves(replace_in_leaf, memory, entries)
 
 
-def _marked(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:
-    """Values by name, and by `_name` the environments that have them, as Gymnasium's infos are."""
-    return {key: item for name, value in values.items() for key, item in ((name, value), (f"_{name}", mask.copy()))}
+def _with_masks(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:
+    """Return values by name, and by `_name` the mask of the environments that have them, as in Gymnasium's infos."""
+    info = {}
+    for name, value in values.items():
+        info[name] = value
+        info[f"_{name}"] = mask.copy()
+    return info
 
 
-def _by_environment(observations: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Observations of some environments in an array of objects, with None for the others."""
+def _to_objects(observations: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return the observations of some environments in an array of objects, with None for the other environments."""
     objects = np.full(len(observations), None, dtype=object)
     for index in np.flatnonzero(mask).tolist():
         objects[index] = observations[index].copy()

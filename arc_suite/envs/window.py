@@ -11,7 +11,9 @@ from arc_suite.markers import Marker
 from arc_suite.simulation import opengl
 from arc_suite.simulation.pictures import Decorated, geom_of
 
-_PATIENCE = 10.0  # s, for the window to close
+_CLOSING_TIMEOUT = 10.0  # s
+_AZIMUTH = 140.0  # degrees, of the camera that the mouse turns
+_ELEVATION = -15.0  # degrees
 
 
 class Window:
@@ -27,34 +29,42 @@ class Window:
         """Open the window.
 
         Args:
-            shown: the decorated body; its owner poses it.
+            shown: the decorated body; the caller sets its poses.
             camera_id: name or index of the first camera, -1 for one that follows the torso and that the mouse turns.
             pressed: called with GLFW's number of each key, in the window's thread.
-            instead: the alternative to a window, for the error.
+            instead: what to do without a window, for the error.
 
         Raises:
             RenderingUnavailable: no window can be opened here.
         """
         opengl.require_window(instead)
-        from mujoco import viewer  # initializes GLFW, which complains where there is no display
+        from mujoco import viewer  # imported here: it initializes GLFW, which prints errors where there is no display
 
-        self._model, self._data, others = shown.model.ptr, shown.data.ptr, set(threading.enumerate())
+        self._model = shown.model.ptr
+        self._data = shown.data.ptr
+        other_threads = set(threading.enumerate())
         try:
             self._viewer = viewer.launch_passive(
                 self._model, self._data, key_callback=pressed, show_left_ui=False, show_right_ui=False
             )
-        except RuntimeError as error:  # macOS has windows under `mjpython` alone
+        except RuntimeError as error:  # macOS opens windows only under `mjpython`
             raise opengl.RenderingUnavailable(f"cannot open a window: {error}; {instead}") from None
-        self._threads = set(threading.enumerate()) - others
-        index = self._model.camera(camera_id).id if isinstance(camera_id, str) else camera_id
+        self._threads = set(threading.enumerate()) - other_threads
+        self._set_camera(camera_id)
+        self._next_picture_time = time.monotonic()  # s
+
+    def _set_camera(self, camera_id: int | str) -> None:
+        camera_index = self._model.camera(camera_id).id if isinstance(camera_id, str) else camera_id
         with self._viewer.lock():
             camera = self._viewer.cam
-            if index >= 0:
-                camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, index
+            if camera_index >= 0:
+                camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+                camera.fixedcamid = camera_index
             else:
-                camera.type, camera.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, self._model.body("torso").id
-                camera.azimuth, camera.elevation = 140.0, -15.0
-        self._due = time.monotonic()
+                camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
+                camera.trackbodyid = self._model.body("torso").id
+                camera.azimuth = _AZIMUTH
+                camera.elevation = _ELEVATION
 
     @property
     def is_open(self) -> bool:
@@ -62,36 +72,40 @@ class Window:
         return self._viewer.is_running()
 
     def show(self, duration: float, markers: Iterable[Marker] = (), text: str = "") -> None:
-        """Draw the present pose and return `duration` seconds after the last picture was due; nothing once closed.
+        """Draw the present pose, wait until the previous picture has had its time, and return.
+
+        A window that was closed shows nothing and does not wait.
 
         Args:
-            duration: s, for which the picture stands.
+            duration: for which this picture stands, s.
             markers: debug markers to show.
             text: a line in the lower left corner.
         """
         if not self.is_open:
             return
+        shown_markers = list(markers)
         with self._viewer.lock():
-            scene, markers = self._viewer.user_scn, list(markers)
-            scene.ngeom = len(markers)
-            for marker, geom in zip(markers, scene.geoms, strict=False):
+            user_scene = self._viewer.user_scn
+            user_scene.ngeom = len(shown_markers)
+            for marker, geom in zip(shown_markers, user_scene.geoms, strict=False):  # there are more geoms
                 geom_of(marker, geom)
         self._viewer.set_texts((None, mujoco.mjtGridPos.mjGRID_BOTTOMLEFT, text, None))
         self._viewer.sync()
-        time.sleep(max(0.0, self._due - time.monotonic()))
-        self._due = time.monotonic() + duration
+        time.sleep(max(0.0, self._next_picture_time - time.monotonic()))
+        self._next_picture_time = time.monotonic() + duration
 
     def pulls(self) -> np.ndarray:
-        """Return force, N, and torque, N m, with which the mouse pulls at each body of the model: (bodies, 6)."""
+        """Return the force, N, and torque, N m, of the mouse on each body of the model: (bodies, 6)."""
         self._data.xfrc_applied[:] = 0.0
         with self._viewer.lock():
-            perturb = self._viewer.perturb
-            if perturb.active and perturb.select > 0:
-                mujoco.mjv_applyPerturbForce(self._model, self._data, perturb)
+            perturbation = self._viewer.perturb
+            if perturbation.active and perturbation.select > 0:
+                mujoco.mjv_applyPerturbForce(self._model, self._data, perturbation)
         return self._data.xfrc_applied.copy()
 
     def close(self) -> None:
-        """Close the window; once more does nothing."""
+        """Close the window; a second call does nothing."""
         self._viewer.close()
-        for thread in self._threads:  # were the process to end while one still draws, it would crash
-            thread.join(_PATIENCE)
+        # A thread that still draws while the process ends would crash.
+        for thread in self._threads:
+            thread.join(_CLOSING_TIMEOUT)
