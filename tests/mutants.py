@@ -111,7 +111,8 @@ MUTANTS = {
     "a new stream of an environment carries on the old one": "self._streams_begin[index] = «True→False»",
     "environments share a seed": "[first« + index→» for index in range(self.num_envs)]",
     "observations of a batch handed out live": "self._observation = observation«.copy()→»",
-    "a command for all environments": "memory = changed_memory« if mask is None else trees.where(mask, changed_memory, memory)→»",
+    "a command for all environments": "memory = changed_memory"
+    "« if mask is None else trees.where(mask, changed_memory, memory)→»",
     "commands of environments replace one another": "value = «np.where(mask[:, None], value, earlier_value)→value»",
     "a copy resets the shared model": "        if «share_model→False»:\n            self._shared",
     "kicks forgotten in batches": "«data.qvel[mask] += inputs.kick[mask]→pass»",
