@@ -29,7 +29,7 @@ def test_the_state_of_the_studio():
     state = states.from_json(text)
     assert states.to_json(state) == text
     assert state.value("gait") == "tripod" and state.value("turn") == -0.2
-    assert len(sketch.body(state.sketch).legs) == 6
+    assert len(sketch.make_body(state.sketch).legs) == 6
 
 
 def test_tracks():
