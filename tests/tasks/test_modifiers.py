@@ -173,7 +173,7 @@ GOLDEN += [5, 0.47232399628840227, 0.8414767148983973, 0.13111064234791392, 0.30
 def test_the_draws_are_these_in_this_order():
     drawn = draws.draw_from_stream(np.random.RandomState(7), 6)
     first = [*np.diff(drawn.kick_steps, prepend=0)[:5], *drawn.kick_sizes[:5], *drawn.kick_directions[:4]]
-    last = [drawn.leg, drawn.strength, drawn.friction, drawn.mass, drawn.delay, drawn.noise_key]
+    last = [drawn.failing_leg, drawn.motor_strength, drawn.friction, drawn.mass, drawn.delay, drawn.noise_key]
     assert len(first + last) == 20
     assert_allclose(first + last, GOLDEN, rtol=1e-15)
 
@@ -184,7 +184,7 @@ def test_later_draws_are_uniform_and_take_nothing_from_the_stream():
     assert drawn.min() >= 0.0 and drawn.max() < 1.0
     assert_allclose(drawn.mean(axis=0), 0.5, atol=0.02)  # four standard deviations
     assert abs(np.corrcoef(drawn.T) - np.eye(134)).max() < 0.08
-    assert draws.draw_by_key(7, 12).place.tolist() == draws.draw_by_key(7, 18).place.tolist()
+    assert draws.draw_by_key(7, 12).payload_place.tolist() == draws.draw_by_key(7, 18).payload_place.tolist()
 
 
 def drawn_over(episodes, **settings):
@@ -282,7 +282,7 @@ def test_a_force_pushes_the_torso_for_its_time_and_begins_again():
     environment = begun("tick", "walk", force=0.5, time_limit=math.inf)
     task, memory, seen = environment.task.definition, environment.task.memory, {}
     schedule = state(environment, Pushes)
-    period = schedule.first[-1] + pushes.MOST_STEPS
+    period = schedule.first[-1] + pushes.MAX_PUSH_STEPS
     for step in range(1, 2 * int(period) + 1):
         memory, inputs = task.before(memory, np.zeros(18))
         assert inputs.kick is None and inputs.force.shape == (3,) and not inputs.force[2]
@@ -586,7 +586,7 @@ def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
     schedule = state(environment, Kicks)
     first, kick = schedule.steps[0], schedule.kicks[0]
     shown = []
-    for _ in range(first + kicks.SHOWN + 5):
+    for _ in range(first + kicks.ARROW_STEPS + 5):
         environment.step(np.zeros(18))
         shown.append(kick_arrows(environment))
         if len(shown) == first:
@@ -597,7 +597,7 @@ def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
             assert_allclose(off[:2] / np.hypot(*off[:2]), kick / np.hypot(*kick))  # it points at the torso
             height = environment.task.body.torso.standing_height
             assert np.linalg.norm(way) == pytest.approx(height * np.hypot(*kick) / math.sqrt(GRAVITY * height))
-    assert [len(arrows) for arrows in shown] == [0] * (first - 1) + [1] * kicks.SHOWN + [0] * 6
+    assert [len(arrows) for arrows in shown] == [0] * (first - 1) + [1] * kicks.ARROW_STEPS + [0] * 6
 
 
 def test_a_leg_whose_motors_have_failed_is_dark():

@@ -12,7 +12,7 @@ from arc_suite.tasks.command import Schedule
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.gait_and_pose import GaitAndPose
 from arc_suite.tasks.ground import LEVELS, Lanes, Level
-from arc_suite.tasks.modifiers import OWN
+from arc_suite.tasks.modifiers import SUITE_MODIFIERS
 from arc_suite.tasks.parameters import Noise, Parameters
 from website import markdown
 
@@ -35,7 +35,7 @@ MEANINGS = {
         for kind in (Parameters, Noise, walk.WalkSettings, Schedule, GaitAndPose, Level, Lanes)
         for name, text in markdown.fields(kind).items()
     },
-    **{name: markdown.fields(kind)[name] for kind in OWN for name in kind.defaults},
+    **{name: markdown.fields(kind)[name] for kind in SUITE_MODIFIERS for name in kind.defaults},
     **_MEANINGS,
 }
 _BOUNDS = {
@@ -59,7 +59,7 @@ def of_task(kind: type[Task]) -> str:
 
 def of_all_tasks() -> str:
     """Return the table of the settings that every task has."""
-    defaults = {"": {name: default for kind in OWN for name, default in kind.defaults.items()}}
+    defaults = {"": {name: default for kind in SUITE_MODIFIERS for name, default in kind.defaults.items()}}
     names = ("random", "time_limit", "arena", "on_divergence", *defaults[""])
     return table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in names))
 

@@ -9,12 +9,12 @@ from collections.abc import Callable
 import jax
 
 from arc_suite import checks
-from arc_suite.tasks.modifiers.contacts import FRICTIONS
+from arc_suite.tasks.modifiers.contacts import FRICTION_FIELDS
 
 # Fields of the model that each range multiplies. Others would need constants that MuJoCo derives from them, as mass
 # does: that is a setting of every task.
 _FIELDS = {
-    "friction": FRICTIONS,
+    "friction": FRICTION_FIELDS,
     "motor_strength": ("actuator_gear",),
     "damping": ("dof_damping",),
 }

@@ -24,34 +24,53 @@ from arc_suite.tasks.modifiers.observation_noise import ObservationNoise
 from arc_suite.tasks.modifiers.pushes import Pushes
 from arc_suite.tasks.modifiers.sensors import Sensors
 
-# The suite's own, from the body outwards. A modified task has all of them.
-OWN: tuple[type[Modifier], ...] = (
-    *(Contacts, Masses, Sensors, Control, Motors, Kicks, Pushes),
-    *(Delay, ExcludedBlocks, ObservationNoise, History),
+# The suite's modifiers, from the body outwards. A modified task has all of them.
+SUITE_MODIFIERS: tuple[type[Modifier], ...] = (
+    Contacts,
+    Masses,
+    Sensors,
+    Control,
+    Motors,
+    Kicks,
+    Pushes,
+    Delay,
+    ExcludedBlocks,
+    ObservationNoise,
+    History,
 )
 
-# By name of a setting: the modifier that has it. `registration.register` adds those of other packages.
-MODIFIERS: dict[str, type[Modifier]] = {name: kind for kind in OWN for name in kind.defaults}
+# Name of a setting -> the modifier that has it. `registration.register` adds the modifiers of other packages.
+MODIFIERS: dict[str, type[Modifier]] = {
+    setting: modifier for modifier in SUITE_MODIFIERS for setting in modifier.defaults
+}
 
 
 def fit_modifiers(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> tuple[Modifier, ...]:
-    """Return the modifiers that settings ask for: all of the suite's own, and those of other packages that are named.
+    """Return the modifiers for some settings: all of the suite's, and those of other packages that have a setting here.
 
     Args:
         settings: some of the settings in `MODIFIERS`, by name.
-        body: that is modified.
+        body: the body of the task.
         blocks: of the task's observation, by name.
 
     Raises:
         ValueError: an unknown name, or a value that does not fit.
     """
-    kinds = dict.fromkeys(OWN)
+    modifiers = list(SUITE_MODIFIERS)
     for name in settings:
-        kinds[MODIFIERS[checks.name(name, MODIFIERS, "modifier")]] = None
-    values = {name: value for kind in kinds for name, value in kind.defaults.items()} | dict(settings)
-    return tuple(kind.of(values, body, blocks) for kind in kinds)
+        modifier = MODIFIERS[checks.name(name, MODIFIERS, "modifier")]
+        if modifier not in modifiers:
+            modifiers.append(modifier)
+    values: dict[str, Any] = {}
+    for modifier in modifiers:
+        values |= modifier.defaults
+    values |= settings
+    return tuple(modifier.of(values, body, blocks) for modifier in modifiers)
 
 
 def bounds() -> dict[str, tuple[float, float]]:
-    """Return the bounds of numbers, or of each of two, by name of the setting."""
-    return {name: limits for kind in dict.fromkeys(MODIFIERS.values()) for name, limits in kind.bounds.items()}
+    """Return the lowest and highest number by name of the setting; both ends of a range lie between them."""
+    limits: dict[str, tuple[float, float]] = {}
+    for modifier in MODIFIERS.values():
+        limits |= modifier.bounds
+    return limits

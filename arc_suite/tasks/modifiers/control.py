@@ -10,7 +10,7 @@ from arc_suite.models.sizing import position_gains, reaches, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
-from arc_suite.tasks.modifiers.draws import Episode, within
+from arc_suite.tasks.modifiers.draws import Episode, interpolate
 from arc_suite.tasks.modifiers.modifier import Modifier
 from arc_suite.tasks.modifiers.multiples import find_multiples
 from arc_suite.tasks.parts import Scalar
@@ -19,7 +19,8 @@ from arc_suite.tasks.scene import Scene
 
 ACTIONS = ("torque", "position")
 
-_SERVOS = ("actuator_gainprm", "actuator_biasprm")  # of both: offset, stiffness, damping
+# Fields of the model with a row for each servo. The first three columns are: offset, stiffness, damping.
+_SERVO_FIELDS = ("actuator_gainprm", "actuator_biasprm")
 
 
 class ControlState(NamedTuple):
@@ -49,21 +50,21 @@ class Control(_ControlFields, Modifier):
     """Control of the joints.
 
     Attributes:
-        gains: multiple of the stiffness, and another of the damping, of position control and servos, or two of them.
-        actions: "torque", or "position": an action is then the joints' wanted angles, 0 for the standing
-            pose and as far as the farther limit of a joint's range for 1 and -1, held by the body's own gains. None:
-            torques of motors and positions of servos, which take nothing else.
+        gains: range of the multiple of the stiffness, and of that of the damping, of position control and servos.
+        actions: "torque", or "position": an action is then the target angles of the joints. 0 is the standing pose, 1
+            and -1 are as far from it as the farther limit of the joint's range. The setting None stands for torques of
+            motors, and for positions of servos, which take nothing else.
         is_of_servos: whether servos hold positions by themselves.
         stiffness: (joints,) action per rad.
         damping: (joints,) action per rad/s.
-        reach: (joints,) the farther limit of each joint's range, from the standing pose, rad.
+        reach: (joints,) distance of the farther limit of each joint's range from the standing pose, rad.
     """
 
     __slots__ = ()
 
     defaults = {"gains": (1.0, 1.0), "actions": None}
     bounds = {"gains": (0.01, 10.0)}
-    read_back_fields = _SERVOS
+    read_back_fields = _SERVO_FIELDS
 
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
@@ -88,65 +89,82 @@ class Control(_ControlFields, Modifier):
 
     def draw(self, episode: Episode) -> ControlState:
         """Return the gains of the episode."""
-        still = np.zeros(len(self.reach))
-        return ControlState(within(self.gains, episode.keyed.gains), still, still)
+        zeros = np.zeros(len(self.reach))
+        return ControlState(interpolate(self.gains, episode.keyed.gains), angles=zeros, speeds=zeros)
 
     def fields(self, scene: Scene, model: Mapping[str, Any], state: ControlState) -> dict[str, Any]:
         """Return the gains of servos."""
         if not self.is_of_servos or self.gains == (1.0, 1.0):
             return {}
-        multiples = np.ones(model[_SERVOS[0]].shape[1])
-        multiples[:3] = state.gains[[0, 0, 1]]
-        return {name: multiples * model[name] for name in _SERVOS}
+        stiffness_gain = state.gains[0]
+        damping_gain = state.gains[1]
+        columns = model["actuator_gainprm"].shape[1]
+        multiples = np.ones(columns)
+        multiples[:3] = (stiffness_gain, stiffness_gain, damping_gain)  # offset, stiffness, damping
+        return {name: multiples * model[name] for name in _SERVO_FIELDS}
 
     def act(self, state: ControlState, action, elapsed) -> tuple[ControlState, Any]:
         """Return the torques that hold the positions of an action."""
         return state, self.torques(state, action)
 
     def torques(self, state: ControlState, action):
-        """Return the actions (..., joints) in [-1, 1] of motors that hold joints at the positions of an action."""
+        """Return the torques (..., joints) of motors, in [-1, 1], that hold joints at the positions of an action."""
         stiffness_gain = state.gains[..., :1]
         damping_gain = state.gains[..., 1:]
-        pull = stiffness_gain * (self.stiffness * (self.reach * action - state.angles))
-        return (pull - damping_gain * (self.damping * state.speeds)).clip(-1.0, 1.0)
+        target_angles = self.reach * action
+        spring = stiffness_gain * (self.stiffness * (target_angles - state.angles))
+        damper = damping_gain * (self.damping * state.speeds)
+        return (spring - damper).clip(-1.0, 1.0)
 
     def positions(self, torques, angles, speeds):
-        """Return the action (..., joints) for which motors that hold positions give torques, as far as joints reach.
+        """Return the action (..., joints) by which position control gives some torques: the inverse of `torques`.
+
+        An action is clipped to [-1, 1], so that targets stay within the reach of the joints.
 
         Args:
             torques: (..., joints) in [-1, 1].
             angles: (..., joints) of the joints, rad.
             speeds: (..., joints) of the joints, rad/s.
         """
-        return ((angles + (torques + self.damping * speeds) / self.stiffness) / self.reach).clip(-1.0, 1.0)
+        target_angles = angles + (torques + self.damping * speeds) / self.stiffness
+        return (target_angles / self.reach).clip(-1.0, 1.0)
 
     def measure(self, state: ControlState, readings: Readings) -> ControlState:
         """Return the state with the joints' angles and velocities."""
-        return state._replace(angles=readings.joint_angles + 0.0, speeds=readings.velocities[..., 6:] + 0.0)
+        # Sums with 0 are copies: readings may be views of the simulation.
+        angles = readings.joint_angles + 0.0
+        speeds = readings.velocities[..., 6:] + 0.0  # after 6 numbers of the torso
+        return state._replace(angles=angles, speeds=speeds)
 
     def privileged_blocks(self, body: Body) -> dict[str, Block]:
         """Return the block `gains`."""
         return {"gains": Block((Scalar("multiple of the stiffness"), Scalar("multiple of the damping")))}
 
     def privileged(self, state: ControlState, elapsed, heading) -> dict[str, Any]:
-        """Return the multiples."""
+        """Return the multiples of stiffness and damping."""
         return {"gains": state.gains}
 
     def read_back(self, scene: Scene, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the mean multiples of the gains of servos, of a body that has them."""
-        joints = len(scene.body.joint_names)
-        columns = (np.s_[:joints, 0], np.s_[:joints, 2])  # stiffness, damping
-        multiples = [find_multiples(scene, fields, *pair) for pair in zip(_SERVOS, columns, strict=True)]
-        if not self.is_of_servos or all(multiple is None for multiple in multiples):
+        """Return the mean multiples of the gains of servos that a user has changed; nothing for motors."""
+        if not self.is_of_servos:
             return {}
-        gains = [
-            gain if multiple is None else multiple.mean()
-            for gain, multiple in zip(blocks["gains"], multiples, strict=True)
-        ]
-        return {"gains": blocks["gains"].__array_namespace__().stack(gains)}
+        joints = len(scene.body.joint_names)
+        # The gain of a servo is its stiffness, the third number of its bias its damping.
+        stiffness = find_multiples(scene, fields, "actuator_gainprm", np.s_[:joints, 0])
+        damping = find_multiples(scene, fields, "actuator_biasprm", np.s_[:joints, 2])
+        if stiffness is None and damping is None:
+            return {}
+        stiffness_gain, damping_gain = blocks["gains"]
+        if stiffness is not None:
+            stiffness_gain = stiffness.mean()
+        if damping is not None:
+            damping_gain = damping.mean()
+        xp = blocks["gains"].__array_namespace__()
+        return {"gains": xp.stack([stiffness_gain, damping_gain])}
 
 
 def _check_actions(value, body: Body) -> str:
+    """Return the checked setting `actions`; in place of None, what the motors or servos of the body take."""
     if value is None:
         return "position" if body.source else "torque"
     if checks.name(value, ACTIONS, "actions") == "torque" and body.source:

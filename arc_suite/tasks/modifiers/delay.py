@@ -11,14 +11,14 @@ from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.modifiers.draws import Episode
 from arc_suite.tasks.modifiers.modifier import Modifier
 
-LONGEST_DELAY = 100  # control steps
+MAX_DELAY = 100  # control steps
 
 
 class DelayState(NamedTuple):
-    """Actions under way.
+    """Actions that have not arrived at the motors.
 
     Attributes:
-        delay: (...) of actions, control steps.
+        delay: (...) of actions in this episode, control steps.
         waiting: (..., longest delay, joints) the latest actions, the newest first.
     """
 
@@ -34,22 +34,26 @@ class Delay(_DelayFields, Modifier):
     """Delay of actions.
 
     Attributes:
-        delay: delay of actions, control steps, or two of them.
+        delay: lowest and highest delay of actions, control steps.
     """
 
     __slots__ = ()
 
     defaults = {"delay": (0, 0)}
-    bounds = {"delay": (0, LONGEST_DELAY)}
+    bounds = {"delay": (0, MAX_DELAY)}
 
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
         value = settings["delay"]
-        least, most = cls.bounds["delay"]
-        low, high = value if isinstance(value, tuple | list) and len(value) == 2 else (value, value)
-        low = checks.integer("delay", low, least, most)
-        return cls((low, checks.integer("delay", high, low, most)))
+        if isinstance(value, tuple | list) and len(value) == 2:
+            low, high = value
+        else:
+            low = value
+            high = value
+        lowest = checks.integer("delay", low, 0, MAX_DELAY)
+        highest = checks.integer("delay", high, lowest, MAX_DELAY)
+        return cls((lowest, highest))
 
     @property
     def is_active(self) -> bool:
@@ -62,15 +66,16 @@ class Delay(_DelayFields, Modifier):
         return self.delay[1]
 
     def draw(self, episode: Episode) -> DelayState:
-        """Return the delay of the episode, and no action."""
+        """Return the delay of the episode; until the first action arrives, motors get zeros."""
         low, high = self.delay
-        waiting = np.zeros((high, len(episode.scene.body.joint_names)))
-        return DelayState(low + int(episode.stream.delay * (high - low + 1)), waiting)
+        delay = low + int(episode.stream.delay * (high - low + 1))
+        joints = len(episode.scene.body.joint_names)
+        return DelayState(delay, waiting=np.zeros((high, joints)))
 
     def act(self, state: DelayState, action, elapsed) -> tuple[DelayState, Any]:
-        """Return the state with an action among those that wait, and the one that arrives."""
+        """Return the state with the new action among those that wait, and the action that arrives in this step."""
         xp = action.__array_namespace__()
-        under_way = xp.concatenate([action[..., None, :], state.waiting], axis=-2)
-        delay = xp.asarray(state.delay)[..., None, None]
-        arrived = xp.take_along_axis(under_way, delay, axis=-2)[..., 0, :]
+        under_way = xp.concatenate([action[..., None, :], state.waiting], axis=-2)  # (..., longest delay + 1, joints)
+        index = xp.asarray(state.delay)[..., None, None]
+        arrived = xp.take_along_axis(under_way, index, axis=-2)[..., 0, :]
         return state._replace(waiting=under_way[..., :-1, :]), arrived

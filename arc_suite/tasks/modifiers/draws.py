@@ -1,22 +1,23 @@
 """The random numbers of the suite's own modifiers in one episode: all are drawn, always, in one order.
 
-The first ones come from the stream of seeds, the others from a key among these. So the stream is not longer than it was
-when there were fewer modifiers.
+The first ones come from the stream of seeds. The last of these is a key, and all other numbers follow from the key. So
+a new modifier takes nothing from the stream, and the episodes of a seed stay as they are.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from arc_suite.tasks import noise
 from arc_suite.tasks.scene import Scene
 
-SCHEDULE = 25  # kicks or pushes of a schedule
-SHORTEST = 40  # control steps from one to the next
-LONGEST = 121  # one more than the most control steps from one to the next
+SCHEDULE = 25  # number of kicks, or of pushes, in a schedule
+MIN_INTERVAL = 40  # control steps from a kick or push to the next
+INTERVAL_BOUND = 121  # control steps; intervals are shorter than this
 
-_STEP = np.array([2**32 - 1], np.uint32)  # of the noise's generator, to which no episode counts
+# The step of the noise's generator from which an episode draws; no episode is long enough to reach this step itself.
+_DRAWING_STEP = np.array([2**32 - 1], np.uint32)
 
 
 class StreamDraws(NamedTuple):
@@ -26,19 +27,19 @@ class StreamDraws(NamedTuple):
         kick_steps: (SCHEDULE,) control steps before which kicks come, each 40 to 120 after the one before.
         kick_sizes: (SCHEDULE,) uniform in [0, 1).
         kick_directions: (SCHEDULE,) rad, uniform in [0, 2 pi).
-        leg: index of one.
-        strength: position of the motors' strength in its range, uniform in [0, 1).
+        failing_leg: index of the leg whose motors may fail.
+        motor_strength: position of the motors' strength in its range, uniform in [0, 1).
         friction: position of the friction in its range, uniform in [0, 1).
         mass: position of the mass in its range, uniform in [0, 1).
         delay: position of the delay in its range, uniform in [0, 1).
-        noise_key: an integer of 32 bits.
+        noise_key: an integer of 32 bits, from which `KeyedDraws` and the noise of observations follow.
     """
 
     kick_steps: np.ndarray
     kick_sizes: np.ndarray
     kick_directions: np.ndarray
-    leg: int
-    strength: float
+    failing_leg: int
+    motor_strength: float
     friction: float
     mass: float
     delay: float
@@ -49,30 +50,30 @@ class KeyedDraws(NamedTuple):
     """Numbers that follow from the key of the noise, each uniform in [0, 1).
 
     Attributes:
-        payload: position of its mass in the range.
-        place: (3,) of the payload in the box around the torso.
-        center: (3,) of mass in the range of its displacements.
+        payload: position of the payload's mass in its range.
+        payload_place: (3,) position of the payload in the box around the torso.
+        center_of_mass: (3,) position of the torso's center of mass in the range of its displacements.
         gains: (2,) positions of stiffness and of damping in their range.
-        armature: position in its range.
-        pauses: (SCHEDULE,) before pushes.
-        lengths: (SCHEDULE,) of pushes in time.
-        sizes: (SCHEDULE,) of pushes.
-        directions: (SCHEDULE,) of pushes.
-        strengths: (joints,) positions of each joint's strength in the range.
-        offsets: (joints,) positions of the sensors' offsets in their range.
+        armature: position of the armature in its range.
+        push_intervals: (SCHEDULE,) positions of the time before each push in its range.
+        push_durations: (SCHEDULE,) positions of the time that each push lasts in its range.
+        push_sizes: (SCHEDULE,) shares of the greatest force.
+        push_directions: (SCHEDULE,) turns.
+        joint_strengths: (joints,) positions of each joint's strength in its range.
+        joint_offsets: (joints,) positions of each sensor's offset in its range.
     """
 
     payload: float
-    place: np.ndarray
-    center: np.ndarray
+    payload_place: np.ndarray
+    center_of_mass: np.ndarray
     gains: np.ndarray
     armature: float
-    pauses: np.ndarray
-    lengths: np.ndarray
-    sizes: np.ndarray
-    directions: np.ndarray
-    strengths: np.ndarray
-    offsets: np.ndarray
+    push_intervals: np.ndarray
+    push_durations: np.ndarray
+    push_sizes: np.ndarray
+    push_directions: np.ndarray
+    joint_strengths: np.ndarray
+    joint_offsets: np.ndarray
 
 
 class Episode(NamedTuple):
@@ -89,37 +90,65 @@ class Episode(NamedTuple):
     keyed: KeyedDraws
 
     def generator(self, name: str) -> np.random.Generator:
-        """Return a generator for a modifier of another package, by its name; it takes nothing from the stream."""
+        """Return a generator for a modifier of another package, given its name; it takes nothing from the stream."""
         return np.random.default_rng((int(self.stream.noise_key), *name.encode()))
 
 
 def draw_episode(scene: Scene, random: np.random.RandomState) -> Episode:
     """Draw the numbers of an episode."""
     stream = draw_from_stream(random, len(scene.body.legs))
-    return Episode(scene, stream, draw_by_key(stream.noise_key, len(scene.body.joint_names)))
+    keyed = draw_by_key(stream.noise_key, len(scene.body.joint_names))
+    return Episode(scene, stream, keyed)
 
 
 def draw_from_stream(random: np.random.RandomState, legs: int) -> StreamDraws:
     """Draw the numbers that come from the stream of seeds, for a body with a number of legs."""
+    intervals = random.randint(MIN_INTERVAL, INTERVAL_BOUND, SCHEDULE)
+    kick_sizes = random.uniform(size=SCHEDULE)
+    kick_directions = random.uniform(0.0, 2.0 * math.pi, SCHEDULE)
+    failing_leg = random.randint(legs)
+    motor_strength, friction, mass, delay = random.uniform(size=4)
     return StreamDraws(
-        random.randint(SHORTEST, LONGEST, SCHEDULE).cumsum(),
-        random.uniform(size=SCHEDULE),
-        random.uniform(0.0, 2.0 * math.pi, SCHEDULE),
-        random.randint(legs),
-        *random.uniform(size=4),
-        random.randint(2**32, dtype=np.uint32),
+        kick_steps=intervals.cumsum(),
+        kick_sizes=kick_sizes,
+        kick_directions=kick_directions,
+        failing_leg=failing_leg,
+        motor_strength=motor_strength,
+        friction=friction,
+        mass=mass,
+        delay=delay,
+        noise_key=random.randint(2**32, dtype=np.uint32),
     )
 
 
 def draw_by_key(noise_key: int, joints: int) -> KeyedDraws:
     """Draw the numbers that follow from the key of the noise, for a body with a number of joints."""
-    sizes = (1, 3, 3, 2, 1, *[SCHEDULE] * 4, joints, joints)
-    uniform = 0.5 + 0.5 * noise.noise(np.array([noise_key], np.uint32), _STEP, sum(sizes))
-    draws = KeyedDraws(*np.split(uniform, np.cumsum(sizes)[:-1]))
-    return draws._replace(payload=draws.payload[0], armature=draws.armature[0])
+    counts = {
+        "payload": 1,
+        "payload_place": 3,
+        "center_of_mass": 3,
+        "gains": 2,
+        "armature": 1,
+        "push_intervals": SCHEDULE,
+        "push_durations": SCHEDULE,
+        "push_sizes": SCHEDULE,
+        "push_directions": SCHEDULE,
+        "joint_strengths": joints,
+        "joint_offsets": joints,
+    }
+    key = np.array([noise_key], np.uint32)
+    uniform = 0.5 + 0.5 * noise.noise(key, _DRAWING_STEP, sum(counts.values()))
+    draws: dict[str, Any] = {}
+    start = 0
+    for name, count in counts.items():
+        draws[name] = uniform[start : start + count]
+        start += count
+    draws["payload"] = draws["payload"][0]
+    draws["armature"] = draws["armature"][0]
+    return KeyedDraws(**draws)
 
 
-def within(span: tuple[float, float], share):
-    """Return the number (...) that lies at a share (...) of a range."""
+def interpolate(span: tuple[Any, Any], share):
+    """Return the number (...) that lies at a share (...) of the way from the low end of a range to its high end."""
     low, high = span
     return low + share * (high - low)

@@ -17,7 +17,7 @@ class ExcludedBlocks(_ExcludedBlocksFields, Modifier):
     """Blocks that are not observed.
 
     Attributes:
-        exclude_blocks: names of blocks that the observation leaves out: the vector gets shorter.
+        exclude_blocks: names of blocks that the observation leaves out. The vector gets shorter.
     """
 
     __slots__ = ()
@@ -40,11 +40,11 @@ class ExcludedBlocks(_ExcludedBlocksFields, Modifier):
         return self.exclude_blocks
 
     def blocks(self, body: Body, blocks: Mapping[str, Block]) -> Mapping[str, Block]:
-        """Return the other blocks."""
+        """Return the blocks that are not left out."""
         return {name: block for name, block in blocks.items() if name not in self.exclude_blocks}
 
     def observe(self, state, observed: dict, elapsed) -> dict[str, Any]:
-        """Return the other blocks."""
+        """Return the blocks that are not left out."""
         return {name: block for name, block in observed.items() if name not in self.exclude_blocks}
 
 

@@ -18,7 +18,7 @@ from arc_suite.tasks.parts import Planar
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.scene import Inputs, Scene
 
-SHOWN = 10  # control steps for which pictures show a kick
+ARROW_STEPS = 10  # control steps for which pictures show the arrow of a kick
 
 
 class KicksState(NamedTuple):
@@ -32,10 +32,12 @@ class KicksState(NamedTuple):
     steps: np.ndarray
     kicks: np.ndarray
 
-    def due(self, elapsed):
-        """Return the change of velocity (..., 2) by a kick in the step after others (..., 1)."""
-        is_due = elapsed % self.steps[..., -1:] + 1 == self.steps
-        return (is_due[..., None] * self.kicks).sum(axis=-2)
+    def kick_after(self, elapsed):
+        """Return the kick (..., 2), m/s, that comes after (..., 1) control steps; 0 where no kick comes."""
+        period = self.steps[..., -1:]
+        step = elapsed % period + 1
+        comes = step == self.steps
+        return (comes[..., None] * self.kicks).sum(axis=-2)
 
 
 class _KicksFields(NamedTuple):
@@ -48,10 +50,10 @@ class Kicks(_KicksFields, Modifier):
     """Kicks of the torso.
 
     Attributes:
-        kicks: the greatest change of the torso's velocity by a kick, sqrt(g h): each of a schedule is
-            uniform from 0 up to it, in any horizontal direction, 40 to 120 control steps apart.
+        kicks: the greatest change of the torso's velocity by a kick, sqrt(g h). The size of each kick is uniform from 0
+            up to it, in any horizontal direction. Kicks are 40 to 120 control steps apart.
         height: (1,) the standing height, m.
-        velocities: how many the simulation has.
+        velocities: nv, the number of velocities of the simulation.
     """
 
     __slots__ = ()
@@ -62,8 +64,9 @@ class Kicks(_KicksFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        joints = len(body.joint_names) + len(body.held)
-        return cls(cls.check_number("kicks", settings), np.array([body.torso.standing_height]), 6 + joints)
+        joints = len(body.joint_names) + len(body.held)  # `held` joints move in the simulation, but have no motors
+        velocities = 6 + joints  # 6 of the torso
+        return cls(cls.check_number("kicks", settings), np.array([body.torso.standing_height]), velocities)
 
     @property
     def is_active(self) -> bool:
@@ -74,29 +77,34 @@ class Kicks(_KicksFields, Modifier):
         """Return the schedule of the episode."""
         stream = episode.stream
         directions = np.stack([np.cos(stream.kick_directions), np.sin(stream.kick_directions)], axis=-1)
-        unit = self.kicks * math.sqrt(GRAVITY * episode.scene.body.torso.standing_height)
-        return KicksState(stream.kick_steps, unit * stream.kick_sizes[:, None] * directions)
+        greatest = self.kicks * math.sqrt(GRAVITY * episode.scene.body.torso.standing_height)  # m/s
+        return KicksState(stream.kick_steps, greatest * stream.kick_sizes[:, None] * directions)
 
     def drive(self, state: KicksState, inputs: Inputs, elapsed) -> Inputs:
-        """Return the inputs with the kick (..., nv) that is due."""
-        push = state.due(elapsed)
-        xp = push.__array_namespace__()
-        kick = xp.concatenate([push, xp.zeros((*push.shape[:-1], self.velocities - 2))], axis=-1)
+        """Return the inputs with the kick (..., nv) of this control step."""
+        planar_kick = state.kick_after(elapsed)
+        xp = planar_kick.__array_namespace__()
+        zeros = xp.zeros((*planar_kick.shape[:-1], self.velocities - 2))
+        kick = xp.concatenate([planar_kick, zeros], axis=-1)
         return inputs._replace(kick=kick if inputs.kick is None else inputs.kick + kick)
 
     def privileged_blocks(self, body: Body) -> dict[str, Block]:
-        """Return the block `kick`: change of the torso's velocity in the latest step."""
+        """Return the block `kick`: the change of the torso's velocity by a kick in the latest step."""
         return {"kick": Block((Planar("kick", "sqrt(g h)"),))}
 
     def privileged(self, state: KicksState, elapsed, heading) -> dict[str, Any]:
-        """Return the kick as the torso heads."""
-        has_begun = elapsed > 0
-        kick = state.due(elapsed - has_begun) * has_begun / (GRAVITY * self.height) ** 0.5
+        """Return the kick of the latest step, forward and left of the torso, in sqrt(g h); 0 before the first step."""
+        has_begun = elapsed > 0  # counts as 0 or 1
+        steps_before_latest = elapsed - has_begun
+        velocity_unit = (GRAVITY * self.height) ** 0.5  # m/s
+        kick = state.kick_after(steps_before_latest) * has_begun / velocity_unit
         return {"kick": rotations.to_heading_frame(kick, heading)}
 
     def markers(self, scene: Scene, state: KicksState, readings: Readings, elapsed: int) -> Iterator[Marker]:
-        """Yield an arrow for some steps after a kick."""
-        since = elapsed - state.steps
-        is_shown = (since >= 0) & (since % state.steps[-1] < SHOWN)
-        for kick in state.kicks[is_shown] / math.sqrt(GRAVITY * scene.body.torso.standing_height):
+        """Yield an arrow for some control steps after a kick."""
+        period = state.steps[-1]
+        steps_since_kick = elapsed - state.steps
+        is_shown = (steps_since_kick >= 0) & (steps_since_kick % period < ARROW_STEPS)
+        velocity_unit = math.sqrt(GRAVITY * scene.body.torso.standing_height)  # m/s
+        for kick in state.kicks[is_shown] / velocity_unit:
             yield from draw_arrow(scene.body, readings, kick)

@@ -10,22 +10,22 @@ from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.inertia import Inertia
-from arc_suite.tasks.modifiers.draws import Episode, within
+from arc_suite.tasks.modifiers.draws import Episode, interpolate
 from arc_suite.tasks.modifiers.modifier import Modifier
 from arc_suite.tasks.parts import Scalar, Vector
 from arc_suite.tasks.scene import Scene
 
-_MASSES = ("body_mass", "body_inertia")
-_INERTIA = ("body_mass", "body_ipos", "body_inertia", "body_iquat")  # in the order of `Inertia`
+_MASS_FIELDS = ("body_mass", "body_inertia")  # fields of the model that the setting `mass` multiplies
+_INERTIA_FIELDS = ("body_mass", "body_ipos", "body_inertia", "body_iquat")  # in the order of the fields of `Inertia`
 
 
 class MassesState(NamedTuple):
     """What an episode draws of masses.
 
     Attributes:
-        mass: (..., 1) multiple.
-        payload: (..., 4) its mass, a share of the body's, and its place in the torso's frame, h.
-        center_of_mass: (..., 3) displacement in the torso's frame, h.
+        mass: (..., 1) multiple of mass and inertia of all parts.
+        payload: (..., 4) mass of the payload, a share of the body's, and its place in the torso's frame, h.
+        center_of_mass: (..., 3) displacement of the torso's center of mass in the torso's frame, h.
     """
 
     mass: np.ndarray
@@ -43,9 +43,9 @@ class Masses(_MassesFields, Modifier):
     """Masses of the body.
 
     Attributes:
-        mass: multiple of mass and inertia of all parts, or two of them.
-        payload: mass of a load as a share of the body's, or two of them; its place, uniform in the box around
-            the torso, is drawn.
+        mass: range of the multiple of mass and inertia of all parts.
+        payload: range of the mass of a load, as a share of the body's. The place of the load is uniform in the box
+            around the torso.
         center_of_mass: the greatest displacement of the torso's center of mass along each axis, h.
     """
 
@@ -64,28 +64,29 @@ class Masses(_MassesFields, Modifier):
 
     @property
     def is_active(self) -> bool:
-        """Whether steps have to call it: never, as the model holds it."""
+        """Whether steps have to call it: never, as the simulation itself has the masses."""
         return False
 
     def draw(self, episode: Episode) -> MassesState:
         """Return the masses of the episode."""
         body = episode.scene.body
         keyed = episode.keyed
-        low, high = (corner / body.torso.standing_height for corner in torso_box(body))
-        payload_share = within(self.payload, keyed.payload)
-        payload_position = within((low, high), keyed.place)
+        low_corner, high_corner = torso_box(body)  # m
+        height = body.torso.standing_height
+        payload_share = interpolate(self.payload, keyed.payload)
+        payload_place = interpolate((low_corner / height, high_corner / height), keyed.payload_place)
         return MassesState(
-            mass=np.array([within(self.mass, episode.stream.mass)]),
-            payload=np.array([payload_share, *payload_position]),
-            center_of_mass=self.center_of_mass * (2.0 * keyed.center - 1.0),
+            mass=np.array([interpolate(self.mass, episode.stream.mass)]),
+            payload=np.array([payload_share, *payload_place]),
+            center_of_mass=self.center_of_mass * (2.0 * keyed.center_of_mass - 1.0),
         )
 
     def fields(self, scene: Scene, model: Mapping[str, Any], state: MassesState) -> dict[str, Any]:
         """Return the masses and inertias of the model."""
         fields = {}
         if self.mass != (1.0, 1.0):
-            fields = {name: state.mass[0] * model[name] for name in _MASSES}
-        if self.payload != (0.0, 0.0) or self.center_of_mass:
+            fields = {name: state.mass[0] * model[name] for name in _MASS_FIELDS}
+        if self.payload != (0.0, 0.0) or self.center_of_mass != 0.0:
             fields |= _change_torso(scene, state, {**model, **fields})
         return fields
 
@@ -98,13 +99,14 @@ class Masses(_MassesFields, Modifier):
         }
 
     def privileged(self, state: MassesState, elapsed, heading) -> dict[str, Any]:
-        """Return what was drawn."""
+        """Return the masses that the episode has drawn."""
         return state._asdict()
 
     def read_back(self, scene: Scene, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the multiple of the legs' mass, the payload, and the displacement of the torso's center of mass.
+        """Return the blocks for masses that a user has changed; nothing where they are as compiled.
 
-        What the torso weighs in addition is the payload, in the torso's center of mass.
+        `mass` is then the multiple of the mass of the legs. The additional mass of the torso counts as the payload.
+        Its place is the torso's center of mass, whose displacement is `center_of_mass`.
         """
         if not any(name in fields for name in self.read_back_fields):
             return {}
@@ -112,15 +114,18 @@ class Masses(_MassesFields, Modifier):
         height = scene.body.torso.standing_height
         body_mass = standing(scene.body).mass
         torso = scene.layout.torso
-        legs = np.arange(len(scene.model["body_mass"]))[scene.layout.parts][1:]
-        torso_mass = scene.model["body_mass"][torso]
+        compiled_masses = scene.model["body_mass"]
+        parts = np.arange(len(compiled_masses))[scene.layout.parts]
+        leg_parts = parts[1:]  # without the torso
+        torso_mass = compiled_masses[torso]
         torso_center = scene.model["body_ipos"][torso]
+        # The masses that the episode has drawn; of changed fields, those of the user.
         multiple = blocks["mass"]
-        payload = body_mass * blocks["payload"][:1]
+        payload = body_mass * blocks["payload"][:1]  # kg
         moment = torso_mass * (torso_center + height * blocks["center_of_mass"])
         center = (moment + payload * height * blocks["payload"][1:]) / (torso_mass + payload)
         if "body_mass" in fields:
-            multiple = fields["body_mass"][legs].sum(keepdims=True) / scene.model["body_mass"][legs].sum()
+            multiple = fields["body_mass"][leg_parts].sum(keepdims=True) / compiled_masses[leg_parts].sum()
             payload = fields["body_mass"][[torso]] / multiple - torso_mass
         if "body_ipos" in fields:
             center = fields["body_ipos"][torso]
@@ -132,16 +137,16 @@ class Masses(_MassesFields, Modifier):
 
 
 def _change_torso(scene: Scene, state: MassesState, model: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the masses with a payload on the torso, and its center of mass moved."""
-    part = scene.layout.torso
+    """Return the inertia fields, in which the torso's center of mass is displaced and the torso has a payload."""
+    index = scene.layout.torso
     height = scene.body.torso.standing_height
-    fields = {name: model[name].copy() for name in _INERTIA}
-    torso = Inertia(*(fields[name][part] for name in _INERTIA))
+    torso = Inertia(*(model[name][index] for name in _INERTIA_FIELDS))
     torso = torso._replace(center=torso.center + height * state.center_of_mass)
     payload_share = state.payload[0]
     if payload_share > 0.0:
-        payload = payload_share * state.mass[0] * standing(scene.body).mass
+        payload = payload_share * state.mass[0] * standing(scene.body).mass  # kg
         torso = torso.with_point(payload, height * state.payload[1:])
-    for name, value in zip(_INERTIA, torso, strict=True):
-        fields[name][part] = value
+    fields = {name: model[name].copy() for name in _INERTIA_FIELDS}
+    for name, value in zip(_INERTIA_FIELDS, torso, strict=True):
+        fields[name][index] = value
     return fields

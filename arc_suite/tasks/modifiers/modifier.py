@@ -1,8 +1,8 @@
-"""What a modifier is: one or several settings that belong together, as one value.
+"""The base class of modifiers: a modifier is one value with one or several settings that belong together.
 
 A modifier says what an episode draws, which fields of the model change, and what happens to actions, readings and
 observations. Its methods are pure functions of arrays with any leading axes, like those of a task. `Modified` calls
-them in the order of its modifiers, which lead from the body outwards; actions pass from the last one to the first.
+the modifiers in their order, from the body outwards. Actions pass in the other direction, from the last to the first.
 """
 
 from collections.abc import Hashable, Iterator, Mapping
@@ -19,13 +19,13 @@ from arc_suite.tasks.scene import Inputs, Scene
 
 
 class Modifier:
-    """Base class of modifiers, which are NamedTuples: one value for bodies of a batch stacks their fields.
+    """Base class of modifiers, which are NamedTuples. For a batch of bodies, each field is stacked into one array.
 
     Write `of`, and the methods for what the modifier does. A state is a NamedTuple of arrays, or an empty tuple.
 
     Attributes:
         defaults: by name of a setting, the value that changes nothing.
-        bounds: by name of a setting, the lowest and highest number, or those of each of two.
+        bounds: by name of a setting, the lowest and highest number; both ends of a range lie between them.
         read_back_fields: fields of the model that `read_back` takes.
     """
 
@@ -41,7 +41,7 @@ class Modifier:
 
         Args:
             settings: the values of the settings of all modifiers, by name.
-            body: that is modified.
+            body: the body of the task.
             blocks: of the task's observation, by name.
 
         Raises:
@@ -74,14 +74,14 @@ class Modifier:
 
     @property
     def structure(self) -> Hashable:
-        """What environments of one batch share of it, beyond `is_active`."""
+        """A value that must be equal for all environments of a batch, in addition to `is_active`."""
         return ()
 
     def check_mirror(self, image: Image) -> None:
-        """Check that what it does is as likely on either side of the body.
+        """Check that the modifier treats both sides of the body alike, on average over episodes.
 
         Raises:
-            ValueError: it is not.
+            ValueError: it treats one side differently.
         """
 
     def draw(self, episode: Episode) -> Any:
@@ -96,23 +96,23 @@ class Modifier:
 
         Args:
             scene: of the task.
-            model: the fields that `scene.CHANGEABLE` names, as the task and earlier modifiers have them.
-            state: at the start.
+            model: the fields that `scene.CHANGEABLE` names, as the task and the modifiers before this one change them.
+            state: the state at the start.
         """
         return {}
 
     def act(self, state, action, elapsed) -> tuple[Any, Any]:
-        """Return the state, and the action (..., joints) that the task is given.
+        """Return the state, and the action (..., joints) for the task or the modifier before this one.
 
         Args:
-            state: before the step.
-            action: (..., joints) of the policy, or of the modifier after this one.
+            state: the state before the step.
+            action: (..., joints) of the policy, or from the modifier after this one.
             elapsed: (..., 1) uint32, control steps since the start.
         """
         return state, action
 
     def drive(self, state, inputs: Inputs, elapsed) -> Inputs:
-        """Return what is written into the simulation, given what the task writes; for `elapsed` see `act`."""
+        """Return the inputs of the simulation in a step, given the inputs from the task; for `elapsed` see `act`."""
         return inputs
 
     def sense(self, state, readings: Readings) -> Readings:
@@ -136,33 +136,33 @@ class Modifier:
         return blocks
 
     def privileged_blocks(self, body: Body) -> dict[str, Block]:
-        """Return the privileged blocks that it adds, by name."""
+        """Return the privileged blocks that the modifier adds, by name."""
         return {}
 
     def privileged(self, state, elapsed, heading) -> dict[str, Any]:
-        """Return these blocks, each (..., size).
+        """Return the observation of its privileged blocks, each (..., size), by name.
 
         Args:
-            state: after the step.
+            state: the state after the step.
             elapsed: (..., 1) uint32, control steps since the start.
             heading: (...) of the torso, rad.
         """
         return {}
 
     def read_back(self, scene: Scene, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict[str, Any]:
-        """Return those of its privileged blocks of one environment, each (size,), that changed fields decide.
+        """Return those of its privileged blocks, each (size,), whose values a user has changed in the model.
 
-        A privileged observation shows the body as it is, also where a user has changed the model.
+        A privileged observation shows the body as it is, also where a user has changed the model of an environment.
 
         Args:
             scene: of the task.
-            blocks: privileged blocks as drawn, by name.
+            blocks: the privileged blocks of one environment as the episode has drawn them, by name.
             fields: fields of the model that a user has set, by name.
         """
         return {}
 
     def markers(self, scene: Scene, state, readings: Readings, elapsed: int) -> Iterator[Marker]:
-        """Yield what pictures of one environment show of it."""
+        """Yield the markers with which pictures of one environment show the modifier."""
         yield from ()
 
     def failed_legs(self, scene: Scene, state, elapsed: int) -> tuple[str, ...]:

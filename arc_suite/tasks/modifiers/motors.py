@@ -1,6 +1,5 @@
 """Motors: how strong they are, which fail, and their armatures."""
 
-import math
 from collections.abc import Hashable, Mapping
 from typing import Any, NamedTuple, Self
 
@@ -10,7 +9,7 @@ from arc_suite import checks
 from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
-from arc_suite.tasks.modifiers.draws import Episode, within
+from arc_suite.tasks.modifiers.draws import Episode, interpolate
 from arc_suite.tasks.modifiers.modifier import Modifier
 from arc_suite.tasks.modifiers.multiples import find_multiples
 from arc_suite.tasks.parts import Joints, Scalar
@@ -18,19 +17,19 @@ from arc_suite.tasks.scene import Inputs, Scene
 
 FAILS_FROM = 40  # control steps after which the motors of a leg fail
 
-_LIMITS = "jnt_actfrcrange"  # of the torques of servos
-_FREE = 5  # degrees of freedom of the torso's joint beyond one: joint i has degree i + 5
+_TORQUE_LIMITS = "jnt_actfrcrange"  # field of the model: the lowest and highest torque of each joint's servo
+_EXTRA_DEGREES = 5  # the torso's joint has 6 degrees of freedom, others 1: joint i has degree of freedom i + 5
 
 
 class MotorsState(NamedTuple):
     """What an episode draws of motors.
 
     Attributes:
-        motor_strength: (..., 1) share of all motors.
-        joint_strength: (..., joints) shares of each, in addition.
-        strength: (..., joints) of both.
-        failing: (..., joints) whether they are those of the leg whose motors fail.
-        armature: (..., 1) multiple.
+        motor_strength: (..., 1) share of the torque that all motors give.
+        joint_strength: (..., joints) shares of the torque that each motor gives, in addition.
+        strength: (..., joints) product of both.
+        failing: (..., joints) whether the motor belongs to the leg whose motors fail.
+        armature: (..., 1) multiple of the armatures of all joints.
     """
 
     motor_strength: np.ndarray
@@ -52,12 +51,12 @@ class Motors(_MotorsFields, Modifier):
     """Motors or servos of the joints.
 
     Attributes:
-        motor_strength: share of the torque of all motors, or two of them.
-        joint_strength: share of the torque of each motor, or two of them, in addition to `motor_strength`: every
-            joint draws its own.
-        armature: multiple of the armatures of all joints, or two of them.
-        actuator_failure: True for a leg that is drawn, or the index of one: its motors do nothing from step 40 on.
-        are_servos: whether they are servos.
+        motor_strength: range of the share of the torque that all motors give.
+        joint_strength: range of the share of the torque that each motor gives, in addition to `motor_strength`. Each
+            joint has a share of its own.
+        armature: range of the multiple of the armatures of all joints.
+        actuator_failure: the index of a leg whose motors do nothing from step 40 on; True for a random leg.
+        are_servos: whether the joints have servos in place of motors.
     """
 
     __slots__ = ()
@@ -69,7 +68,7 @@ class Motors(_MotorsFields, Modifier):
         "actuator_failure": False,
     }
     bounds = {"motor_strength": (0.0, 1.0), "joint_strength": (0.0, 1.0), "armature": (0.01, 100.0)}
-    read_back_fields = ("dof_armature", "actuator_gear", "actuator_gainprm", _LIMITS)
+    read_back_fields = ("dof_armature", "actuator_gear", "actuator_gainprm", _TORQUE_LIMITS)
 
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
@@ -77,8 +76,13 @@ class Motors(_MotorsFields, Modifier):
         failure = settings["actuator_failure"]
         if not isinstance(failure, bool):
             checks.integer("actuator_failure", failure, 0, len(body.legs) - 1)
-        spans = [cls.check_span(name, settings) for name in cls.bounds]
-        return cls(*spans, failure, bool(body.source))
+        return cls(
+            motor_strength=cls.check_span("motor_strength", settings),
+            joint_strength=cls.check_span("joint_strength", settings),
+            armature=cls.check_span("armature", settings),
+            actuator_failure=failure,
+            are_servos=bool(body.source),
+        )
 
     @property
     def structure(self) -> Hashable:
@@ -86,7 +90,7 @@ class Motors(_MotorsFields, Modifier):
         return self.actuator_failure is not False
 
     def check_mirror(self, image: Image) -> None:
-        """Check that no leg of one side fails in every episode."""
+        """Check that the leg that fails is a random one, or one on the midline."""
         leg = self.actuator_failure
         if not isinstance(leg, bool) and image.legs[leg] != leg:
             raise ValueError(f"actuator_failure: expected a leg that is drawn, or one on the midline, got {leg}")
@@ -94,16 +98,22 @@ class Motors(_MotorsFields, Modifier):
     def draw(self, episode: Episode) -> MotorsState:
         """Return strengths, failure and armature of the episode."""
         stream = episode.stream
-        motor_strength = np.array([within(self.motor_strength, stream.strength)])
-        joint_strength = within(self.joint_strength, episode.keyed.strengths)
-        owners = _owners(episode.scene.body)
-        leg = stream.leg if self.actuator_failure is True else self.actuator_failure
+        keyed = episode.keyed
+        motor_strength = np.array([interpolate(self.motor_strength, stream.motor_strength)])
+        joint_strength = interpolate(self.joint_strength, keyed.joint_strengths)
+        leg_of_joint = _find_legs_of_joints(episode.scene.body)
+        if self.actuator_failure is False:
+            failing = np.zeros(len(leg_of_joint), bool)
+        elif self.actuator_failure is True:
+            failing = leg_of_joint == stream.failing_leg
+        else:
+            failing = leg_of_joint == self.actuator_failure
         return MotorsState(
-            motor_strength,
-            joint_strength,
+            motor_strength=motor_strength,
+            joint_strength=joint_strength,
             strength=motor_strength * joint_strength,
-            failing=np.zeros(len(owners), bool) if self.actuator_failure is False else owners == leg,
-            armature=np.array([within(self.armature, episode.keyed.armature)]),
+            failing=failing,
+            armature=np.array([interpolate(self.armature, keyed.armature)]),
         )
 
     def fields(self, scene: Scene, model: Mapping[str, Any], state: MotorsState) -> dict[str, Any]:
@@ -112,15 +122,15 @@ class Motors(_MotorsFields, Modifier):
         if self.armature != (1.0, 1.0):
             fields["dof_armature"] = state.armature[0] * model["dof_armature"]
         if self.are_servos and (self.motor_strength != (1.0, 1.0) or self.joint_strength != (1.0, 1.0)):
-            limits = state.motor_strength[0] * model[_LIMITS]
-            limits[_joints(scene)] *= state.joint_strength[:, None]
-            fields[_LIMITS] = limits
+            limits = state.motor_strength[0] * model[_TORQUE_LIMITS]
+            limits[_find_joints_in_model(scene)] *= state.joint_strength[:, None]
+            fields[_TORQUE_LIMITS] = limits
         return fields
 
     def drive(self, state: MotorsState, inputs: Inputs, elapsed) -> Inputs:
-        """Return what motors give: weak and failing ones less than the torques that are commanded of them.
+        """Return the inputs with the torques that motors give: weak and failing motors give less than commanded.
 
-        Servos are also given their releases.
+        Servos have a second input each, after those for their targets: the share of the torque that they do not give.
         """
         strength = state.strength
         ctrl = strength * inputs.ctrl
@@ -129,47 +139,59 @@ class Motors(_MotorsFields, Modifier):
             ctrl = ctrl * works
             strength = strength * works
         if self.are_servos:
-            ctrl = ctrl.__array_namespace__().concatenate([ctrl, 1.0 - strength], axis=-1)
+            xp = ctrl.__array_namespace__()
+            ctrl = xp.concatenate([ctrl, 1.0 - strength], axis=-1)
         return inputs._replace(ctrl=ctrl)
 
     def privileged_blocks(self, body: Body) -> dict[str, Block]:
-        """Return the blocks `armature`, and `strength`: shares of the torque that motors give, 0 once they failed."""
+        """Return the blocks `armature`, and `strength`: shares of the torque that motors give, 0 after a failure."""
         strength = Joints(body, "strength of {}", signed=False)
         return {"armature": Block((Scalar("multiple of the armatures"),)), "strength": Block((strength,))}
 
     def privileged(self, state: MotorsState, elapsed, heading) -> dict[str, Any]:
-        """Return the multiple, and the shares."""
+        """Return the multiple of the armatures, and the shares of the torque that motors give."""
         has_failed = state.failing & (elapsed > FAILS_FROM)
         return {"armature": state.armature, "strength": state.strength * ~has_failed}
 
     def read_back(self, scene: Scene, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the mean multiple of changed armatures, and strengths times those of changed motors or servos."""
-        joints = len(scene.body.joint_names)
+        """Return the mean multiple of the armatures, and the strengths, of joints that a user has changed.
+
+        Strengths are those that the episode has drawn, times the multiples by which the user has changed the torques.
+        """
+        changed_blocks = {}
         armatures = find_multiples(scene, fields, "dof_armature", scene.layout.joint_velocities)
-        changed = {} if armatures is None else {"armature": armatures.mean(keepdims=True)}
+        if armatures is not None:
+            changed_blocks["armature"] = armatures.mean(keepdims=True)
         if self.are_servos:
-            strengths = {_LIMITS: (_joints(scene), 1)}
+            upper_limits = (_find_joints_in_model(scene), 1)
+            torque_multiples = [find_multiples(scene, fields, _TORQUE_LIMITS, upper_limits)]
         else:
-            strengths = dict.fromkeys(("actuator_gear", "actuator_gainprm"), np.s_[:joints, 0])
-        multiples = [find_multiples(scene, fields, name, part) for name, part in strengths.items()]
-        multiples = [multiple for multiple in multiples if multiple is not None]
-        if multiples:
-            changed["strength"] = math.prod(multiples, start=blocks["strength"])
-        return changed
+            joints = len(scene.body.joint_names)
+            first_column = np.s_[:joints, 0]
+            torque_multiples = [
+                find_multiples(scene, fields, "actuator_gear", first_column),
+                find_multiples(scene, fields, "actuator_gainprm", first_column),
+            ]
+        for multiples in torque_multiples:
+            if multiples is not None:
+                strength = changed_blocks.get("strength", blocks["strength"])
+                changed_blocks["strength"] = strength * multiples
+        return changed_blocks
 
     def failed_legs(self, scene: Scene, state: MotorsState, elapsed: int) -> tuple[str, ...]:
-        """Return the leg whose motors have failed, once they have."""
+        """Return the name of the leg whose motors have failed; none before they fail."""
         if elapsed <= FAILS_FROM:
             return ()
-        failed = set(_owners(scene.body)[state.failing].tolist())
-        return tuple(leg.name for index, leg in enumerate(scene.body.legs) if index in failed)
+        failed_indices = _find_legs_of_joints(scene.body)[state.failing].tolist()
+        return tuple(leg.name for index, leg in enumerate(scene.body.legs) if index in failed_indices)
 
 
-def _owners(body: Body) -> np.ndarray:
-    """Return the leg (joints,) of each joint."""
+def _find_legs_of_joints(body: Body) -> np.ndarray:
+    """Return the index of the leg of each joint (joints,)."""
     return np.repeat(np.arange(len(body.legs)), [len(leg.joints) for leg in body.legs])
 
 
-def _joints(scene: Scene) -> np.ndarray:
+def _find_joints_in_model(scene: Scene) -> np.ndarray:
     """Return the indices (joints,) of the body's joints in the model."""
-    return np.arange(len(scene.model["dof_armature"]))[scene.layout.joint_velocities] - _FREE
+    degrees_of_freedom = np.arange(len(scene.model["dof_armature"]))
+    return degrees_of_freedom[scene.layout.joint_velocities] - _EXTRA_DEGREES

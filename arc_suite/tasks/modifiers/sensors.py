@@ -1,4 +1,4 @@
-"""Sensors of joints, whose zeros are displaced."""
+"""Sensors of the joints' angles: each shows its angle with a constant error, its offset."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Self
@@ -19,7 +19,7 @@ class SensorsState(NamedTuple):
     """What an episode draws of sensors.
 
     Attributes:
-        joint_offset: (..., joints) of the angles that they show, rad.
+        joint_offset: (..., joints) error of each sensor: the angle that it shows minus the true angle, rad.
     """
 
     joint_offset: np.ndarray
@@ -35,10 +35,10 @@ class Sensors(_SensorsFields, Modifier):
     """Sensors of the joints' angles.
 
     Attributes:
-        joint_offset: the greatest error of the zero of each joint's sensor, rad: of the angles that are observed, and
-            of those that position control and servos hold.
-        reach: (joints,) the farther limit of each joint's range, from the standing pose, rad.
-        are_of_servos: whether servos, in place of this suite, hold positions by them.
+        joint_offset: the greatest error of each joint's sensor, rad. It changes the angles that are observed, and those
+            at which position control and servos hold the joints.
+        reach: (joints,) distance of the farther limit of each joint's range from the standing pose, rad.
+        are_of_servos: whether servos read the sensors; servos hold positions inside the simulation.
     """
 
     __slots__ = ()
@@ -53,22 +53,26 @@ class Sensors(_SensorsFields, Modifier):
 
     @property
     def is_active(self) -> bool:
-        """Whether zeros are displaced."""
+        """Whether sensors have errors."""
         return self.joint_offset > 0.0
 
     def draw(self, episode: Episode) -> SensorsState:
         """Return the offsets of the episode."""
-        return SensorsState(self.joint_offset * (2.0 * episode.keyed.offsets - 1.0))
+        signed_shares = 2.0 * episode.keyed.joint_offsets - 1.0  # in [-1, 1)
+        return SensorsState(self.joint_offset * signed_shares)
 
     def drive(self, state: SensorsState, inputs: Inputs, elapsed) -> Inputs:
-        """Return the positions that servos hold: displaced as their sensors are."""
-        return inputs._replace(ctrl=inputs.ctrl - state.joint_offset / self.reach) if self.are_of_servos else inputs
+        """Return the inputs with the true positions that servos hold, as their sensors show others."""
+        if not self.are_of_servos:
+            return inputs
+        return inputs._replace(ctrl=inputs.ctrl - state.joint_offset / self.reach)
 
     def sense(self, state: SensorsState, readings: Readings) -> Readings:
-        """Return the readings with displaced angles."""
+        """Return the readings with the angles that the sensors show."""
         xp = readings.posture.__array_namespace__()
         angles = readings.joint_angles + state.joint_offset
-        posture = xp.concatenate([readings.posture[..., :5], angles], axis=-1)
+        height_and_quaternion = readings.posture[..., :5]
+        posture = xp.concatenate([height_and_quaternion, angles], axis=-1)
         return readings._replace(posture=posture, joint_angles=angles)
 
     def privileged_blocks(self, body: Body) -> dict[str, Block]:
