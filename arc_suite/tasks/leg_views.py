@@ -1,12 +1,12 @@
 """An observation as each leg of a body sees it, so that one network can act for all legs.
 
-Legs are alike up to a turn and a reflection. A leg on the right sees the mirrored observation. The torso's planar
-vectors are turned about the vertical, and signs of joints chosen, so that each foot moves as that of the first leg.
-A command to the left is then to one leg what a command forward is to another. Every view is linear: the parts of
-blocks say what a leg sees of them, see `parts.Part.view`.
+A turn and a reflection map one leg onto another. A leg on the right sees the mirrored observation. For each leg, the
+torso's planar vectors are turned about the vertical, and joints get signs. Then the same actions move every foot like
+that of the first leg: a command to the left is to one leg what a command forward is to another. Every view is linear:
+`parts.Part.view` says what a leg sees of a part.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -19,21 +19,23 @@ from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.mirrors import Mirror, Symmetry
 from arc_suite.tasks.parts import ViewingLeg, diagonal, rotation
 
-VERSION = 1  # of what legs see; runs without one have turned the blocks `TURNED_BEFORE` alone
+VERSION = 1  # of what legs see; runs without a version have turned only the blocks in `TURNED_BEFORE`
 TURNED_BEFORE = ("posture", "velocities", "gait_clock", "command")
+
+_SIMILARITY_DIGITS = 9  # decimals, so that of equally good turns the first is chosen despite rounding
 
 
 class LegViews(NamedTuple):
     """What the legs of a body see and do; a leg with fewer joints than another has zeros in their place.
 
     Attributes:
-        sources: (2, legs, features) places of the two numbers of a vector that a feature is made from.
-        factors: (2, legs, features) of these numbers.
-        bias: (legs, features) of the features; the first ones are 1 for the pair that a leg belongs to, else 0.
-        joints: (joints,) places among what all legs do, (legs * joints of a leg,), of what the body's joints take.
-        signs: (joints,) of what they take.
-        most: joints of a leg.
-        sizes: of the parts of the features: of pairs, then of blocks.
+        sources: (2, legs, features) indices of the two numbers of a vector whose weighted sum is a feature.
+        factors: (2, legs, features) weights of these numbers.
+        bias: (legs, features) added to the sum. The first features say to which pair a leg belongs: 1, or else 0.
+        joints: (joints,) index of each joint's action among the actions of all legs, (legs * most,).
+        signs: (joints,) by which these actions are multiplied.
+        most: number of joints of the leg with the most joints; each leg has as many actions.
+        sizes: numbers of features: first those of pairs, then those of each block.
     """
 
     sources: np.ndarray
@@ -49,40 +51,44 @@ def leg_views(body: Body, blocks: Mapping[str, Block], symmetry: Symmetry | None
     """Return the views of the legs of a body.
 
     Args:
-        body: with the legs.
-        blocks: of the vectors that they see, by name, in order: those of an observation, and others after them.
-        symmetry: mirror maps of such vectors; None for legs that are not each other's images.
+        body: the body with the legs.
+        blocks: the blocks of the vectors that legs see, by name, in the order of a vector: first those of the
+            observation, then further ones.
+        symmetry: mirror maps of such vectors; None for a body whose legs are no mirror images of each other.
 
     Raises:
         ValueError: a block has numbers without a frame, or a feature is made from more than two numbers.
     """
-    kinds, is_mirrored = _kinds(body, symmetry)
-    pairs = kinds[:, None] == np.unique(kinds)
-    weights = []
-    biases = []
-    actions = []
-    for leg, pair, mirrored in zip(_viewing_legs(body, kinds), pairs, is_mirrored, strict=True):
+    seen_as, is_mirrored = _pair_legs(body, symmetry)
+    pairs = seen_as[:, None] == np.unique(seen_as)  # (legs, pairs)
+    weights_of_legs = []
+    biases_of_legs = []
+    actions_of_legs = []
+    for leg, pair, mirrored in zip(_viewing_legs(body, seen_as), pairs, is_mirrored, strict=True):
         views = [_view_block(name, block, leg) for name, block in blocks.items()]
-        weight = diagonal(np.zeros((0, len(pair))), *(view.weights for view in views))
-        action = leg.joints
+        no_weights_of_pairs = np.zeros((0, len(pair)))
+        leg_weights = diagonal(no_weights_of_pairs, *(view.weights for view in views))
+        leg_actions = leg.joints
         if mirrored:
-            weight = _matrix(symmetry.observation) @ weight
-            action = action @ _matrix(symmetry.action)
-        weights.append(weight)
-        biases.append(np.concatenate([pair, *(view.bias for view in views)]))
-        actions.append(action)
-    weight = np.stack(weights, axis=1)
-    sources = np.argsort(-abs(weight), axis=0, kind="stable")[:2]
-    action = np.concatenate(actions)
-    places = abs(action).argmax(axis=0)
+            leg_weights = _matrix(symmetry.observation) @ leg_weights
+            leg_actions = leg_actions @ _matrix(symmetry.action)
+        weights_of_legs.append(leg_weights)
+        biases_of_legs.append(np.concatenate([pair, *(view.bias for view in views)]))
+        actions_of_legs.append(leg_actions)
+        sizes = (len(pair), *(len(view.bias) for view in views))  # the same for each leg
+    weights = np.stack(weights_of_legs, axis=1)  # (numbers, legs, features)
+    sources = np.argsort(-abs(weights), axis=0, kind="stable")[:2]
+    actions = np.concatenate(actions_of_legs)  # (actions of all legs, joints), one number of each column is not 0
+    action_of_joint = abs(actions).argmax(axis=0)
+    signs = actions[action_of_joint, np.arange(len(action_of_joint))]
     return LegViews(
-        sources,
-        np.take_along_axis(weight, sources, axis=0).astype(np.float32),
-        np.stack(biases).astype(np.float32),
-        places,
-        action[places, range(len(places))].astype(np.float32),
-        len(action) // len(body.legs),
-        (len(pair), *(len(view.bias) for view in views)),
+        sources=sources,
+        factors=np.take_along_axis(weights, sources, axis=0).astype(np.float32),
+        bias=np.stack(biases_of_legs).astype(np.float32),
+        joints=action_of_joint,
+        signs=signs.astype(np.float32),
+        most=len(actions) // len(body.legs),
+        sizes=sizes,
     )
 
 
@@ -94,23 +100,30 @@ class _BlockView(NamedTuple):
 
 
 def _view_block(name: str, block: Block, leg: ViewingLeg) -> _BlockView:
+    """Return what a leg sees of a block: of each part its features, then its constants."""
     if not block.has_frame:
         raise ValueError(f"network legs: block {name!r} has numbers without a frame, expected other parts")
-    weights = []
+    weights_of_parts = []
     biases = []
     for part in block.parts:
         features = part.view(leg)
         constants = part.constants(leg)
-        weights.append(np.pad(features, ((0, 0), (0, len(constants)))))
-        biases += [np.zeros(features.shape[1]), constants]
-    weight = diagonal(*weights)
-    if (most := np.count_nonzero(weight, axis=0).max(initial=0)) > 2:
-        raise ValueError(f"network legs: block {name!r}: expected features of two numbers at most, got {most}")
-    return _BlockView(weight, np.concatenate(biases))
+        weights_of_parts.append(np.pad(features, ((0, 0), (0, len(constants)))))
+        biases.append(np.zeros(features.shape[1]))
+        biases.append(constants)
+    weights = diagonal(*weights_of_parts)
+    numbers_of_a_feature = np.count_nonzero(weights, axis=0).max(initial=0)
+    if numbers_of_a_feature > 2:
+        expected = "expected features of two numbers at most"
+        raise ValueError(f"network legs: block {name!r}: {expected}, got {numbers_of_a_feature}")
+    return _BlockView(weights, np.concatenate(biases))
 
 
-def _kinds(body: Body, symmetry: Symmetry | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the leg (legs,) whose views each leg has, and whether (legs,) it has them in the mirror."""
+def _pair_legs(body: Body, symmetry: Symmetry | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return by index the leg (legs,) whose view each leg has, and whether (legs,) the leg has it in the mirror.
+
+    With a symmetry, a leg on the right has the mirrored view of its counterpart on the left.
+    """
     indices = np.arange(len(body.legs))
     if symmetry is None:
         return indices, np.zeros(len(indices), bool)
@@ -118,33 +131,47 @@ def _kinds(body: Body, symmetry: Symmetry | None) -> tuple[np.ndarray, np.ndarra
     return np.where(is_right, mirror.image(body).legs, indices), is_right
 
 
-def _viewing_legs(body: Body, kinds: Iterable[int]) -> Iterator[ViewingLeg]:
-    """Yield the legs that observations are transformed for."""
-    jacobians = _jacobians(body)
-    soles = standing(body).soles[:, :2]
-    joints = by_leg(body, np.eye(len(body.joint_names)))
-    for kind in kinds:
-        turn, signs = _align(jacobians[kind], jacobians[kinds[0]])
-        yield ViewingLeg(kind, turn, signs[:, None] * _pad(joints[kind], len(signs)), soles[kind] / reach(body))
+def _viewing_legs(body: Body, indices: np.ndarray) -> Iterator[ViewingLeg]:
+    """Yield the legs with these indices (n,), aligned with the first of them."""
+    jacobians = _sole_jacobians(body)
+    soles = standing(body).soles[:, :2]  # m
+    one_hot_joints = by_leg(body, np.eye(len(body.joint_names)))  # (joints of the leg, joints) of each leg
+    first_jacobian = jacobians[indices[0]]
+    for index in indices:
+        turn, signs = _align(jacobians[index], first_jacobian)
+        joints = signs[:, None] * _pad(one_hot_joints[index], len(signs))
+        yield ViewingLeg(index, turn, joints, foot=soles[index] / reach(body))
 
 
 def _align(jacobian: np.ndarray, first: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the turn, rad, and the signs of joints, for which a foot's Jacobian (joints, 3) is most like the first."""
+    """Return the turn, rad, and the signs (joints,), that align a leg with the first one.
+
+    Of the turns by whole degrees, it is the one by which the joints move both soles in the most similar way.
+
+    Args:
+        jacobian: (joints, 3) velocity of the leg's sole per joint velocity.
+        first: the same of the first leg.
+    """
     turns = np.radians(range(360))
-    planar = np.einsum("ji,tik->tjk", jacobian[:, :2], [rotation(turn) for turn in turns])
-    products = (planar * first[:, :2]).sum(axis=-1) + jacobian[:, 2] * first[:, 2]
-    best = abs(products).sum(axis=-1).round(9).argmax()
-    return turns[best], np.where(products[best] < 0.0, -1.0, 1.0)
+    rotations = [rotation(turn) for turn in turns]
+    planar_velocities = np.einsum("ji,tik->tjk", jacobian[:, :2], rotations)  # (turns, joints, 2)
+    products = (planar_velocities * first[:, :2]).sum(axis=-1) + jacobian[:, 2] * first[:, 2]  # (turns, joints)
+    similarities = abs(products).sum(axis=-1).round(_SIMILARITY_DIGITS)
+    best = similarities.argmax()
+    signs = np.where(products[best] < 0.0, -1.0, 1.0)
+    return turns[best], signs
 
 
-def _jacobians(body: Body) -> list[np.ndarray]:
-    """Velocities (joints, 3) of each sole per joint velocity, with as many rows for each leg."""
+def _sole_jacobians(body: Body) -> list[np.ndarray]:
+    """Return the velocities (joints, 3) of each sole per joint velocity; 0 for joints that only other legs have."""
     most = max(len(leg.joints) for leg in body.legs)
     return [_pad(jacobian.T, most) for jacobian in standing(body).jacobians]
 
 
-def _pad(rows: np.ndarray, count: int) -> np.ndarray:
-    return np.concatenate([rows, np.zeros((count - len(rows), *rows.shape[1:]))])
+def _pad(array: np.ndarray, count: int) -> np.ndarray:
+    """Return an array (n, ...) with zeros at its end (count, ...)."""
+    zeros = np.zeros((count - len(array), *array.shape[1:]))
+    return np.concatenate([array, zeros])
 
 
 def _matrix(mirror_map: Mirror) -> np.ndarray:
