@@ -185,7 +185,8 @@ def measure_walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMean
         walks = [_walk_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
     finally:
         environment.close()
-    return WalkMeans(*map(float, np.mean(walks, axis=0)))
+    means = np.mean(walks, axis=0)
+    return WalkMeans(*means.tolist())
 
 
 def open_walk(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environment, Policy]:
@@ -202,22 +203,22 @@ def open_walk(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Envir
 
 def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: int) -> WalkMeans:
     """Return the means of one episode."""
-    data = environment.physics.data.ptr
+    data = environment.physics.data.ptr  # MuJoCo's arrays, which the episode changes
     task = environment.task.definition
     body = task.scene.body
     control_timestep = task.scene.control_timestep
     torques = energy.torques(body)
-    work = energy.start(len(body.joint_names))
+    work = energy.start(len(body.joint_names))  # of the motors, divided by weight, m
     for timestep in evaluation.rollout(environment, policy, seed, steps):
-        joint_angles = data.qpos[7:]
+        joint_angles = data.qpos[7:]  # after the position and the quaternion of the torso
         if timestep.first():
             start_x = data.qpos[0]
             steps_taken = 0
-            has_fallen = False
+            fell = False
             work = energy.begin(work, joint_angles)
         else:
             steps_taken += 1
-            has_fallen |= walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
+            fell |= walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
             work = energy.after(work, torques, data.ctrl, joint_angles)
     progress = environment.task.progress  # the task's metrics of the episode
     displacement = data.qpos[0] - start_x
@@ -233,5 +234,5 @@ def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: in
         tracking=tracking,
         cost_of_transport=progress.get("cost_of_transport", math.nan),
         power=work.total * GRAVITY / (steps_taken * control_timestep),
-        falls=has_fallen,
+        falls=fell,
     )

@@ -155,7 +155,7 @@ class Page:
     def _hide_charts_in_narrow_window(self, client: viser.ClientHandle) -> None:
         """Hide the charts from a visitor who is the only one and has a narrow window."""
         if len(self._server.get_clients()) == 1 and client.camera.image_width < _MIN_WIDTH_FOR_CHARTS:
-            self._shows_charts.value = False
+            self._charts_checkbox.value = False
 
     def _add_changes(self) -> None:
         """Add undo, redo and reset, as buttons and as keys, and switches of charts and companion."""
@@ -170,8 +170,8 @@ class Page:
         undo_command.on_trigger(lambda event: self._undo())
         redo_command = self._gui.add_command("Redo", hotkey="Z", modifier="cmd/ctrl+shift")
         redo_command.on_trigger(lambda event: self._redo())
-        self._shows_charts = self._gui.add_checkbox("Charts", True)
-        self._shows_charts.on_update(self._switch_charts)
+        self._charts_checkbox = self._gui.add_checkbox("Charts", True)
+        self._charts_checkbox.on_update(self._switch_charts)
         keep = self._gui.add_checkbox("Keep", False, hint="This creature walks next to all later ones")
         keep.on_update(lambda event: self._session.keep(event.target.value))
 
