@@ -131,7 +131,7 @@ def presets_for(setup: Setup) -> Sequence[str]:
 
 
 def policy_and_label() -> tuple[str, str]:
-    """Return the policy and its label in the dataset's id, "" for the policy's name.
+    """Return the policy and its label in the dataset's id; an empty label stands for the policy's name.
 
     Raises:
         ValueError: --checkpoint and --quality together, or a run without such a checkpoint.

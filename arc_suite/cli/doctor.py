@@ -87,7 +87,7 @@ def _examine_picture() -> Finding:
 
 
 def draw() -> None:
-    """Draw a picture, and print as JSON by what it was drawn; the doctor runs this in another process."""
+    """Draw a picture, and print what drew it, as JSON; the doctor runs this in another process."""
     from dm_control import _render
 
     from arc_suite.envs.dm import load

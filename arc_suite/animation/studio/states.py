@@ -143,8 +143,12 @@ def to_json(state: PageState) -> str:
 
 def _changed_fields(part: Sketch | VisitorCommand) -> dict[str, Any]:
     """Return the fields of a sketch or of a command that differ from the defaults."""
-    values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
-    return {field.name: values[field.name] for field in dataclasses.fields(part) if values[field.name] != field.default}
+    changed_fields = {}
+    for field in dataclasses.fields(part):
+        value = getattr(part, field.name)
+        if value != field.default:
+            changed_fields[field.name] = value
+    return changed_fields
 
 
 def is_state(text: str) -> bool:
