@@ -15,7 +15,7 @@ for arguments in {arguments}:
     for name in flags.FLAGS:
         flags.FLAGS[name].unparse()
     flags.FLAGS(["studio", *arguments])
-    print(repr(studio._sketch()))
+    print(repr(studio._sketch_from_flags()))
 """
 
 
