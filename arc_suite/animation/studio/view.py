@@ -24,7 +24,7 @@ _CAMERA_TARGET = (0.0, 0.0, 0.25)  # units, from which the arrow of a command is
 _PHONE_TARGET = (0.0, 0.0, -2.3)  # units; a sheet of widgets covers the lower part of a phone's picture
 _MAX_PHONE_WIDTH = 500  # pixels of a picture
 _CAMERA_ANGLE = math.radians(35.0)  # over the shorter side of a picture
-_FLOOR_FOLLOWING = 0.1  # share of the difference, by which the camera follows the height of the ground in a picture
+_CAMERA_RISE_SHARE = 0.1  # of the difference to the height of the ground, that the camera makes up in each picture
 _COMPANION_DISTANCE = 0.9  # between both creatures, in sums of their reaches
 
 _GROUND_EXTENT = 14.0  # units of uneven ground to each side of the torso, that are drawn
@@ -106,7 +106,7 @@ class View:
                 self._companion.pose(companion_qpos, functools.partial(self._place_companion, torso_position))
             self._ground.follow(torso_position)
             floor = self._ground.height(torso_position) / self._unit
-            self._shown_floor += _FLOOR_FOLLOWING * (floor - self._shown_floor)
+            self._shown_floor += _CAMERA_RISE_SHARE * (floor - self._shown_floor)
             center = (torso_position + 0.5 * self._lane) / self._unit  # between the creature and its companion
             self._world.position = (-center[0], -center[1], -self._shown_floor)
             self._markers.show(markers, torso_position)
@@ -209,6 +209,7 @@ class _Ground:
         for solid in solids:
             mesh = shapes.shape_mesh(solid["kind"], solid["size"], _MAX_DEVIATION * self._unit)
             if solid["color"] is None:
+                # A shade is a brightness, 0 to 1.
                 color = rgb([solid["shade"] * component / 255.0 for component in _STEP_COLOR])
             else:
                 color = rgb(solid["color"])
