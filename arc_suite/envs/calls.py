@@ -30,14 +30,14 @@ class KnownAttributes:
         is_public = name[0] != "_"
         is_complete = "_sealed_by" in self.__dict__
         if is_public and is_complete:
-            self._check_known(name)
+            self._check_attribute(name)
         super().__setattr__(name, value)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
             self.__dict__[self._FORMER_NAMES.get(name, name)] = value
 
-    def _check_known(self, name: str) -> None:
+    def _check_attribute(self, name: str) -> None:
         """Raise AttributeError for a name that no attribute has."""
         is_known = name in self.__dict__ or hasattr(type(self), name)
         if not is_known and type(self).__module__ == self._sealed_by:

@@ -116,7 +116,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         Raises:
             AttributeError: there is no such attribute.
         """
-        self._check_known(name)
+        self._check_attribute(name)
         setattr(self, name, value)
         return True
 

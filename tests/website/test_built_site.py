@@ -21,7 +21,7 @@ def of_these_pages():
 
 pytestmark = pytest.mark.skipif(not of_these_pages(), reason="no site of these pages here: make docs")
 
-PLAYERS = (players.GAME, players.GALLERY, *players.films().values())
+PLAYERS = (players.GAME, players.GALLERY, *players.film_pages().values())
 FIRST_STEPS = ROOT / "docs" / "first_steps.md"
 
 

@@ -123,7 +123,7 @@ def test_links_that_sphinx_can_follow():
         "[a](README.md), [b](../README.md#tasks), [c](../examples/godot), [d](../web), [e](walk.md#parity), ![f](x.png)"
     )
     front = "[a](../index.md), [b](../index.md), [c](../examples/godot/README.md), d, [e](walk.md#parity), ![f](x.png)"
-    assert sources.resolved(text, docs) == front
+    assert sources.resolve_links(text, docs) == front
 
 
 @pytest.mark.long

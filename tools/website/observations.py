@@ -5,7 +5,8 @@ from typing import NamedTuple
 from arc_suite.tasks.contract import Task
 from website import markdown
 
-BLOCKS = {
+# What the blocks of an observation contain, by name.
+BLOCK_CONTENTS = {
     "posture": "torso height, torso quaternion (w first), joint angles",
     "velocities": "torso velocity, torso angular velocity, joint velocities",
     "contact_forces": "torque and force of the contacts on each rigid part, clipped to [-1, 1]",
@@ -23,9 +24,9 @@ class Entry(NamedTuple):
     """One number of an observation.
 
     Attributes:
-        block: its name.
+        block: name of its block.
         name: of the number.
-        unit: of the number; empty without one.
+        unit: of the number; empty if it has none.
     """
 
     block: str
@@ -35,10 +36,14 @@ class Entry(NamedTuple):
 
 def entries(task: Task) -> list[Entry]:
     """Return the entries of a task's observation in the order of the vector."""
-    return [Entry(name, *entry) for name, block in task.blocks.items() for entry in block.entries()]
+    all_entries = []
+    for block_name, block in task.blocks.items():
+        for name, unit in block.entries():
+            all_entries.append(Entry(block_name, name, unit))
+    return all_entries
 
 
-def listed(task: Task, title: str) -> str:
-    """Return the table of all entries, which a click unfolds."""
-    lines = ([str(index), entry.block, entry.name, entry.unit] for index, entry in enumerate(entries(task)))
+def entries_table(task: Task, title: str) -> str:
+    """Return the table of all entries, which a click on its title unfolds."""
+    lines = [[str(index), entry.block, entry.name, entry.unit] for index, entry in enumerate(entries(task))]
     return markdown.dropdown(title, ("index", "block", "entry", "unit"), lines)

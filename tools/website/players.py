@@ -1,4 +1,4 @@
-"""Pages of the site in which creatures walk, where `make web` has built their scripts."""
+"""Pages of the site in which creatures walk; they need the scripts that `make web` builds."""
 
 from pathlib import Path
 
@@ -10,13 +10,15 @@ from arc_suite.animation import pages, play_pages
 from arc_suite.robots import ROBOTS
 from website import markdown
 
-GAME, GALLERY = "play.html", "gallery.html"  # pages to play in: the robots, generated creatures
+GAME = "play.html"  # page to play in with the robots
+GALLERY = "gallery.html"  # page to play in with generated creatures
 CREATURES = tuple(f"varied:{seed}" for seed in range(24))
-START, STEPS = 60, 200  # control steps before a film, in which the thrown body finds its feet, and in it
+FILM_START = 60  # control steps before a film, in which the body finds its balance after the start
+FILM_STEPS = 200  # control steps of a film
 
 
-def films() -> dict[str, str]:
-    """Return names of the films' pages by robot."""
+def film_pages() -> dict[str, str]:
+    """Return the names of the pages with films by robot."""
     return {robot: f"walk_{robot}.html" for robot in ROBOTS}
 
 
@@ -26,23 +28,32 @@ def write(folder: Path) -> None:
     Raises:
         ValueError: the scripts have not been built.
     """
-    for name, bodies in {GAME: ROBOTS.values(), GALLERY: map(registry.body_of, CREATURES)}.items():
+    bodies_of_page = {GAME: ROBOTS.values(), GALLERY: map(registry.body_of, CREATURES)}
+    for name, bodies in bodies_of_page.items():
         page = play_pages.page([play_pages.creature(body) for body in bodies])
         (folder / name).write_text(page, encoding="utf-8")
-    for robot, name in films().items():
+    for robot, name in film_pages().items():
         environment = arc_suite.load(robot, "walk", {"random": 0})
         policy = policies.policy("ppo", robot, task=environment.task.definition)
-        track = style.record(environment, policy, 0, START + STEPS)
-        (folder / name).write_text(pages.page({robot: _after(track, START)}), encoding="utf-8")
+        track = style.record(environment, policy, 0, FILM_START + FILM_STEPS)
+        film = _cut_start(track, FILM_START)
+        (folder / name).write_text(pages.page({robot: film}), encoding="utf-8")
 
 
-def _after(track: style.Track, start: int) -> style.Track:
-    """The rest of a track after some of its control steps."""
-    parts = {name: value[start:] for name, value in track._asdict().items() if isinstance(value, np.ndarray)}
-    return track._replace(**parts, terms={name: values[start:] for name, values in track.terms.items()})
+def _cut_start(track: style.Track, steps: int) -> style.Track:
+    """Return a track without its first control steps."""
+    arrays = {name: value[steps:] for name, value in track._asdict().items() if isinstance(value, np.ndarray)}
+    terms = {name: values[steps:] for name, values in track.terms.items()}
+    return track._replace(**arrays, terms=terms)
 
 
-def frame(source: str, title: str, kind: str = "creature") -> str:
-    """Return the HTML that shows a page within another; `kind` is a class of docs/_static/site.css."""
-    attributes = {"class": kind, "src": source, "title": title, "loading": "lazy"}
-    return markdown.as_html(markdown.element("iframe", **attributes))
+def frame(source: str, title: str, style_class: str = "creature") -> str:
+    """Return the HTML that shows a page within another one.
+
+    Args:
+        source: path of the page that is shown.
+        title: of the frame.
+        style_class: one of docs/_static/site.css.
+    """
+    attributes = {"class": style_class, "src": source, "title": title, "loading": "lazy"}
+    return markdown.to_html(markdown.element("iframe", **attributes))

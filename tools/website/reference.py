@@ -9,8 +9,8 @@ from arc_suite.cli.programs import PROGRAMS, program_summary
 from arc_suite.learning.studies.text_tables import table
 from website import markdown, returns, settings
 
-# Modules that users import, by title of their page.
-API = {
+# Modules that users import, by title of the page about them.
+API_MODULES = {
     "Environments": ("arc_suite", "arc_suite.envs.vector", "arc_suite.envs.bodies", "arc_suite.envs.pixels"),
     "Demonstrators and policies": ("arc_suite.cpg", "arc_suite.policies"),
     "Training and evaluation": ("arc_suite.learning", "arc_suite.evaluation", "arc_suite.evaluation.published"),
@@ -31,23 +31,23 @@ API = {
 
 
 def api_name(title: str) -> str:
-    """Return the name of a page of the API."""
+    """Return the name of an API page, given its title."""
     return f"api_{title.lower().replace(' ', '_')}"
 
 
-# Pages by name.
+# Titles of the pages by name.
 TITLES = {
     "commands": "Command line",
     "settings": "Settings of all tasks",
-    **{api_name(title): f"API: {title.lower()}" for title in API},
+    **{api_name(title): f"API: {title.lower()}" for title in API_MODULES},
 }
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    """Yield names of pages and their texts."""
+    """Yield the name and the text of each page."""
     yield "commands", commands_page()
     yield "settings", settings_page()
-    for title, modules in API.items():
+    for title, modules in API_MODULES.items():
         yield api_name(title), api_page(title, modules)
 
 
@@ -58,28 +58,31 @@ def settings_page() -> str:
         "Keys of `task_kwargs` of `arc_suite.load` and `gymnasium.make`, and of `--set name=value`. Where a setting "
         "takes two numbers, every episode draws its own between them. The pages of the [tasks](../tasks.md) list the "
         "settings of each, and [modifiers](../modifiers.md) has examples.",
-        settings.of_all_tasks(),
+        settings.table_of_all_tasks(),
     )
 
 
 def commands_page() -> str:
-    """Return the page of all programs, with the help of each."""
+    """Return the page of all programs, with the help text of each."""
     with ThreadPoolExecutor() as pool:
-        helps = list(pool.map(_help, PROGRAMS))
-    parts = [f"## `{name}`\n\n```text\n{text}\n```" for name, text in zip(PROGRAMS, helps, strict=True)]
-    listed = table(("program", "does"), ([f"[`{name}`](#{name})", program_summary(name)] for name in PROGRAMS))
-    return markdown.page(TITLES["commands"], "What `arc-suite PROGRAM --help` prints.", listed, *parts)
+        help_texts = list(pool.map(_read_help, PROGRAMS))
+    lines = [[f"[`{name}`](#{name})", program_summary(name)] for name in PROGRAMS]
+    program_table = table(("program", "does"), lines)
+    sections = [f"## `{name}`\n\n```text\n{text}\n```" for name, text in zip(PROGRAMS, help_texts, strict=True)]
+    return markdown.page(TITLES["commands"], "What `arc-suite PROGRAM --help` prints.", program_table, *sections)
 
 
-def _help(program: str) -> str:
+def _read_help(program: str) -> str:
+    """Return what a program prints with `--help`."""
     command = [sys.executable, "-m", "arc_suite", program, "--help"]
-    done = subprocess.run(command, cwd=returns.ROOT, capture_output=True, encoding="utf-8", check=True)
-    return done.stdout.strip()
+    process = subprocess.run(command, cwd=returns.ROOT, capture_output=True, encoding="utf-8", check=True)
+    return process.stdout.strip()
 
 
 def api_page(title: str, modules: tuple[str, ...]) -> str:
-    """Return a page of Sphinx directives that take the docstrings of modules."""
-    parts = [f"```{{eval-rst}}\n.. automodule:: {name}\n   :members:\n```" for name in modules]
-    return markdown.page(
-        TITLES[api_name(title)], *(f"## `{name}`\n\n{part}" for name, part in zip(modules, parts, strict=True))
-    )
+    """Return a page of Sphinx directives that show the docstrings of modules."""
+    sections = []
+    for name in modules:
+        directive = f"```{{eval-rst}}\n.. automodule:: {name}\n   :members:\n```"
+        sections.append(f"## `{name}`\n\n{directive}")
+    return markdown.page(TITLES[api_name(title)], *sections)

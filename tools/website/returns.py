@@ -1,8 +1,9 @@
-"""Committed returns as tables: of standing, demonstrators and learners."""
+"""Tables of committed returns: of standing, of demonstrators and of learners."""
 
-import itertools
 import json
 from pathlib import Path
+
+import numpy as np
 
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
@@ -19,31 +20,53 @@ _LEARNER_HEADS = ("robot, task", "algorithm", "seeds", "return", "score", "IQM [
 
 
 def demonstrators(robots=tuple(ROBOTS), tasks=tuple(TASKS)) -> str:
-    """Return the table of standing and of the best demonstrator, of committed places; empty without any."""
-    setups = [Setup.of(robot, task) for task in tasks for robot in robots]
-    found = {setup: known for setup in setups if (known := anchors.known(setup))}
-    heads = ("robot, task", "standing", "best demonstrator", "preset")
-    return table(heads, itertools.starmap(_anchors, found.items())) if found else ""
+    """Return the table of the returns of standing and of the best demonstrator; empty if none are committed."""
+    lines = []
+    for task in tasks:
+        for robot in robots:
+            setup = Setup.of(robot, task)
+            returns_of_presets = anchors.known(setup)
+            if returns_of_presets:
+                lines.append(_demonstrator_cells(setup, returns_of_presets))
+    return table(("robot, task", "standing", "best demonstrator", "preset"), lines) if lines else ""
 
 
-def _anchors(setup: Setup, known: anchors.Returns) -> tuple[str, str, str, str]:
-    best = anchors.of_returns(known).preset
-    zero, most = (f"{known[name].mean():.0f} +- {known[name].std():.0f}" for name in (anchors.ZERO, best))
-    return str(setup), zero, most, f"`{best}`"
+def _demonstrator_cells(setup: Setup, returns_of_presets: anchors.Returns) -> tuple[str, str, str, str]:
+    """Return the cells of a setup's line in the table of demonstrators."""
+    best_preset = anchors.of_returns(returns_of_presets).preset
+    standing = _mean_and_deviation(returns_of_presets[anchors.ZERO])
+    best = _mean_and_deviation(returns_of_presets[best_preset])
+    return str(setup), standing, best, f"`{best_preset}`"
+
+
+def _mean_and_deviation(returns: np.ndarray) -> str:
+    return f"{returns.mean():.0f} +- {returns.std():.0f}"
 
 
 def learners(robots=tuple(ROBOTS), tasks=tuple(TASKS), studies: str = "../../studies/") -> str:
-    """Return the table of learners in committed studies, `studies` away; empty where there are none."""
-    places = {str(Setup.of(robot, task)) for task in tasks for robot in robots}
-    rows = leaderboard.rank_configurations(csv_files.read(ROOT / "studies" / leaderboard.TABLE, leaderboard.HEADS))
-    lines = [row | {"study": leaderboard.link(row, studies)} for row in rows if row["robot, task"] in places]
-    return table(_LEARNER_HEADS, ([line[head] for head in _LEARNER_HEADS] for line in lines)) if lines else ""
+    """Return the table of learners in committed studies; empty if there are none.
+
+    Args:
+        robots: names of robots.
+        tasks: names of tasks.
+        studies: path of the folder of studies, from the page with the table.
+    """
+    setup_names = {str(Setup.of(robot, task)) for task in tasks for robot in robots}
+    results = csv_files.read(ROOT / "studies" / leaderboard.TABLE, leaderboard.HEADS)
+    lines = []
+    for configuration in leaderboard.rank_configurations(results):
+        if configuration["robot, task"] in setup_names:
+            fields = configuration | {"study": leaderboard.link(configuration, studies)}
+            lines.append([fields[head] for head in _LEARNER_HEADS])
+    return table(_LEARNER_HEADS, lines) if lines else ""
 
 
-def published(robot: str) -> str:
-    """Return the table of what the paper publishes for a robot in `walk`, and of the policy in the package."""
-    packaged = json.loads((PACKAGED / "policies.json").read_text(encoding="utf-8"))[f"{robot}-walk"]
-    lines = [("the paper's demonstrator", DEMONSTRATORS[robot])]
-    lines += [(f"the paper's {name}, 1,000,000 steps", value) for name, value in FINALS[robot].items()]
-    lines += [("`--policy ppo`, which comes with the package", packaged["return"])]
-    return table(("policy", "return"), ((name, f"{value:.0f}") for name, value in lines))
+def paper_table(robot: str) -> str:
+    """Return the table of the paper's returns of a robot in `walk`, and of the policy in the package."""
+    packaged_policies = json.loads((PACKAGED / "policies.json").read_text(encoding="utf-8"))
+    returns_of_policies = {"the paper's demonstrator": DEMONSTRATORS[robot]}
+    for name, final_return in FINALS[robot].items():
+        returns_of_policies[f"the paper's {name}, 1,000,000 steps"] = final_return
+    returns_of_policies["`--policy ppo`, which comes with the package"] = packaged_policies[f"{robot}-walk"]["return"]
+    lines = [(name, f"{policy_return:.0f}") for name, policy_return in returns_of_policies.items()]
+    return table(("policy", "return"), lines)

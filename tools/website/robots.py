@@ -12,14 +12,14 @@ def page(robot: str, player: str = "") -> str:
     """Return the page of a robot.
 
     Args:
-        robot: its name.
-        player: Markdown of a page in which it walks; without one there is a film.
+        robot: name of the robot.
+        player: HTML that shows a page in which the robot walks; if empty, the page has a moving picture.
     """
     setup = Setup.of(robot)
     task, model = setup.prepare()
     return markdown.page(
         f"`{robot}`",
-        f"{about(robot)} Gymnasium id: `{setup.env_id}`; each task has one.",
+        f"{description(robot)} Gymnasium id: `{setup.env_id}`; each task has one.",
         player or f"![{robot}](../films/{robot}.webp)",
         "## Body",
         _body(setup, model),
@@ -28,10 +28,10 @@ def page(robot: str, player: str = "") -> str:
         _joints(model),
         "## Observation",
         f"Of `walk`: {task.size} numbers. Other tasks add blocks at the end; see the page of each task.",
-        observations.listed(task, "Every index"),
+        observations.entries_table(task, "Every index"),
         "## Reward",
         "Weights of `walk`. The [page of the task](../walk.md) defines the terms.",
-        table(("term", "weight"), ([f"`{k}`", markdown.number(v)] for k, v in task.settings.weights.items())),
+        _weights(task),
         "## Gait",
         "What `walk` prescribes.",
         _gait(task),
@@ -39,18 +39,20 @@ def page(robot: str, player: str = "") -> str:
         "Means and standard deviations, by the [evaluation protocol](../results.md).",
         returns.demonstrators(robots=(robot,)),
         "What the paper publishes for `walk`, and the policy in the package:",
-        returns.published(robot),
+        returns.paper_table(robot),
         "Learners in the committed [studies](../../studies/README.md):",
         returns.learners(robots=(robot,)),
     )
 
 
-def about(robot: str) -> str:
+def description(robot: str) -> str:
     """Return what a robot is, in a sentence."""
-    return markdown.summary(importlib.import_module(f"arc_suite.robots.{robot}"))
+    module = importlib.import_module(f"arc_suite.robots.{robot}")
+    return markdown.summary(module)
 
 
 def _body(setup: Setup, model) -> str:
+    """Return the table of the body's sizes and numbers of parts."""
     body = setup.body
     legs = ", ".join(leg.name for leg in body.legs)
     return table(
@@ -59,40 +61,56 @@ def _body(setup: Setup, model) -> str:
             ("legs", f"{len(body.legs)}: {legs}"),
             ("joints", f"{model.nu}"),
             ("rigid parts", f"{len(body.part_names)}"),
-            ("mass", f"{markdown.number(model.body_mass.sum())} kg"),
-            ("standing height h", f"{markdown.number(body.torso.standing_height)} m"),
-            ("control step", f"{markdown.number(setup.definition.scene.control_timestep)} s"),
+            ("mass", f"{markdown.format_value(model.body_mass.sum())} kg"),
+            ("standing height h", f"{markdown.format_value(body.torso.standing_height)} m"),
+            ("control step", f"{markdown.format_value(setup.definition.scene.control_timestep)} s"),
         ],
     )
 
 
 def _joints(model) -> str:
+    """Return the table of the joints, in the order of the action."""
     lines = []
     for index in range(model.nu):
         joint = model.joint(model.actuator_trnid[index, 0])
-        low, high = joint.range
-        span = f"{math.degrees(low):.0f} to {math.degrees(high):.0f}"
-        numbers = model.actuator_gear[index, 0], joint.damping[0], joint.armature[0]
-        lines.append([str(index), f"`{joint.name}`", span, f"{low:.3f} to {high:.3f}", *map(markdown.number, numbers)])
+        low, high = joint.range  # rad
+        line = [
+            str(index),
+            f"`{joint.name}`",
+            f"{math.degrees(low):.0f} to {math.degrees(high):.0f}",
+            f"{low:.3f} to {high:.3f}",
+            markdown.format_value(model.actuator_gear[index, 0]),
+            markdown.format_value(joint.damping[0]),
+            markdown.format_value(joint.armature[0]),
+        ]
+        lines.append(line)
     heads = ("index", "joint", "range, degrees", "range, rad", "torque, N m", "damping, N m s/rad", "armature, kg m^2")
     return table(heads, lines)
 
 
+def _weights(task) -> str:
+    """Return the table of the weights of the reward's terms."""
+    lines = [[f"`{term}`", markdown.format_value(weight)] for term, weight in task.settings.weights.items()]
+    return table(("term", "weight"), lines)
+
+
 def _gait(task) -> str:
-    values, settings = task.parameters, task.settings
-    offsets = {
-        leg.name: phase / math.tau for leg, phase in zip(task.scene.body.legs, values.phase_offsets, strict=True)
-    }
+    """Return the table of the gait and the heights that a task prescribes."""
+    parameters = task.parameters
+    settings = task.settings
+    offsets = {}  # cycles, by name of the leg
+    for leg, phase in zip(task.scene.body.legs, parameters.phase_offsets, strict=True):
+        offsets[leg.name] = phase / math.tau
     return table(
         ("quantity", "value"),
         [
-            ("target velocity v*", f"{markdown.number(values.target_velocity)} m/s"),
-            ("velocity band", f"{markdown.number(settings.velocity_band)} m/s"),
-            ("frequency", f"{markdown.number(values.gait_frequency)} Hz"),
-            ("duty factor", markdown.number(values.duty_factor)),
-            ("phase offsets, cycles", markdown.number(offsets)),
-            ("a foot stands below", f"{markdown.number(values.stance_threshold)} m"),
-            ("healthy heights of the torso", f"{markdown.number(settings.healthy_range)} m"),
+            ("target velocity v*", f"{markdown.format_value(parameters.target_velocity)} m/s"),
+            ("velocity band", f"{markdown.format_value(settings.velocity_band)} m/s"),
+            ("frequency", f"{markdown.format_value(parameters.gait_frequency)} Hz"),
+            ("duty factor", markdown.format_value(parameters.duty_factor)),
+            ("phase offsets, cycles", markdown.format_value(offsets)),
+            ("a foot stands below", f"{markdown.format_value(parameters.stance_threshold)} m"),
+            ("healthy heights of the torso", f"{markdown.format_value(settings.healthy_range)} m"),
         ],
     )
 
@@ -101,7 +119,7 @@ def gallery(frame: str) -> str:
     """Return the page of generated creatures.
 
     Args:
-        frame: Markdown of a page to play in; empty without one.
+        frame: HTML that shows a page to play in; empty if there is none.
     """
     return markdown.page(
         "24 generated creatures",
@@ -111,13 +129,22 @@ def gallery(frame: str) -> str:
         frame,
         table(
             ("body", "legs", "joints", "mass, kg", "standing height, m", "v*, m/s", "frequency, Hz", "duty factor"),
-            map(_creature, players.CREATURES),
+            [_creature_cells(name) for name in players.CREATURES],
         ),
     )
 
 
-def _creature(name: str) -> list[str]:
+def _creature_cells(name: str) -> list[str]:
+    """Return the cells of a creature's line in the table of creatures."""
     task, model = Setup.of(name).prepare()
-    body, gait = task.scene.body, task.parameters
-    numbers = model.body_mass.sum(), body.torso.standing_height, *gait[:3]
-    return [f"`{name}`", f"{len(body.legs)}", f"{model.nu}", *map(markdown.number, numbers)]
+    body = task.scene.body
+    return [
+        f"`{name}`",
+        f"{len(body.legs)}",
+        f"{model.nu}",
+        markdown.format_value(model.body_mass.sum()),
+        markdown.format_value(body.torso.standing_height),
+        markdown.format_value(task.parameters.target_velocity),
+        markdown.format_value(task.parameters.gait_frequency),
+        markdown.format_value(task.parameters.duty_factor),
+    ]

@@ -18,8 +18,8 @@ from website import markdown
 
 HEADS = ("setting", "default", "bounds", "meaning")
 
-# Settings without a field of their own.
-_MEANINGS = {
+# Meanings of settings that are no field of a class below.
+_MEANINGS_WITHOUT_FIELD = {
     "gait": f"a gait by name, in place of duty_factor and phase_offsets: {', '.join(gaits.NAMES)}",
     "base_noise": f"one number for {', '.join(parameters.SHARED_NOISE['base_noise'])}",
     "joint_noise": f"one number for {', '.join(parameters.SHARED_NOISE['joint_noise'])}",
@@ -29,15 +29,23 @@ _MEANINGS = {
     "on_divergence": "raise, or terminate: what a step does whose physics diverges; terminate in vector environments",
     "random": "seed of the episodes, for `load`; Gymnasium takes it in `reset`",
 }
-MEANINGS = {
-    **{
-        name: text
-        for kind in (Parameters, Noise, walk.WalkSettings, Schedule, GaitAndPose, Level, Lanes)
-        for name, text in markdown.fields(kind).items()
-    },
-    **{name: markdown.fields(kind)[name] for kind in SUITE_MODIFIERS for name in kind.defaults},
-    **_MEANINGS,
-}
+
+
+def _collect_meanings() -> dict[str, str]:
+    """Return the meanings of all settings by name, from the docstrings of the classes that have them as fields."""
+    meanings = {}
+    for settings_class in (Parameters, Noise, walk.WalkSettings, Schedule, GaitAndPose, Level, Lanes):
+        meanings |= markdown.attribute_meanings(settings_class)
+    for modifier in SUITE_MODIFIERS:
+        modifier_meanings = markdown.attribute_meanings(modifier)
+        for name in modifier.defaults:
+            meanings[name] = modifier_meanings[name]
+    return meanings | _MEANINGS_WITHOUT_FIELD
+
+
+MEANINGS = _collect_meanings()
+
+# Lowest and highest values of settings by name.
 _BOUNDS = {
     **parameters.BOUNDS,
     **modifiers.bounds(),
@@ -51,36 +59,48 @@ _BOUNDS = {
 }  # fmt: skip
 
 
-def of_task(kind: type[Task]) -> str:
+def table_of_task(task_class: type[Task]) -> str:
     """Return the table of the settings that a task has in addition to those of all tasks."""
-    defaults = {robot: _defaults(Setup.of(robot, kind.name).definition) for robot in ROBOTS}
-    return table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in kind.names()))
+    defaults = {robot: _defaults(Setup.of(robot, task_class.name).definition) for robot in ROBOTS}
+    return table(HEADS, [_cells(name, defaults) for name in task_class.names()])
 
 
-def of_all_tasks() -> str:
+def table_of_all_tasks() -> str:
     """Return the table of the settings that every task has."""
-    defaults = {"": {name: default for kind in SUITE_MODIFIERS for name, default in kind.defaults.items()}}
-    names = ("random", "time_limit", "arena", "on_divergence", *defaults[""])
-    return table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in names))
+    defaults = {}
+    for modifier in SUITE_MODIFIERS:
+        defaults |= modifier.defaults
+    names = ("random", "time_limit", "arena", "on_divergence", *defaults)
+    return table(HEADS, [_cells(name, {"all robots": defaults}) for name in names])
 
 
-def _cells(name: str, defaults: Mapping[str, Mapping[str, Any]]) -> tuple[str, str, str]:
-    values = {robot: markdown.number(each[name]) if name in each else "-" for robot, each in defaults.items()}
-    same = len(set(values.values())) == 1
-    default = next(iter(values.values())) if same else ", ".join(f"{robot} {value}" for robot, value in values.items())
-    return default, bounds(name), MEANINGS[name]
+def _cells(name: str, defaults: Mapping[str, Mapping[str, Any]]) -> tuple[str, str, str, str]:
+    """Return the cells of a setting's line, given the defaults of each robot by the settings' names."""
+    texts = {}  # the default by robot
+    for robot, robot_defaults in defaults.items():
+        texts[robot] = markdown.format_value(robot_defaults[name]) if name in robot_defaults else "-"
+    if len(set(texts.values())) == 1:
+        default = next(iter(texts.values()))
+    else:
+        default = ", ".join(f"{robot} {text}" for robot, text in texts.items())
+    return f"`{name}`", default, bounds(name), MEANINGS[name]
 
 
 def bounds(name: str) -> str:
-    """Return the bounds of a setting as text; "-" where it is no number or has none."""
+    """Return the bounds of a setting as text; "-" if it has none, or is no number."""
     low, high = _BOUNDS.get(name, (-parameters.LARGEST, parameters.LARGEST))
-    if high >= parameters.LARGEST:
-        return f"from {low:g}" if low > -parameters.LARGEST else "-"
-    return f"{low:g} to {high:g}"
+    if high < parameters.LARGEST:
+        return f"{low:g} to {high:g}"
+    return f"from {low:g}" if low > -parameters.LARGEST else "-"
 
 
 def _defaults(task: Task) -> dict[str, Any]:
-    given = task.settings
-    found = {**given.parameters._asdict(), **given.noise._asdict(), **given._asdict()}
-    parts = (vars(found[name]) for name in ("ground", "command", "gait_and_pose") if found.get(name))
-    return {**found, **{name: value for part in parts for name, value in part.items()}, "weights": "see Reward"}
+    """Return the default values of a task's settings by name."""
+    settings = task.settings
+    defaults = {**settings.parameters._asdict(), **settings.noise._asdict(), **settings._asdict()}
+    for part_name in ("ground", "command", "gait_and_pose"):
+        part = settings._asdict().get(part_name)
+        if part:
+            defaults |= vars(part)
+    defaults["weights"] = "see Reward"
+    return defaults

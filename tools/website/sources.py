@@ -1,4 +1,4 @@
-"""The folder that Sphinx reads: the repository's pages at the same places, what they refer to, and generated pages."""
+"""The folder that Sphinx reads: the repository's pages and the files that they show, and generated pages."""
 
 import os
 import re
@@ -10,12 +10,15 @@ from arc_suite.tasks import TASKS
 from website import markdown, players, reference, robots, tasks
 from website.returns import ROOT
 
+# The repository's pages, as patterns of paths.
 PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "examples/**/*.md", "studies/**/*.md")
 
-FRONT = (ROOT / "README.md", ROOT / "docs" / "README.md")  # whose texts the front page has
+README = ROOT / "README.md"
+DOCS_README = ROOT / "docs" / "README.md"
+FRONT = (README, DOCS_README)  # pages whose texts the front page contains
 
-# Measured tables that are no study, by page.
-_MEASURED = {
+# Texts of the cards of measured tables that are no study, by page.
+_MEASURED_TABLES = {
     "demonstrators": "Demonstrators",
     "robots_of_others": "Robots of others",
     "clips": "Clips",
@@ -23,15 +26,16 @@ _MEASURED = {
     "reliability": "Reliability",
 }
 
-_WRITTEN = {name for name in TASKS if (ROOT / "docs" / f"{name}.md").is_file()}  # the others lie under `ground`
+# Tasks with a page in docs/; docs/ground.md is about the other tasks.
+_TASKS_WITH_PAGE = {name for name in TASKS if (ROOT / "docs" / f"{name}.md").is_file()}
 
-# Page -> pages that lie below it, most of them generated, with what their cards say.
+# For a page, the pages below it in the tree of pages, with the texts of their cards. Most of them are generated.
 BELOW = {
-    "docs/robots.md": {f"robots/{robot}": robots.about(robot) for robot in players.films()},
+    "docs/robots.md": {f"robots/{robot}": robots.description(robot) for robot in players.film_pages()},
     "docs/bodies.md": {"robots/gallery": "24 generated creatures"},
     "docs/tasks.md": {name: f"`{name}`: {markdown.summary(task)}" for name, task in TASKS.items()},
     "docs/reference.md": {f"reference/{name}": title for name, title in reference.TITLES.items()},
-    "studies/README.md": _MEASURED
+    "studies/README.md": _MEASURED_TABLES
     | {f"{path.parent.name}/README": path.parent.name for path in ROOT.glob("studies/*/README.md")},
 }
 
@@ -41,24 +45,34 @@ _SECTION = re.compile(r"^## (?P<title>[^\n]*)\n(?P<text>.*?)(?=^## |\Z)", re.MUL
 
 
 def write(folder: Path, walks: bool) -> None:
-    """Write all sources into a new folder; `walks` says whether there are pages in which creatures walk."""
+    """Write all sources into a new folder.
+
+    Args:
+        folder: to write into.
+        walks: whether the site has pages in which creatures walk.
+    """
     paths = {path for pattern in PAGES for path in ROOT.glob(pattern)}
     for path in sorted(paths.difference(FRONT)):
         _copy(path, folder)
-    for name, text in generated(walks):
+    for name, text in generate_pages(walks):
         _write(folder / "docs" / f"{name}.md", text)
         _copy_files(text, (ROOT / "docs" / name).parent, folder)
     _write(folder / "index.md", front_page(walks))
-    _copy_files(FRONT[0].read_text(encoding="utf-8"), ROOT, folder)
+    _copy_files(README.read_text(encoding="utf-8"), ROOT, folder)
 
 
 def _copy(page: Path, folder: Path) -> None:
-    """Copy a page with what its links need."""
-    text, place = page.read_text(encoding="utf-8"), page.relative_to(ROOT)
-    below = BELOW.get(place.as_posix(), {})
-    text = resolved(text, page.parent)
-    written = tasks.page(page.stem, text) if page.stem in _WRITTEN and page.parent.name == "docs" else text
-    parts = [written, *((markdown.cards(below), toctree(below)) if below else ())]
+    """Copy a page of the repository, with the files to which it refers.
+
+    Pages of tasks get the tables of the code, and pages with others below them get cards that lead to these.
+    """
+    place = page.relative_to(ROOT)
+    text = resolve_links(page.read_text(encoding="utf-8"), page.parent)
+    is_task_page = page.parent.name == "docs" and page.stem in _TASKS_WITH_PAGE
+    parts = [tasks.page(page.stem, text) if is_task_page else text]
+    pages_below = BELOW.get(place.as_posix())
+    if pages_below:
+        parts += [markdown.cards(pages_below), toctree(pages_below)]
     _write(folder / place, "\n".join(parts))
     _copy_files(text, page.parent, folder)
 
@@ -68,16 +82,16 @@ def _copy_files(text: str, start: Path, folder: Path) -> None:
     for link in _LINK.finditer(text):
         target = (start / link["path"]).resolve()
         if target.is_file() and target.suffix != ".md":
-            copied = folder / target.relative_to(ROOT)
-            copied.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(target, copied)
+            copy = folder / target.relative_to(ROOT)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(target, copy)
 
 
-def resolved(text: str, folder: Path) -> str:
+def resolve_links(text: str, folder: Path) -> str:
     """Return a page of a folder with links that Sphinx can follow.
 
-    Links to the READMEs of the repository and of docs/ lead to the front page, links to a folder to its README, or
-    nowhere where it has none.
+    Links to the READMEs of the repository and of docs/ become links to the front page. A link to another folder becomes
+    one to its README, or plain text if it has none.
     """
 
     def resolve(link: re.Match) -> str:
@@ -86,30 +100,34 @@ def resolved(text: str, folder: Path) -> str:
             return f"{link['text']}({os.path.relpath(ROOT / 'index.md', folder)})"
         if not target.is_dir():
             return link[0]
-        return f"{link['text']}({link['path']}/README.md)" if (target / "README.md").is_file() else link["text"][1:-1]
+        if (target / "README.md").is_file():
+            return f"{link['text']}({link['path']}/README.md)"
+        return link["text"].removeprefix("[").removesuffix("]")
 
     return _LINK.sub(resolve, text)
 
 
-def generated(walks: bool) -> Iterator[tuple[str, str]]:
-    """Yield names of generated pages, as in `BELOW`, and their texts."""
-    for robot, name in players.films().items():
-        yield (
-            f"robots/{robot}",
-            robots.page(robot, players.frame(f"../../{name}", f"{robot} walks", "walk") if walks else ""),
-        )
-    shown = players.frame(f"../../{players.GALLERY}#walk", "Creatures to play with") if walks else ""
-    yield "robots/gallery", robots.gallery(shown)
-    yield from ((task, tasks.page(task)) for task in TASKS if task not in _WRITTEN)
-    yield from ((f"reference/{name}", text) for name, text in reference.pages())
+def generate_pages(walks: bool) -> Iterator[tuple[str, str]]:
+    """Yield the name, as in `BELOW`, and the text of each generated page; for the argument see `write`."""
+    for robot, film_page in players.film_pages().items():
+        player = players.frame(f"../../{film_page}", f"{robot} walks", "walk") if walks else ""
+        yield f"robots/{robot}", robots.page(robot, player)
+    gallery_frame = players.frame(f"../../{players.GALLERY}#walk", "Creatures to play with") if walks else ""
+    yield "robots/gallery", robots.gallery(gallery_frame)
+    for task in TASKS:
+        if task not in _TASKS_WITH_PAGE:
+            yield task, tasks.page(task)
+    for name, text in reference.pages():
+        yield f"reference/{name}", text
 
 
 def front_page(walks: bool) -> str:
     """Return the README, and below it the tree of all pages, by the sections of docs/README.md.
 
-    The moving picture of the README becomes a creature to play with.
+    If the site has pages in which creatures walk, one replaces the moving picture of the README.
     """
-    readme, index = (path.read_text(encoding="utf-8") for path in FRONT)
+    readme = README.read_text(encoding="utf-8")
+    index = DOCS_README.read_text(encoding="utf-8")
     trees = []
     for section in _SECTION.finditer(index):
         links = [(ROOT / "docs" / link["path"]).resolve() for link in _LINK.finditer(section["text"])]
@@ -117,12 +135,13 @@ def front_page(walks: bool) -> str:
         trees.append(toctree(names, section["title"]))
     if walks:
         readme = _PICTURE.sub(players.frame(f"{players.GAME}#walk", "Creatures to play with"), readme, count=1)
-    return "\n\n".join([resolved(readme, ROOT), *trees]) + "\n"
+    return "\n\n".join([resolve_links(readme, ROOT), *trees]) + "\n"
 
 
 def toctree(names: Iterable[str], caption: str = "") -> str:
-    """Return the directive that puts pages below the page on which it stands."""
-    return "\n".join(["```{toctree}", ":hidden:", *([f":caption: {caption}"] if caption else []), "", *names, "```"])
+    """Return the directive that puts pages below the page with this directive in the tree of pages."""
+    caption_lines = [f":caption: {caption}"] if caption else []
+    return "\n".join(["```{toctree}", ":hidden:", *caption_lines, "", *names, "```"])
 
 
 def _write(path: Path, text: str) -> None:

@@ -1,7 +1,8 @@
-"""A page of each task: what is written by hand, then tables of the code."""
+"""A page of each task: the text of docs/, then tables of the code."""
 
 import math
 import re
+from collections.abc import Callable, Mapping
 
 import arc_suite
 from arc_suite.cpg.selection import suited_presets
@@ -13,6 +14,7 @@ from arc_suite.tasks.command_task import CommandTask
 from arc_suite.tasks.contract import STEPS, Task
 from website import markdown, observations, returns, settings
 
+# Definitions of the reward's terms by name: of costs, of the other terms of `walk`, and of tasks with commands.
 _COSTS = {
     "gait_cost": "number of contact schedule errors",
     "control": "squared action",
@@ -22,12 +24,12 @@ _COSTS = {
     "vertical_velocity": "squared vertical velocity of the torso",
     "posture": "squared distance of the joint angles from `default_angles`",
 }
-_WALK = {
+_WALK_TERMS = {
     "forward": "1 at the target velocity, 0 from the edge of `velocity_band` on",
     "healthy": "1 while the torso's height is in `healthy_range`",
     "gait_bonus": "share of the feet in stance or swing as the gait prescribes",
 }
-_COMMAND = {
+_COMMAND_TERMS = {
     "tracking": "triangular kernel of the velocity error times that of the turning error",
     "progress": "velocity toward the end of the lane, or the goal, by v*: a leaky mean, at most 1, times the cosine of "
     "the tilt",
@@ -38,6 +40,7 @@ _COMMAND = {
     "goal": "1 in the step that reaches a goal",
     "transport": "work of the motors by weight, over the displacement at v*",
 }
+# Definitions of metrics by name.
 METRICS = {
     "speed": "mean velocity along world x, m/s",
     "distance": "distance along the lane, as a share of that at v*, over the whole episode",
@@ -53,12 +56,14 @@ METRICS = {
 }
 
 
-def terms(kind: type[Task]) -> dict[str, str]:
+def terms(task_class: type[Task]) -> dict[str, str]:
     """Return definitions of the reward's terms of a task, by name."""
-    if not issubclass(kind, CommandTask):
-        return _WALK | _COSTS
-    rates = {name: f"{_COSTS[name]}, in units of h and g" for name in ("angular_velocity", "vertical_velocity")}
-    return _COSTS | rates | _COMMAND
+    if not issubclass(task_class, CommandTask):
+        return _WALK_TERMS | _COSTS
+    velocity_costs = {
+        name: f"{_COSTS[name]}, in units of h and g" for name in ("angular_velocity", "vertical_velocity")
+    }
+    return _COSTS | velocity_costs | _COMMAND_TERMS
 
 
 def page(name: str, written: str = "") -> str:
@@ -66,105 +71,122 @@ def page(name: str, written: str = "") -> str:
 
     Args:
         name: of the task.
-        written: what docs/ has of it; empty for a task on ground, which docs/ground.md explains.
+        written: text of its page in docs/; empty for a task on ground, which docs/ground.md explains.
     """
-    kind, tasks = TASKS[name], {robot: Setup.of(robot, name).definition for robot in ROBOTS}
-    return "\n\n".join([written.strip() or _introduced(name), _tables(name, kind, tasks)])
+    tasks = {robot: Setup.of(robot, name).definition for robot in ROBOTS}
+    return "\n\n".join([written.strip() or _introduction(name), _tables(name, TASKS[name], tasks)])
 
 
-def _introduced(name: str) -> str:
-    explained = f"{markdown.summary(TASKS[name])} [Ground](ground.md) explains it."
-    return f"# {name.capitalize()}\n\n![{name}](films/{name}.webp)\n\n{explained}"
+def _introduction(name: str) -> str:
+    """Return the beginning of the page of a task that has no page in docs/."""
+    sentences = f"{markdown.summary(TASKS[name])} [Ground](ground.md) explains it."
+    return f"# {name.capitalize()}\n\n![{name}](films/{name}.webp)\n\n{sentences}"
 
 
-def _tables(name: str, kind: type[Task], tasks) -> str:
-    return markdown.joined(
+def _tables(name: str, task_class: type[Task], tasks: Mapping[str, Task]) -> str:
+    """Return the sections of a task's page with tables of the code, given the task of each robot."""
+    return markdown.join_parts(
         "## Parts",
-        _parts(kind),
-        f"An episode has {STEPS} control steps: {_each(tasks, _duration)}. "
+        _parts(task_class),
+        f"An episode has {STEPS} control steps: {_text_by_robot(tasks, _duration)}. "
         f"Ids: {', '.join(f'`{Setup.of(robot, name).env_id}`' for robot in ROBOTS)}.",
         "## Observation",
         _observation(tasks),
         "## Reward",
-        _reward(kind, tasks),
+        _reward(task_class, tasks),
         "## End",
-        _end(kind, tasks),
+        _end(task_class, tasks),
         "## Metrics",
         "In `environment.task.progress`, and in Gymnasium's infos as `progress_...`.",
         _metrics(name),
         "## Settings",
         "Keys of `task_kwargs`, and of `--set name=value`. [All tasks](reference/settings.md) have some more.",
-        settings.of_task(kind),
+        settings.table_of_task(task_class),
         "## Demonstrators",
-        f"Presets that suit the task, the best first: {_each(tasks, _presets)}.",
+        f"Presets that suit the task, the best first: {_text_by_robot(tasks, _presets)}.",
         returns.demonstrators(tasks=(name,)),
-        _measured(name),
+        _measured_demonstrators(name),
         "## Learners",
         returns.learners(tasks=(name,), studies="../studies/") or "No committed study has runs of this task.",
     )
 
 
-def _each(tasks, text) -> str:
-    """A text of all robots where it is the same, else of each."""
-    found = {robot: text(task) for robot, task in tasks.items()}
-    same = len(set(found.values())) == 1
-    return next(iter(found.values())) if same else "; ".join(f"{robot} {value}" for robot, value in found.items())
+def _text_by_robot(tasks: Mapping[str, Task], describe: Callable[[Task], str]) -> str:
+    """Return a text about the task of each robot; only one if it is the same for all.
+
+    Args:
+        tasks: by name of the robot.
+        describe: function from a task to the text.
+    """
+    texts = {robot: describe(task) for robot, task in tasks.items()}
+    if len(set(texts.values())) == 1:
+        return next(iter(texts.values()))
+    return "; ".join(f"{robot} {text}" for robot, text in texts.items())
 
 
 def _duration(task: Task) -> str:
-    return f"{markdown.number(STEPS * task.scene.control_timestep)} s"
+    return f"{markdown.format_value(STEPS * task.scene.control_timestep)} s"
 
 
 def _presets(task: Task) -> str:
     return ", ".join(f"`{name}`" for name in suited_presets(task))
 
 
-def _parts(kind: type[Task]) -> str:
-    if not issubclass(kind, CommandTask):
+def _parts(task_class: type[Task]) -> str:
+    """Return the table of a task's command, ground and modifiers; empty for a task without commands."""
+    if not issubclass(task_class, CommandTask):
         return ""
-    lines = [("command", markdown.summary(type(kind.command))), ("ground", markdown.summary(type(kind.ground)))]
-    lines += [
-        (f"`{name}`", f"{markdown.number(value)}: {settings.MEANINGS[name]}") for name, value in kind.modifiers.items()
+    lines = [
+        ("command", markdown.summary(type(task_class.command))),
+        ("ground", markdown.summary(type(task_class.ground))),
     ]
+    for name, value in task_class.modifiers.items():
+        lines.append((f"`{name}`", f"{markdown.format_value(value)}: {settings.MEANINGS[name]}"))
     return table(("part", "what it is"), lines)
 
 
-def _observation(tasks) -> str:
+def _observation(tasks: Mapping[str, Task]) -> str:
+    """Return the table of the observation's blocks, and the table of all entries for the first robot."""
+    first_robot = next(iter(tasks))
+    first_task = tasks[first_robot]
     lines = []
-    for block in next(iter(tasks.values())).blocks:
+    for block in first_task.blocks:
         sizes = [str(task.sizes[block]) for task in tasks.values()]
-        lines.append([f"`{block}`", *sizes, observations.BLOCKS[block]])
-    lines.append(["in all", *(str(task.size) for task in tasks.values()), ""])
-    robot, task = next(iter(tasks.items()))
-    listed = table(("block", *tasks, "content"), lines)
-    return f"{listed}\n\n{observations.listed(task, f'Every index, of {robot}')}"
+        lines.append([f"`{block}`", *sizes, observations.BLOCK_CONTENTS[block]])
+    total_sizes = [str(task.size) for task in tasks.values()]
+    lines.append(["in all", *total_sizes, ""])
+    block_table = table(("block", *tasks, "content"), lines)
+    return f"{block_table}\n\n{observations.entries_table(first_task, f'Every index, of {first_robot}')}"
 
 
-def _reward(kind: type[Task], tasks) -> str:
-    definitions = terms(kind)
+def _reward(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
+    """Return the table of the reward's terms."""
+    definitions = terms(task_class)
+    first_task = next(iter(tasks.values()))
     lines = []
-    for term in next(iter(tasks.values())).settings.weights:
-        weight = _each(tasks, lambda task, term=term: markdown.number(task.settings.weights[term]))
+    for term in first_task.settings.weights:
+        weight = _text_by_robot(tasks, lambda task, term=term: markdown.format_value(task.settings.weights[term]))
         lines.append([f"`{term}`", weight, definitions[term]])
     text = "The sum of weighted terms. Infos have the terms as `reward_...`, without weights."
-    if issubclass(kind, CommandTask):
+    if issubclass(task_class, CommandTask):
         text += (
             " A weighted sum s of the costs, whose weights are negative, becomes s / sqrt(1 + (s / `cost_limit`)^2)."
         )
     return f"{text}\n\n{table(('term', 'weight', 'definition'), lines)}"
 
 
-def _end(kind: type[Task], tasks) -> str:
-    if not issubclass(kind, CommandTask):
-        heights = _each(tasks, lambda task: f"{markdown.number(task.settings.healthy_range)} m")
+def _end(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
+    """Return the table, or a sentence, about the discounts at the end of an episode."""
+    if not issubclass(task_class, CommandTask):
+        heights = _text_by_robot(tasks, lambda task: f"{markdown.format_value(task.settings.healthy_range)} m")
         return f"The discount is 0 where the torso leaves its healthy heights ({heights}), and 1 at the time limit."
-    health = kind.health
+    health = task_class.health
     tilt = f"{math.degrees(math.acos(health.least_upright)):.0f} degrees"
     lines = [
         ("0", f"the torso is lower than {health.lowest:g} h over the ground, or tilted by more than {tilt}"),
         ("0", f"the ground carries the torso with more than {health.lying:g} of the weight"),
     ]
-    if isinstance(kind.ground, ground.Lanes):
+    if isinstance(task_class.ground, ground.Lanes):
         lines.append(("0", f"a foot stays under the ground for {ground.SINKING} steps, a contact artifact"))
         lines.append(
             ("1", f"the torso is {ground.OFF_LANE:g} h from the lane's middle, or {ground.END:g} h from an end")
@@ -173,18 +195,20 @@ def _end(kind: type[Task], tasks) -> str:
 
 
 def _metrics(name: str) -> str:
-    environment = arc_suite.load(next(iter(ROBOTS)), name)
+    """Return the table of a task's metrics."""
+    first_robot = next(iter(ROBOTS))
+    environment = arc_suite.load(first_robot, name)
     environment.reset()
-    return table(("metric", "meaning"), ([f"`{key}`", METRICS[key]] for key in environment.task.progress))
+    return table(("metric", "meaning"), [[f"`{metric}`", METRICS[metric]] for metric in environment.task.progress])
 
 
-def _measured(name: str) -> str:
-    """The tables of a task in studies/demonstrators.md."""
+def _measured_demonstrators(name: str) -> str:
+    """Return the tables of a task in studies/demonstrators.md, or a link to that page if it has none."""
     text = (returns.ROOT / "studies" / "demonstrators.md").read_text(encoding="utf-8")
-    found = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", text, re.DOTALL)
-    if not found:
+    match = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", text, re.DOTALL)
+    if match is None:
         return "[Demonstrators, measured](../studies/demonstrators.md) has further demonstrators."
-    about = (
+    caption = (
         "Return, and the task's first metric of distance, goals, tracking; by preset (and difficulty of the ground):"
     )
-    return f"{about}\n\n{found[1].strip()}"
+    return f"{caption}\n\n{match[1].strip()}"
