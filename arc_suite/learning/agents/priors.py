@@ -14,11 +14,11 @@ from arc_suite.learning.agents.learner import Damaged, RunContext
 from arc_suite.learning.agents.replay import Replay
 from arc_suite.tasks import Task
 
-_COUNT = "count.json"  # written last: without it the files are incomplete
+_COUNTERS = "count.json"  # file of the counters of the transitions; written last: without it the files are incomplete
 
 
 def check_prior_is_named(prior: str | None, needed: bool) -> None:
-    """Check that a run names prior data if its algorithm needs them, and else none.
+    """Check that a run names prior data if and only if its algorithm needs them.
 
     Raises:
         ValueError: they are missing, or not taken.
@@ -34,7 +34,7 @@ def dataset_digest(prior: str) -> str:
     Raises:
         ValueError: no such dataset, or one that is damaged.
     """
-    return _digest(_opened(prior).summaries())
+    return _digest_of_episodes(_open_dataset(prior).summaries())
 
 
 def dataset_seeds(prior: str) -> range:
@@ -43,16 +43,16 @@ def dataset_seeds(prior: str) -> range:
     Raises:
         ValueError: no such dataset, or one with episodes of evaluation.
     """
-    found = _opened(prior).seeds
-    if seed_ranges.common_seeds([found], seed_ranges.EVALUATION):
-        least = seed_ranges.COLLECTING.start
-        expected = f"expected seeds from {least} on, got {found.start}"
+    seeds = _open_dataset(prior).seeds
+    if seed_ranges.common_seeds([seeds], seed_ranges.EVALUATION):
+        first_allowed = seed_ranges.COLLECTING.start
+        expected = f"expected seeds from {first_allowed} on, got {seeds.start}"
         raise ValueError(f"prior {checks.preview(prior)}: {expected}; collect it anew")
-    return found
+    return seeds
 
 
 def open_replay(context: RunContext, task: Task) -> Replay:
-    """Return the prior data of a run; its files are written from the dataset first, where they are missing.
+    """Return the prior data of a run; where its files are missing, they are written from the dataset.
 
     Observations are those of the task, which may leave out blocks of the dataset's.
 
@@ -60,48 +60,43 @@ def open_replay(context: RunContext, task: Task) -> Replay:
         ValueError: no such dataset, one that is damaged, or of another body or task, or damaged files.
         OSError: the disk is full, or the like.
     """
-    dataset = _opened(context.prior)
-    found, setup = dataset.settings.setup, context.setup
-    whole = setup.definition.sizes
-    if found.body != setup.body:
-        raise ValueError(f"prior {checks.preview(context.prior)}: of {found.body.name}, and not of {setup.body.name}")
-    if found != setup:
-        raise ValueError(f"prior {checks.preview(context.prior)}: of {found}, and not of {setup}")
-    version = dataset.metadata["arc_suite"].get("task_version")
-    if version != setup.kind.version:  # of other dynamics, rewards or observations
-        there, here = checks.quote(version), f"{setup.kind.version} is installed"
-        raise ValueError(f"prior {checks.preview(context.prior)}: of version {there} of {setup.kind.name}; {here}")
+    dataset = _open_dataset(context.prior)
+    _check_dataset(dataset, context)
     summaries = dataset.summaries()
-    size, joints = task.size, len(setup.body.joint_names)
     count = sum(summary["length"] for summary in summaries)
     if not count:
         raise ValueError(f"prior {checks.preview(context.prior)}: holds no episode")
-    columns = np.concatenate([np.full(count, name in task.sizes) for name, count in whole.items()])
-    left_out = "".join(f"-{name}" for name in whole if name not in task.sizes)
-    folder = files.folder(Path(context.folder).parent / f"prior-{_digest(summaries)[:16]}{left_out}")
+    size = task.size
+    joints = len(context.setup.body.joint_names)
+    dataset_blocks = context.setup.definition.sizes
+    left_out = "".join(f"-{name}" for name in dataset_blocks if name not in task.sizes)
+    folder_name = f"prior-{_digest_of_episodes(summaries)[:16]}{left_out}"
+    folder = files.folder(Path(context.folder).parent / folder_name)
     with files.hold_lock(folder / ".lock"):
-        if not (folder / _COUNT).exists():
+        if not (folder / _COUNTERS).exists():
+            # Which numbers of the dataset's observations the task has, (size of these,) booleans.
+            is_in_task = np.concatenate(
+                [np.full(block_size, name in task.sizes) for name, block_size in dataset_blocks.items()]
+            )
             replay = Replay(folder, count, size, joints)
-            for episode in dataset:
-                last = episode.length - 1
-                observations = episode.observations[:, columns]
-                for step in range(episode.length):
-                    here, there = observations[step], observations[step + 1]
-                    ended = bool(episode.terminations[step])
-                    replay.add(here, episode.actions[step], episode.rewards[step], ended, there, step == last)
-            with files.writing_json(folder / _COUNT) as file:
+            _add_episodes(replay, dataset, is_in_task)
+            with files.writing_json(folder / _COUNTERS) as file:
                 file.update(total=replay.total, ends=replay.ends, checksum=replay.checksum, dataset=context.prior)
     try:
         replay = Replay(folder, count, size, joints, mode="r")
-        known = checks.mapping(_COUNT, files.read_json(folder / _COUNT))
-        replay.restore(*(checks.integer(name, known[name], 0) for name in ("total", "ends", "checksum")))
+        counters = checks.mapping(_COUNTERS, files.read_json(folder / _COUNTERS))
+        replay.restore(
+            total=checks.integer("total", counters["total"], 0),
+            ends=checks.integer("ends", counters["ends"], 0),
+            checksum=checks.integer("checksum", counters["checksum"], 0),
+        )
         return replay
     except (Damaged, ValueError, KeyError, TypeError) as error:
         damage = f"{folder} is damaged: {checks.quote(error)}"
         raise ValueError(f"prior {checks.preview(context.prior)}: {damage}; delete it") from None
 
 
-def _opened(prior: str):
+def _open_dataset(prior: str):
     try:
         from arc_suite import data
     except ImportError as error:
@@ -109,5 +104,35 @@ def _opened(prior: str):
     return data.open(prior)
 
 
-def _digest(summaries: Sequence[Mapping]) -> str:
+def _check_dataset(dataset, context: RunContext) -> None:
+    """Raise ValueError for a dataset of another body, task, settings or version of the task than those of a run."""
+    dataset_setup = dataset.settings.setup
+    setup = context.setup
+    prior = checks.preview(context.prior)
+    if dataset_setup.body != setup.body:
+        raise ValueError(f"prior {prior}: of {dataset_setup.body.name}, and not of {setup.body.name}")
+    if dataset_setup != setup:
+        raise ValueError(f"prior {prior}: of {dataset_setup}, and not of {setup}")
+    version = dataset.metadata["arc_suite"].get("task_version")
+    if version != setup.kind.version:  # of other dynamics, rewards or observations
+        installed = f"{setup.kind.version} is installed"
+        raise ValueError(f"prior {prior}: of version {checks.quote(version)} of {setup.kind.name}; {installed}")
+
+
+def _add_episodes(replay: Replay, dataset, is_in_task: np.ndarray) -> None:
+    """Add the transitions of all episodes of a dataset, with the numbers of observations that the task has."""
+    for episode in dataset:
+        observations = episode.observations[:, is_in_task]
+        for step in range(episode.length):
+            replay.add(
+                observations[step],
+                episode.actions[step],
+                episode.rewards[step],
+                terminated=bool(episode.terminations[step]),
+                next_observation=observations[step + 1],
+                is_last=step == episode.length - 1,
+            )
+
+
+def _digest_of_episodes(summaries: Sequence[Mapping]) -> str:
     return hashlib.sha256("".join(summary["sha256"] for summary in summaries).encode()).hexdigest()

@@ -1,9 +1,9 @@
 """Replay buffers in memory-mapped files: the latest transitions of a run, and prior data.
 
-An observation is stored once, as the next one of a transition is the observation of the transition after it. Last
-observations of episodes are in a file of their own. A million transitions of Queen take 0.9 GB. Files have their
-full size from the start, so a disk that is too small is an error at the start. Checkpoints hold a checksum of what
-can be sampled, as a file that was deleted or cut reads as zeros.
+An observation is stored once: the next observation of a transition is the observation of the transition after it.
+Final observations of episodes are in a separate file. A million transitions of Queen take 0.9 GB. Files have their full
+size from the start, so a disk that is too small is an error at the start. Checkpoints hold a checksum of what can be
+sampled, as a file that was deleted or cut reads as zeros.
 
 Several environments take turns: with n of them, the transition after number k is number k + n.
 """
@@ -18,8 +18,9 @@ import numpy as np
 from arc_suite import files
 from arc_suite.learning.agents.learner import Damaged
 
-_ENDS = 256  # final observations by which their file grows
-_CHUNK = 4096  # transitions that are read at once
+_ENDS = 256  # final observations that a new file has room for
+_NO_END = -1  # in place of the index of a final observation
+_TRANSITIONS_PER_READ = 4096
 
 
 class Transitions(NamedTuple):
@@ -44,8 +45,8 @@ class Transitions(NamedTuple):
 class Replay:
     """The latest transitions of streams of episodes, in files of a folder.
 
-    Transitions that could be sampled `slack` transitions ago are not overwritten, so a run can resume from a
-    checkpoint that is not older.
+    A slot of the files holds a transition. The last `slack` transitions that could be sampled before are not
+    overwritten, so a run can resume from a checkpoint that is up to `slack` transitions old.
 
     Attributes:
         total: transitions added since the start.
@@ -61,9 +62,9 @@ class Replay:
         Args:
             folder: of the files.
             capacity: transitions that can be sampled.
-            size: of an observation.
-            joints: of an action.
-            slack: further transitions that are kept.
+            size: numbers of an observation.
+            joints: numbers of an action.
+            slack: further transitions that stay in the files.
             mode: "w+" to make the files where they are missing, "r+" to resume from them, "r" to read them alone.
                 Files to resume from may be shorter, of a smaller capacity at which no transition was overwritten.
             num_envs: environments, whose transitions are added in turn.
@@ -72,18 +73,24 @@ class Replay:
             Damaged: a file to resume from is missing, or one to read is missing or too short.
             OSError: the disk is full, or the like.
         """
-        self._folder, self._capacity, self._size, self._mode = files.folder(folder), capacity, size, mode
+        self._folder = files.folder(folder)
+        self._capacity = capacity
+        self._size = size
+        self._mode = mode
         self._num_envs = num_envs
-        self._slots = capacity + slack + num_envs  # further ones for the observations that come next
+        self._slots = capacity + slack + num_envs  # `num_envs` more for the next observations of the latest transitions
         make = mode == "w+"
-        self._observations = self._mapped("observations", np.float32, (self._slots, size), make)
-        self._actions = self._mapped("actions", np.float32, (self._slots, joints), make)
-        self._rewards = self._mapped("rewards", np.float32, (self._slots,), make)
-        self._goes_on = self._mapped("goes_on", np.float32, (self._slots,), make)
-        self._end = self._mapped("ends", np.int32, (self._slots,), make)  # which final observation is next, or -1
-        self._final = self._mapped("final_observations", np.float32, (_ENDS, size), make)
+        self._observations = self._map_file("observations", np.float32, (self._slots, size), make)
+        self._actions = self._map_file("actions", np.float32, (self._slots, joints), make)
+        self._rewards = self._map_file("rewards", np.float32, (self._slots,), make)
+        self._goes_on = self._map_file("goes_on", np.float32, (self._slots,), make)
+        # Of each slot the index of its next observation among the final ones; `_NO_END` where the episode goes on.
+        self._end_indices = self._map_file("ends", np.int32, (self._slots,), make)
+        self._final_observations = self._map_file("final_observations", np.float32, (_ENDS, size), make)
         self._checksums = np.zeros(self._slots, np.uint32)
-        self.total = self.ends = self.checksum = 0
+        self.total = 0
+        self.ends = 0
+        self.checksum = 0
 
     def __len__(self) -> int:
         """Return the number of transitions that can be sampled."""
@@ -92,18 +99,24 @@ class Replay:
     def add(self, observation, action, reward: float, terminated: bool, next_observation, is_last: bool) -> None:
         """Add a transition; if it is not the last of its episode, the next one starts from its next observation."""
         slot = self.total % self._slots
-        self._observations[slot], self._actions[slot], self._rewards[slot] = observation, action, reward
-        self._goes_on[slot], self._end[slot] = not terminated, -1
+        self._observations[slot] = observation
+        self._actions[slot] = action
+        self._rewards[slot] = reward
+        self._goes_on[slot] = not terminated
         if is_last:
-            self._make_room(self.ends + 1)
-            self._final[self.ends], self._end[slot] = next_observation, self.ends
+            self._grow_final_observations(self.ends + 1)
+            self._final_observations[self.ends] = next_observation
+            self._end_indices[slot] = self.ends
             self.ends += 1
         else:
-            self._observations[(slot + self._num_envs) % self._slots] = next_observation
+            self._end_indices[slot] = _NO_END
+            self._observations[self._next_slots(slot)] = next_observation
         if self.total >= self._capacity:
-            self.checksum -= int(self._checksums[(self.total - self._capacity) % self._slots])
+            oldest_slot = (self.total - self._capacity) % self._slots
+            self.checksum -= int(self._checksums[oldest_slot])
         self.total += 1
-        self._count_in(self.total - 1, self.transitions_at(np.array([len(self) - 1])))
+        latest = self.transitions_at(np.array([len(self) - 1]))
+        self._add_to_checksum(self.total - 1, latest)
 
     def transitions_at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
         """Return copies of transitions by index; index 0 is the oldest.
@@ -116,61 +129,92 @@ class Replay:
         Returns:
             Arrays (batch, ...).
         """
-        numbers = self.total - len(self) + indices  # since the start
-        first = numbers % self._slots
-        rewards, factor = self._rewards[first], np.ones(len(indices), np.float32)
-        going = np.ones(len(indices), bool)
+        numbers = self.total - len(self) + indices  # of transitions, since the start
+        first_slots = numbers % self._slots
+        rewards = self._rewards[first_slots]
+        discounts = np.ones(len(indices), np.float32)
+        has_next_step = np.ones(len(indices), bool)
         for _ in range(n_step - 1):
-            going &= (self._end[numbers % self._slots] < 0) & (numbers + self._num_envs < self.total)
-            numbers = np.where(going, numbers + self._num_envs, numbers)
-            factor = np.where(going, factor * np.float32(discount), factor)
-            rewards += np.where(going, factor * self._rewards[numbers % self._slots], np.float32(0.0))
-        last = numbers % self._slots
-        nexts, ends = self._observations[(last + self._num_envs) % self._slots], self._end[last]
-        final = ends >= 0
-        nexts[final] = self._final[ends[final]]
-        factor = factor * self._goes_on[last]
-        return Transitions(self._observations[first], self._actions[first], rewards, factor, nexts)
+            episode_goes_on = self._end_indices[numbers % self._slots] < 0
+            is_next_stored = numbers + self._num_envs < self.total
+            has_next_step &= episode_goes_on & is_next_stored
+            numbers = np.where(has_next_step, numbers + self._num_envs, numbers)
+            discounts = np.where(has_next_step, discounts * np.float32(discount), discounts)
+            rewards += np.where(has_next_step, discounts * self._rewards[numbers % self._slots], np.float32(0.0))
+        last_slots = numbers % self._slots
+        next_observations = self._observations[self._next_slots(last_slots)]
+        end_indices = self._end_indices[last_slots]
+        is_end = end_indices >= 0
+        next_observations[is_end] = self._final_observations[end_indices[is_end]]
+        return Transitions(
+            observations=self._observations[first_slots],
+            actions=self._actions[first_slots],
+            rewards=rewards,
+            goes_on=discounts * self._goes_on[last_slots],
+            next_observations=next_observations,
+        )
+
+    def _next_slots(self, slots):
+        """Return the slots of the next transitions of the same environments."""
+        return (slots + self._num_envs) % self._slots
 
     def restore(self, total: int, ends: int, checksum: int) -> None:
-        """Resume with the given counters; at most `slack` later transitions may be on disk.
+        """Resume with the counters of a checkpoint; at most `slack` later transitions may be on disk.
 
         Raises:
             Damaged: the files hold other transitions.
         """
-        self.total, self.ends, self.checksum = total, ends, 0
-        self._make_room(ends)
-        for first in range(0, len(self), _CHUNK):
-            indices = np.arange(first, min(first + _CHUNK, len(self)))
-            self._count_in(total - len(self) + first, self.transitions_at(indices))
+        self.total = total
+        self.ends = ends
+        self.checksum = 0
+        self._grow_final_observations(ends)
+        first_number = total - len(self)
+        for first in range(0, len(self), _TRANSITIONS_PER_READ):
+            indices = np.arange(first, min(first + _TRANSITIONS_PER_READ, len(self)))
+            self._add_to_checksum(first_number + first, self.transitions_at(indices))
         if self.checksum != checksum:
             raise Damaged(f"{self._folder} holds other transitions")
 
-    def _count_in(self, number: int, transitions: Transitions) -> None:
-        """Add transitions to the checksum; the first one has a number since the start."""
+    def _add_to_checksum(self, first_number: int, transitions: Transitions) -> None:
+        """Add consecutive transitions to the checksum, of which the first has this number since the start."""
         columns = [array.reshape(len(array), -1) for array in transitions]
-        for row in np.concatenate(columns, axis=1):
-            self._checksums[number % self._slots] = crc = zlib.crc32(row, number & 0xFFFFFFFF)
+        for number, values in enumerate(np.concatenate(columns, axis=1), first_number):
+            crc = zlib.crc32(values, number & 0xFFFFFFFF)
+            self._checksums[number % self._slots] = crc
             self.checksum += crc
-            number += 1
 
-    def _make_room(self, ends: int) -> None:
-        while len(self._final) < ends:
-            shape = 2 * len(self._final), self._size
-            self._final = self._mapped("final_observations", np.float32, shape, make=self._mode != "r")
+    def _grow_final_observations(self, ends: int) -> None:
+        """Map the file of final observations again until it has room for this many."""
+        while len(self._final_observations) < ends:
+            shape = (2 * len(self._final_observations), self._size)
+            make = self._mode != "r"
+            self._final_observations = self._map_file("final_observations", np.float32, shape, make)
 
-    def _mapped(self, name: str, dtype, shape: tuple[int, ...], make: bool) -> np.ndarray:
-        path, size = self._folder / name, int(np.prod(shape)) * np.dtype(dtype).itemsize
-        if make or (self._mode == "r+" and path.is_file()):
+    def _map_file(self, name: str, dtype, shape: tuple[int, ...], make: bool) -> np.ndarray:
+        """Map a file of the folder as an array.
+
+        Args:
+            name: of the file.
+            dtype: of the array.
+            shape: of the array.
+            make: whether to make the file or to lengthen it.
+
+        Raises:
+            Damaged: the file is missing or too short.
+        """
+        path = self._folder / name
+        size = int(np.prod(shape)) * np.dtype(dtype).itemsize  # bytes
+        is_resumed = self._mode == "r+" and path.is_file()
+        if make or is_resumed:
             _allocate(path, size)
-        elif not (path.is_file() and path.stat().st_size >= size):
+        elif not path.is_file() or path.stat().st_size < size:
             raise Damaged(f"{path} is missing or too short")
-        found = np.memmap(path, dtype, "r" if self._mode == "r" else "r+", shape=shape)
-        return np.asarray(found)  # indexing a plain array is faster
+        mapped_array = np.memmap(path, dtype, "r" if self._mode == "r" else "r+", shape=shape)
+        return np.asarray(mapped_array)  # indexing a plain array is faster
 
 
 def _allocate(path: Path, size: int) -> None:
-    """Make a file, or lengthen it."""
+    """Make a file of a size, bytes, or lengthen it."""
     try:
         with path.open("a+b") as file:
             if hasattr(os, "posix_fallocate"):
@@ -182,18 +226,19 @@ def _allocate(path: Path, size: int) -> None:
 
 
 class CombinedReplay:
-    """Two sources of transitions in one: prior data, which are never overwritten, and a buffer."""
+    """Prior data, which are never overwritten, and a buffer, as one source of transitions."""
 
-    def __init__(self, first: Replay, second: Replay):
-        """Take the sources."""
-        self._first, self._second = first, second
+    def __init__(self, prior: Replay, buffer: Replay):
+        """Combine prior data and a buffer."""
+        self._prior = prior
+        self._buffer = buffer
 
     def __len__(self) -> int:
         """Return the number of transitions that can be sampled."""
-        return len(self._first) + len(self._second)
+        return len(self._prior) + len(self._buffer)
 
     def transitions_at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
-        """Return copies of transitions by index, as `Replay.transitions_at` does; those of the first source come first.
+        """Return copies of transitions by index, as `Replay.transitions_at` does; the prior ones come first.
 
         Args:
             indices: (batch,) from 0 to `len` - 1.
@@ -203,12 +248,9 @@ class CombinedReplay:
         Returns:
             Arrays (batch, ...), in the order of the indices.
         """
-        count = len(self._first)
-        of_first = indices < count
-        steps = n_step, discount
-        parts = (
-            self._first.transitions_at(indices[of_first], *steps),
-            self._second.transitions_at(indices[~of_first] - count, *steps),
-        )
-        places = np.argsort(np.concatenate([np.flatnonzero(of_first), np.flatnonzero(~of_first)]))
-        return Transitions(*(np.concatenate(pair)[places] for pair in zip(*parts, strict=True)))
+        is_prior = indices < len(self._prior)
+        prior_part = self._prior.transitions_at(indices[is_prior], n_step, discount)
+        buffer_part = self._buffer.transitions_at(indices[~is_prior] - len(self._prior), n_step, discount)
+        positions = np.concatenate([np.flatnonzero(is_prior), np.flatnonzero(~is_prior)])
+        order = np.argsort(positions)
+        return Transitions(*(np.concatenate(parts)[order] for parts in zip(prior_part, buffer_part, strict=True)))
