@@ -22,7 +22,7 @@ from arc_suite.cpg.selection import suited_preset  # noqa: E402
 from arc_suite.envs.vector import VectorEnv  # noqa: E402
 from arc_suite.models.posture import room  # noqa: E402
 from arc_suite.robots import ROBOTS, gaits  # noqa: E402
-from arc_suite.tasks import direction  # noqa: E402
+from arc_suite.tasks import gait_and_pose  # noqa: E402
 
 FIRST = 7000  # seed of the first body of a family, of those that nothing else uses
 POSES = [(-0.15, 0, 0, 0, 0, 0), (-0.3, 0, 0, 0, 0, 0), (0.1, 0, 0, 0, 0, 0)]
@@ -62,7 +62,7 @@ class Run:
                 stands = np.arctan2(sine, cosine) / (2.0 * np.pi) % 1.0 < duty[:, None]
                 stands |= ~blocks["gait_clock"].any(axis=-1)[:, None]
                 motion.append(blocks["command"][:, 3:])
-                poses.append(direction.measured(self.task.context, readings))
+                poses.append(gait_and_pose.measure_pose(self.task.context, readings))
                 on_ground = readings.foot_heights < self.task.parameters.stance_threshold
                 compliance.append((on_ground == stands).mean(axis=-1))
         return [np.mean(values, axis=0) for values in (motion, poses, compliance)]

@@ -100,7 +100,7 @@ def _ground(setup: Setup, arena: str) -> dict[str, Any]:
     data = mujoco.MjData(model)
     data.qpos[:] = task.scene.standing
     mujoco.mj_forward(model, data)
-    return {"xml": text, "start": pages.to_json_values(task.cleared(task.read(data)), digits=None)}
+    return {"xml": text, "start": pages.to_json_values(task.raise_off_ground(task.read(data)), digits=None)}
 
 
 def _task(task: Task, commanded: Task) -> dict[str, Any]:

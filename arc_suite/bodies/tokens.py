@@ -143,7 +143,7 @@ def flat(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) 
 
 def split(vectors) -> dict[str, Any]:
     """Return vectors (..., 664) of NumPy or JAX as the blocks of `FLAT`, by name."""
-    return {name: vectors[..., part] for name, part in blocks.places(FLAT).items()}
+    return {name: vectors[..., part] for name, part in blocks.slices(FLAT).items()}
 
 
 def leg_inputs(vectors):
@@ -280,8 +280,8 @@ class Tokens(NamedTuple):
     @staticmethod
     def _places(task: Task) -> np.ndarray:
         body = task.scene.body
-        numbers = {name: np.arange(part.start, part.stop) for name, part in blocks.places(task.sizes).items()}
-        parts = {name: [numbers[name][part] for part in task.blocks[name].places] for name in BLOCKS}
+        numbers = {name: np.arange(part.start, part.stop) for name, part in blocks.slices(task.sizes).items()}
+        parts = {name: [numbers[name][part] for part in task.blocks[name].slices] for name in BLOCKS}
         height, orientation, angles = parts["posture"]
         linear, angular, speeds = parts["velocities"]
         (forces,) = parts["contact_forces"]

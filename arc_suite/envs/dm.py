@@ -434,7 +434,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         blocks = self.definition.observe(self._now.memory, readings)
         if self._flat:
             return {_FLAT: self.definition.vector(blocks)}
-        return self.definition.named(blocks)
+        return self.definition.copy_blocks(blocks)
 
     def get_termination(self, physics):
         """Return the discount at the end of an episode: 0 if terminated or diverged, 1 if truncated; else None."""

@@ -1,4 +1,4 @@
-"""Blocks of an observation: the parts of each and its noise, declared once."""
+"""Blocks of an observation: the parts of each block, and its noise."""
 
 import itertools
 import math
@@ -16,22 +16,21 @@ from arc_suite.tasks.parts import HEADED, ROTATIONS, WORLD, Joints, Part, Phase,
 
 # Half-widths of noise at level 1, about those of legged_gym (joints 0.01 rad and 1.5 rad/s, velocity 0.1 m/s and
 # 0.2 rad/s, gravity 0.05, heights 0.1 m) for a robot that stands half a meter high.
-HEIGHT = 0.02  # h
-ORIENTATION = 0.02  # of the quaternion's components
-JOINT_ANGLE = 0.01  # rad
-LINEAR_VELOCITY = 0.05  # sqrt(g h)
-ANGULAR_VELOCITY = 0.05  # sqrt(g / h)
-JOINT_VELOCITY = 0.3  # sqrt(g / h)
-CONTACT_FORCE = 0.02  # of the range to which forces are clipped
+HEIGHT_NOISE = 0.02  # h
+ORIENTATION_NOISE = 0.02  # components of the quaternion
+JOINT_ANGLE_NOISE = 0.01  # rad
+LINEAR_VELOCITY_NOISE = 0.05  # sqrt(g h)
+ANGULAR_VELOCITY_NOISE = 0.05  # sqrt(g / h)
+JOINT_VELOCITY_NOISE = 0.3  # sqrt(g / h)
+CONTACT_FORCE_NOISE = 0.02  # share of the range to which forces are clipped
 
 
 class Block(NamedTuple):
     """A block of the observation.
 
     Attributes:
-        parts: that it is made of, in order.
-        noise: half-widths of the noise of each part at level 1, in its unit, or one for all of them; None for what is
-            known exactly.
+        parts: its parts, in order.
+        noise: half-widths of the noise of each part at level 1, in its unit, or one number for all; None without noise.
     """
 
     parts: tuple[Part, ...]
@@ -39,7 +38,7 @@ class Block(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers it has."""
+        """The number of its numbers."""
         return sum(part.size for part in self.parts)
 
     @property
@@ -48,25 +47,26 @@ class Block(NamedTuple):
         return tuple(map(type, self.parts))
 
     @property
-    def places(self) -> list[slice]:
-        """Where each of its parts lies in it."""
+    def slices(self) -> list[slice]:
+        """The slice of each of its parts."""
         ends = itertools.accumulate(part.size for part in self.parts)
         return [slice(end - part.size, end) for part, end in zip(self.parts, ends, strict=True)]
 
     @property
     def has_frame(self) -> bool:
-        """Whether it is known how all of its numbers transform."""
+        """Whether all of its parts have a frame, so that they can be mirrored and turned."""
         return all(part.has_frame for part in self.parts)
 
     @property
     def measures_joints(self) -> bool:
-        """Whether it holds angles or other numbers of joints, as what a history keeps does."""
+        """Whether it holds numbers of joints; a history keeps such blocks."""
         return any(isinstance(part, Joints) for part in self.parts)
 
     @property
     def widths(self) -> np.ndarray:
         """The half-widths (size,) of the noise at level 1 of a block that declares it."""
-        return np.repeat(np.broadcast_to(self.noise, len(self.parts)), [part.size for part in self.parts])
+        sizes = [part.size for part in self.parts]
+        return np.repeat(np.broadcast_to(self.noise, len(self.parts)), sizes)
 
     def mirror(self, image: Image) -> Mirror:
         """Return the left-right map.
@@ -81,8 +81,8 @@ class Block(NamedTuple):
         return [entry for part in self.parts for entry in part.entries()]
 
 
-def places(sizes: Mapping[str, int]) -> dict[str, slice]:
-    """Return where each block lies in a vector of all, by name, given their sizes in the order of the vector."""
+def slices(sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Return the slice of each block in a vector of all, by name, given their sizes in the order of the vector."""
     ends = itertools.accumulate(sizes.values())
     return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
@@ -90,37 +90,44 @@ def places(sizes: Mapping[str, int]) -> dict[str, slice]:
 def posture(body: Body) -> Block:
     """Return the block of the torso's height and quaternion, and the joint angles: (5 + joints)."""
     parts = Scalar("torso height", "m"), Quaternion("torso quaternion"), Joints(body, "angle of {}", "rad")
-    return Block(parts, (HEIGHT * body.torso.standing_height, ORIENTATION, JOINT_ANGLE))
+    return Block(parts, (HEIGHT_NOISE * body.torso.standing_height, ORIENTATION_NOISE, JOINT_ANGLE_NOISE))
 
 
 def velocities(body: Body, headed: bool = False) -> Block:
     """Return the block of the torso's linear and angular velocity, and the joint velocities: (6 + joints).
 
     Args:
-        body: that moves.
-        headed: whether the linear velocity is as the torso heads; else it is in the world's frame.
+        body: the body.
+        headed: whether the linear velocity is relative to the heading; else it is in the world's frame.
     """
     height = body.torso.standing_height
-    unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
+    velocity_unit = math.sqrt(GRAVITY * height)
+    rate_unit = math.sqrt(GRAVITY / height)
     parts = (
         Vector("torso velocity", "m/s", HEADED if headed else WORLD),
         Vector("torso angular velocity", "rad/s", ROTATIONS, axial=True),
         Joints(body, "velocity of {}", "rad/s"),
     )
-    return Block(parts, (LINEAR_VELOCITY * unit, ANGULAR_VELOCITY * rate, JOINT_VELOCITY * rate))
+    noise = (
+        LINEAR_VELOCITY_NOISE * velocity_unit,
+        ANGULAR_VELOCITY_NOISE * rate_unit,
+        JOINT_VELOCITY_NOISE * rate_unit,
+    )
+    return Block(parts, noise)
 
 
 def contact_forces(body: Body, headed: bool = False) -> Block:
     """Return the block of torque and force on each rigid part: (6 * parts).
 
     Args:
-        body: that moves.
-        headed: whether they are as the torso heads and in the body's weight; else in the world's frame and in N.
+        body: the body.
+        headed: whether they are relative to the heading and in the body's weight; else in the world's frame and in N.
     """
     axes = HEADED if headed else ("x", "y", "z")
-    torque, force = ("weight x h", "weight") if headed else ("N m", "N")
-    parts = Vector("torque on {}", torque, axes, axial=True), Vector("force on {}", force, axes)
-    return Block((RigidParts(body, parts),), CONTACT_FORCE)
+    torque_unit, force_unit = ("weight x h", "weight") if headed else ("N m", "N")
+    torque = Vector("torque on {}", torque_unit, axes, axial=True)
+    force = Vector("force on {}", force_unit, axes)
+    return Block((RigidParts(body, (torque, force)),), CONTACT_FORCE_NOISE)
 
 
 def gait_clock(phase_offsets: np.ndarray | None = None, default_angles: np.ndarray | None = None) -> Block:
@@ -139,10 +146,10 @@ def of_gait(
     """Return the blocks of the paper's observation (Section 3), for a body in a gait.
 
     Args:
-        body: that moves.
+        body: the body.
         phase_offsets: see `parameters.Parameters`.
         default_angles: see `parameters.Parameters`.
-        headed: whether vectors are as the torso heads; see `velocities` and `contact_forces`.
+        headed: whether vectors are relative to the heading; see `velocities` and `contact_forces`.
     """
     return {
         "posture": posture(body),

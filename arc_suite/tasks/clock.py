@@ -1,7 +1,7 @@
-"""The gait's clock, an integer tick a control step with tables by tick, and how well feet follow its contact schedule.
+"""The gait's clock, with tables by tick, one tick a control step, and how well feet follow its contact schedule.
 
-A gait's edges fall exactly on control steps, where rounding decides; so the phases are added up in
-double precision once, and every run, on a CPU or a GPU, looks them up.
+Feet touch down and lift off exactly at control steps, where rounding decides on which side. So the phases are summed
+up once, in double precision, and every run, on a CPU or a GPU, looks them up.
 """
 
 import math
@@ -12,7 +12,7 @@ import numpy as np
 
 TWO_PI = 2.0 * math.pi
 
-_LONGEST = 100_000  # ticks that are added up; a longer episode goes round
+_MAX_TICKS = 100_000  # of the tables; a longer episode repeats them
 
 
 class Clock(NamedTuple):
@@ -29,7 +29,7 @@ class Clock(NamedTuple):
     stance: np.ndarray
 
     @classmethod
-    def made(cls, frequency: float, duty_factor: float, offsets, control_timestep: float, steps: float) -> Self:
+    def make(cls, frequency: float, duty_factor: float, offsets, control_timestep: float, steps: float) -> Self:
         """Make the clock of a gait.
 
         Args:
@@ -37,24 +37,25 @@ class Clock(NamedTuple):
             duty_factor: share of a cycle that a foot spends in stance.
             offsets: (feet,) rad, added to the clock's phase.
             control_timestep: s between ticks.
-            steps: ticks of an episode after the first, may be infinite: an episode longer than the
-                tables goes round them, back to the tick whose phase is the nearest to what is next.
+            steps: ticks of an episode after the first, may be infinite. An episode longer than the tables repeats
+                them: they end where the next phase is the nearest to that of tick 0.
         """
-        turn = TWO_PI * frequency * control_timestep
-        count = int(min(steps, _LONGEST)) + 1
+        advance = TWO_PI * frequency * control_timestep
+        count = int(min(steps, _MAX_TICKS)) + 1
         phases = np.zeros(count)
         for tick in range(1, count):
-            phases[tick] = (phases[tick - 1] + turn) % TWO_PI
-        if steps > _LONGEST:
+            phases[tick] = (phases[tick - 1] + advance) % TWO_PI
+        if steps > _MAX_TICKS:
             ends = np.arange(count // 2, count)
-            phases = phases[: ends[np.argmin(np.abs(np.sin(0.5 * phases[ends])))]]
+            distances_from_zero = np.abs(np.sin(0.5 * phases[ends]))
+            phases = phases[: ends[np.argmin(distances_from_zero)]]
         return cls(
             phases=phases,
             circle=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
             stance=desired_contacts(phases, duty_factor, offsets),
         )
 
-    def at(self, table: np.ndarray, tick):
+    def look_up(self, table: np.ndarray, tick):
         """Return the entries (..., n) of a table at ticks (...), integers of Python, NumPy or JAX."""
         if not isinstance(tick, int):
             table = tick.__array_namespace__().asarray(table)
@@ -62,7 +63,7 @@ class Clock(NamedTuple):
 
 
 class Clocks(NamedTuple):
-    """Clocks of environments of different bodies, with their tables one behind the other.
+    """Clocks of environments of different bodies, with their tables concatenated.
 
     Attributes:
         phases: (all ticks,) rad in [0, 2 pi).
@@ -80,15 +81,16 @@ class Clocks(NamedTuple):
 
     @classmethod
     def of(cls, clocks: Sequence[Clock]) -> Self:
-        """Join clocks of gaits of as many feet; a clock that several environments share is held once."""
-        different = {id(clock): clock for clock in clocks}
-        lengths = np.array([len(clock.phases) for clock in different.values()])
-        places = {name: place for place, name in enumerate(different)}
-        which = np.array([places[id(clock)] for clock in clocks])
-        tables = (np.concatenate(tables) for tables in zip(*different.values(), strict=True))
-        return cls(*tables, (lengths.cumsum() - lengths)[which], lengths[which])
+        """Join clocks of gaits with equal numbers of feet; environments that share a clock share its tables."""
+        distinct_clocks = {id(clock): clock for clock in clocks}
+        index_of_id = {name: index for index, name in enumerate(distinct_clocks)}
+        indices = np.array([index_of_id[id(clock)] for clock in clocks])
+        counts = np.array([len(clock.phases) for clock in distinct_clocks.values()])
+        starts = counts.cumsum() - counts
+        phases, circle, stance = (np.concatenate(tables) for tables in zip(*distinct_clocks.values(), strict=True))
+        return cls(phases, circle, stance, starts[indices], counts[indices])
 
-    def at(self, table: np.ndarray, tick):
+    def look_up(self, table: np.ndarray, tick):
         """Return the entries (environments, n) of a table at ticks (environments,)."""
         return table[self.starts + tick % self.counts]
 

@@ -1,8 +1,8 @@
-"""Commands: the velocity that a body is to follow, and how well it does.
+"""Commands: the velocity that a body is to follow, and how well it follows.
 
-A command is a frozen value with pure functions of its own memory. Velocities are (forward, left,
-turning) as the torso heads, in the units of `Context.units`. `place` is (..., 3): x and y of the
-torso's frame, m, and its yaw, rad.
+A command is a frozen value with pure functions of its own memory. Velocities are (forward, left, turning) relative to
+the heading of the torso, in the units of `Context.units`. `place` is (..., 3): x and y of the torso's frame, m, and
+its yaw, rad.
 """
 
 import dataclasses
@@ -23,16 +23,21 @@ from arc_suite.tasks.parts import Planar, Scalar
 from arc_suite.tasks.readings import component
 from arc_suite.tasks.sensors import FAR
 
-BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
-RANGES = ((-0.5, 1.0), (-0.5, 0.5), (-1.0, 1.0))  # of commands that are drawn: forward, left and turning
-DIRECTIONS, FARTHEST = ("forward", "left", "turning"), 10.0  # names of these, and bound of what may be drawn
-COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
+BAND = 0.75  # error at which tracking is 0, as a share of the command, or of half a unit for smaller commands
+DIRECTIONS = ("forward", "left", "turning")
+RANGES = ((-0.5, 1.0), (-0.5, 0.5), (-1.0, 1.0))  # of drawn commands, by direction
+MAX_COMMAND = 10.0  # bound of the ranges that a caller may set
+COMMANDS = 17  # of a schedule
+SHORTEST = 60  # control steps for which a command holds
+LONGEST = 161  # one more than the most control steps for which a command holds
 
 GOALS = 16  # of a chain; after the last one the way leads back
 NEAR = 0.7  # distance of the torso at which a goal is reached, R
-_DISK, _GOAL = 0.02, (0.2, 0.9, 0.4, 1.0)  # thickness, R, and color of the disk that shows a goal
+_DISK_THICKNESS = 0.02  # of the disk that shows a goal, R
+_DISK_COLOR = (0.2, 0.9, 0.4, 1.0)
 
-_MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+# Steps to the eight corners around one.
+_MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
 
 
 class Followed(NamedTuple):
@@ -41,7 +46,7 @@ class Followed(NamedTuple):
     Attributes:
         memory: of the command.
         desired: (..., 3) the velocity that holds from now on.
-        tracking: (...) how well the step followed it, at most 1.
+        tracking: (...) how well the step followed the velocity, at most 1.
         arrived: (...) whether the step reached a goal; False where there are none.
     """
 
@@ -53,10 +58,10 @@ class Followed(NamedTuple):
 
 @runtime_checkable
 class WithLive(Protocol):
-    """What the memory of a command must have that can be set live, see `Command.live`: a NamedTuple with this field.
+    """Memory of a command that can be set live, see `Command.live`: a NamedTuple with this field.
 
     Attributes:
-        live: (..., 3) velocity that is set from outside; NaN for what the task itself would do.
+        live: (..., 3) velocity that is set from outside; NaN for that of the command itself.
     """
 
     live: np.ndarray
@@ -64,9 +69,9 @@ class WithLive(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class Command(ABC):
-    """What a body is to follow.
+    """A velocity that a body is to follow.
 
-    A command of a new kind writes the five abstract methods. Unless its `live` is empty, its memory is a `WithLive`.
+    A command of a new kind defines the five abstract methods. Unless its `live` is empty, its memory is a `WithLive`.
 
     Attributes:
         settings: names of the fields that a caller may set.
@@ -97,14 +102,14 @@ class Command(ABC):
         """
 
     @abstractmethod
-    def terms(self, memory, followed, upright, stepped) -> dict:
+    def terms(self, memory, step_tracking, upright, feet_in_schedule) -> dict:
         """Return the bonuses for following, each (...), by name.
 
         Args:
             memory: of the command, after the step.
-            followed: (...) tracking of the step.
+            step_tracking: (...) tracking of the step.
             upright: (...) cosine of the torso's tilt.
-            stepped: (...) share of the feet that followed the contact schedule.
+            feet_in_schedule: (...) share of the feet that followed the contact schedule.
         """
 
     @abstractmethod
@@ -128,7 +133,7 @@ class Command(ABC):
         return {}
 
     def schedule(self, random: np.random.RandomState, share: float) -> "Scheduled":
-        """Draw a schedule, which every command does; `share` says how far a curriculum has widened its ranges."""
+        """Draw a schedule, which every command does; a curriculum has widened its ranges by `share`, from 0 to 1."""
         return draw_schedule(random)
 
     def begin(self, context: Context, memory, place) -> Any:
@@ -139,16 +144,16 @@ class Command(ABC):
         """Return whether (...) another drawn command holds since control step `steps` (...)."""
         return False
 
-    def progress(self, context: Context, memory, judged) -> dict:
+    def progress(self, context: Context, memory, judged_steps) -> dict:
         """Return the metrics that it adds to progress, given the steps (...) over which the episode is judged."""
         return {}
 
-    def outcome(self, context: Context, memory, tracking, judged):
+    def outcome(self, context: Context, memory, all_tracking, judged_steps):
         """Return the outcome (...) by which a curriculum judges an episode: its mean tracking."""
-        return tracking / judged
+        return all_tracking / judged_steps
 
     def markers(self, context: Context, memory) -> list[Marker]:
-        """Return what pictures show of it, in addition to the command's arrows."""
+        """Return the markers that pictures show in addition to the arrows of the velocity."""
         return []
 
 
@@ -156,14 +161,14 @@ class Live(NamedTuple):
     """Memory of a command that can be set live.
 
     Attributes:
-        live: (..., 3) set from outside; NaN for what the task itself would do.
+        live: (..., 3) velocity that is set from outside; NaN for that of the command itself.
         distance: (...) along world x since the start, m.
-        gained: (...) velocity along world x by the target velocity, a leaky mean over a cycle of the gait.
+        speed_share: (...) velocity along world x over the target velocity, a leaky mean over a cycle of the gait.
     """
 
     live: np.ndarray
     distance: np.ndarray
-    gained: np.ndarray
+    speed_share: np.ndarray
 
 
 class Scheduled(NamedTuple):
@@ -172,18 +177,18 @@ class Scheduled(NamedTuple):
     Attributes:
         ends: (..., COMMANDS) steps at which the commands of the schedule end.
         schedule: (..., COMMANDS, 3) commands.
-        live: (..., 3) set from outside, in place of the schedule where it is not NaN.
-        gained: (...) share of the command that the mean motion reaches in its direction; 0 at a stop.
+        live: (..., 3) velocity that is set from outside; NaN for that of the schedule.
+        speed_share: (...) share of the command that the mean motion reaches in its direction; 0 at a stop.
     """
 
     ends: np.ndarray
     schedule: np.ndarray
     live: np.ndarray
-    gained: np.ndarray
+    speed_share: np.ndarray
 
 
 def draw_schedule(random: np.random.RandomState, ranges=RANGES) -> Scheduled:
-    """Draw how long each command is held, then the commands between ranges (3, 2)."""
+    """Draw how long each command holds, then the commands between ranges (3, 2)."""
     ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
     schedule = np.array([draw_command(random, ranges) for _ in range(COMMANDS)])
     return Scheduled(ends, schedule, np.full(3, np.nan), np.float64(0.0))
@@ -192,44 +197,49 @@ def draw_schedule(random: np.random.RandomState, ranges=RANGES) -> Scheduled:
 def draw_command(random: np.random.RandomState, ranges=RANGES) -> np.ndarray:
     """Draw a command (3,): mostly forward, some turning or sideways, one in ten a stop; always six draws.
 
-    Speed and turning, as shares of the farthest of their ranges (3, 2) or of 1, are at most 1 together.
+    The sum of speed and turning is at most 1, each as a share of the largest in its ranges (3, 2), or of 1.
     """
     low, high = np.transpose(ranges)
     command = random.uniform(low, high)
-    sideways, turns, goes = random.uniform(size=3) < (0.5, 0.7, 0.95)
-    command = command * (1.0, sideways, turns)
-    fast, quick = max(1.0, *np.abs(ranges[:2]).flat), max(1.0, *np.abs(ranges[2]))
-    size = np.hypot(command[0], command[1]) / fast + abs(command[2]) / quick
-    return command / max(size, 1.0) * (goes and size >= 0.2)
+    goes_sideways, turns, goes = random.uniform(size=3) < (0.5, 0.7, 0.95)
+    command = command * (1.0, goes_sideways, turns)
+    max_speed = max(1.0, *np.abs(ranges[:2]).flat)
+    max_turning = max(1.0, *np.abs(ranges[2]))
+    size = np.hypot(command[0], command[1]) / max_speed + abs(command[2]) / max_turning
+    is_going = goes and size >= 0.2
+    return command / max(size, 1.0) * is_going
 
 
 def tracking(desired, motion):
-    """Return how well a motion (..., 3) follows a velocity (..., 3): the product of course and turning, 0 to 1."""
-    numpy, error = motion.__array_namespace__(), desired - motion
-    speed = numpy.hypot(desired[..., 0], desired[..., 1])
-    miss = numpy.hypot(error[..., 0], error[..., 1])
-    course = terms.triangle(miss, BAND * numpy.maximum(speed, 0.5))
-    return course * terms.triangle(error[..., 2], BAND * numpy.maximum(abs(desired[..., 2]), 0.5))
+    """Return how well a motion (..., 3) follows a velocity (..., 3), 0 to 1: in its direction times in its turning."""
+    xp = motion.__array_namespace__()
+    error = desired - motion
+    desired_speed = xp.hypot(desired[..., 0], desired[..., 1])
+    planar_error = xp.hypot(error[..., 0], error[..., 1])
+    planar_tracking = terms.triangle(planar_error, BAND * xp.maximum(desired_speed, 0.5))
+    turning_tracking = terms.triangle(error[..., 2], BAND * xp.maximum(abs(desired[..., 2]), 0.5))
+    return planar_tracking * turning_tracking
 
 
-def along(desired, motion):
+def projected_share(desired, motion):
     """Return the projection of a motion (..., 3) onto a velocity (..., 3), as a share (...) of it; 0 at a stop.
 
-    Unlike `tracking` it rises from standing still, so a learner finds its first steps by it.
+    Unlike `tracking`, it increases from standing still on, so that a learner is rewarded for its first steps.
     """
-    size, reached = _product(desired, desired), _product(desired, motion)
-    return reached / size.__array_namespace__().where(size > 0.0, size, 1.0)
+    squared_speed = _scalar_product(desired, desired)
+    xp = squared_speed.__array_namespace__()
+    return _scalar_product(desired, motion) / xp.where(squared_speed > 0.0, squared_speed, 1.0)
 
 
-def _product(one, other):
-    """The scalar product (...) of vectors (..., 3), summed in one order for any leading axes."""
-    products = one * other
+def _scalar_product(left, right):
+    """Return the scalar product (...) of vectors (..., 3), summed in one order for any leading axes."""
+    products = left * right
     return products[..., 0] + products[..., 1] + products[..., 2]
 
 
 @dataclasses.dataclass(frozen=True)
 class Schedule(Command):
-    """Commands that are drawn for the episode, each held for some seconds; stops are among them.
+    """Commands that are drawn for the episode, each for some seconds; some are stops.
 
     Attributes:
         commands: ranges that replace some of `RANGES`, by the names in `DIRECTIONS`, in units of the command.
@@ -244,33 +254,35 @@ class Schedule(Command):
         ranges = dict(zip(DIRECTIONS, self.commands, strict=True))
         for name, span in checks.mapping("commands", overrides.get("commands")).items():
             checks.name(name, DIRECTIONS, "command")
-            ranges[name] = checks.span(f"commands[{name!r}]", span, -FARTHEST, FARTHEST)
+            ranges[name] = checks.span(f"commands[{name!r}]", span, -MAX_COMMAND, MAX_COMMAND)
         return dataclasses.replace(self, commands=tuple(ranges.values()))
 
     def schedule(self, random: np.random.RandomState, share: float) -> Scheduled:
-        """Draw a schedule between the ranges, as far as a curriculum has widened them."""
+        """Draw a schedule between the ranges, which a curriculum widens from `RANGES` to those of the settings."""
         if share == 1.0:
             return draw_schedule(random, self.commands)
-        return draw_schedule(random, np.array(RANGES) + share * np.subtract(self.commands, RANGES))
+        widening = np.subtract(self.commands, RANGES)
+        return draw_schedule(random, np.array(RANGES) + share * widening)
 
     def start(self, context: Context, random, schedule: Scheduled) -> Scheduled:
         """Return the drawn schedule."""
         return schedule
 
     def desired(self, context: Context, memory: Scheduled, steps, place):
-        """Return the command that holds; a schedule that has run out begins again."""
-        numpy = memory.ends.__array_namespace__()
-        return numpy.where(numpy.isnan(memory.live), held(memory.ends, memory.schedule, steps), memory.live)
+        """Return the command that holds; after its end, the schedule repeats."""
+        xp = memory.ends.__array_namespace__()
+        scheduled = scheduled_value(memory.ends, memory.schedule, steps)
+        return xp.where(xp.isnan(memory.live), scheduled, memory.live)
 
     def follow(self, context: Context, memory: Scheduled, steps, before, place, motion, readings) -> Followed:
-        """Return the command after a control step, and how far the motion reaches in its direction."""
+        """Return the command after a control step, and the share of it that the motion reaches."""
         desired = self.desired(context, memory, steps, place)
-        memory = memory._replace(gained=along(desired, motion))
+        memory = memory._replace(speed_share=projected_share(desired, motion))
         return Followed(memory, desired, tracking(desired, motion))
 
-    def terms(self, memory: Scheduled, followed, upright, stepped) -> dict:
+    def terms(self, memory: Scheduled, step_tracking, upright, feet_in_schedule) -> dict:
         """Return the bonuses for progress in the command's direction, and for following it."""
-        return velocity_bonuses(memory.gained, followed, upright, stepped)
+        return velocity_bonuses(memory.speed_share, step_tracking, upright, feet_in_schedule)
 
     def observe(self, context: Context, memory: Scheduled) -> dict:
         """Return no blocks."""
@@ -278,26 +290,26 @@ class Schedule(Command):
 
     def resampled(self, memory: Scheduled, steps) -> Any:
         """Return whether (...) the next command of the schedule holds since step `steps`, unless a live one does."""
-        return begins(memory.ends, memory.live, steps)
+        return begins_next(memory.ends, memory.live, steps)
 
 
-def held(ends, values, steps):
-    """Return which of the values (..., n, size) of a schedule holds at step `steps` (...).
+def scheduled_value(ends, values, steps):
+    """Return the value (..., size) of a schedule that holds at step `steps` (...).
 
     Args:
-        ends: (..., n) steps at which they end; a schedule that has run out begins again.
-        values: in their order.
-        steps: since the start.
+        ends: (..., n) steps at which values end; after the last one, the schedule repeats.
+        values: (..., n, size), in order.
+        steps: (...) control steps since the start.
     """
     step = steps % ends[..., -1]
     current = (step[..., None] >= ends).sum(axis=-1)[..., None, None]
     return ends.__array_namespace__().take_along_axis(values, current, axis=-2)[..., 0, :]
 
 
-def begins(ends, live, steps):
-    """Return whether (...) the next of the values of a schedule holds since step `steps` (...); see `held`.
+def begins_next(ends, live, steps):
+    """Return whether (...) the next value of a schedule holds since step `steps` (...); see `scheduled_value`.
 
-    It does not where a value (..., size) from outside is complete.
+    It does not where a live value (..., size) has no NaN, as that one holds.
     """
     step = steps % ends[..., -1]
     changes = (step[..., None] == ends).any(axis=-1) | ((step == 0) & (steps > 0))
@@ -306,59 +318,60 @@ def begins(ends, live, steps):
 
 @dataclasses.dataclass(frozen=True)
 class AlongLane(Command):
-    """Along world x at the target velocity, and a turn back into that direction."""
+    """Along world x at the target velocity, with a turn back into that direction."""
 
     def start(self, context: Context, random, schedule: Scheduled) -> Live:
         """Return a memory without displacement; the drawn schedule is not used."""
         return Live(schedule.live, np.float64(0.0), np.float64(0.0))
 
     def desired(self, context: Context, memory: Live, steps, place):
-        """Return the command as the torso heads."""
-        heading, numpy = place[..., 2], place.__array_namespace__()
-        turn = (-heading * context.reach / context.height).clip(-1.0, 1.0)
-        along = numpy.stack([numpy.cos(heading), -numpy.sin(heading), turn], axis=-1)
-        return numpy.where(numpy.isnan(memory.live), along, memory.live)
+        """Return the velocity along the lane, relative to the heading, or the live one."""
+        heading = place[..., 2]
+        xp = place.__array_namespace__()
+        turning = (-heading * context.reach / context.height).clip(-1.0, 1.0)
+        along_lane = xp.stack([xp.cos(heading), -xp.sin(heading), turning], axis=-1)
+        return xp.where(xp.isnan(memory.live), along_lane, memory.live)
 
     def follow(self, context: Context, memory: Live, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step, and the distance."""
         desired = self.desired(context, memory, steps, place)
         displacement = component(place, 0) - component(before, 0)
-        gained = _gained(context, memory.gained, displacement)
-        memory = Live(memory.live, memory.distance + displacement, gained)
+        speed_share = _mean_speed_share(context, memory.speed_share, displacement)
+        memory = Live(memory.live, memory.distance + displacement, speed_share)
         return Followed(memory, desired, tracking(desired, motion))
 
-    def terms(self, memory: Live, followed, upright, stepped) -> dict:
+    def terms(self, memory: Live, step_tracking, upright, feet_in_schedule) -> dict:
         """Return the bonuses for progress along the lane, and for following the command."""
-        return velocity_bonuses(memory.gained, followed, upright, stepped)
+        return velocity_bonuses(memory.speed_share, step_tracking, upright, feet_in_schedule)
 
     def observe(self, context: Context, memory: Live) -> dict:
         """Return no blocks."""
         return {}
 
-    def progress(self, context: Context, memory: Live, judged) -> dict:
+    def progress(self, context: Context, memory: Live, judged_steps) -> dict:
         """Return the distance along the lane as a share of that at the target velocity."""
-        return {"distance": self.outcome(context, memory, None, judged)}
+        return {"distance": self.outcome(context, memory, None, judged_steps)}
 
-    def outcome(self, context: Context, memory: Live, tracking, judged):
-        """Return the same share."""
-        return memory.distance / (context.pace * judged)
+    def outcome(self, context: Context, memory: Live, all_tracking, judged_steps):
+        """Return the distance along the lane as a share of that at the target velocity."""
+        return memory.distance / (context.pace * judged_steps)
 
 
 class Chain(NamedTuple):
     """Memory of a chain of goals.
 
     Attributes:
-        goals: (..., GOALS, 2) where they are, m.
-        reached: (...) how many goals were.
-        arrived: (...) whether one was in the latest step.
-        gained: (...) approach to the goal by the target velocity, a leaky mean over a cycle of the gait.
+        goals: (..., GOALS, 2) positions, m.
+        reached: (...) number of goals that were reached.
+        arrived: (...) whether the latest step reached one.
+        speed_share: (...) velocity to the goal over the target velocity, a leaky mean over a cycle of the gait.
         to_goal: (..., 2) from the torso to the present goal, forward and left, m.
     """
 
     goals: np.ndarray
     reached: np.ndarray
     arrived: np.ndarray
-    gained: np.ndarray
+    speed_share: np.ndarray
     to_goal: np.ndarray
 
 
@@ -368,36 +381,39 @@ def draw_chain(random: np.random.RandomState) -> np.ndarray:
 
 
 def chain(numbers) -> np.ndarray:
-    """Return corners (n, 2) of the grid's cells, each next to the one before, the first next to the start.
+    """Return corners (n, 2) of the grid's cells, each next to the previous one, the first one next to the start.
 
     Args:
-        numbers: (n,) from 0 to 1; each chooses among the corners next to the one before, straight
-            or across a cell, except the one before that.
+        numbers: (n,) from 0 to 1. Each chooses among the corners of the grid next to the latest one, along a side or
+            across a cell. The corner before the latest one is left out, so that the way does not lead back at once.
     """
-    corners, farthest = [(0, 0), (0, 0)], CELLS // 2
+    edge = CELLS // 2
+    corners = [(0, 0), (0, 0)]  # the start, twice
     for number in numbers:
-        near = [(corners[-1][0] + i, corners[-1][1] + j) for i, j in _MOVES]
-        near = [corner for corner in near if max(map(abs, corner)) <= farthest and corner != corners[-2]]
-        corners.append(near[int(number * len(near))])
+        x, y = corners[-1]
+        neighbors = [(x + i, y + j) for i, j in _MOVES]
+        in_grid = [corner for corner in neighbors if max(map(abs, corner)) <= edge]
+        choices = [corner for corner in in_grid if corner != corners[-2]]
+        corners.append(choices[int(number * len(choices))])
     return np.array(corners[2:], float)
 
 
 def at_goal(bearing):
-    """Return the command (..., 3) that turns to a bearing (...), rad, and walks there as far as it is faced."""
-    numpy = bearing.__array_namespace__()
-    forward = numpy.cos(bearing).clip(0.0)
-    return numpy.stack([forward, 0.0 * forward, bearing.clip(-1.0, 1.0)], axis=-1)
+    """Return the command (..., 3) to a goal at a bearing (...), rad: a turn, and forward as it faces the goal."""
+    xp = bearing.__array_namespace__()
+    forward = xp.cos(bearing).clip(0.0)
+    return xp.stack([forward, 0.0 * forward, bearing.clip(-1.0, 1.0)], axis=-1)
 
 
 @dataclasses.dataclass(frozen=True)
 class ToGoal(Command):
-    """Straight to a goal, pillars or not, and when it is reached to the next one of a chain.
+    """Straight to a goal, through pillars if need be, and when it is reached to the next one of a chain.
 
     Lengths are multiples of the arena's unit R.
     """
 
     def live(self, body: Body) -> dict[str, int]:
-        """Return nothing: goals are not set from outside."""
+        """Return no names, as goals cannot be set from outside."""
         return {}
 
     def blocks(self, body: Body) -> dict[str, Block]:
@@ -415,83 +431,93 @@ class ToGoal(Command):
         return memory._replace(to_goal=_to_goal(memory.goals, memory.reached, place))
 
     def desired(self, context: Context, memory: Chain, steps, place):
-        """Return the command: straight at the goal as far as the body faces it, and a turn to face it."""
-        goal, numpy = memory.to_goal, memory.goals.__array_namespace__()
-        return at_goal(numpy.arctan2(goal[..., 1], goal[..., 0]))
+        """Return the command: straight to the goal as far as the body faces it, and a turn to face it."""
+        goal = memory.to_goal
+        xp = memory.goals.__array_namespace__()
+        return at_goal(xp.arctan2(goal[..., 1], goal[..., 0]))
 
     def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step: progress to the goal, and the next goal where it is reached."""
-        numpy, unit = place.__array_namespace__(), context.arena.unit
-        far = numpy.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])
-        goal = _to_goal(memory.goals, memory.reached, place)
-        near = numpy.hypot(goal[..., 0], goal[..., 1])
-        arrived = near <= NEAR * unit
+        xp = place.__array_namespace__()
+        distance_before = xp.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])  # m
+        to_goal = _to_goal(memory.goals, memory.reached, place)
+        distance = xp.hypot(to_goal[..., 0], to_goal[..., 1])
+        arrived = distance <= NEAR * context.arena.unit
         reached = memory.reached + arrived
         memory = Chain(
             goals=memory.goals,
             reached=reached,
             arrived=arrived,
-            gained=_gained(context, memory.gained, far - near),
+            speed_share=_mean_speed_share(context, memory.speed_share, distance_before - distance),
             to_goal=_to_goal(memory.goals, reached, place),
         )
-        return Followed(memory, self.desired(context, memory, steps, place), _bounded(memory.gained), arrived)
+        desired = self.desired(context, memory, steps, place)
+        return Followed(memory, desired, _progress_bonus(memory.speed_share), arrived)
 
-    def terms(self, memory: Chain, followed, upright, stepped) -> dict:
+    def terms(self, memory: Chain, step_tracking, upright, feet_in_schedule) -> dict:
         """Return the bonuses for progress to the goal and for reaching it."""
-        earned = {"progress": _bounded(memory.gained) * upright, "goal": memory.arrived * 1.0}
-        return {**earned, "obedient_gait": followed * stepped}
+        return {
+            "progress": _progress_bonus(memory.speed_share) * upright,
+            "goal": memory.arrived * 1.0,
+            "obedient_gait": step_tracking * feet_in_schedule,
+        }
 
     def observe(self, context: Context, memory: Chain) -> dict:
         """Return cosine and sine of the goal's bearing, and its distance."""
-        goal, unit = memory.to_goal, context.arena.unit
-        numpy = goal.__array_namespace__()
-        apart = numpy.maximum(numpy.hypot(goal[..., 0], goal[..., 1]), 1e-9 * unit)[..., None]
-        return {"goal": numpy.concatenate([goal / apart, (apart / (FAR * unit)).clip(0.0, 1.0)], axis=-1)}
+        goal = memory.to_goal
+        unit = context.arena.unit  # R, m
+        xp = goal.__array_namespace__()
+        distance = xp.hypot(goal[..., 0], goal[..., 1])
+        distance = xp.maximum(distance, 1e-9 * unit)[..., None]  # above 0, as the direction is divided by it
+        direction = goal / distance
+        return {"goal": xp.concatenate([direction, (distance / (FAR * unit)).clip(0.0, 1.0)], axis=-1)}
 
-    def progress(self, context: Context, memory: Chain, judged) -> dict:
+    def progress(self, context: Context, memory: Chain, judged_steps) -> dict:
         """Return how many goals were reached."""
         return {"goals": memory.reached * 1.0}
 
     def markers(self, context: Context, memory: Chain) -> list[Marker]:
         """Return the goal as the disk within which it is reached."""
-        unit = context.arena.unit
-        middle = np.array((*_goal(memory.goals, memory.reached), 0.0))
-        return [Marker("cylinder", middle, middle + (0.0, 0.0, _DISK * unit), NEAR * unit, _GOAL)]
+        unit = context.arena.unit  # R, m
+        center = np.array((*_present_goal(memory.goals, memory.reached), 0.0))
+        top = center + (0.0, 0.0, _DISK_THICKNESS * unit)
+        return [Marker("cylinder", center, top, NEAR * unit, _DISK_COLOR)]
 
 
-def velocity_bonuses(gained, followed, upright, stepped) -> dict:
+def velocity_bonuses(speed_share, step_tracking, upright, feet_in_schedule) -> dict:
     """Return the bonuses for progress and for following a velocity, each (...).
 
     Args:
-        gained: (...) progress as a share of what the command asks for.
-        followed: (...) tracking of the step.
+        speed_share: (...) velocity in the direction of the command, as a share of the command.
+        step_tracking: (...) tracking of the step.
         upright: (...) cosine of the torso's tilt.
-        stepped: (...) share of the feet that followed the contact schedule.
+        feet_in_schedule: (...) share of the feet that followed the contact schedule.
     """
     return {
-        "progress": _bounded(gained) * upright,
-        "tracking": followed,
-        "obedient_gait": followed * stepped,
+        "progress": _progress_bonus(speed_share) * upright,
+        "tracking": step_tracking,
+        "obedient_gait": step_tracking * feet_in_schedule,
     }
 
 
-def _gained(context: Context, before, displacement):
-    """The leaky mean (...) of progress, given that before the step and the displacement (...) of the step, m."""
-    return (1.0 - context.leak) * before + context.leak * displacement / context.pace
+def _mean_speed_share(context: Context, mean_before, displacement):
+    """Return the leaky mean (...) of the speed share, given that before the step and its displacement (...), m."""
+    return (1.0 - context.leak) * mean_before + context.leak * displacement / context.pace
 
 
-def _bounded(gained):
-    """What progress (...) earns: at most 1, without a lower bound, so that a body that sways earns its net progress."""
-    return gained.clip(max=1.0)
+def _progress_bonus(speed_share):
+    """Return the bonus (...), at most 1. It has no lower bound, so that a body that sways has its net progress."""
+    return speed_share.clip(max=1.0)
 
 
-def _goal(goals, reached):
-    """Where the present goal is (..., 2), m, after a number (...) of reached ones."""
-    numpy, end = goals.__array_namespace__(), GOALS - 1
-    number = end - abs(end - reached % (2 * end))
-    return numpy.take_along_axis(goals, numpy.asarray(number)[..., None, None], axis=-2)[..., 0, :]
+def _present_goal(goals, reached):
+    """Return the position (..., 2) of the present goal, m, after a number (...) of goals that were reached."""
+    xp = goals.__array_namespace__()
+    last = GOALS - 1
+    index = last - abs(last - reached % (2 * last))  # to the end of the chain and back
+    return xp.take_along_axis(goals, xp.asarray(index)[..., None, None], axis=-2)[..., 0, :]
 
 
 def _to_goal(goals, reached, place):
-    """Where the present goal is from the torso (..., 2), forward and left, m."""
-    return rotations.to_heading_frame(_goal(goals, reached) - place[..., :2], place[..., 2])
+    """Return the position (..., 2) of the present goal from the torso, forward and left, m."""
+    return rotations.to_heading_frame(_present_goal(goals, reached) - place[..., :2], place[..., 2])

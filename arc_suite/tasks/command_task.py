@@ -1,10 +1,10 @@
 """Tasks in which a body follows a command of velocities, on some ground, in the prescribed gait.
 
 A task is composed of frozen values: a command, a ground, a health, and in some tasks a gait and a pose by
-command. This module defines the order in which they draw, remember, observe and earn. Nothing in it has a
-scale: lengths are in standing heights h, speeds in the body's own target velocity or sqrt(g h), rates in
-sqrt(g / h), contact forces in the body's weight. Directions are the body's own, as the torso heads,
-so that an episode may start in any. What standing still would earn is gated by how well the command is followed.
+command. This module defines the order in which they draw, remember, observe and are rewarded. Nothing in it has a
+scale: lengths are in standing heights h, speeds in the target velocity or sqrt(g h), rates in sqrt(g / h),
+contact forces in the body's weight. Directions are relative to the heading of the torso, so that an episode may
+start with any heading. Bonuses that standing still would have are multiplied by the tracking of the command.
 """
 
 import functools
@@ -33,9 +33,9 @@ from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.parts import Part, Planar, Scalar
 from arc_suite.tasks.readings import Readings, component
 
-COST_LIMIT = 0.6  # a third of it is what standing costs, twice as much uniform torques
+COST_LIMIT = 0.6  # standing costs a third of it, uniform random torques twice as much
 
-# Weights of the costs: walk's, of rates in SI units as Queen has them in units of her own.
+# Weights of the costs: those of walk. Rates are in units of the body, and weigh for Queen as much as in walk.
 COSTS = {
     "gait_cost": -0.1,
     "control": -0.05,
@@ -47,10 +47,11 @@ COSTS = {
     "transport": 0.0,
 }
 
-_AHEAD = 0.8  # distance from the torso to where the command's arrows begin, R
-_SHAFT = 0.06  # radius of the arrows, R
-_SAMPLES = np.linspace(0.0, 1.0, 9)  # of an arrow, which the ground must not cover
-_GOING, _TURNING = (1.0, 0.75, 0.1, 1.0), (0.2, 0.8, 1.0, 1.0)  # their colors
+_ARROW_DISTANCE = 0.8  # of the start of the command's arrows from the torso, R
+_ARROW_RADIUS = 0.06  # R
+_ARROW_SAMPLES = np.linspace(0.0, 1.0, 9)  # points of an arrow that must lie over the ground
+_VELOCITY_COLOR = (1.0, 0.75, 0.1, 1.0)
+_TURNING_COLOR = (0.2, 0.8, 1.0, 1.0)
 
 
 class CommandTaskSettings(NamedTuple):
@@ -78,7 +79,7 @@ class CommandTaskSettings(NamedTuple):
 class Sensed(
     NamedTuple("Sensed", [(field, np.ndarray) for field in (*Readings._fields, "heading", "touches", "feet")])
 ):
-    """Readings with contact forces in the body's weight and as the torso heads.
+    """Readings with contact forces in the body's weight, and relative to the heading of the torso.
 
     Attributes:
         heading: (...) yaw of the torso, rad.
@@ -86,7 +87,8 @@ class Sensed(
         feet: (..., feet, 2) places from the torso's frame, forward and left, m; None where no pose is by command.
     """
 
-    torso_height, effort = Readings.torso_height, Readings.effort
+    torso_height = Readings.torso_height
+    effort = Readings.effort
 
 
 class Core(NamedTuple):
@@ -94,18 +96,18 @@ class Core(NamedTuple):
 
     Attributes:
         steps: (...) control steps since the start.
-        tick: (...) of the gait's clock, which rests while the command says stop.
+        tick: (...) of the gait's clock, which stands still while the command is a stop.
         action: (..., joints) of the latest step, clipped to [-1, 1].
         previous_action: (..., joints) of the step before; 0 before the first.
         schedule_errors: (...) number of contact schedule errors in the latest step.
         all_schedule_errors: (...) sum of `schedule_errors` over the steps.
         energy: of the motors.
-        path: (...) length of the path of the leaky motion since the start, m.
+        path: (...) length of the path since the start, from `motion`, m.
         place: (..., 3) of the torso's frame at the latest reading: x and y, m, and yaw, rad.
         motion: (..., 3) velocity of the torso, a leaky mean over a cycle of the gait.
         desired: (..., 3) velocity that the command asks for.
-        followed: (...) tracking of the latest step.
-        tracking: (...) sum of `followed` over the steps.
+        step_tracking: (...) tracking of the latest step.
+        all_tracking: (...) sum of `step_tracking` over the steps.
     """
 
     steps: int | np.ndarray
@@ -119,12 +121,12 @@ class Core(NamedTuple):
     place: np.ndarray
     motion: np.ndarray
     desired: np.ndarray
-    followed: np.ndarray
-    tracking: np.ndarray
+    step_tracking: np.ndarray
+    all_tracking: np.ndarray
 
 
 class CommandTaskMemory(NamedTuple):
-    """Memory of an episode: what all tasks with a command have, and that of each of the values."""
+    """Memory of an episode: that of all tasks with a command, and those of the values of which the task is composed."""
 
     core: Core
     command: Any
@@ -139,7 +141,7 @@ class CommandTask(Task):
     Attributes:
         command: what to follow.
         gait_and_pose: which gait and pose to follow, in addition; None for the prescribed gait.
-        ground: where, with the settings that a caller does not give.
+        ground: where, with its default settings.
         health: when a body has fallen.
         yaw: half-width of the heading at the start, rad.
     """
@@ -171,16 +173,19 @@ class CommandTask(Task):
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> CommandTaskSettings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
-        elsewhere = () if cls.own_arena else ("arena",)
-        given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere)
+        names_of_others = () if cls.own_arena else ("arena",)
+        values = parameters.values(body, overrides, cls.name, cls.names(), names_of_others)
+        gait_and_pose = None
+        if cls.gait_and_pose is not None:
+            gait_and_pose = cls.gait_and_pose.with_settings(body, overrides)
         return CommandTaskSettings(
-            parameters.parameters(body, given, backward=False),
-            parameters.weights(cls.weights, given["weights"], overrides.get("weights")),
+            parameters.parameters(body, values, backward=False),
+            parameters.weights(cls.weights, values["weights"], overrides.get("weights")),
             parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
-            parameters.noise(given),
+            parameters.noise(values),
             cls.ground.with_settings(overrides),
             cls.command.with_settings(body, overrides),
-            cls.gait_and_pose and cls.gait_and_pose.with_settings(body, overrides),
+            gait_and_pose,
         )
 
     @classmethod
@@ -190,8 +195,10 @@ class CommandTask(Task):
 
     @functools.cached_property
     def blocks(self) -> Mapping[str, Block]:
-        """The paper's observation, the command with the motion that is to follow it, what command and ground add."""
-        body, gait, gait_and_pose = self.scene.body, self.parameters, self.settings.gait_and_pose
+        """The paper's observation, the command and the measured motion, and the blocks that command and ground add."""
+        body = self.scene.body
+        gait = self.parameters
+        gait_and_pose = self.settings.gait_and_pose
         return {
             **blocks.of_gait(body, gait.phase_offsets, gait.default_angles, headed=True),
             "command": Block((*_velocity("desired"), *_velocity("measured"))),
@@ -203,19 +210,23 @@ class CommandTask(Task):
     @property
     def commands(self) -> Mapping[str, int]:
         """Sizes of what may be set from outside while an episode runs, by name."""
-        body, gait_and_pose = self.scene.body, self.settings.gait_and_pose
-        return self.settings.command.live(body) | ({} if gait_and_pose is None else gait_and_pose.live(body))
+        body = self.scene.body
+        gait_and_pose = self.settings.gait_and_pose
+        sizes = self.settings.command.live(body)
+        return sizes if gait_and_pose is None else sizes | gait_and_pose.live(body)
 
     @property
     def command_limits(self) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
         """The lowest and highest numbers of the commands that are bounded, by name."""
-        gait_and_pose, scene = self.settings.gait_and_pose, self.scene
-        return {} if gait_and_pose is None else gait_and_pose.limits(scene.body, scene.control_timestep)
+        gait_and_pose = self.settings.gait_and_pose
+        if gait_and_pose is None:
+            return {}
+        return gait_and_pose.limits(self.scene.body, self.scene.control_timestep)
 
     def named_command(self, name: str, value: str) -> np.ndarray | None:
         """Return the numbers of a command that is given by a name."""
         gait_and_pose = self.settings.gait_and_pose
-        return None if gait_and_pose is None else gait_and_pose.named(self.scene.body, name, value)
+        return None if gait_and_pose is None else gait_and_pose.named_command(self.scene.body, name, value)
 
     @property
     def lies(self) -> bool:
@@ -247,15 +258,15 @@ class CommandTask(Task):
     @functools.cached_property
     def clock(self) -> Clock:
         """The clock of the prescribed gait."""
-        p = self.parameters
-        return Clock.made(
-            p.gait_frequency, p.duty_factor, p.phase_offsets, self.scene.control_timestep, self.step_limit
+        gait = self.parameters
+        return Clock.make(
+            gait.gait_frequency, gait.duty_factor, gait.phase_offsets, self.scene.control_timestep, self.step_limit
         )
 
     def phase(self, memory: CommandTaskMemory):
         """Return the phase (...) of the gait, rad."""
         if self.settings.gait_and_pose is None:
-            return self.clock.at(self.clock.phases, memory.core.tick)
+            return self.clock.look_up(self.clock.phases, memory.core.tick)
         return self.settings.gait_and_pose.phase(memory.gait_and_pose)
 
     def leg_phases(self, memory: CommandTaskMemory) -> tuple[Any, Any]:
@@ -271,14 +282,15 @@ class CommandTask(Task):
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the start, in this order: ground, state, yaw, schedule, obstacles, command, gait and pose.
 
-        The schedule is drawn for every command, and used by `command.Schedule` alone.
+        A schedule is drawn for every command, although `command.Schedule` alone uses it.
 
         Raises:
             ValueError: the memory of a command that can be set live has no field `live`.
         """
-        context, ground = self.context, self.settings.ground
+        context = self.context
+        ground = self.settings.ground
         ground_memory, displacement = ground.place(context, random, stream)
-        qpos, qvel = self.settings.noise.drawn(ground.pose(self.scene), random)
+        qpos, qvel = self.settings.noise.draw(ground.pose(self.scene), random)
         qpos[:2] += displacement
         qpos[3:7] = rotations.turn_about_z(qpos[3:7], random.uniform(-self.yaw, self.yaw))
         schedule = self.settings.command.schedule(random, ground.share(ground_memory))
@@ -286,9 +298,24 @@ class CommandTask(Task):
         command_memory = self._start_command(random, schedule)
         gait_and_pose = self.settings.gait_and_pose
         gait_memory = None if gait_and_pose is None else gait_and_pose.start(context, random)
-        still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
-        spent, none = energy.start(len(still)), np.zeros(3)
-        core = Core(0, 0, still, still, zero, zero, spent, zero, none, none, none, zero, zero)
+        joints = len(self.scene.body.joint_names)
+        no_action = np.zeros(joints)
+        zero = np.float64(0.0)
+        core = Core(
+            steps=0,
+            tick=0,
+            action=no_action,
+            previous_action=no_action,
+            schedule_errors=zero,
+            all_schedule_errors=zero,
+            energy=energy.start(joints),
+            path=zero,
+            place=np.zeros(3),
+            motion=np.zeros(3),
+            desired=np.zeros(3),
+            step_tracking=zero,
+            all_tracking=zero,
+        )
         health = self.health.start(lies=ground.lies)
         memory = CommandTaskMemory(core, command_memory, ground_memory, health, gait_memory)
         return Start(qpos, qvel, memory, obstacles)
@@ -303,56 +330,64 @@ class CommandTask(Task):
 
     def read(self, data) -> Sensed:
         """Take the readings."""
-        layout, heading = self.scene.layout, rotations.yaw(data.qpos[..., 3:7])
-        forces = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit
-        numpy, across = forces.__array_namespace__(), heading[..., None]
-        torque = rotations.to_heading_frame(forces[..., 0:2], across)
-        force = rotations.to_heading_frame(forces[..., 3:5], across)
-        forces = numpy.concatenate([torque, forces[..., 2:3], force, forces[..., 5:6]], axis=-1)
+        layout = self.scene.layout
+        heading = rotations.yaw(data.qpos[..., 3:7])
+        heading_of_parts = heading[..., None]
+        world_forces = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit
+        xp = world_forces.__array_namespace__()
+        torque = rotations.to_heading_frame(world_forces[..., 0:2], heading_of_parts)
+        force = rotations.to_heading_frame(world_forces[..., 3:5], heading_of_parts)
+        forces = xp.concatenate([torque, world_forces[..., 2:3], force, world_forces[..., 5:6]], axis=-1)
         readings = reading.read(data, layout, self.scene.arena, forces)
         touches = self.settings.ground.touches(data)
         if self.settings.gait_and_pose is None:
             return Sensed(*readings, heading, touches, None)
-        apart = data.xpos[..., layout.feet, :2] - data.xpos[..., layout.torso, None, :2]
-        return Sensed(*readings, heading, touches, rotations.to_heading_frame(apart, across))
+        feet_from_torso = data.xpos[..., layout.feet, :2] - data.xpos[..., layout.torso, None, :2]
+        return Sensed(*readings, heading, touches, rotations.to_heading_frame(feet_from_torso, heading_of_parts))
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
-        return self.cleared(readings)
+        return self.raise_off_ground(readings)
 
     def begin(self, memory: CommandTaskMemory, readings: Sensed) -> CommandTaskMemory:
-        """Remember where the torso is, and what the command asks for there."""
-        place = _place(readings)
+        """Return the memory with the place of the torso, and the velocity that the command asks for there."""
+        place = _read_place(readings)
         command = self.settings.command.begin(self.context, memory.command, place)
         desired = self.settings.command.desired(self.context, command, memory.core.steps, place)
-        spent = energy.begin(memory.core.energy, readings.joint_angles)
-        core = memory.core._replace(energy=spent, place=place, desired=desired)
+        energy_memory = energy.begin(memory.core.energy, readings.joint_angles)
+        core = memory.core._replace(energy=energy_memory, place=place, desired=desired)
         return memory._replace(core=core, command=command)
 
     def before(self, memory: CommandTaskMemory, action) -> tuple[CommandTaskMemory, Inputs]:
-        """Remember the action, which is applied as it is."""
+        """Return the memory with the action, and the action itself as what to write."""
         core = memory.core._replace(action=action, previous_action=memory.core.action)
         return memory._replace(core=core), Inputs(action)
 
     def after(self, memory: CommandTaskMemory, readings: Sensed) -> CommandTaskMemory:
         """Return the memory after a control step, in this order: gait, health, motion, command, ground."""
-        core, context, place = memory.core, self.context, _place(readings)
-        numpy, steps = place.__array_namespace__(), core.steps + 1
-        going = core.desired.any(axis=-1)
-        tick = core.tick + going
-        gait_and_pose, gait_memory = self.settings.gait_and_pose, memory.gait_and_pose
+        core = memory.core
+        context = self.context
+        place = _read_place(readings)
+        xp = place.__array_namespace__()
+        steps = core.steps + 1
+        is_going = core.desired.any(axis=-1)
+        tick = core.tick + is_going
+        gait_and_pose = self.settings.gait_and_pose
+        gait_memory = memory.gait_and_pose
         if gait_and_pose is None:
-            stance, crouch = self.clock.at(self.clock.stance, tick), 1.0
+            stance = self.clock.look_up(self.clock.stance, tick)
+            crouch = 1.0
         else:
-            gait_memory = gait_and_pose.before_feet(context, gait_memory, steps, going)
-            stance, crouch = gait_and_pose.stance(gait_memory), gait_and_pose.crouch(gait_memory)
-        stance = stance | ~going[..., None]  # all feet, while the command says stop
+            gait_memory = gait_and_pose.before_feet(context, gait_memory, steps, is_going)
+            stance = gait_and_pose.stance(gait_memory)
+            crouch = gait_and_pose.crouch(gait_memory)
+        stance = stance | ~is_going[..., None]  # at a stop, all feet stand
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
         health = self.health.after(context, memory.health, readings, steps, crouch)
-        motion = self._motion(core, place)
+        motion = self._mean_motion(core, place)
         if gait_and_pose is not None:
-            stepped = 1.0 - schedule_errors / self.parameters.feet
-            gait_memory = gait_and_pose.after(context, gait_memory, readings, stepped)
+            feet_in_schedule = 1.0 - schedule_errors / self.parameters.feet
+            gait_memory = gait_and_pose.after(context, gait_memory, readings, feet_in_schedule)
         followed = self.settings.command.follow(context, memory.command, steps, core.place, place, motion, readings)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
         core = Core(
@@ -363,12 +398,12 @@ class CommandTask(Task):
             schedule_errors=schedule_errors,
             all_schedule_errors=core.all_schedule_errors + schedule_errors,
             energy=energy.after(core.energy, self._torques, readings.effort(core.action), readings.joint_angles),
-            path=core.path + context.pace * numpy.hypot(motion[..., 0], motion[..., 1]),
+            path=core.path + context.pace * xp.hypot(motion[..., 0], motion[..., 1]),
             place=place,
             motion=motion,
             desired=followed.desired,
-            followed=followed.tracking,
-            tracking=core.tracking + followed.tracking,
+            step_tracking=followed.tracking,
+            all_tracking=core.all_tracking + followed.tracking,
         )
         return CommandTaskMemory(core, followed.memory, ground, health, gait_memory)
 
@@ -376,14 +411,15 @@ class CommandTask(Task):
     def _torques(self) -> np.ndarray:
         return energy.torques(self.scene.body)
 
-    def _motion(self, core: Core, place):
-        """The mean velocity (..., 3), of steps in the frame of the heading at their start."""
-        context, numpy, moved = self.context, place.__array_namespace__(), place - core.place
-        turn = rotations.wrap_angle(moved[..., 2])
-        moved = numpy.concatenate(
-            [rotations.to_heading_frame(moved[..., :2], core.place[..., 2]), turn[..., None]], axis=-1
-        )
-        return (1.0 - context.leaks) * core.motion + context.leaks * moved / context.step_units
+    def _mean_motion(self, core: Core, place):
+        """Return the mean velocity (..., 3); that of a step is relative to the heading at its start."""
+        context = self.context
+        xp = place.__array_namespace__()
+        world_displacement = place - core.place
+        displacement = rotations.to_heading_frame(world_displacement[..., :2], core.place[..., 2])
+        turn = rotations.wrap_angle(world_displacement[..., 2])
+        step_motion = xp.concatenate([displacement, turn[..., None]], axis=-1)
+        return (1.0 - context.leaks) * core.motion + context.leaks * step_motion / context.step_units
 
     def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
         """Return the memory with a live command."""
@@ -399,61 +435,75 @@ class CommandTask(Task):
 
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
         """
-        core, height, gait_and_pose = memory.core, self.context.height, self.settings.gait_and_pose
-        default, stepped = self.parameters.default_angles, 1.0 - core.schedule_errors / self.parameters.feet
-        earned = self.settings.command.terms(memory.command, core.followed, memory.health.upright, stepped)
+        core = memory.core
+        height = self.context.height
+        gait_and_pose = self.settings.gait_and_pose
+        default_angles = self.parameters.default_angles
+        feet_in_schedule = 1.0 - core.schedule_errors / self.parameters.feet
+        bonuses = self.settings.command.terms(
+            memory.command, core.step_tracking, memory.health.upright, feet_in_schedule
+        )
         if gait_and_pose is not None:
-            default = gait_and_pose.default_angles(self.context, memory.gait_and_pose, default)
-            earned = gait_and_pose.terms(memory.gait_and_pose, earned, core.followed)
-        costs = terms.costs(readings, core.action, core.previous_action, core.schedule_errors, default)
+            default_angles = gait_and_pose.default_angles(self.context, memory.gait_and_pose, default_angles)
+            bonuses = gait_and_pose.terms(memory.gait_and_pose, bonuses, core.step_tracking)
+        costs = terms.costs(readings, core.action, core.previous_action, core.schedule_errors, default_angles)
         return {
             **costs,
             "angular_velocity": costs["angular_velocity"] * (height / GRAVITY),
             "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
             "transport": core.energy.step / self.context.pace,
             **self.health.terms(memory.health),
-            **earned,
+            **bonuses,
         }
 
     def observe(self, memory: CommandTaskMemory, readings: Sensed) -> dict:
-        """Return the blocks as the torso heads, without a clock at a stop and without negative zeros."""
-        core, context, heading = memory.core, self.context, readings.heading
-        numpy, posture, velocities = core.motion.__array_namespace__(), readings.posture, readings.velocities
+        """Return the blocks relative to the heading, with a clock of zeros at a stop, and without negative zeros."""
+        core = memory.core
+        context = self.context
+        heading = readings.heading
+        xp = core.motion.__array_namespace__()
+        posture = readings.posture
+        velocities = readings.velocities
         quaternion = rotations.turn_about_z(readings.torso_quaternion, -heading)
         velocity = rotations.to_heading_frame(velocities[..., :2], heading)
         gait_and_pose = self.settings.gait_and_pose
         if gait_and_pose is None:
-            circle, more = self.clock.at(self.clock.circle, core.tick), {}
+            clock_circle = self.clock.look_up(self.clock.circle, core.tick)
+            gait_blocks = {}
         else:
-            circle = gait_and_pose.circle(memory.gait_and_pose)
-            more = gait_and_pose.observe(context, memory.gait_and_pose)
-        observed = {
-            "posture": numpy.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
-            "velocities": numpy.concatenate([velocity, velocities[..., 2:]], axis=-1),
+            clock_circle = gait_and_pose.circle(memory.gait_and_pose)
+            gait_blocks = gait_and_pose.observe(context, memory.gait_and_pose)
+        observation = {
+            "posture": xp.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
+            "velocities": xp.concatenate([velocity, velocities[..., 2:]], axis=-1),
             "contact_forces": readings.contact_forces,
-            "gait_clock": circle * core.desired.any(axis=-1)[..., None],
-            "command": numpy.concatenate([core.desired, core.motion], axis=-1),
+            "gait_clock": clock_circle * core.desired.any(axis=-1)[..., None],
+            "command": xp.concatenate([core.desired, core.motion], axis=-1),
             **self.settings.command.observe(context, memory.command),
-            **more,
+            **gait_blocks,
             **self.settings.ground.observe(context, memory.ground, core.place, readings),
         }
-        return {name: block + 0.0 for name, block in observed.items()}
+        return {name: block + 0.0 for name, block in observation.items()}
 
     def ended(self, memory: CommandTaskMemory, readings: Sensed) -> tuple:
-        """Terminate where the body fell; the ground may end the episode, too."""
+        """Return whether the body fell, which terminates the episode; the ground may end the episode, too."""
         return self.settings.ground.ended(memory.ground, memory.health.fell)
 
     def progress(self, memory: CommandTaskMemory) -> dict:
         """Return the mean `tracking`, whether the body `fell`, `gait_compliance`, and what command and ground add.
 
-        The cost of transport divides by the path of the leaky motion, whatever its direction.
+        The cost of transport divides by the length of the path, whatever its direction.
         """
-        core, gait_and_pose, judged = memory.core, self.settings.gait_and_pose, self.judged(memory)
-        steps = core.steps + (core.steps == 0)
+        core = memory.core
+        gait_and_pose = self.settings.gait_and_pose
+        judged_steps = self.judged_steps(memory)
+        steps = core.steps + (core.steps == 0)  # at least 1
+        metrics_of_command = self.settings.command.progress(self.context, memory.command, judged_steps)
+        if gait_and_pose is not None:
+            metrics_of_command |= gait_and_pose.progress(memory.gait_and_pose, judged_steps)
         return {
-            **self.settings.command.progress(self.context, memory.command, judged),
-            **({} if gait_and_pose is None else gait_and_pose.progress(memory.gait_and_pose, judged)),
-            "tracking": core.tracking / steps,
+            **metrics_of_command,
+            "tracking": core.all_tracking / steps,
             **self.health.progress(memory.health),
             "gait_compliance": clock.compliance(core.all_schedule_errors, steps, self.parameters.feet),
             "cost_of_transport": energy.cost_of_transport(core.energy, core.path, self.context.pace * steps),
@@ -462,61 +512,80 @@ class CommandTask(Task):
 
     def resampled(self, memory: CommandTaskMemory) -> Any:
         """Return whether the latest step began another drawn command."""
-        steps, gait_and_pose = memory.core.steps, self.settings.gait_and_pose
-        velocity = self.settings.command.resampled(memory.command, steps)
-        return velocity if gait_and_pose is None else velocity | gait_and_pose.resampled(memory.gait_and_pose, steps)
+        steps = memory.core.steps
+        gait_and_pose = self.settings.gait_and_pose
+        is_resampled = self.settings.command.resampled(memory.command, steps)
+        if gait_and_pose is None:
+            return is_resampled
+        return is_resampled | gait_and_pose.resampled(memory.gait_and_pose, steps)
 
-    def judged(self, memory: CommandTaskMemory):
-        """Return the steps (...) over which an episode is judged: a full episode once it is over, else those so far."""
-        steps, (terminated, truncated) = memory.core.steps, self.ended(memory, None)
-        numpy = memory.core.place.__array_namespace__()
-        return numpy.where(terminated | truncated, self.context.steps, steps + (steps == 0))
+    def judged_steps(self, memory: CommandTaskMemory):
+        """Return the steps (...) over which an episode is judged: those so far, or of a full one once it ended."""
+        steps = memory.core.steps
+        terminated, truncated = self.ended(memory, None)
+        xp = memory.core.place.__array_namespace__()
+        return xp.where(terminated | truncated, self.context.steps, steps + (steps == 0))
 
     def stream_state(self, memory: CommandTaskMemory) -> Any:
         """Return the stream state of the ground, by the outcome of the episode.
 
-        One that was cut off within the first cycle of the gait has none.
+        An episode that was cut off within the first cycle of the gait has no outcome, NaN.
         """
-        steps, (terminated, truncated) = memory.core.steps, self.ended(memory, None)
-        ended = terminated or truncated or steps >= self.step_limit
-        if not (ended or steps * self.context.leak >= 1.0):
+        steps = memory.core.steps
+        terminated, truncated = self.ended(memory, None)
+        has_ended = terminated or truncated or steps >= self.step_limit
+        has_full_cycle = steps * self.context.leak >= 1.0
+        if not has_ended and not has_full_cycle:
             return self.settings.ground.stream_state(memory.ground, np.nan, False)
-        outcome = self.settings.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
+        outcome = self.settings.command.outcome(
+            self.context, memory.command, memory.core.all_tracking, self.judged_steps(memory)
+        )
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 
     def markers(self, memory: CommandTaskMemory, readings: Sensed) -> list[Marker]:
         """Return arrows on the ground ahead of the torso: the desired velocity, and from its tip the turning.
 
-        The latter is the sideways velocity of a point R ahead. At the target velocity an arrow is R long.
+        The arrow of turning is the sideways velocity of a point R ahead. At the target velocity an arrow is R long.
         """
-        unit, (x, y, heading) = self.context.reach, memory.core.place
-        forward, left, turn = (unit * share for share in memory.core.desired)
+        reach = self.context.reach  # R, m
+        radius = _ARROW_RADIUS * reach
+        x, y, heading = memory.core.place
+        forward, left, turn = (reach * share for share in memory.core.desired)
         ahead = np.array((math.cos(heading), math.sin(heading)))
-        aside = np.array((-ahead[1], ahead[0]))
-        hub = np.array((x, y)) + _AHEAD * unit * ahead
-        tip = hub + forward * ahead + left * aside
-        ways = (hub, tip, _GOING), (tip, tip + turn * aside, _TURNING)
-        arrows = [self._arrow(foot, end, color) for foot, end, color in ways if (foot != end).any()]
-        base = np.array((*hub, self.scene.arena.height(*hub)))
-        disk = Marker("cylinder", base, base + (0.0, 0.0, _SHAFT * unit), 2.0 * _SHAFT * unit, _GOING)
+        leftward = np.array((-ahead[1], ahead[0]))
+        start = np.array((x, y)) + _ARROW_DISTANCE * reach * ahead
+        tip = start + forward * ahead + left * leftward
+        tip_of_turning = tip + turn * leftward
+        arrows = []
+        if (start != tip).any():
+            arrows.append(self._arrow(start, tip, _VELOCITY_COLOR))
+        if (tip != tip_of_turning).any():
+            arrows.append(self._arrow(tip, tip_of_turning, _TURNING_COLOR))
+        base = np.array((*start, self.scene.arena.height(*start)))
+        disk = Marker("cylinder", base, base + (0.0, 0.0, radius), 2.0 * radius, _VELOCITY_COLOR)
         return [disk, *arrows, *self.settings.command.markers(self.context, memory.command)]
 
-    def _arrow(self, foot: np.ndarray, end: np.ndarray, color) -> Marker:
-        """An arrow on the ground between two points (2,); its axis clears what is higher than both ends."""
-        points = foot + _SAMPLES[:, None] * (end - foot)
-        heights = self.scene.arena.height(*points.T)
-        straight = heights[0] + _SAMPLES * (heights[-1] - heights[0])
-        lifted = straight + (heights - straight).max() + _SHAFT * self.context.reach
-        start, tip = (np.array((*points[i], lifted[i])) for i in (0, -1))
-        return Marker("arrow", start, tip, _SHAFT * self.context.reach, color)
+    def _arrow(self, start: np.ndarray, end: np.ndarray, color) -> Marker:
+        """Return an arrow between two points (2,), so far above the ground that nothing between them covers it."""
+        radius = _ARROW_RADIUS * self.context.reach
+        points = start + _ARROW_SAMPLES[:, None] * (end - start)
+        ground_heights = self.scene.arena.height(*points.T)
+        straight = ground_heights[0] + _ARROW_SAMPLES * (ground_heights[-1] - ground_heights[0])
+        heights = straight + (ground_heights - straight).max() + radius
+        first_point = np.array((*points[0], heights[0]))
+        last_point = np.array((*points[-1], heights[-1]))
+        return Marker("arrow", first_point, last_point, radius, color)
 
 
 def _velocity(name: str) -> tuple[Part, ...]:
     """Return the parts of a velocity (3,) in units of the command."""
     planar = Planar(unit="v*", axes=(f"{name} forward", f"{name} left"))
-    return planar, Scalar(f"{name} turning", "v* / R", sign=-1)
+    turning = Scalar(f"{name} turning", "v* / R", sign=-1)
+    return planar, turning
 
 
-def _place(readings: Sensed):
-    numpy, frame = readings.posture.__array_namespace__(), readings.frame_position
-    return numpy.stack([component(frame, 0), component(frame, 1), readings.heading], axis=-1)
+def _read_place(readings: Sensed):
+    """Return the place (..., 3) of the torso's frame: x and y, m, and yaw, rad."""
+    xp = readings.posture.__array_namespace__()
+    frame = readings.frame_position
+    return xp.stack([component(frame, 0), component(frame, 1), readings.heading], axis=-1)

@@ -1,4 +1,4 @@
-"""Lengths and speeds of a body, in whose multiples tasks with a command are defined."""
+"""Lengths and speeds of a body, which are the units of tasks with a command."""
 
 from typing import Any, NamedTuple
 
@@ -11,21 +11,23 @@ from arc_suite.tasks.fitting import velocity_units
 
 
 class Context(NamedTuple):
-    """What the command, the ground and the health of a task are fitted to.
+    """Lengths and speeds to which the command, the ground and the health of a task are fitted.
 
     Attributes:
         arena: where the task takes place.
         height: h, the standing height, m.
         reach: R, the mean distance of the feet from their center, m.
-        units: (3,) of commands: the target velocity, twice, m/s, and rad/s at which feet move as fast when turning.
-        force_unit: (1, 6) of contact forces: the weight times the standing height, N m, three times, and the weight, N.
-        step_units: (3,) displacements of a control step at these units, m and rad.
+        units: (3,) of commands: the target velocity, twice, m/s, and the turning velocity, rad/s, at which feet on a
+            circle of radius R are as fast.
+        force_unit: (1, 6) of contact forces: three times the weight times the standing height, N m, then three times
+            the weight, N.
+        step_units: (3,) displacements of a control step at `units`, m and rad.
         pace: displacement of a control step at the target velocity, m.
-        leak: weight of the latest step in leaky means, which reach back over a cycle of the gait.
-        leaks: (3,) the same, for means of vectors.
+        leak: weight of the latest step in leaky means over a cycle of the gait.
+        leaks: (3,) the same weight, for means of vectors.
         steps: control steps over which an episode is judged.
         tempo: sqrt(h / g), control steps.
-        reference: what else the command measures the body by.
+        reference: what gait and pose by command measure the body by; None without them.
     """
 
     arena: Arena
@@ -44,7 +46,8 @@ class Context(NamedTuple):
     @classmethod
     def of(cls, scene, parameters, step_limit: float, reference: Any = None) -> "Context":
         """Return the context of a task in a `contract.Scene` that prescribes `parameters.Parameters`."""
-        body, pose = scene.body, standing(scene.body)
+        body = scene.body
+        pose = standing(body)
         units = velocity_units(body, parameters.target_velocity)
         leak = min(parameters.gait_frequency * scene.control_timestep, 1.0)
         return cls(

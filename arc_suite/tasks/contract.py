@@ -1,12 +1,11 @@
 """The contract of a task: frozen values and pure functions of arrays, which every driver can run.
 
-A task says how an episode starts, what is remembered of it, what a policy observes, what a step
-earns and when it ends. It holds no state and touches no simulation: memory is a value that comes in
-and goes out, and what is to be written is returned. Arrays may carry any leading axes `...`: none
-for one environment, one for a batch. Where a function is needed it comes from the
-array's own namespace, so that the same text runs under NumPy and JAX. NumPy rounds powers of scalars and
-of arrays differently: write `x * x` where `x` has only leading axes. `arc-suite check --task` finds
-what differs between one environment and a batch.
+A task says how an episode starts, what it remembers, what a policy observes, what the reward of a step is and
+when the episode ends. It holds no state and touches no simulation: memory is an argument and a result, and what
+is to be written into the simulation is returned. Arrays may have any leading axes `...`: none for one environment,
+one for a batch. Functions of arrays come from the array's own namespace, so that the same text runs under NumPy
+and JAX. NumPy rounds powers of scalars and of arrays differently: write `x * x` where `x` has only leading axes.
+`arc-suite check --task` finds what differs between one environment and a batch.
 
 An episode, as a driver runs it, for one environment or with a leading axis for a batch::
 
@@ -41,7 +40,7 @@ from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors, privileged
 from arc_suite.tasks import readings as reading
-from arc_suite.tasks.blocks import Block, places
+from arc_suite.tasks.blocks import Block, slices
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Readings
@@ -52,7 +51,7 @@ STEPS = 1000  # control steps of an episode
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
 CURRICULUM = ("curriculum", "level")
 
-_CLEAR = 0.01  # of the standing height, by which a lift brings feet clear of the ground
+_CLEARANCE = 0.01  # standing heights; feet start at least so far above the ground
 
 
 class Observed(ABC):
@@ -80,9 +79,9 @@ class Observed(ABC):
     def symmetry(self) -> Symmetry:
         """The mirror maps of observations and actions.
 
-        A walk and its mirror image, from the mirrored start by the mirrored actions, earn the same, the
-        clock of the gait half a cycle later where left and right take turns. On ground that is not level
-        the image walks on mirrored ground.
+        A walk and its mirror image have the same rewards. The image starts from the mirrored state, takes the
+        mirrored actions, and walks on mirrored ground. Where left and right legs take turns, the clock of its gait is
+        half a cycle later.
 
         Raises:
             ValueError: the body, the gait or its default angles are not symmetric, or a block has numbers without a
@@ -97,7 +96,7 @@ class Observed(ABC):
 
     @functools.cached_property
     def size(self) -> int:
-        """Of the observation as a vector."""
+        """The size of the observation as a vector."""
         return sum(self.sizes.values())
 
     def vector(self, blocks: Mapping[str, np.ndarray], dtype=None) -> np.ndarray:
@@ -110,7 +109,7 @@ class Observed(ABC):
         arrays = list(blocks.values())
         return arrays[0].__array_namespace__().concatenate(arrays, axis=-1, dtype=dtype)
 
-    def named(self, blocks: Mapping[str, np.ndarray]) -> collections.OrderedDict:
+    def copy_blocks(self, blocks: Mapping[str, np.ndarray]) -> collections.OrderedDict:
         """Return observed blocks by name, in new memory.
 
         Raises:
@@ -120,9 +119,9 @@ class Observed(ABC):
         return collections.OrderedDict({name: block.copy() for name, block in blocks.items()})
 
     def _check(self, blocks: Mapping[str, np.ndarray]) -> None:
-        if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:
-            observed = {name: block.shape[-1] for name, block in blocks.items()}
-            raise ValueError(f"observation of {self.name}: expected blocks {self.sizes}, got {observed}")
+        if [(name, block.shape[-1]) for name, block in blocks.items()] != self._sizes_in_order:
+            sizes = {name: block.shape[-1] for name, block in blocks.items()}
+            raise ValueError(f"observation of {self.name}: expected blocks {self.sizes}, got {sizes}")
 
     def split(self, vector: np.ndarray) -> collections.OrderedDict:
         """Return an observation vector (..., size) as named blocks, views of it.
@@ -132,16 +131,16 @@ class Observed(ABC):
         """
         if vector.shape[-1:] != (self.size,):
             raise ValueError(f"observation: expected {self.size} numbers, got shape {vector.shape}")
-        return collections.OrderedDict((name, vector[..., part]) for name, part in self._parts.items())
+        return collections.OrderedDict((name, vector[..., part]) for name, part in self._slices.items())
 
     @functools.cached_property
-    def _declared(self) -> list[tuple[str, int]]:
+    def _sizes_in_order(self) -> list[tuple[str, int]]:
         return list(self.sizes.items())
 
     @functools.cached_property
-    def _parts(self) -> dict[str, slice]:
-        """Where each block lies in the vector."""
-        return places(self.sizes)
+    def _slices(self) -> dict[str, slice]:
+        """The slice of each block in the vector."""
+        return slices(self.sizes)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -150,21 +149,22 @@ class Task(Observed):
 
     Attributes:
         scene: what it is made for.
-        settings: its numbers, with a field `weights`: `weights` with those that the robot or the caller replaces.
+        settings: its numbers. The field `weights` holds `weights`, with changes of the robot or the caller.
         step_limit: control steps of an episode, may be infinite.
         name: by which `arc_suite.load` and ids know the task.
-        weights: signed weight of every term of the reward by name, in the order in which they are added up.
+        weights: signed weight of every term of the reward by name, in the order of summation.
         cost_limit: bound of the weighted sum of the costs of a step; None for no bound. See `terms.reward`.
-        version: raised with any change of dynamics, reward or observation.
+        version: increased with any change of dynamics, reward or observation.
         commands: sizes of what may be set from outside while an episode runs, such as by a player's stick,
             by name; see `with_command`.
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
         gait_and_pose: gait and pose by command, see `gait_and_pose.GaitAndPose`; None where there are none.
-        from_body: cached attributes with numbers that follow from the body or the settings. With these and the settings
-            stacked along a leading axis, its functions serve a batch of different bodies or settings. A class that
-            inherits declares its own, as it may have further ones; without it, each body has a batch of its own.
+        from_body: cached attributes with numbers that follow from the body or the settings. Where these and the
+            settings are stacked along a leading axis, the functions of the task take a batch of different bodies or
+            settings. A subclass declares this attribute again, as it may have further ones. Without it, each body has
+            its own batch.
         structure: what else environments of one batch share.
     """
 
@@ -205,10 +205,11 @@ class Task(Observed):
     def leg_phases(self, memory) -> tuple[Any, Any] | None:
         """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds.
 
-        The gait wants a leg in stance while its phase, less whole turns, is below 2 pi times the duty factor, of
-        which one number will do for all environments. None where the task prescribes no gait.
+        The gait has a leg in stance while its phase, modulo 2 pi, is below 2 pi times the duty factor. The duty factor
+        may be one number for all environments. None where the task prescribes no gait.
         """
-        phase, gait = self.phase(memory), self.parameters
+        phase = self.phase(memory)
+        gait = self.parameters
         if phase is None or gait is None:
             return None
         return phase[..., None] + gait.phase_offsets, gait.duty_factor
@@ -225,7 +226,7 @@ class Task(Observed):
 
     @property
     def actions(self) -> str:
-        """What an action asks of a motor: "torque", or of a servo: "position"."""
+        """What an action means: the "torque" of a motor, or the "position" of a servo."""
         return "position" if self.scene.body.source else "torque"
 
     @property
@@ -234,9 +235,9 @@ class Task(Observed):
         return {}
 
     def named_command(self, name: str, value: str) -> np.ndarray | None:
-        """Return the numbers (size,) of a live command that is given by a name, as a gait may be.
+        """Return the numbers (size,) of a live command that is given by a name, such as a gait.
 
-        None where names stand for nothing.
+        None for commands that have no names.
 
         Raises:
             ValueError: there is no such name.
@@ -255,7 +256,7 @@ class Task(Observed):
 
     @property
     def parameters(self) -> Parameters | None:
-        """What the task prescribes of a walk: its gait and its standing pose; None where it prescribes none."""
+        """The gait and the standing pose that the task prescribes; None where it prescribes none."""
         return None
 
     @property
@@ -271,38 +272,38 @@ class Task(Observed):
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw how an episode starts, and everything else that is random in it.
 
-        The number of draws is fixed and does not depend on what is drawn, so that an episode is a
+        The number of draws is fixed and does not depend on drawn values, so that an episode is a
         function of its seed, the stream state and its actions.
 
         Args:
-            random: what to draw from.
-            stream: state of the stream after the episode before, or `first()`.
+            random: the random generator.
+            stream: state of the stream after the previous episode, or `first()`.
         """
 
     def read(self, data) -> Readings:
-        """Take the readings of `MjData`, or of anything with its fields under leading axes."""
+        """Return the readings of `MjData`, or of an object that has its fields with leading axes."""
         return reading.read(data, self.scene.layout, self.scene.arena)
 
     def clear_spawn(self, memory, readings: Readings) -> np.ndarray | None:
-        """Return the positions (..., nq) that bring every foot clear of the ground at the start of an episode.
+        """Return the positions (..., nq) at which every foot is clear of the ground at the start of an episode.
 
-        None on level ground, which pushes out what starts in it; any other ground holds it fast.
+        None on level ground, which pushes out feet that start in it. Other ground would hold them.
         """
-        return None if self.scene.arena.is_level else self.cleared(readings)
+        return None if self.scene.arena.is_level else self.raise_off_ground(readings)
 
-    def cleared(self, readings: Readings) -> np.ndarray:
+    def raise_off_ground(self, readings: Readings) -> np.ndarray:
         """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground."""
-        numpy = readings.foot_heights.__array_namespace__()
+        xp = readings.foot_heights.__array_namespace__()
         rise = (self.clearances - readings.foot_heights).max(axis=-1).clip(0.0)
-        x, y, z = (readings.torso_position[..., i] for i in range(3))
-        position = numpy.stack([x, y, z + rise], axis=-1)
-        return numpy.concatenate([position, readings.qpos[..., 3:]], axis=-1)
+        x, y, z = (readings.torso_position[..., axis] for axis in range(3))
+        position = xp.stack([x, y, z + rise], axis=-1)
+        return xp.concatenate([position, readings.qpos[..., 3:]], axis=-1)
 
     @functools.cached_property
     def clearances(self) -> np.ndarray:
-        """(legs,) heights of the feet's centers at which a start leaves them clear of the ground, m."""
+        """(legs,) lowest heights over the ground at which the centers of feet start, m."""
         radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
-        return radii + _CLEAR * self.scene.body.torso.standing_height
+        return radii + _CLEARANCE * self.scene.body.torso.standing_height
 
     @abstractmethod
     def begin(self, memory, readings: Readings) -> Any:
@@ -317,15 +318,15 @@ class Task(Observed):
         """Return the memory after a control step."""
 
     def with_command(self, memory, name: str, value) -> Any:
-        """Return the memory with a live command: one of `commands` set to (..., size) numbers from outside.
+        """Return the memory with a live command: numbers (..., size) of one of `commands`, set from outside.
 
-        NaN stands for what the task itself would do.
+        NaN stands for the command of the task itself.
         """
         return memory._replace(**{name: value})
 
     @abstractmethod
     def terms(self, memory, readings: Readings) -> dict:
-        """Return the reward's raw terms by name, each (...): neither weighed nor limited."""
+        """Return the reward's raw terms by name, each (...), without weights and limits."""
 
     @abstractmethod
     def observe(self, memory, readings: Readings) -> dict:

@@ -1,6 +1,6 @@
 """Energy: the positive work of the motors, from which the cost of transport follows.
 
-Work is divided by the body's weight, so its unit is m. The motors do not win back what they brake, as in
+Work is divided by the body's weight, so its unit is m. Negative work does not count, as in
 `style.metrics.cost_of_transport`.
 """
 
@@ -12,7 +12,7 @@ from arc_suite.models.sizing import sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots.spec import Body
 
-NOWHERE = 0.05  # share of the path at the target velocity below which a body gets nowhere
+MIN_PATH = 0.05  # share of the path at the target velocity; shorter paths count as so long
 
 
 class Energy(NamedTuple):
@@ -36,7 +36,7 @@ def start(joints: int) -> Energy:
 
 def begin(memory: Energy, angles) -> Energy:
     """Return the memory from which the first step starts, given the joint angles (..., joints), rad."""
-    return memory._replace(angles=angles + 0.0)  # not a view
+    return memory._replace(angles=angles + 0.0)  # a copy, as readings are views of the simulation
 
 
 def after(memory: Energy, torques: np.ndarray, action, angles) -> Energy:
@@ -53,18 +53,18 @@ def after(memory: Energy, torques: np.ndarray, action, angles) -> Energy:
 
 
 def cost_of_transport(memory: Energy, path, target_path):
-    """Return the cost of transport (...): work by weight and path.
+    """Return the cost of transport (...): work over weight and path.
 
     Args:
         memory: of the episode.
-        path: (...) length of it so far, m.
-        target_path: (...) length at the target velocity, m; a shorter path than a twentieth of it counts as that.
+        path: (...) length of the path so far, m.
+        target_path: (...) length at the target velocity, m; see `MIN_PATH`.
     """
-    numpy = memory.total.__array_namespace__()
-    return memory.total / numpy.maximum(path, NOWHERE * target_path)
+    xp = memory.total.__array_namespace__()
+    return memory.total / xp.maximum(path, MIN_PATH * target_path)
 
 
 def torques(body: Body) -> np.ndarray:
-    """Return the greatest torques (joints,) of a body's motors by its weight, m."""
+    """Return the greatest torques (joints,) of a body's motors over its weight, m."""
     gears = np.array([joint.torque for joint in sized(body).joints])
     return gears / (standing(body).mass * GRAVITY)

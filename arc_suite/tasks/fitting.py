@@ -1,4 +1,4 @@
-"""Walk's numbers for a body that has none of its own, from its standing pose.
+"""Numbers of walk for a body without published ones, from its standing pose.
 
 Speeds are multiples of sqrt(g h) (a Froude number of speed / sqrt(g h)), frequencies of
 sqrt(g / h) and lengths of h, the height at which the torso stands, so that bodies of one shape and
@@ -13,29 +13,30 @@ from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.models.stride import TARGET_FROUDE, fitted_gait, gait_frequency
 from arc_suite.robots.spec import Body
 
-BAND = 0.75  # of the target velocity; published: 0.6 to 1
-STANCE_HEIGHT = 0.04  # of h, by which a foot in stance may be off the ground
-HEALTHY_RANGE = (0.4, 1.8)  # of h; published: 0.3 to 0.44, and 1.6 to 2
+BAND = 0.75  # share of the target velocity; published: 0.6 to 1
+STANCE_HEIGHT = 0.04  # h; a foot in stance is at most so far off the ground
+HEALTHY_RANGE = (0.4, 1.8)  # h; published: 0.3 to 0.44, and 1.6 to 2
 
 # Noise of the start.
-POSITION_NOISE = 0.05  # of h; published: 0.03 to 0.2
-ORIENTATION_NOISE = 0.02  # of the quaternion's components, which have no unit; published: 0.02 to 0.1
-LINEAR_VELOCITY_NOISE = 0.01  # of sqrt(g h); published: 0.007 to 0.05
-ANGULAR_VELOCITY_NOISE = 0.004  # of sqrt(g / h); published: 0.003 to 0.02
+POSITION_NOISE = 0.05  # h; published: 0.03 to 0.2
+ORIENTATION_NOISE = 0.02  # components of the quaternion; published: 0.02 to 0.1
+LINEAR_VELOCITY_NOISE = 0.01  # sqrt(g h); published: 0.007 to 0.05
+ANGULAR_VELOCITY_NOISE = 0.004  # sqrt(g / h); published: 0.003 to 0.02
 JOINT_ANGLE_NOISE = 0.1  # rad, as published
-JOINT_VELOCITY_NOISE = 0.02  # of sqrt(g / h); published: 0.014 to 0.03
+JOINT_VELOCITY_NOISE = 0.02  # sqrt(g / h); published: 0.014 to 0.03
 
 
 def fitted_parameters(body: Body) -> dict:
-    """Return parameters of walk for any body: units as in `parameters.Parameters`, every noise by itself."""
+    """Return parameters of walk for any body: units as in `parameters.Parameters`, a number for each noise."""
     height = body.torso.standing_height
-    unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
-    speed = TARGET_FROUDE * unit
+    velocity_unit = math.sqrt(GRAVITY * height)
+    rate_unit = math.sqrt(GRAVITY / height)
+    speed = TARGET_FROUDE * velocity_unit
     gait = fitted_gait(body)
     return {
         "target_velocity": speed,
         "velocity_band": BAND * speed,
-        "gait_frequency": gait_frequency(body) * rate,
+        "gait_frequency": gait_frequency(body) * rate_unit,
         "duty_factor": gait.duty_factor,
         "phase_offsets": tuple(2.0 * math.pi * offset for offset in gait.offsets),
         "stance_threshold": max(leg.foot.radius for leg in body.legs) + STANCE_HEIGHT * height,
@@ -48,21 +49,22 @@ def fitted_parameters(body: Body) -> dict:
 def fitted_noise(body: Body) -> dict[str, float]:
     """Return every noise of a start that suits any body: names and units as in `walk.Noise`."""
     height = body.torso.standing_height
-    unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
+    velocity_unit = math.sqrt(GRAVITY * height)
+    rate_unit = math.sqrt(GRAVITY / height)
     return {
         "position_noise": POSITION_NOISE * height,
         "orientation_noise": ORIENTATION_NOISE,
-        "linear_velocity_noise": LINEAR_VELOCITY_NOISE * unit,
-        "angular_velocity_noise": ANGULAR_VELOCITY_NOISE * rate,
+        "linear_velocity_noise": LINEAR_VELOCITY_NOISE * velocity_unit,
+        "angular_velocity_noise": ANGULAR_VELOCITY_NOISE * rate_unit,
         "joint_angle_noise": JOINT_ANGLE_NOISE,
-        "joint_velocity_noise": JOINT_VELOCITY_NOISE * rate,
+        "joint_velocity_noise": JOINT_VELOCITY_NOISE * rate_unit,
     }
 
 
 def velocity_units(body: Body, target_velocity: float) -> np.ndarray:
     """Return the units (3,) of commands: the target velocity forward and left, m/s, and a turning velocity, rad/s.
 
-    At the latter the feet move as fast when the body turns on the spot.
+    At the unit of turning on the spot, feet on a circle of radius R move at the target velocity.
     """
     speed = abs(target_velocity)
     return np.array((speed, speed, speed / reach(body)))
@@ -71,4 +73,5 @@ def velocity_units(body: Body, target_velocity: float) -> np.ndarray:
 def reach(body: Body) -> float:
     """Return R, the mean horizontal distance of the feet from the center of mass in the standing pose, m."""
     pose = standing(body)
-    return float(np.hypot(*(pose.soles - pose.center)[:, :2].T).mean())
+    x, y = (pose.soles - pose.center)[:, :2].T
+    return float(np.hypot(x, y).mean())

@@ -1,7 +1,7 @@
 """A gait and a pose of the torso by command, drawn for the episode or set while it runs.
 
-Pose and gait glide to the command. The clock counts integers: every gait's edges are exact, whatever its numbers,
-and the phase goes on when another gait is asked for.
+Pose and gait glide to the command. The clock counts integers, so that touchdowns of every gait are exact. The phase
+continues when the command changes to another gait.
 """
 
 import dataclasses
@@ -19,49 +19,49 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import terms
 from arc_suite.tasks.blocks import Block, gait_clock
 from arc_suite.tasks.clock import TWO_PI
-from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, begins, held
+from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, begins_next, scheduled_value
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.parts import ROTATIONS, Legs, Planar, Scalar
 
-CYCLE = 1 << 20  # units of the clock
-STEADY = ("trot", "walk", "tripod", "tetrapod", "ripple")  # gaits that are drawn, where they fit
+CYCLE = 1 << 20  # units of the clock in a cycle of the gait
+DRAWN_GAITS = ("trot", "walk", "tripod", "tetrapod", "ripple")  # those that fit the body
 
-_TEMPI = (0.8, 1.2)  # of the frequencies that are drawn, multiples of the prescribed one
-_SHARE = 0.35  # of the numbers of a pose that are drawn; others are 0
-_SPEED = 0.25  # at which a pose glides, standing heights or rad a sqrt(h / g)
-_LEAST = 0.1  # standing heights or rad: a pose as far from the rest is judged as strictly as any nearer one
-_UNTIMED = 0.7  # share of the feet that follow a contact schedule by chance, when a body walks in another gait
-_DUTIES = (0.05, 0.95)
-_FASTEST = 0.25  # cycles a control step
+_FREQUENCY_RANGE = (0.8, 1.2)  # of drawn frequencies, multiples of the prescribed one
+_DRAWN_SHARE = 0.35  # probability that a number of a pose is drawn; others are 0
+_GLIDE_SPEED = 0.25  # of a pose, standing heights or rad in a time of sqrt(h / g)
+_MIN_POSE_SIZE = 0.1  # standing heights or rad; smaller poses are judged as strictly as one of this size
+_CHANCE_IN_SCHEDULE = 0.7  # share of feet that follow a contact schedule by chance, in a walk in another gait
+_DUTY_FACTORS = (0.05, 0.95)  # bounds
+_MAX_ADVANCE = 0.25  # cycles a control step
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Choices:
-    """What poses and gaits are drawn from.
+    """Ranges of drawn poses and gaits.
 
     Attributes:
         room: (6, 2) bounds of the numbers of a pose.
         gaits: (n, legs + 2) in units of the clock.
-        tempi: between which their frequencies are drawn, multiples of the prescribed one.
+        frequency_range: of drawn frequencies, multiples of the prescribed one.
     """
 
     room: np.ndarray
     gaits: np.ndarray
-    tempi: tuple[float, float]
+    frequency_range: tuple[float, float]
 
 
 class Reference(NamedTuple):
-    """What poses and gaits of a body are measured by.
+    """Reference of a body by which poses and gaits are measured.
 
     Attributes:
         ride: height of the torso at rest, standing heights.
-        feet: (legs, 2) places from the torso at rest, forward and left, m.
-        angles: (joints,) at rest, from the default ones, rad.
-        turns: (joints, 6) of joints in a pose, rad.
-        glide: of a pose in a control step, standing heights or rad.
-        step: a control step, s.
-        gait: (legs + 2,) the prescribed one, in units of the clock.
-        choices: what is drawn from.
+        feet: (legs, 2) positions from the torso at rest, forward and left, m.
+        angles: (joints,) at rest, relative to the default ones, rad.
+        turns: (joints, 6) change of joint angles with each number of a pose, rad.
+        glide: largest change of a pose in a control step, standing heights or rad.
+        step: control step, s.
+        gait: (legs + 2,) the prescribed gait, in units of the clock.
+        choices: ranges of drawn poses and gaits.
     """
 
     ride: float
@@ -80,17 +80,18 @@ class GaitAndPoseMemory(NamedTuple):
     Attributes:
         pose_ends: (..., COMMANDS) steps at which the poses of the schedule end.
         poses: (..., COMMANDS, 6); see `posture`.
-        live_pose: (..., 6) set from outside, in place of the schedule where it is not NaN.
+        live_pose: (..., 6) set from outside; NaN for the pose of the schedule.
         gait_ends: (..., COMMANDS) steps at which the gaits of the schedule end.
         gaits: (..., COMMANDS, legs + 2) in units of the clock: offsets, duty factor, and advance in a control step.
-        live_gait: (..., legs + 2) set from outside: offsets, cycles, duty factor, and frequency, Hz.
-        pose: (..., 6) that holds.
-        gait: (..., legs + 2) that holds, in units of the clock.
+        live_gait: (..., legs + 2) set from outside: offsets, cycles, duty factor, and frequency, Hz; NaN for that
+            of the schedule.
+        pose: (..., 6) the present one, which glides to the command.
+        gait: (..., legs + 2) the present one, in units of the clock.
         phase: (...) of the gait, in units of the clock.
-        off: (..., 6) by which the torso is off the pose that holds, a leaky mean over a cycle of the prescribed gait.
-        posed: (...) how well the latest step kept the pose, 0 to 1.
-        all_posed: (...) sum of `posed` over the steps.
-        stepped: (...) share of the feet that follow the contact schedule, a leaky mean over the same cycle.
+        pose_error: (..., 6) of the torso, a leaky mean over a cycle of the prescribed gait.
+        pose_tracking: (...) how well the latest step kept the pose, 0 to 1.
+        all_pose_tracking: (...) sum of `pose_tracking` over the steps.
+        feet_in_schedule: (...) share of the feet that follow the contact schedule, a leaky mean over the same cycle.
     """
 
     pose_ends: np.ndarray
@@ -102,25 +103,25 @@ class GaitAndPoseMemory(NamedTuple):
     pose: np.ndarray
     gait: np.ndarray
     phase: np.ndarray
-    off: np.ndarray
-    posed: np.ndarray
-    all_posed: np.ndarray
-    stepped: np.ndarray
+    pose_error: np.ndarray
+    pose_tracking: np.ndarray
+    all_pose_tracking: np.ndarray
+    feet_in_schedule: np.ndarray
 
 
-_LIVE = {"pose": "live_pose", "gait": "live_gait"}
+_FIELD_OF_COMMAND = {"pose": "live_pose", "gait": "live_gait"}
 
 
 @dataclasses.dataclass(frozen=True)
 class GaitAndPose:
-    """A gait and a pose of the torso by command, in addition to a velocity; each is held for some seconds.
+    """A gait and a pose of the torso by command, in addition to a velocity; each holds for some seconds.
 
     Attributes:
-        poses: share of the body's room from which poses are drawn; 0 for none.
-        gaits: names of gaits that are drawn, with their frequencies; None for the steady ones that fit, and none of
-            them for the prescribed gait alone.
+        poses: share of the body's room from which poses are drawn; 0 for no poses.
+        gaits: names of gaits that are drawn, with their frequencies; None for those of `DRAWN_GAITS` that fit, empty
+            for the prescribed gait alone.
         settings: names of the fields that a caller may set.
-        observed: names of the blocks that show the gait and the pose that hold.
+        observed: names of the blocks of the present gait and pose.
     """
 
     poses: float = 0.8
@@ -137,7 +138,8 @@ class GaitAndPose:
         """
         poses = checks.number("poses", overrides.get("poses", self.poses), 0.0, 1.0)
         names = overrides.get("gaits", self.gaits)
-        names = None if names is None else checks.names("gaits", names, gaits.fitting_gaits(body), "gait")
+        if names is not None:
+            names = checks.names("gaits", names, gaits.fitting_gaits(body), "gait")
         return dataclasses.replace(self, poses=poses, gaits=names)
 
     def live(self, body: Body) -> dict[str, int]:
@@ -146,44 +148,61 @@ class GaitAndPose:
 
     def limits(self, body: Body, step: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Return the lowest and highest numbers of poses and gaits, by name, given a control step, s."""
-        most = np.append(np.ones(len(body.legs)), (_DUTIES[1], _FASTEST / step))
-        least = np.append(-np.ones(len(body.legs)), (_DUTIES[0], 1.0 / (CYCLE * step)))
-        return {"pose": (-np.ones(6), np.ones(6)), "gait": (least, most)}
+        low_duty_factor, high_duty_factor = _DUTY_FACTORS
+        lowest = np.append(-np.ones(len(body.legs)), (low_duty_factor, 1.0 / (CYCLE * step)))
+        highest = np.append(np.ones(len(body.legs)), (high_duty_factor, _MAX_ADVANCE / step))
+        return {"pose": (-np.ones(6), np.ones(6)), "gait": (lowest, highest)}
 
-    def named(self, body: Body, name: str, value: str) -> np.ndarray | None:
-        """Return the numbers of a gait that is named, at the frequency that the task asks for; None for other commands.
+    def named_command(self, body: Body, name: str, value: str) -> np.ndarray | None:
+        """Return the numbers of a gait by its name, at the frequency of the schedule; None for other commands.
 
         Raises:
             ValueError: no such gait, or one that does not fit the body.
         """
         if name != "gait":
             return None
-        made = gaits.gait(body, value)
-        return np.array((*made.offsets, made.duty_factor, np.nan))
+        gait = gaits.gait(body, value)
+        return np.array((*gait.offsets, gait.duty_factor, np.nan))
 
     def reference(self, scene, parameters) -> Reference:
-        """Return what poses and gaits of a body are measured by, in a task with `parameters.Parameters`."""
-        body, rest = scene.body, posture.rest(scene.body)
-        height, step = body.torso.standing_height, scene.control_timestep
-        own = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))
-        names = [name for name in STEADY if name in gaits.fitting_gaits(body)] if self.gaits is None else self.gaits
-        made = [gaits.gait(body, name) for name in names]
-        drawn = [np.array((*gait.offsets, gait.duty_factor, parameters.gait_frequency)) for gait in made] or [own]
-        tempi = (1.0, 1.0) if names == () else _TEMPI
+        """Return the reference of a body, in a task with `parameters.Parameters`."""
+        body = scene.body
+        rest = posture.rest(body)
+        height = body.torso.standing_height
+        step = scene.control_timestep
+        prescribed = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))
+        choices = Choices(
+            room=self.poses * posture.room(body, planted=False),
+            gaits=to_clock_units(self._drawn_gaits(body, prescribed), step),
+            frequency_range=(1.0, 1.0) if self.gaits == () else _FREQUENCY_RANGE,
+        )
         return Reference(
             ride=rest.ride,
             feet=rest.places[:, :2],
             angles=rest.legs.by_joint(rest.angles),
             turns=posture.turns(body),
-            glide=_SPEED * math.sqrt(GRAVITY / height) * step,
+            glide=_GLIDE_SPEED * math.sqrt(GRAVITY / height) * step,
             step=step,
-            gait=counted(own, step),
-            choices=Choices(self.poses * posture.room(body, planted=False), counted(np.array(drawn), step), tempi),
+            gait=to_clock_units(prescribed, step),
+            choices=choices,
         )
 
+    def _drawn_gaits(self, body: Body, prescribed: np.ndarray) -> np.ndarray:
+        """Return the gaits (n, legs + 2) that are drawn, at the prescribed frequency; else the prescribed one."""
+        names = self.gaits
+        if names is None:
+            names = [name for name in DRAWN_GAITS if name in gaits.fitting_gaits(body)]
+        if not names:
+            return prescribed[None]
+        frequency = prescribed[-1]
+        drawn_gaits = [gaits.gait(body, name) for name in names]
+        return np.array([(*gait.offsets, gait.duty_factor, frequency) for gait in drawn_gaits])
+
     def blocks(self, body: Body) -> dict[str, Block]:
-        """Return the blocks that it adds: the clock and the pose that hold, and of the gait sine and cosine of the
-        phase of each leg, the duty factor and the frequency by sqrt(g / h)."""
+        """Return the blocks that it adds: the clock, the pose, and the gait.
+
+        The block of the gait has sine and cosine of the phase of each leg, duty factor, and frequency over sqrt(g / h).
+        """
         pose = (
             Scalar("height", "h"),
             Planar(unit="h"),
@@ -201,75 +220,88 @@ class GaitAndPose:
     def start(self, context: Context, random: np.random.RandomState) -> GaitAndPoseMemory:
         """Draw poses and gaits, and when they end; an episode begins at rest, in the prescribed gait."""
         reference = context.reference
-        low, high = reference.choices.room.T
-        ends, gait_ends = (random.randint(SHORTEST, LONGEST, COMMANDS).cumsum() for _ in range(2))
-        poses = random.uniform(-1.0, 1.0, (COMMANDS, 6)) * (random.uniform(size=(COMMANDS, 6)) < _SHARE)
-        # Not all numbers at their bounds at once.
+        choices = reference.choices
+        low, high = choices.room.T
+        pose_ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
+        gait_ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
+        poses = random.uniform(-1.0, 1.0, (COMMANDS, 6)) * (random.uniform(size=(COMMANDS, 6)) < _DRAWN_SHARE)
+        # Numbers are not at their bounds all at once.
         poses /= abs(poses).sum(axis=-1, keepdims=True).clip(min=1.0)
-        which, tempi = random.uniform(size=COMMANDS), random.uniform(*reference.choices.tempi, COMMANDS)
-        drawn = reference.choices.gaits[(which * len(reference.choices.gaits)).astype(int)]
-        drawn[:, -1] = np.rint(drawn[:, -1] * tempi)
-        zero, still = np.float64(0.0), np.zeros(6)
+        indices = (random.uniform(size=COMMANDS) * len(choices.gaits)).astype(int)
+        frequency_factors = random.uniform(*choices.frequency_range, COMMANDS)
+        drawn_gaits = choices.gaits[indices]
+        drawn_gaits[:, -1] = np.rint(drawn_gaits[:, -1] * frequency_factors)
+        zero = np.float64(0.0)
         return GaitAndPoseMemory(
-            pose_ends=ends,
+            pose_ends=pose_ends,
             poses=np.where(poses < 0.0, -low, high) * poses,
             live_pose=np.full(6, np.nan),
             gait_ends=gait_ends,
-            gaits=drawn,
+            gaits=drawn_gaits,
             live_gait=np.full(len(reference.gait), np.nan),
-            pose=still,
+            pose=np.zeros(6),
             gait=reference.gait,
             phase=np.int64(0),
-            off=still,
-            posed=zero,
-            all_posed=zero,
-            stepped=np.float64(1.0),
+            pose_error=np.zeros(6),
+            pose_tracking=zero,
+            all_pose_tracking=zero,
+            feet_in_schedule=np.float64(1.0),
         )
 
-    def before_feet(self, context: Context, memory: GaitAndPoseMemory, steps, going) -> GaitAndPoseMemory:
-        """Return the memory with pose and gait a control step nearer to the command, and the clock a step on.
+    def before_feet(self, context: Context, memory: GaitAndPoseMemory, steps, is_going) -> GaitAndPoseMemory:
+        """Return the memory with pose and gait a control step nearer to the command, and the clock advanced.
 
         Args:
             context: of the task.
             memory: before the step.
             steps: (...) control steps since the start, this one included.
-            going: (...) whether the velocity is no stop, at which the clock rests.
+            is_going: (...) whether the commanded velocity is no stop; at a stop the clock stands still.
         """
-        xp, reference = memory.pose.__array_namespace__(), context.reference
-        asked = held(memory.pose_ends, memory.poses, steps)
-        asked = xp.where(xp.isnan(memory.live_pose), asked, memory.live_pose)
+        xp = memory.pose.__array_namespace__()
+        reference = context.reference
+        scheduled_pose = scheduled_value(memory.pose_ends, memory.poses, steps)
+        commanded_pose = xp.where(xp.isnan(memory.live_pose), scheduled_pose, memory.live_pose)
         glide = xp.asarray(reference.glide)[..., None]
-        pose = memory.pose + xp.minimum(xp.maximum(asked - memory.pose, -glide), glide)
-        live = counted(memory.live_gait, xp.asarray(reference.step)[..., None])
-        asked = xp.where(xp.isnan(memory.live_gait), held(memory.gait_ends, memory.gaits, steps), live)
-        gait = glided(memory.gait, asked)
-        phase = (memory.phase + gait[..., -1] * going) % CYCLE
+        pose = memory.pose + xp.minimum(xp.maximum(commanded_pose - memory.pose, -glide), glide)
+        live_gait = to_clock_units(memory.live_gait, xp.asarray(reference.step)[..., None])
+        scheduled_gait = scheduled_value(memory.gait_ends, memory.gaits, steps)
+        commanded_gait = xp.where(xp.isnan(memory.live_gait), scheduled_gait, live_gait)
+        gait = glide_gait(memory.gait, commanded_gait)
+        phase = (memory.phase + gait[..., -1] * is_going) % CYCLE
         return memory._replace(pose=pose, gait=gait, phase=phase)
 
-    def after(self, context: Context, memory: GaitAndPoseMemory, readings, stepped) -> GaitAndPoseMemory:
+    def after(self, context: Context, memory: GaitAndPoseMemory, readings, feet_in_schedule) -> GaitAndPoseMemory:
         """Return the memory with how well the torso keeps its pose, and the feet their schedule.
 
         Args:
             context: of the task.
-            memory: of `before_feet`.
+            memory: from `before_feet`.
             readings: after the step.
-            stepped: (...) share of the feet that followed the contact schedule.
+            feet_in_schedule: (...) share of the feet that followed the contact schedule.
         """
         xp = memory.pose.__array_namespace__()
-        leaks = xp.asarray(context.leak)[..., None]
-        off = (1.0 - leaks) * memory.off + leaks * (measured(context, readings) - memory.pose)
-        posed = kept(memory.pose[..., :3], off[..., :3]) * kept(memory.pose[..., 3:], off[..., 3:])
-        stepped = (1.0 - context.leak) * memory.stepped + context.leak * stepped
-        return memory._replace(off=off, posed=posed, all_posed=memory.all_posed + posed, stepped=stepped)
+        leak = context.leak
+        leaks = xp.asarray(leak)[..., None]
+        pose = memory.pose
+        pose_error = (1.0 - leaks) * memory.pose_error + leaks * (measure_pose(context, readings) - pose)
+        translation_tracking = tracking_of_pose(pose[..., :3], pose_error[..., :3])
+        rotation_tracking = tracking_of_pose(pose[..., 3:], pose_error[..., 3:])
+        pose_tracking = translation_tracking * rotation_tracking
+        return memory._replace(
+            pose_error=pose_error,
+            pose_tracking=pose_tracking,
+            all_pose_tracking=memory.all_pose_tracking + pose_tracking,
+            feet_in_schedule=(1.0 - leak) * memory.feet_in_schedule + leak * feet_in_schedule,
+        )
 
     def resampled(self, memory: GaitAndPoseMemory, steps) -> Any:
-        """Return whether (...) another drawn pose or gait holds since step `steps`, unless live."""
-        pose = begins(memory.pose_ends, memory.live_pose, steps)
-        return pose | begins(memory.gait_ends, memory.live_gait, steps)
+        """Return whether (...) another drawn pose or gait holds since step `steps`, unless a live one does."""
+        begins_pose = begins_next(memory.pose_ends, memory.live_pose, steps)
+        return begins_pose | begins_next(memory.gait_ends, memory.live_gait, steps)
 
     def with_command(self, memory: GaitAndPoseMemory, name: str, value) -> GaitAndPoseMemory:
         """Return the memory with a live pose or gait."""
-        return memory._replace(**{_LIVE[name]: value})
+        return memory._replace(**{_FIELD_OF_COMMAND[name]: value})
 
     def phase(self, memory: GaitAndPoseMemory):
         """Return the phase (...) of the gait, rad."""
@@ -280,19 +312,19 @@ class GaitAndPose:
         return _circle(memory.phase, memory.pose)
 
     def stance(self, memory: GaitAndPoseMemory):
-        """Return which feet (..., legs) the gait that holds has on the ground."""
+        """Return which feet (..., legs) the present gait has on the ground."""
         return _phases(memory) < memory.gait[..., -2:-1]
 
     def leg_phases(self, memory: GaitAndPoseMemory) -> tuple[Any, Any]:
-        """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds."""
+        """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the present gait."""
         return _phases(memory) * (TWO_PI / CYCLE), memory.gait[..., -2] / CYCLE
 
     def crouch(self, memory: GaitAndPoseMemory):
-        """Return the share (...) of its height at rest that the torso is asked to keep, at most 1."""
+        """Return the commanded height (...) of the torso as a share of that at rest, at most 1."""
         return (1.0 + memory.pose[..., 0]).clip(max=1.0)
 
     def default_angles(self, context: Context, memory: GaitAndPoseMemory, default_angles):
-        """Return the angles (..., joints) from which the posture is measured: those of the pose that holds, rad.
+        """Return the angles (..., joints) from which the posture is measured: those of the present pose, rad.
 
         Args:
             context: of the task.
@@ -300,88 +332,105 @@ class GaitAndPose:
             default_angles: (joints,) of the task, rad.
         """
         reference = context.reference
-        turned = (reference.turns * memory.pose[..., None, :]).sum(axis=-1)
-        return default_angles + reference.angles + turned
+        angles_in_pose = (reference.turns * memory.pose[..., None, :]).sum(axis=-1)
+        return default_angles + reference.angles + angles_in_pose
 
-    def terms(self, memory: GaitAndPoseMemory, earned: Mapping[str, Any], followed) -> dict:
+    def terms(self, memory: GaitAndPoseMemory, bonuses: Mapping[str, Any], step_tracking) -> dict:
         """Return the bonuses for the velocity, and that for following it in the pose and the gait.
 
         Args:
             memory: after the step.
-            earned: bonuses of the velocity's command, by name.
-            followed: (...) tracking of the step.
+            bonuses: of the command of the velocity, by name.
+            step_tracking: (...) tracking of the step.
         """
-        in_gait = ((memory.stepped - _UNTIMED) / (1.0 - _UNTIMED)).clip(0.0)
-        obedience = followed * memory.posed * in_gait
-        return {"progress": earned["progress"], "tracking": earned["tracking"], "obedience": obedience}
+        gait_tracking = ((memory.feet_in_schedule - _CHANCE_IN_SCHEDULE) / (1.0 - _CHANCE_IN_SCHEDULE)).clip(0.0)
+        obedience = step_tracking * memory.pose_tracking * gait_tracking
+        return {"progress": bonuses["progress"], "tracking": bonuses["tracking"], "obedience": obedience}
 
     def observe(self, context: Context, memory: GaitAndPoseMemory) -> dict:
-        """Return the pose and the gait that hold."""
-        xp, reference = memory.pose.__array_namespace__(), context.reference
+        """Return the blocks of the present pose and gait."""
+        xp = memory.pose.__array_namespace__()
         circles = _circle(_phases(memory), memory.pose)
-        rate = xp.asarray(context.height / GRAVITY) ** 0.5 / xp.asarray(reference.step)
-        duty, advance = (memory.gait[..., i] / CYCLE for i in (-2, -1))
-        numbers = xp.stack([duty, advance * rate], axis=-1)
+        time_unit = xp.asarray(context.height / GRAVITY) ** 0.5 / xp.asarray(context.reference.step)  # control steps
+        duty_factor = memory.gait[..., -2] / CYCLE
+        advance = memory.gait[..., -1] / CYCLE
+        numbers = xp.stack([duty_factor, advance * time_unit], axis=-1)
         return {
             "pose": memory.pose,
             "gait": xp.concatenate([circles[..., 0], circles[..., 1], numbers], axis=-1),
         }
 
-    def progress(self, memory: GaitAndPoseMemory, judged) -> dict:
-        """Return how well the pose was kept, on average over the steps (...) by which the episode is judged."""
-        return {"pose_tracking": memory.all_posed / judged}
+    def progress(self, memory: GaitAndPoseMemory, judged_steps) -> dict:
+        """Return the mean tracking of the pose over the steps (...) by which the episode is judged."""
+        return {"pose_tracking": memory.all_pose_tracking / judged_steps}
 
 
-def counted(gait, step) -> np.ndarray:
-    """Return a gait (..., legs + 2) in units of the clock, integers; NaN becomes any of them.
+def to_clock_units(gait, step) -> np.ndarray:
+    """Return a gait (..., legs + 2) in units of the clock, integers; NaN becomes an arbitrary one.
 
     Args:
         gait: offsets, cycles, duty factor and frequency, Hz.
-        step: a control step, s.
+        step: control step, s.
     """
-    numpy = gait.__array_namespace__()
-    gait = numpy.where(numpy.isnan(gait), 0.0, gait)
-    offsets, duty, advance = gait[..., :-2] % 1.0, gait[..., -2:-1], gait[..., -1:] * step
-    shares = numpy.concatenate([offsets, duty.clip(*_DUTIES), advance.clip(1.0 / CYCLE, _FASTEST)], axis=-1)
-    return numpy.rint(CYCLE * shares).astype(int)
+    xp = gait.__array_namespace__()
+    gait = xp.where(xp.isnan(gait), 0.0, gait)
+    offsets = gait[..., :-2] % 1.0
+    duty_factor = gait[..., -2:-1].clip(*_DUTY_FACTORS)
+    advance = (gait[..., -1:] * step).clip(1.0 / CYCLE, _MAX_ADVANCE)
+    shares = xp.concatenate([offsets, duty_factor, advance], axis=-1)
+    return xp.rint(CYCLE * shares).astype(int)
 
 
-def glided(gait, asked):
-    """Return a gait (..., legs + 2) that is a control step nearer to another, within a cycle; offsets the short way."""
-    numpy, half, advance = gait.__array_namespace__(), CYCLE // 2, gait[..., -1:]
-    apart = asked - gait
-    apart = numpy.concatenate([(apart[..., :-2] + half) % CYCLE - half, apart[..., -2:]], axis=-1)
-    most = numpy.maximum(advance // 2, 1)
-    gait = gait + numpy.minimum(numpy.maximum(apart, -most), most)
-    return numpy.concatenate([gait[..., :-2] % CYCLE, gait[..., -2:]], axis=-1)
+def glide_gait(gait, commanded_gait):
+    """Return a gait (..., legs + 2) that is a control step nearer to the commanded one, which it reaches in a cycle.
+
+    Offsets change in the direction that is shorter.
+    """
+    xp = gait.__array_namespace__()
+    half_cycle = CYCLE // 2
+    difference = commanded_gait - gait
+    offset_difference = (difference[..., :-2] + half_cycle) % CYCLE - half_cycle
+    difference = xp.concatenate([offset_difference, difference[..., -2:]], axis=-1)
+    advance = gait[..., -1:]
+    max_change = xp.maximum(advance // 2, 1)
+    gait = gait + xp.minimum(xp.maximum(difference, -max_change), max_change)
+    return xp.concatenate([gait[..., :-2] % CYCLE, gait[..., -2:]], axis=-1)
 
 
-def measured(context: Context, readings):
-    """Return the pose (..., 6) of a torso over its feet."""
-    numpy, reference, height = readings.posture.__array_namespace__(), context.reference, context.height
-    rest = numpy.asarray(reference.feet)
-    middle, apart = readings.feet.mean(axis=-2, keepdims=True), rest - rest.mean(axis=-2, keepdims=True)
-    shift = (rest - readings.feet).mean(axis=-2) / numpy.asarray(height)[..., None]
-    (x, y), (feet_x, feet_y) = (numpy.moveaxis(places, -1, 0) for places in (apart, readings.feet - middle))
-    yaw = numpy.arctan2((feet_x * y - feet_y * x).sum(axis=-1), (feet_x * x + feet_y * y).sum(axis=-1))
+def measure_pose(context: Context, readings):
+    """Return the pose (..., 6) of a torso relative to its feet."""
+    xp = readings.posture.__array_namespace__()
+    reference = context.reference
+    height = context.height
+    rest_feet = xp.asarray(reference.feet)
+    feet = readings.feet
+    shift = (rest_feet - feet).mean(axis=-2) / xp.asarray(height)[..., None]
+    rest_x, rest_y = xp.moveaxis(rest_feet - rest_feet.mean(axis=-2, keepdims=True), -1, 0)
+    feet_x, feet_y = xp.moveaxis(feet - feet.mean(axis=-2, keepdims=True), -1, 0)
+    # The rotation that turns the feet onto those at rest, by least squares.
+    sine = (feet_x * rest_y - feet_y * rest_x).sum(axis=-1)
+    cosine = (feet_x * rest_x + feet_y * rest_y).sum(axis=-1)
+    yaw = xp.arctan2(sine, cosine)
     rise = readings.torso_height / height - reference.ride
     tilt = posture.tilt(rotations.matrix(readings.torso_quaternion)[..., 2, :])
-    return numpy.concatenate([rise[..., None], shift, tilt, yaw[..., None]], axis=-1)
+    return xp.concatenate([rise[..., None], shift, tilt, yaw[..., None]], axis=-1)
 
 
-def kept(pose, off):
-    """Return how well (...) some numbers (..., n) of a pose are kept, given by how much (..., n) they are off."""
-    numpy = pose.__array_namespace__()
-    size, miss = (numpy.sqrt((numbers * numbers).sum(axis=-1)) for numbers in (pose, off))
-    return terms.triangle(miss, BAND * numpy.maximum(size, _LEAST / BAND))
+def tracking_of_pose(pose, pose_error):
+    """Return how well (...) some numbers (..., n) of a pose are kept, 0 to 1, given their errors (..., n)."""
+    xp = pose.__array_namespace__()
+    size = xp.sqrt((pose * pose).sum(axis=-1))
+    error = xp.sqrt((pose_error * pose_error).sum(axis=-1))
+    return terms.triangle(error, BAND * xp.maximum(size, _MIN_POSE_SIZE / BAND))
 
 
 def _phases(memory: GaitAndPoseMemory):
-    """The phase (..., legs) of each leg, in units of the clock."""
+    """Return the phase (..., legs) of each leg, in units of the clock."""
     return (memory.phase[..., None] + memory.gait[..., :-2]) % CYCLE
 
 
 def _circle(phase, like):
-    """Sine and cosine (..., 2) of phases (...), in units of the clock."""
-    numpy, angle = like.__array_namespace__(), phase * (TWO_PI / CYCLE)
-    return numpy.stack([numpy.sin(angle), numpy.cos(angle)], axis=-1)
+    """Return sine and cosine (..., 2) of phases (...) in units of the clock, by the functions of an array `like`."""
+    xp = like.__array_namespace__()
+    angle = phase * (TWO_PI / CYCLE)
+    return xp.stack([xp.sin(angle), xp.cos(angle)], axis=-1)

@@ -1,4 +1,4 @@
-"""Grounds: where a task with a command takes place, and what a body sees of it.
+"""Grounds: where a task with a command takes place, and what a body observes of it.
 
 A ground is a frozen value with pure functions of its own memory. `place` is (..., 3): x and y of the
 torso's frame, m, and its yaw, rad.
@@ -27,17 +27,17 @@ from arc_suite.tasks.sensors import RAYS, SCAN, SIGHT
 
 STARTS = ("standing", "belly")  # poses in which an episode starts
 LEVELS = 10  # of a curriculum, with difficulties from 0 to 1
-STAYS = 0.75  # probability of the highest level after itself; else any
-SPREAD = 6.0  # half-width of the start across the lane, h, as are the next four
-OFF_LANE = 10.0  # distance from the middle of the lane at which an episode is truncated
-SUNK = 0.05  # depth of a foot's center under the ground that a contact never reaches
-LONGEST = 300.0  # length of a lane ahead of the start
-END = 1.0  # before the end of a lane, at which an episode is truncated
-SINKING = 5  # consecutive control steps after which a foot has sunk for good
+STAY_PROBABILITY = 0.75  # of the highest level after itself; else any level follows
+START_SPREAD = 6.0  # largest distance of the start from the middle of the lane, h
+OFF_LANE = 10.0  # distance from the middle of the lane at which an episode is truncated, h
+LANE_END = 1.0  # distance from either end of the lane at which an episode is truncated, h
+MAX_LANE_LENGTH = 300.0  # ahead of the start, h
+SUNK_DEPTH = 0.05  # of a foot's center under the ground, h; feet in regular contact do not reach it
+SUNK_STEPS = 5  # consecutive control steps at this depth after which a foot is stuck
 
 
 class Nothing(NamedTuple):
-    """Memory of a ground that remembers nothing."""
+    """Memory of a ground that needs none."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Ground:
 
     Attributes:
         own_arena: whether the ground is the only arena of the task.
-        blocks: that it adds to the observation, by name.
+        blocks: the blocks that it adds to the observation, by name.
     """
 
     own_arena: ClassVar[bool] = False
@@ -54,7 +54,7 @@ class Ground:
 
     @property
     def adapts(self) -> bool:
-        """Whether the outcome of an episode chooses where the next one starts."""
+        """Whether the start of an episode depends on the outcome of the previous one."""
         return False
 
     @property
@@ -92,7 +92,7 @@ class Ground:
         return Nothing(), (0.0, 0.0)
 
     def share(self, memory) -> float:
-        """Return how far a curriculum has widened the ranges of commands, from 0 to 1."""
+        """Return the share, from 0 to 1, by which a curriculum has widened the ranges of commands."""
         return 1.0
 
     def obstacles(self, context: Context, random: np.random.RandomState, memory) -> tuple[Any, np.ndarray | None]:
@@ -120,18 +120,18 @@ class Ground:
         return {}
 
     def stream_state(self, memory, outcome, fell) -> Any:
-        """Return what the next episode of the stream starts from."""
+        """Return the stream state from which the next episode starts."""
         return None
 
 
 class Stream(NamedTuple):
-    """What an episode leaves to the next one of its stream.
+    """Stream state of a curriculum, which an episode leaves for the next one.
 
     Attributes:
-        level: of a curriculum.
-        outcome: share of what was commanded that it achieved; NaN where there was no episode.
-        failed: whether it ended in failure.
-        visited: whether its level was any one in place of the highest.
+        level: of the episode.
+        outcome: of the episode, see `Command.outcome`; NaN where there was none.
+        failed: whether the episode ended in failure.
+        visited: whether the episode visited a level, from the highest one.
     """
 
     level: int | np.ndarray
@@ -144,43 +144,46 @@ class Lane(NamedTuple):
     """Memory of lanes.
 
     Attributes:
-        lane: (...) y of its middle, m.
+        middle: (...) y of the middle of the lane, m.
         level: (...) of the curriculum; 0 without one.
-        visits: (...) whether the level is any one in place of the highest.
-        sinking: (...) consecutive control steps for which a foot has been under ground.
-        sunk: (...) whether a foot is stuck in the ground, which contacts should never allow.
-        left: (...) whether the torso has left the lane, to a side or at an end.
+        visits: (...) whether the episode visits this level, from the highest one.
+        steps_under_ground: (...) consecutive control steps for which a foot has been at `SUNK_DEPTH`.
+        is_stuck: (...) whether a foot is stuck under the ground, an artifact of contacts.
+        has_left: (...) whether the torso has left the lane, to a side or at an end.
     """
 
-    lane: np.ndarray
+    middle: np.ndarray
     level: np.ndarray
     visits: np.ndarray
-    sinking: np.ndarray
-    sunk: np.ndarray
-    left: np.ndarray
+    steps_under_ground: np.ndarray
+    is_stuck: np.ndarray
+    has_left: np.ndarray
 
 
-def next_level(stream: Stream, stays, other, down: float, up: float):
-    """Return the level (...) of the next episode, and whether it visits any level; arrays have any leading axes.
+def next_level(stream: Stream, chance, level_to_visit, down: float, up: float):
+    """Return the level (...) of the next episode, and whether (...) the episode visits it.
 
-    Who masters the highest level visits another one for one episode in four, and returns.
+    After a success at the highest level, one episode in four visits another level, and the next one returns.
 
     Args:
-        stream: of the episode before.
-        stays: (...) drawn from 0 to 1.
-        other: (...) a level, drawn.
+        stream: state that the previous episode has left.
+        chance: (...) drawn from 0 to 1; it decides whether a visit begins.
+        level_to_visit: (...) drawn.
         down: outcome below which the level falls.
-        up: outcome above which it rises, unless the episode failed.
+        up: outcome above which the level rises, unless the episode failed.
     """
     level = np.asarray(stream.level) if isinstance(stream.level, int) else stream.level
-    numpy, highest = level.__array_namespace__(), LEVELS - 1
-    rises = (stream.outcome > up) & numpy.logical_not(stream.failed)
-    starts = rises & (level == highest) & numpy.logical_not(stream.visited) & (stays >= STAYS)
-    goes_on = stream.visited & numpy.isnan(stream.outcome)  # nothing happened on the visit
-    risen = numpy.where(starts, other, (level + 1).clip(max=highest))
-    fallen = numpy.where(stream.outcome < down, (level - 1).clip(0), level)
-    returns = stream.visited & ~goes_on
-    return numpy.where(returns, highest, numpy.where(rises, risen, fallen)), starts | goes_on
+    xp = level.__array_namespace__()
+    highest = LEVELS - 1
+    has_succeeded = (stream.outcome > up) & xp.logical_not(stream.failed)
+    may_visit = has_succeeded & (level == highest) & xp.logical_not(stream.visited)
+    begins_visit = may_visit & (chance >= STAY_PROBABILITY)
+    continues_visit = stream.visited & xp.isnan(stream.outcome)  # the visit had no outcome
+    ends_visit = stream.visited & ~continues_visit
+    level_after_success = xp.where(begins_visit, level_to_visit, (level + 1).clip(max=highest))
+    level_otherwise = xp.where(stream.outcome < down, (level - 1).clip(0), level)
+    level = xp.where(has_succeeded, level_after_success, level_otherwise)
+    return xp.where(ends_visit, highest, level), begins_visit | continues_visit
 
 
 class Widened(NamedTuple):
@@ -188,7 +191,7 @@ class Widened(NamedTuple):
 
     Attributes:
         level: (...) of the curriculum.
-        visits: (...) whether the level is any one in place of the highest.
+        visits: (...) whether the episode visits this level, from the highest one.
     """
 
     level: np.ndarray
@@ -201,7 +204,7 @@ class Level(Ground):
 
     Attributes:
         start: "standing", or "belly": the body begins with its torso on the ground.
-        curriculum: whether the ranges of commands widen from the usual ones to those that are asked for.
+        curriculum: whether the ranges of commands widen from the default ones to those of the setting `commands`.
         level: at which a curriculum begins.
         thresholds: outcomes below and above which its level falls and rises.
     """
@@ -221,13 +224,11 @@ class Level(Ground):
         start = checks.name(overrides.get("start", self.start), STARTS, "start")
         curriculum = checks.boolean("curriculum", overrides.get("curriculum", self.curriculum))
         level = checks.integer("level", overrides.get("level", self.level), 0, LEVELS - 1)
-        for name, given in (
-            ("curriculum", curriculum and not overrides.get("commands")),
-            ("level", level and not curriculum),
-        ):
-            if given:
-                wanted = "commands, whose ranges it widens" if name == "curriculum" else "curriculum=True"
-                raise ValueError(f"{name}: expected with {wanted}, got {overrides[name]}")
+        if curriculum and not overrides.get("commands"):
+            expected = "commands, whose ranges it widens"
+            raise ValueError(f"curriculum: expected with {expected}, got {overrides['curriculum']}")
+        if level and not curriculum:
+            raise ValueError(f"level: expected with curriculum=True, got {overrides['level']}")
         return dataclasses.replace(self, start=start, curriculum=curriculum, level=level)
 
     @property
@@ -247,7 +248,7 @@ class Level(Ground):
         return Widened(int(level), visits), (0.0, 0.0)
 
     def share(self, memory) -> float:
-        """Return how far the ranges of commands are widened, from 0 to 1."""
+        """Return the share, from 0 to 1, by which the ranges of commands are widened."""
         return memory.level / (LEVELS - 1.0) if self.curriculum else 1.0
 
     def progress(self, memory) -> dict:
@@ -255,7 +256,7 @@ class Level(Ground):
         return {"level": memory.level * 1.0} if self.curriculum else {}
 
     def stream_state(self, memory, outcome, fell) -> Stream | None:
-        """Return what the next level follows from."""
+        """Return the stream state of the curriculum; None without one."""
         return Stream(memory.level, outcome, fell, memory.visits) if self.curriculum else None
 
     @property
@@ -267,7 +268,8 @@ class Level(Ground):
         """Return the pose of the start, lying or standing."""
         if not self.lies:
             return scene.standing
-        (height, angles), qpos = posture.belly(scene.body), scene.standing.copy()
+        height, angles = posture.belly(scene.body)
+        qpos = scene.standing.copy()
         qpos[2] = height
         qpos[scene.layout.joint_angles] += angles
         return qpos
@@ -279,7 +281,8 @@ class Lanes(Ground):
 
     Attributes:
         kinds: of ground, in the order of `terrain.KINDS`; an episode draws one.
-        copies: lanes of each kind, and of each kind and level of a curriculum; boxes cost time, so there are fewer.
+        copies: number of lanes of each kind without a curriculum, and of each kind and level with one. There are fewer
+            of kinds made of boxes, which take time to simulate.
         middle: share of the lane's length at which a body starts.
         thresholds: outcomes below and above which a curriculum's level falls and rises.
         difficulty: difficulty of all lanes, without a curriculum.
@@ -313,18 +316,18 @@ class Lanes(Ground):
 
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the lanes with checked settings."""
-        given = {name: overrides.get(name, getattr(self, name)) for name in self.settings}
-        sizes = [name for name in terrain.sizes(self.kinds) if given[name] is not None]
+        values = {name: overrides.get(name, getattr(self, name)) for name in self.settings}
+        sizes = [name for name in terrain.sizes(self.kinds) if values[name] is not None]
         for name in ("difficulty", *CURRICULUM):
             if sizes and name in overrides:
-                raise ValueError(f"{name}: expected none with {sizes[0]}={given[sizes[0]]}, got {overrides[name]}")
+                raise ValueError(f"{name}: expected none with {sizes[0]}={values[sizes[0]]}, got {overrides[name]}")
         return dataclasses.replace(
             self,
-            difficulty=checks.number("difficulty", given["difficulty"], 0.0, 1.0),
-            curriculum=checks.boolean("curriculum", given["curriculum"]),
-            level=checks.integer("level", given["level"], 0, LEVELS - 1),
-            terrain_seed=checks.integer("terrain_seed", given["terrain_seed"], 0, 2**32 - 1),
-            **{name: checks.number(name, given[name], *terrain.SIZES[name]) for name in sizes},
+            difficulty=checks.number("difficulty", values["difficulty"], 0.0, 1.0),
+            curriculum=checks.boolean("curriculum", values["curriculum"]),
+            level=checks.integer("level", values["level"], 0, LEVELS - 1),
+            terrain_seed=checks.integer("terrain_seed", values["terrain_seed"], 0, 2**32 - 1),
+            **{name: checks.number(name, values[name], *terrain.SIZES[name]) for name in sizes},
         )
 
     @property
@@ -333,73 +336,110 @@ class Lanes(Ground):
         return self.curriculum
 
     def arena(self, body: Body, parameters: Parameters) -> Arena:
-        """Return the lanes, long enough for the distance at the target velocity, and a seventh more."""
+        """Return the lanes, which are 15 % longer than the way at the target velocity, and 6 h."""
         distance = abs(parameters.target_velocity) * STEPS * control_timestep(body)
-        length = min(6.0 + np.ceil(1.15 * distance / body.torso.standing_height), LONGEST)
+        length = min(6.0 + np.ceil(1.15 * distance / body.torso.standing_height), MAX_LANE_LENGTH)  # h
         levels = np.arange(LEVELS) / (LEVELS - 1.0) if self.curriculum else [self.difficulty]
-        copies = dict.fromkeys(self.kinds, self.copies[self.curriculum])
-        sizes = {name: size for name in terrain.SIZES if (size := getattr(self, name)) is not None}
+        copies = dict.fromkeys(self.kinds, self._copies)
+        sizes = {name: getattr(self, name) for name in terrain.SIZES if getattr(self, name) is not None}
         return terrain.made(body, copies, float(length), tuple(map(float, levels)), self.terrain_seed, sizes)
 
     def first(self) -> Stream:
-        """Return the level at which a stream begins, which its first episode neither raises nor lowers."""
+        """Return the level at which a stream begins; without an outcome, the first episode has it."""
         return Stream(self.level, np.nan, False)
 
+    @property
+    def _copies(self) -> int:
+        """The number of lanes of each kind and level."""
+        without_curriculum, with_curriculum = self.copies
+        return with_curriculum if self.curriculum else without_curriculum
+
     def place(self, context: Context, random: np.random.RandomState, stream: Stream):
-        """Draw kind, level (two draws), lane and place across it."""
-        kind, stays, other = random.randint(len(self.kinds)), random.uniform(), random.randint(LEVELS)
-        copies, arena = self.copies[self.curriculum], context.arena
-        lane, aside = random.randint(copies), random.uniform(-SPREAD, SPREAD)
-        level, visits, levels = 0, np.False_, 1
+        """Draw kind, level (two draws), lane and distance from the middle of the lane, in this order."""
+        kind = random.randint(len(self.kinds))
+        chance = random.uniform()
+        level_to_visit = random.randint(LEVELS)
+        lane = random.randint(self._copies)
+        distance = random.uniform(-START_SPREAD, START_SPREAD)  # h
+        level = 0
+        visits = np.False_
+        levels = 1
         if self.curriculum:
-            (level, visits), levels = next_level(stream, stays, other, *self.thresholds), LEVELS
-        middle = arena.start((kind * levels + int(level)) * copies + lane)
-        start = (self.middle * arena.length * arena.unit, middle + aside * arena.unit)
-        return Lane(np.float64(middle), int(level), visits, 0, np.False_, np.False_), start
+            level, visits = next_level(stream, chance, level_to_visit, *self.thresholds)
+            levels = LEVELS
+        arena = context.arena
+        number = (kind * levels + int(level)) * self._copies + lane  # of the lane in the arena
+        middle = arena.start(number)  # m
+        x = self.middle * arena.length * arena.unit
+        y = middle + distance * arena.unit
+        memory = Lane(
+            middle=np.float64(middle),
+            level=int(level),
+            visits=visits,
+            steps_under_ground=0,
+            is_stuck=np.False_,
+            has_left=np.False_,
+        )
+        return memory, (x, y)
 
     def after(self, context: Context, memory: Lane, place, readings: Readings, arrived) -> Lane:
-        """Count how long a foot has been under ground, and see whether the torso is still in the lane."""
-        unit, length = context.arena.unit, context.arena.length
-        sinking = (memory.sinking + 1) * (readings.foot_heights < -SUNK * unit).any(axis=-1)
-        x, y = place[..., 0], place[..., 1]
-        beyond = (x > (length - END) * unit) | (x < (END - terrain.BACK) * unit)
-        left = beyond | (abs(y - memory.lane) > OFF_LANE * unit)
-        return memory._replace(sinking=sinking, sunk=sinking >= SINKING, left=left)
+        """Return the memory with the steps of a foot under ground, and whether the torso has left the lane."""
+        unit = context.arena.unit  # h, m
+        length = context.arena.length  # h
+        is_under_ground = (readings.foot_heights < -SUNK_DEPTH * unit).any(axis=-1)
+        steps_under_ground = (memory.steps_under_ground + 1) * is_under_ground
+        x = place[..., 0]
+        y = place[..., 1]
+        is_at_end = (x > (length - LANE_END) * unit) | (x < (LANE_END - terrain.BACK) * unit)
+        is_beside_lane = abs(y - memory.middle) > OFF_LANE * unit
+        return memory._replace(
+            steps_under_ground=steps_under_ground,
+            is_stuck=steps_under_ground >= SUNK_STEPS,
+            has_left=is_at_end | is_beside_lane,
+        )
 
     def ended(self, memory: Lane, fell) -> tuple:
-        """Terminate where the body fell or a foot sank; truncate where the torso has left the lane."""
-        return fell | memory.sunk, memory.left
+        """Return whether the body fell or a foot is stuck, and whether the torso has left the lane."""
+        return fell | memory.is_stuck, memory.has_left
 
     def observe(self, context: Context, memory: Lane, place, readings: Readings) -> dict:
         """Return the heights (..., 175) of the ground at `sensors.SCAN`, in h, clipped to [-1, 1].
 
-        0 is where the ground would be if the torso stood over it at its standing height.
+        0 is the height of the ground if the torso is at its standing height.
         """
-        position, heading, arena = readings.torso_position, place[..., 2], context.arena
-        numpy = position.__array_namespace__()
-        reach = numpy.asarray(context.reach)[..., None]
-        forward, left = numpy.asarray(SCAN[0]) * reach, numpy.asarray(SCAN[1]) * reach
-        cosine, sine = numpy.cos(heading)[..., None], numpy.sin(heading)[..., None]
+        arena = context.arena
+        position = readings.torso_position
+        heading = place[..., 2]
+        xp = position.__array_namespace__()
+        reach = xp.asarray(context.reach)[..., None]  # R, m
+        forward = xp.asarray(SCAN[0]) * reach
+        left = xp.asarray(SCAN[1]) * reach
+        cosine = xp.cos(heading)[..., None]
+        sine = xp.sin(heading)[..., None]
         x = position[..., 0:1] + cosine * forward - sine * left
         y = position[..., 1:2] + sine * forward + cosine * left
-        return {"scan": ((arena.height(x, y) - position[..., 2:3]) / arena.unit + 1.0).clip(-1.0, 1.0)}
+        heights = (arena.height(x, y) - position[..., 2:3]) / arena.unit + 1.0
+        return {"scan": heights.clip(-1.0, 1.0)}
 
     def progress(self, memory: Lane) -> dict:
         """Return whether a foot `sank`, and the `level` of a curriculum."""
-        return {"sank": memory.sunk * 1.0} | ({"level": memory.level * 1.0} if self.curriculum else {})
+        metrics = {"sank": memory.is_stuck * 1.0}
+        if self.curriculum:
+            metrics["level"] = memory.level * 1.0
+        return metrics
 
     def stream_state(self, memory: Lane, outcome, fell) -> Stream:
-        """Return what the next level follows from."""
-        return Stream(memory.level, outcome, fell | memory.sunk, memory.visits)
+        """Return the level and the outcome of the episode."""
+        return Stream(memory.level, outcome, fell | memory.is_stuck, memory.visits)
 
 
 class Pillared(NamedTuple):
     """Memory of a field of pillars.
 
     Attributes:
-        pillars: (..., COUNT, 2) where they stand, m.
+        pillars: (..., COUNT, 2) positions, m.
         touched: (...) whether a pillar was touched on the way to the present goal.
-        collisions: (...) ways to a goal, the present one among them, on which a pillar was touched.
+        collisions: (...) number of ways to a goal on which a pillar was touched, with the present way.
     """
 
     pillars: np.ndarray
@@ -409,7 +449,7 @@ class Pillared(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class PillarField(Ground):
-    """A floor with pillars, seen by a range sensor. Lengths are multiples of R, as bodies fit between by their legs."""
+    """A floor with pillars, which a range sensor measures. Lengths are in R, as the legs must fit between pillars."""
 
     own_arena: ClassVar[bool] = True
     blocks: ClassVar[Mapping[str, Block]] = {
@@ -421,7 +461,7 @@ class PillarField(Ground):
         return Pillars(reach(body), 2.0 * body.torso.standing_height)
 
     def obstacles(self, context: Context, random: np.random.RandomState, memory) -> tuple[Pillared, np.ndarray]:
-        """Draw where pillars stand."""
+        """Draw the positions of pillars."""
         pillars = context.arena.places(random.uniform(-1.0, 1.0, (COUNT, 2)))
         return Pillared(pillars[:, :2], np.False_, 0), pillars
 
@@ -431,23 +471,27 @@ class PillarField(Ground):
 
     def after(self, context: Context, memory: Pillared, place, readings, arrived) -> Pillared:
         """Count the ways on which a pillar was touched."""
-        collided = readings.touches & ~memory.touched
+        is_new_collision = readings.touches & ~memory.touched
         touched = (memory.touched | readings.touches) & ~arrived
-        return Pillared(memory.pillars, touched, memory.collisions + collided)
+        return Pillared(memory.pillars, touched, memory.collisions + is_new_collision)
 
     def observe(self, context: Context, memory: Pillared, place, readings: Readings) -> dict:
         """Return the distances (..., 24) of pillars along `sensors.RAYS`, as shares of `SIGHT`, at most 1."""
-        numpy, unit = place.__array_namespace__(), context.arena.unit
-        apart = memory.pillars - place[..., None, :2]
-        apart = rotations.to_heading_frame(apart, place[..., 2:]) / unit
-        x, y = apart[..., None, :, 0], apart[..., None, :, 1]
-        forward, left = numpy.asarray(RAYS)[..., None]
-        along = x * forward + y * left
-        # Half of the chord that the ray cuts off the pillar, squared.
-        chord = RADIUS * RADIUS - (x * left - y * forward) ** 2
-        hit = numpy.where((chord >= 0.0) & (along >= 0.0), along - numpy.sqrt(chord.clip(0.0)), SIGHT)
-        return {"ranges": (hit.min(axis=-1) / SIGHT).clip(0.0, 1.0)}
+        xp = place.__array_namespace__()
+        unit = context.arena.unit  # R, m
+        from_torso = memory.pillars - place[..., None, :2]
+        from_torso = rotations.to_heading_frame(from_torso, place[..., 2:]) / unit  # R
+        x = from_torso[..., None, :, 0]
+        y = from_torso[..., None, :, 1]
+        forward, left = xp.asarray(RAYS)[..., None]
+        distance_along_ray = x * forward + y * left  # of the axis of each pillar
+        distance_from_ray = x * left - y * forward
+        squared_half_chord = RADIUS * RADIUS - distance_from_ray**2  # of the ray in the pillar
+        is_hit = (squared_half_chord >= 0.0) & (distance_along_ray >= 0.0)
+        distance_of_hit = distance_along_ray - xp.sqrt(squared_half_chord.clip(0.0))
+        ranges = xp.where(is_hit, distance_of_hit, SIGHT)
+        return {"ranges": (ranges.min(axis=-1) / SIGHT).clip(0.0, 1.0)}
 
     def progress(self, memory: Pillared) -> dict:
-        """Return on how many ways a pillar was touched."""
+        """Return the number of ways on which a pillar was touched."""
         return {"collisions": memory.collisions * 1.0}

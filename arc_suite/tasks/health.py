@@ -15,13 +15,13 @@ class Condition(NamedTuple):
 
     Attributes:
         upright: (...) cosine of the torso's tilt.
-        fell: (...) whether the torso lies on the ground or is tilted too far, once it was up.
-        counts: (...) whether it was.
+        fell: (...) whether the torso lies on the ground or is tilted too far; False before the body has risen.
+        has_risen: (...) whether the torso was up, or `patience` is over.
     """
 
     upright: np.ndarray
     fell: np.ndarray
-    counts: np.ndarray
+    has_risen: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,10 +30,10 @@ class Upright:
 
     Attributes:
         lowest: height of the torso over the ground, h.
-        lying: share of the weight; a torso that the ground carries with more lies on it.
+        lying: share of the weight that the ground carries under the torso, from which on the torso lies.
         least_upright: cosine of the torso's tilt.
         up: height of the torso at which a body that starts lying has risen, h.
-        patience: time after which it must have, sqrt(h / g).
+        patience: time within which it has to rise, sqrt(h / g).
     """
 
     lowest: float = 0.3
@@ -56,13 +56,14 @@ class Upright:
             steps: (...) since the start, this one included.
             crouch: share (...) of its height that the torso is asked to keep.
         """
-        high = readings.torso_height >= self.lowest * context.height * crouch
-        lies = component(readings.contact_forces, 5) >= self.lying  # upwards on the torso
+        is_high = readings.torso_height >= self.lowest * context.height * crouch
+        upward_force_on_torso = component(readings.contact_forces, 5)  # in the body's weight
+        lies = upward_force_on_torso >= self.lying
         upright = rotations.upright(readings.torso_quaternion)
-        well = high & ~lies & (upright >= self.least_upright)
-        up = well & (readings.torso_height >= self.up * context.height)
-        counts = memory.counts | up | (steps >= self.patience * context.tempo)
-        return Condition(upright, counts & ~well, counts)
+        is_healthy = is_high & ~lies & (upright >= self.least_upright)
+        is_up = is_healthy & (readings.torso_height >= self.up * context.height)
+        has_risen = memory.has_risen | is_up | (steps >= self.patience * context.tempo)
+        return Condition(upright, has_risen & ~is_healthy, has_risen)
 
     def terms(self, memory: Condition) -> dict:
         """Return the bonus for health."""

@@ -1,4 +1,4 @@
-"""Mass added to a rigid part: its mass, center of mass and principal inertia, as a model has them."""
+"""The inertia of a rigid part to which mass is added, in the fields of a MuJoCo model."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from arc_suite import rotations
 
 
 class Inertia(NamedTuple):
-    """How a part's mass is distributed.
+    """Inertia of a part.
 
     Attributes:
         mass: kg.
@@ -22,20 +22,23 @@ class Inertia(NamedTuple):
     principal: np.ndarray
     quaternion: np.ndarray
 
-    def with_point(self, mass: float, place: np.ndarray) -> "Inertia":
-        """Return the inertia together with a point mass, by the parallel-axis theorem.
+    def with_point(self, mass: float, point: np.ndarray) -> "Inertia":
+        """Return the inertia with a point mass added, by the parallel-axis theorem.
 
         Args:
             mass: of the point, kg.
-            place: (3,) of the point in the part's frame, m.
+            point: (3,) position in the part's frame, m.
         """
-        total, apart = self.mass + mass, place - self.center
+        total_mass = self.mass + mass
+        offset = point - self.center
         axes = rotations.matrix(self.quaternion)
-        reduced = self.mass * mass / total
-        tensor = axes * self.principal @ axes.T + reduced * (apart @ apart * np.eye(3) - np.outer(apart, apart))
-        principal, axes = np.linalg.eigh(tensor)
-        axes[:, 0] *= np.sign(np.linalg.det(axes))  # right-handed
-        return Inertia(total, self.center + mass / total * apart, principal, _quaternion(axes))
+        reduced_mass = self.mass * mass / total_mass
+        tensor_of_part = axes * self.principal @ axes.T
+        tensor = tensor_of_part + reduced_mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+        principal, new_axes = np.linalg.eigh(tensor)
+        new_axes[:, 0] *= np.sign(np.linalg.det(new_axes))  # right-handed
+        center = self.center + mass / total_mass * offset
+        return Inertia(total_mass, center, principal, _quaternion(new_axes))
 
 
 def _quaternion(matrix: np.ndarray) -> np.ndarray:
@@ -44,8 +47,13 @@ def _quaternion(matrix: np.ndarray) -> np.ndarray:
     It is an eigenvector of a symmetric matrix, which no rotation makes ill-conditioned (Bar-Itzhack, "New method for
     extracting the quaternion from a rotation matrix", 2000).
     """
-    trace, odd = np.trace(matrix), matrix - matrix.T
+    trace = np.trace(matrix)
+    antisymmetric = matrix - matrix.T
+    axial = (antisymmetric[2, 1], antisymmetric[0, 2], antisymmetric[1, 0])
     profile = np.empty((4, 4))
-    profile[0, 0], profile[0, 1:] = trace, (odd[2, 1], odd[0, 2], odd[1, 0])
-    profile[1:, 0], profile[1:, 1:] = profile[0, 1:], matrix + matrix.T - trace * np.eye(3)
-    return np.linalg.eigh(profile)[1][:, -1]
+    profile[0, 0] = trace
+    profile[0, 1:] = axial
+    profile[1:, 0] = axial
+    profile[1:, 1:] = matrix + matrix.T - trace * np.eye(3)
+    _, eigenvectors = np.linalg.eigh(profile)
+    return eigenvectors[:, -1]  # that of the largest eigenvalue

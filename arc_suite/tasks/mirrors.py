@@ -1,8 +1,7 @@
-"""Mirror maps of observations and actions, across the x-z plane: exact, as they only swap numbers and their signs.
+"""Mirror maps of observations and actions, across the x-z plane. They are exact: they swap numbers and signs.
 
-A task declares how its blocks are mirrored, put together of the maps here. What a policy sees and
-does in a mirror is as likely to happen as what it sees and does, so that every step that is learned
-from is worth two.
+The maps of a task are composed of those of its blocks. The mirror image of a step is as likely as the step itself, so
+a learner may learn from both.
 """
 
 from collections.abc import Iterable
@@ -14,10 +13,10 @@ from arc_suite.robots.mirror import Image
 
 
 class Mirror(NamedTuple):
-    """A map of vectors (..., n) to those that are read of the mirrored body; twice is once.
+    """A map of vectors (..., n) to those of the mirrored body; it is its own inverse.
 
     Attributes:
-        sources: (n,) index of the number that takes the place of each.
+        sources: (n,) index of the number that each number of the image is.
         signs: (n,) 1 or -1.
     """
 
@@ -26,16 +25,16 @@ class Mirror(NamedTuple):
 
     @classmethod
     def with_signs(cls, *signs: int) -> Self:
-        """Return the map that leaves numbers in place, some with the other sign."""
+        """Return the map that only multiplies numbers by signs."""
         return cls(np.arange(len(signs)), np.array(signs, np.int8))
 
     @classmethod
     def permute(cls, sources: np.ndarray) -> Self:
-        """Return the map that takes numbers from other places, with their signs."""
+        """Return the map that only permutes numbers."""
         return cls(sources, np.ones(len(sources), np.int8))
 
     def __call__(self, vectors):
-        """Return the mirrored vectors (..., n), in their own precision; of NumPy or JAX."""
+        """Return the mirrored vectors (..., n) of NumPy or JAX, with the same dtype."""
         return vectors[..., self.sources] * self.signs
 
 
@@ -57,8 +56,10 @@ class Symmetry(NamedTuple):
 
 
 def join(mirrors: Iterable[Mirror]) -> Mirror:
-    """Return the map of vectors that are joined of the vectors of several maps."""
-    sources, signs, size = [], [], 0
+    """Return the map of concatenated vectors."""
+    sources = []
+    signs = []
+    size = 0
     for mirror in mirrors:
         sources.append(size + mirror.sources)
         signs.append(mirror.signs)
@@ -71,12 +72,13 @@ def joints(image: Image) -> Mirror:
     return Mirror(image.joints, image.signs.astype(np.int8))
 
 
-def repeat(places: np.ndarray, mirror: Mirror) -> Mirror:
-    """Return the map of the vectors of several parts, one behind the other.
+def repeat(partners: np.ndarray, mirror: Mirror) -> Mirror:
+    """Return the map of the concatenated vectors of several parts, such as legs.
 
     Args:
-        places: (parts,) index of the part across, such as `Image.parts`.
-        mirror: of the vector of one part.
+        partners: (parts,) index of the part on the other side, such as `Image.parts`.
+        mirror: the map of the vector of one part.
     """
     size = len(mirror.signs)
-    return Mirror((size * places[:, None] + mirror.sources).ravel(), np.tile(mirror.signs, len(places)))
+    sources = size * partners[:, None] + mirror.sources
+    return Mirror(sources.ravel(), np.tile(mirror.signs, len(partners)))

@@ -1,12 +1,12 @@
-"""Noise of senses: numbers that follow from an episode's key and its step alone.
+"""Noise of sensors: numbers that depend on the key of an episode and the step alone.
 
-A generator that counts gives the same numbers to one environment, to a batch and under
-JAX, and once more when an episode is played again, without a state that steps would have to carry.
+Such a counter-based generator has no state. It gives the same numbers to one environment, to a batch and under JAX,
+and again when an episode is repeated.
 """
 
 import numpy as np
 
-_GOLDEN = np.uint32(0x9E3779B9)  # 2^32 over the golden ratio: what is counted lies far apart
+_GOLDEN = np.uint32(0x9E3779B9)  # 2^32 over the golden ratio; its multiples lie far apart
 
 
 def noise(key, step, count: int):
@@ -15,16 +15,16 @@ def noise(key, step, count: int):
     Args:
         key: (..., 1) uint32 of the episode.
         step: (..., 1) uint32.
-        count: how many.
+        count: number of numbers.
     """
-    numpy = key.__array_namespace__()
-    index = numpy.arange(count, dtype=numpy.uint32)
-    drawn = scramble(scramble(key ^ (step * _GOLDEN)) + index * _GOLDEN)
-    return drawn * 2.0**-31 - 1.0
+    xp = key.__array_namespace__()
+    index = xp.arange(count, dtype=xp.uint32)
+    bits = scramble(scramble(key ^ (step * _GOLDEN)) + index * _GOLDEN)
+    return bits * 2.0**-31 - 1.0
 
 
 def scramble(bits):
-    """Return scrambled uint32 numbers (...), a bijection in which every bit depends on all bits.
+    """Return uint32 numbers (...) by a bijection in which every bit depends on all bits.
 
     This is the finalizer of MurmurHash3 (Appleby 2011).
     """

@@ -1,4 +1,4 @@
-"""Parameters of tasks: of the four robots as published, of any other body fitted to it, and what a caller overrides."""
+"""Parameters of tasks: published ones of the four robots, fitted ones of other bodies, and overrides by a caller."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
@@ -12,19 +12,20 @@ from arc_suite.tasks import modifiers
 from arc_suite.tasks.clock import TWO_PI
 from arc_suite.tasks.fitting import fitted_noise, fitted_parameters
 
-# What the parameters of a robot may leave out.
-COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "weights": {}}
+# Parameters that a robot may leave out.
+DEFAULTS = {"duty_factor": 0.6, "default_angles": 0.0, "weights": {}}
 
 # One number for several kinds of noise, whatever their units, as published: name -> the settings that it sets.
 SHARED_NOISE = {
     "base_noise": ("position_noise", "orientation_noise", "linear_velocity_noise", "angular_velocity_noise"),
     "joint_noise": ("joint_angle_noise", "joint_velocity_noise"),
 }
-LARGEST = 1e6  # bound of a setting, in its unit: far beyond sense, and finite when squared and summed up
+LARGEST = 1e6  # bound of a setting, in its unit; sums of its square are finite
 
-_TRIPOD, _TROT = (tuple(TWO_PI * offset for offset in offsets) for offsets in (gaits.TRIPOD, gaits.TROT))
+_TRIPOD = tuple(TWO_PI * offset for offset in gaits.TRIPOD)  # rad
+_TROT = tuple(TWO_PI * offset for offset in gaits.TROT)  # rad
 
-# Of walk by robot; units as in `Parameters`, `Noise` and `walk.WalkSettings`.
+# Parameters of walk by robot; units as in `Parameters`, `Noise` and `walk.WalkSettings`.
 _WALK = {
     "queen": {
         "target_velocity": 0.5,
@@ -72,7 +73,7 @@ _WALK = {
     },
 }
 
-# By task, then by robot; what a task has no entry for is walk's.
+# By task, then by robot. Parameters that are not here are those of walk.
 PARAMETERS = {"walk": _WALK}
 
 
@@ -80,7 +81,7 @@ class Parameters(NamedTuple):
     """The gait that a task prescribes, and the speed that belongs to it.
 
     Attributes:
-        target_velocity: speed that belongs to the gait, m/s.
+        target_velocity: speed at which a body in the gait is to walk, m/s.
         gait_frequency: frequency of the gait's clock, Hz.
         duty_factor: share of a cycle that a foot spends in stance.
         phase_offsets: (feet,) added to the clock's phase, rad.
@@ -102,7 +103,7 @@ class Parameters(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Noise of the start: half-widths of uniform noise on the pose, standard deviations of velocities.
+    """Noise of the start: half-widths of uniform noise on the pose, standard deviations of normal noise on velocities.
 
     Attributes:
         position_noise: half-width of the torso's position, m.
@@ -120,12 +121,12 @@ class Noise(NamedTuple):
     joint_angle_noise: float
     joint_velocity_noise: float
 
-    def drawn(self, standing: np.ndarray, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
+    def draw(self, standing: np.ndarray, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
         """Draw the state in which an episode starts: the standing pose with this noise.
 
         Args:
             standing: (nq,) torso position and quaternion, then joint angles.
-            random: to draw from.
+            random: the random generator.
 
         Returns:
             qpos (nq,) and qvel (nq - 1,).
@@ -134,14 +135,15 @@ class Noise(NamedTuple):
         widths = np.repeat((self.position_noise, self.orientation_noise, self.joint_angle_noise), (3, 4, joints))
         qpos = standing + random.uniform(-widths, widths)
         qpos[3:7] /= np.linalg.norm(qpos[3:7])
-        deviations = self.linear_velocity_noise, self.angular_velocity_noise, self.joint_velocity_noise
-        return qpos, np.repeat(deviations, (3, 3, joints)) * random.standard_normal(6 + joints)
+        deviations = (self.linear_velocity_noise, self.angular_velocity_noise, self.joint_velocity_noise)
+        qvel = np.repeat(deviations, (3, 3, joints)) * random.standard_normal(6 + joints)
+        return qpos, qvel
 
 
 # Settings that every task with a gait has.
 NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")
 
-LEAST_SPEED = 0.001  # m/s; paths and speeds are divided by the target velocity
+MIN_SPEED = 0.001  # m/s, of a target velocity, as paths and speeds are divided by it
 
 BOUNDS = {
     "target_velocity": (-1000.0, 1000.0),
@@ -160,74 +162,78 @@ BOUNDS = {
 BOUNDS |= {shared: (0.0, min(BOUNDS[name][1] for name in names)) for shared, names in SHARED_NOISE.items()}
 
 
-def values(body: Body, overrides: Mapping[str, Any], task: str, names: Iterable[str], elsewhere=()) -> dict[str, Any]:
-    """Return the value of every setting by name: the body's own, and in their place what the caller overrides.
+def values(
+    body: Body, overrides: Mapping[str, Any], task: str, names: Iterable[str], names_of_others: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Return the value of every setting by name: that of the caller, or else that of the body.
 
     Args:
-        body: a robot of `PARAMETERS`, or any other body, to which they are fitted.
-        overrides: settings by name; "base_noise" and "joint_noise" set several kinds of noise, "gait", a name
-            of `gaits.NAMES`, the duty factor and the phase offsets, each where that is not set itself.
+        body: a robot of `PARAMETERS`, or any other body, to which values are fitted.
+        overrides: settings of the caller, by name. "base_noise" and "joint_noise" set several kinds of noise; "gait", a
+            name of `gaits.NAMES`, sets the duty factor and the phase offsets. A setting under its own name prevails.
         task: its name, for errors.
         names: of the settings that the task has.
-        elsewhere: names that `load` takes and the task does not see, for suggestions.
+        names_of_others: names of settings that are not the task's, to suggest in errors.
 
     Raises:
         ValueError: an unknown name, or a gait that does not fit the body.
     """
+    suggestions = ("time_limit", *names_of_others, *modifiers.MODIFIERS)
     for name in overrides:
-        checks.name(name, names, f"setting of {task}", suggestions=("time_limit", *elsewhere, *modifiers.MODIFIERS))
-    own = robots.parameters(PARAMETERS["walk"], body, "walk")
-    table = COMMON | (fitted_parameters(body) if own is None else own)
+        checks.name(name, names, f"setting of {task}", suggestions=suggestions)
+    published = robots.parameters(PARAMETERS["walk"], body, "walk")
+    table = DEFAULTS | (fitted_parameters(body) if published is None else published)
     table |= robots.parameters(PARAMETERS.get(task, {}), body, task) or {}
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)
         table |= {"duty_factor": gait.duty_factor, "phase_offsets": offsets}
-    weights = {"weights": table["weights"]}  # a caller's weights change some of them: see `weights`
-    return fitted_noise(body) | _spread(table) | _spread(overrides) | weights
+    settings = fitted_noise(body) | _expand_shared_noise(table) | _expand_shared_noise(overrides)
+    settings["weights"] = table["weights"]  # those of the caller replace some of them; see `weights`
+    return settings
 
 
-def _spread(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Write every number of `SHARED_NOISE` out as the settings that it sets and that are not given."""
-    spread = dict(given)
-    for shared, names in SHARED_NOISE.items():
-        if shared in spread:
-            number = checks.number(shared, spread.pop(shared), *BOUNDS[shared])
-            spread = dict.fromkeys(names, number) | spread
-    return spread
+def _expand_shared_noise(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings with each number of `SHARED_NOISE` as the settings that it sets; settings that are there stay."""
+    expanded = dict(settings)
+    for shared_name, names in SHARED_NOISE.items():
+        if shared_name in expanded:
+            number = checks.number(shared_name, expanded.pop(shared_name), *BOUNDS[shared_name])
+            expanded = dict.fromkeys(names, number) | expanded
+    return expanded
 
 
-def parameters(body: Body, given: Mapping[str, Any], backward: bool = True) -> Parameters:
+def parameters(body: Body, values: Mapping[str, Any], backward: bool = True) -> Parameters:
     """Return checked parameters from the values of all settings by name.
 
     Args:
-        body: that has them.
-        given: values by name.
+        body: the body.
+        values: values by name.
         backward: whether the target velocity may be negative.
 
     Raises:
         ValueError: a value that does not fit the body or its bounds.
     """
     sizes = {"phase_offsets": len(body.legs), "default_angles": len(body.joint_names)}
-    arrays = {name: checks.array(name, given[name], size, *BOUNDS[name]) for name, size in sizes.items()}
+    arrays = {name: checks.array(name, values[name], size, *BOUNDS[name]) for name, size in sizes.items()}
     low, high = BOUNDS["target_velocity"]
-    speed = checks.number("target_velocity", given["target_velocity"], low if backward else LEAST_SPEED, high)
-    if abs(speed) < LEAST_SPEED:
+    speed = checks.number("target_velocity", values["target_velocity"], low if backward else MIN_SPEED, high)
+    if abs(speed) < MIN_SPEED:
         raise ValueError(
-            f"target_velocity: expected at least {LEAST_SPEED:g} m/s in either direction, got {checks.preview(speed)}"
+            f"target_velocity: expected at least {MIN_SPEED:g} m/s in either direction, got {checks.preview(speed)}"
         )
     names = [name for name in Parameters._fields if name not in (*sizes, "target_velocity")]
-    numbers = {name: checks.number(name, given[name], *BOUNDS[name]) for name in names}
+    numbers = {name: checks.number(name, values[name], *BOUNDS[name]) for name in names}
     return Parameters(target_velocity=speed, **numbers, **arrays)
 
 
-def noise(given: Mapping[str, Any]) -> Noise:
+def noise(values: Mapping[str, Any]) -> Noise:
     """Return checked noise from the values of all settings by name.
 
     Raises:
         ValueError: a negative value.
     """
-    return Noise(*(checks.number(name, given[name], *BOUNDS[name]) for name in Noise._fields))
+    return Noise(*(checks.number(name, values[name], *BOUNDS[name]) for name in Noise._fields))
 
 
 def positive(name: str, value: Any) -> float:
@@ -240,14 +246,16 @@ def positive(name: str, value: Any) -> float:
 
 
 def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, changed: Any = None) -> dict[str, float]:
-    """Return the weights of all terms: the task's, of which the body and then the caller replace some.
+    """Return the weights of all terms: those of the task, some of which the body and then the caller replace.
 
     Raises:
         ValueError: an unknown term, or a weight that is no finite number.
     """
     if not isinstance(changed, Mapping | None):
         raise ValueError(f"weights: expected a mapping of names to numbers, got {checks.preview(changed)}")
-    found = {name: of_body.get(name, weight) for name, weight in of_task.items()}
+    weights_by_term = {name: of_body.get(name, weight) for name, weight in of_task.items()}
     for name, weight in (changed or {}).items():
-        found[checks.name(name, found, "weight")] = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)
-    return found
+        number = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)
+        checks.name(name, weights_by_term, "weight")
+        weights_by_term[name] = number
+    return weights_by_term

@@ -1,4 +1,4 @@
-"""What a task is made for, how an episode starts, and what a control step writes into the simulation."""
+"""The scene of a task, the start of an episode, and the inputs of a control step."""
 
 import types
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from arc_suite.arenas import Arena
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.readings import Layout
 
-# Fields of `MjModel` that an episode can have its own values of: masses, frictions, armatures and servos.
+# Fields of `MjModel` whose values may differ from episode to episode: masses, frictions, armatures and servos.
 CHANGEABLE = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "pair_friction", "geom_friction"),
     *("dof_armature", "jnt_actfrcrange", "actuator_gainprm", "actuator_biasprm", "actuator_gear"),
@@ -18,16 +18,16 @@ CHANGEABLE = (
 
 
 class Scene(NamedTuple):
-    """What a task is made for.
+    """The body and the arena of a task, with what follows from their compiled model.
 
     Attributes:
-        body: what moves.
-        arena: where.
-        layout: of the body in the simulation's arrays.
-        standing: (nq,) the pose in which it stands: torso position and quaternion, joint angles.
+        body: the body that moves.
+        arena: the ground and obstacles.
+        layout: indices of the body's parts in the simulation's arrays.
+        standing: (nq,) the standing pose: torso position and quaternion, joint angles.
         control_timestep: s between two actions.
-        substeps: of the simulation between them.
-        model: the fields of `MjModel` that `CHANGEABLE` names, as compiled.
+        substeps: steps of the simulation between two actions.
+        model: fields of the compiled `MjModel`, those of `CHANGEABLE`.
     """
 
     body: Body
@@ -40,14 +40,14 @@ class Scene(NamedTuple):
 
 
 class Start(NamedTuple):
-    """How one episode starts; no leading axes.
+    """The start of one episode; without leading axes.
 
     Attributes:
         qpos: (nq,) positions.
         qvel: (nv,) velocities.
-        memory: numbers and arrays in a NamedTuple, which may hold NamedTuples in turn; replaced from step to step
-            and never written in place.
-        mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
+        memory: numbers and arrays in a NamedTuple, which may hold further NamedTuples. Each step replaces it; nothing
+            writes into it.
+        mocap_pos: (mocap bodies, 3) positions of obstacles, m; None where the arena has none.
         model: fields of `MjModel` that differ in this episode, by name.
     """
 
@@ -59,12 +59,12 @@ class Start(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What a control step writes into the simulation.
+    """Inputs of a control step, which are written into the simulation.
 
     Attributes:
-        ctrl: (..., motors) in [-1, 1].
+        ctrl: (..., motors) controls in [-1, 1].
         kick: (..., nv) added to qvel before the first substep; None for no kick.
-        force: (..., 3) on the torso's center of mass throughout the step, N, world; None for no force.
+        force: (..., 3) on the torso's center of mass throughout the step, in the world, N; None for no force.
     """
 
     ctrl: np.ndarray

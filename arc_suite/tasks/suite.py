@@ -1,4 +1,4 @@
-"""The twelve tasks that follow a command: each is a command on a ground, with what differs in numbers."""
+"""The twelve tasks with a command: each is a command on a ground, with its own numbers."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -8,31 +8,43 @@ from arc_suite.tasks.command_task import COSTS, CommandTask
 from arc_suite.tasks.gait_and_pose import GaitAndPose
 from arc_suite.tasks.ground import Lanes, PillarField
 
-_STACKED = ("clock", "clearances", "context", "_torques")  # what follows from body and settings
+# Attributes that follow from body and settings; see `Task.from_body`.
+_FROM_BODY = ("clock", "clearances", "context", "_torques")
 
 
 class Steer(CommandTask):
     """Following a velocity forward, sideways and in turning, stops included."""
 
-    name, command, from_body = "steer", Schedule(), _STACKED
+    name = "steer"
+    command = Schedule()
+    from_body = _FROM_BODY
 
 
 class Shoved(CommandTask):
     """Following a velocity command under kicks."""
 
-    name, command, modifiers, from_body = "shoved", Schedule(), {"kicks": 1.5}, _STACKED
+    name = "shoved"
+    command = Schedule()
+    modifiers = {"kicks": 1.5}
+    from_body = _FROM_BODY
 
 
 class Limp(CommandTask):
     """Following a velocity command with a leg, drawn for each episode, whose motors fail."""
 
-    name, command, modifiers, from_body = "limp", Schedule(), {"actuator_failure": True}, _STACKED
+    name = "limp"
+    command = Schedule()
+    modifiers = {"actuator_failure": True}
+    from_body = _FROM_BODY
 
 
 class Directed(CommandTask):
     """Following a velocity in a pose and a gait by command."""
 
-    name, command, gait_and_pose, from_body = "directed", Schedule(), GaitAndPose(), _STACKED
+    name = "directed"
+    command = Schedule()
+    gait_and_pose = GaitAndPose()
+    from_body = _FROM_BODY
     demonstrators = ("balanced", "steered")
     weights: ClassVar[Mapping[str, float]] = {
         "progress": 0.25,
@@ -46,72 +58,87 @@ class Directed(CommandTask):
 class Rough(CommandTask):
     """Walking over rough ground."""
 
-    from_body = _STACKED
-    name, yaw = "rough", 0.3
-    command, ground = AlongLane(), Lanes(("rough",))
+    name = "rough"
+    yaw = 0.3
+    command = AlongLane()
+    ground = Lanes(("rough",))
+    from_body = _FROM_BODY
     demonstrators = ("balanced", "surefooted")
 
 
 class Slopes(CommandTask):
     """Walking up and down slopes."""
 
-    from_body = _STACKED
-    name, yaw = "slopes", 0.3
-    command, ground = AlongLane(), Lanes(("slopes",))
+    name = "slopes"
+    yaw = 0.3
+    command = AlongLane()
+    ground = Lanes(("slopes",))
+    from_body = _FROM_BODY
     demonstrators = ("balanced", "surefooted")
 
 
 class Stairs(CommandTask):
     """Walking up and down flights of stairs."""
 
-    from_body = _STACKED
-    name, yaw = "stairs", 0.3
-    command, ground = AlongLane(), Lanes(("stairs",), copies=(4, 1))
+    name = "stairs"
+    yaw = 0.3
+    command = AlongLane()
+    ground = Lanes(("stairs",), copies=(4, 1))
+    from_body = _FROM_BODY
     demonstrators = ("balanced", "surefooted")
 
 
 class Gaps(CommandTask):
     """Walking over trenches."""
 
-    from_body = _STACKED
-    name, yaw = "gaps", 0.3
-    command, ground = AlongLane(), Lanes(("gaps",), copies=(4, 1))
+    name = "gaps"
+    yaw = 0.3
+    command = AlongLane()
+    ground = Lanes(("gaps",), copies=(4, 1))
+    from_body = _FROM_BODY
     demonstrators = ("sighted",)
 
 
 class Course(CommandTask):
     """Walking over one of the four kinds of ground, drawn for every episode."""
 
-    from_body = _STACKED
-    name, yaw = "course", 0.3
-    command, ground = AlongLane(), Lanes(("rough", "slopes", "stairs", "gaps"), copies=(2, 1))
+    name = "course"
+    yaw = 0.3
+    command = AlongLane()
+    ground = Lanes(("rough", "slopes", "stairs", "gaps"), copies=(2, 1))
+    from_body = _FROM_BODY
     demonstrators = ("balanced", "surefooted")
 
 
 class Leap(CommandTask):
     """Leaping over trenches or hurdles, drawn for every episode."""
 
-    from_body = _STACKED
-    name, yaw = "leap", 0.3
-    command, ground = AlongLane(), Lanes(("trenches", "hurdles"), copies=(4, 1), difficulty=0.0)
+    name = "leap"
+    yaw = 0.3
+    command = AlongLane()
+    ground = Lanes(("trenches", "hurdles"), copies=(4, 1), difficulty=0.0)
+    from_body = _FROM_BODY
     demonstrators = ("leaping", "sighted")
 
 
 class Roam(CommandTask):
     """Following a velocity command over rough ground under kicks; a curriculum judges by the mean tracking."""
 
-    from_body = _STACKED
-    name, modifiers = "roam", {"kicks": 1.5}
-    command, ground = Schedule(), Lanes(("rough",), middle=0.5, thresholds=(0.25, 0.5))
+    name = "roam"
+    modifiers = {"kicks": 1.5}
+    command = Schedule()
+    ground = Lanes(("rough",), middle=0.5, thresholds=(0.25, 0.5))
+    from_body = _FROM_BODY
     demonstrators = ("balanced", "surefooted")
 
 
 class Navigate(CommandTask):
     """Reaching goal after goal among pillars."""
 
-    from_body = _STACKED
     name = "navigate"
-    command, ground = ToGoal(), PillarField()
+    command = ToGoal()
+    ground = PillarField()
+    from_body = _FROM_BODY
     demonstrators = ("planned",)
     weights: ClassVar[Mapping[str, float]] = {
         "progress": 1.5,

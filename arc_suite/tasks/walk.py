@@ -65,7 +65,8 @@ class WalkMemory(NamedTuple):
 class Walk(Task):
     """Walking forward at the target speed in the prescribed gait."""
 
-    name, from_body = "walk", ("clock", "clearances", "_torques")
+    name = "walk"
+    from_body = ("clock", "clearances", "_torques")
     weights: ClassVar[Mapping[str, float]] = {  # Section 4; robots have a "control" of their own
         "forward": 1.5,
         "healthy": 1.0,
@@ -87,13 +88,13 @@ class Walk(Task):
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> WalkSettings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
-        given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere=("arena",))
+        values = parameters.values(body, overrides, cls.name, cls.names(), names_of_others=("arena",))
         return WalkSettings(
-            parameters.parameters(body, given),
-            parameters.positive("velocity_band", given["velocity_band"]),
-            _healthy_range(given["healthy_range"]),
-            parameters.weights(cls.weights, given["weights"], overrides.get("weights")),
-            parameters.noise(given),
+            parameters.parameters(body, values),
+            parameters.positive("velocity_band", values["velocity_band"]),
+            _healthy_range(values["healthy_range"]),
+            parameters.weights(cls.weights, values["weights"], overrides.get("weights")),
+            parameters.noise(values),
         )
 
     @functools.cached_property
@@ -109,9 +110,9 @@ class Walk(Task):
     @functools.cached_property
     def clock(self) -> Clock:
         """The clock of the prescribed gait."""
-        p = self.parameters
-        return Clock.made(
-            p.gait_frequency, p.duty_factor, p.phase_offsets, self.scene.control_timestep, self.step_limit
+        gait = self.parameters
+        return Clock.make(
+            gait.gait_frequency, gait.duty_factor, gait.phase_offsets, self.scene.control_timestep, self.step_limit
         )
 
     @functools.cached_property
@@ -125,32 +126,46 @@ class Walk(Task):
 
     def phase(self, memory: WalkMemory):
         """Return the phase (...) of the gait, rad."""
-        return self.clock.at(self.clock.phases, memory.tick)
+        return self.clock.look_up(self.clock.phases, memory.tick)
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
-        """Draw the state: the standing pose, with noise. The clock starts at 0, with no action before."""
-        qpos, qvel = self.settings.noise.drawn(self.scene.standing, random)
-        still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
-        spent = energy.start(len(still))
-        return Start(qpos, qvel, WalkMemory(0, still, still, zero, zero, zero, zero, zero, np.True_, spent))
+        """Draw the state: the standing pose with noise. The clock starts at 0."""
+        qpos, qvel = self.settings.noise.draw(self.scene.standing, random)
+        joints = len(self.scene.body.joint_names)
+        no_action = np.zeros(joints)
+        zero = np.float64(0.0)
+        memory = WalkMemory(
+            tick=0,
+            action=no_action,
+            previous_action=no_action,
+            x=zero,
+            forward_velocity=zero,
+            schedule_errors=zero,
+            distance=zero,
+            all_schedule_errors=zero,
+            healthy=np.True_,
+            energy=energy.start(joints),
+        )
+        return Start(qpos, qvel, memory)
 
     def begin(self, memory: WalkMemory, readings: Readings) -> WalkMemory:
-        """Remember where the torso's frame stands."""
-        x = component(readings.frame_position, 0) + 0.0  # not a view
+        """Return the memory with the torso's x."""
+        x = component(readings.frame_position, 0) + 0.0  # a copy, as readings are views of the simulation
         return memory._replace(x=x, energy=energy.begin(memory.energy, readings.joint_angles))
 
     def before(self, memory: WalkMemory, action) -> tuple[WalkMemory, Inputs]:
-        """Remember the action, which is applied as it is."""
+        """Return the memory with the action, and the action itself as what to write."""
         return memory._replace(action=action, previous_action=memory.action), Inputs(action)
 
     def after(self, memory: WalkMemory, readings: Readings) -> WalkMemory:
         """Advance the clock, and measure the step's displacement and contact schedule errors."""
-        tick, x = memory.tick + 1, component(readings.frame_position, 0) + 0.0
-        schedule_errors = clock.schedule_errors(
-            readings.foot_heights, self.parameters.stance_threshold, self.clock.at(self.clock.stance, tick)
-        )
+        tick = memory.tick + 1
+        x = component(readings.frame_position, 0) + 0.0  # a copy
+        stance = self.clock.look_up(self.clock.stance, tick)
+        schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
         displacement = x - memory.x
-        (low, high), height = self.settings.healthy_range, readings.torso_height
+        low, high = self.settings.healthy_range
+        height = readings.torso_height
         return memory._replace(
             tick=tick,
             x=x,
@@ -164,12 +179,15 @@ class Walk(Task):
 
     def terms(self, memory: WalkMemory, readings: Readings) -> dict:
         """Return the paper's ten terms."""
-        p, band = self.parameters, self.settings.velocity_band
+        gait = self.parameters
+        costs = terms.costs(
+            readings, memory.action, memory.previous_action, memory.schedule_errors, gait.default_angles
+        )
         return {
-            "forward": terms.triangle(memory.forward_velocity - p.target_velocity, band),
+            "forward": terms.triangle(memory.forward_velocity - gait.target_velocity, self.settings.velocity_band),
             "healthy": memory.healthy.astype(float),
-            "gait_bonus": 1.0 - memory.schedule_errors / p.feet,
-            **terms.costs(readings, memory.action, memory.previous_action, memory.schedule_errors, p.default_angles),
+            "gait_bonus": 1.0 - memory.schedule_errors / gait.feet,
+            **costs,
         }
 
     def observe(self, memory: WalkMemory, readings: Readings) -> dict:
@@ -178,16 +196,16 @@ class Walk(Task):
             "posture": readings.posture,
             "velocities": readings.velocities,
             "contact_forces": readings.contact_forces,
-            "gait_clock": self.clock.at(self.clock.circle, memory.tick),
+            "gait_clock": self.clock.look_up(self.clock.circle, memory.tick),
         }
 
     def ended(self, memory: WalkMemory, readings: Readings) -> tuple:
-        """Terminate where the torso has left its healthy range; truncate nowhere."""
+        """Return whether the torso has left its healthy range, which terminates the episode; nothing truncates it."""
         return ~memory.healthy, False
 
     def progress(self, memory: WalkMemory) -> dict:
         """Return the mean `speed`, m/s, `gait_compliance`, the share of feet as prescribed, and `cost_of_transport`."""
-        steps = memory.tick + (memory.tick == 0)
+        steps = memory.tick + (memory.tick == 0)  # at least 1
         time = steps * self.scene.control_timestep
         path = abs(self.target_velocity) * time
         return {

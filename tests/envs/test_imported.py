@@ -87,7 +87,7 @@ def test_every_task_opens_and_steps(body, task):
 
 def test_angles_are_those_from_the_standing_pose(body):
     opened = environment(body, joint_angle_noise=0.0)
-    blocks = opened.task.definition.named(opened.task.get_observation(opened.physics))
+    blocks = opened.task.definition.copy_blocks(opened.task.get_observation(opened.physics))
     np.testing.assert_allclose(blocks["posture"][5:], 0.0, atol=1e-12)
     home = source.angles_at_home(body)
     found = [opened.physics.model.ptr.joint(name).qposadr[0] for name in body.joint_names]

@@ -11,7 +11,7 @@ import arc_suite
 from arc_suite.arenas import terrain
 from arc_suite.envs.gym import Env
 from arc_suite.tasks import TASKS, modifiers, parameters
-from arc_suite.tasks.command import FARTHEST
+from arc_suite.tasks.command import MAX_COMMAND
 from arc_suite.tasks.ground import LEVELS
 
 LARGEST = parameters.LARGEST
@@ -29,7 +29,7 @@ BOUNDS = {
     "time_limit": (1e-9, LARGEST),
     "actuator_failure": (0, 5),
     "poses": (0.0, 1.0),
-    "commands": ({"forward": -FARTHEST}, {"left": FARTHEST, "turning": (-FARTHEST, FARTHEST)}),
+    "commands": ({"forward": -MAX_COMMAND}, {"left": MAX_COMMAND, "turning": (-MAX_COMMAND, MAX_COMMAND)}),
 }
 NOT_NUMBERS = ("gait", "gaits", "start", "curriculum")
 LEVEL = ("steer", "directed", "shoved", "limp")
@@ -40,7 +40,7 @@ def values(task, name):
     """Settings with one at its bounds; speeds at the least of either direction, too."""
     bounds = BOUNDS[name]
     if name == "target_velocity":
-        least = parameters.LEAST_SPEED
+        least = parameters.MIN_SPEED
         bounds = (least, bounds[1], *((-least, bounds[0]) if task == "walk" else ()))
     wider = {"commands": {"forward": 1.5}} if task in LEVEL else {}
     return [{name: value, **({"curriculum": True, **wider} if name == "level" else {})} for value in bounds]

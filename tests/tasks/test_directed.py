@@ -12,7 +12,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.posture import moved, room
 from arc_suite.robots import ROBOTS, gaits, mirror
 from arc_suite.tasks import mirrors
-from arc_suite.tasks.gait_and_pose import CYCLE, counted, glided
+from arc_suite.tasks.gait_and_pose import CYCLE, glide_gait, to_clock_units
 
 STILL = {"poses": 0.0, "gaits": ()}
 
@@ -40,8 +40,8 @@ def test_a_walk_keeps_the_pose(command):
     environment, walk = directed("tick", command=command, pose=pose)
     timestep = walk(120)
     assert_allclose(timestep.observation["pose"], pose)
-    off = environment.task.memory.gait_and_pose.off
-    assert abs(off[[0, 3, 4]]).max() <= 0.01 and environment.task.memory.gait_and_pose.posed >= 0.7
+    off = environment.task.memory.gait_and_pose.pose_error
+    assert abs(off[[0, 3, 4]]).max() <= 0.01 and environment.task.memory.gait_and_pose.pose_tracking >= 0.7
     assert timestep.observation["posture"][0] == pytest.approx(0.18 * (0.71 - 0.2), abs=0.003)
 
 
@@ -64,7 +64,7 @@ def test_a_gait_by_name_takes_hold_within_a_cycle():
     walk(cycle)
     made = gaits.gait(ROBOTS["queen"], "ripple")
     step = environment.control_timestep()
-    asked = counted(np.array((*made.offsets, made.duty_factor, 1.5)), step)
+    asked = to_clock_units(np.array((*made.offsets, made.duty_factor, 1.5)), step)
     assert_array_equal(environment.task.memory.gait_and_pose.gait, asked)
     errors = [int(walk(1) and environment.task.memory.core.schedule_errors) for _ in range(2 * cycle)]
     assert np.mean(errors) / 6 <= 0.2
@@ -72,17 +72,18 @@ def test_a_gait_by_name_takes_hold_within_a_cycle():
 
 def test_every_gait_has_exact_edges():
     """The share of the steps of many cycles that a foot stands is the duty factor, whatever the frequency."""
-    gait = counted(np.array((0.0, 1.0 / 3.0, 0.6, 1.37)), 0.02)
+    gait = to_clock_units(np.array((0.0, 1.0 / 3.0, 0.6, 1.37)), 0.02)
     phases = gait[-1] * np.arange(CYCLE // 4) % CYCLE
     for offset in gait[:-2]:
         assert ((phases + offset) % CYCLE < gait[-2]).mean() == pytest.approx(0.6, abs=1e-4)
 
 
 def test_offsets_go_the_short_way():
-    now, asked = (counted(np.array((0.9, 0.2, 0.6, 1.5)) + change, 0.02) for change in ((0, 0, 0, 0), (0.2, 0.6, 0, 0)))
+    now = to_clock_units(np.array((0.9, 0.2, 0.6, 1.5)), 0.02)
+    asked = to_clock_units(np.array((1.1, 0.8, 0.6, 1.5)), 0.02)
     offsets = [now[:-2]]
     while not np.array_equal(now, asked):
-        now = glided(now, asked)
+        now = glide_gait(now, asked)
         offsets.append(now[:-2])
     turned = np.diff(np.unwrap(np.array(offsets) * 2 * np.pi / CYCLE, axis=0), axis=0).sum(axis=0) / (2 * np.pi)
     assert_allclose(turned, (0.2, -0.4), atol=1e-5)

@@ -172,8 +172,8 @@ def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
     for _ in range(40):
         environment.reset()
         memory, data = inner(environment.task.memory), environment.physics.data.ptr
-        lanes.add(float(memory.ground.lane))
-        assert abs(data.qpos[1] - memory.ground.lane) < 6.5 * arena.unit
+        lanes.add(float(memory.ground.middle))
+        assert abs(data.qpos[1] - memory.ground.middle) < 6.5 * arena.unit
         assert abs(memory.core.place[2]) < (0.5 if name != "roam" else 3.2)
         assert (task.read(data).foot_heights - radii).min() > 0.0099 * arena.unit
     assert len(lanes) > 0.6 * min(40, len(arena.lanes))
@@ -220,7 +220,7 @@ def test_how_an_episode_ends():
     readings, unit = task.read(environment.physics.data.ptr), task.scene.arena.unit
 
     def ended(x, y):
-        place = np.array([x, memory.ground.lane + y, 0.0])
+        place = np.array([x, memory.ground.middle + y, 0.0])
         after = task.ground.after(task.context, memory.ground, place, readings, False)
         return tuple(bool(end) for end in task.ended(memory._replace(ground=after), readings))
 
@@ -233,9 +233,9 @@ def test_how_an_episode_ends():
     deep = readings._replace(foot_heights=np.full(6, 0.1 * unit) - np.eye(6)[2] * 0.2 * unit)
     for steps in range(1, 6):
         memory = task.after(memory, deep)
-        assert (memory.ground.sinking, bool(task.ended(memory, deep)[0])) == (steps, steps == 5)
+        assert (memory.ground.steps_under_ground, bool(task.ended(memory, deep)[0])) == (steps, steps == 5)
     assert task.progress(memory)["sank"] == 1.0
-    assert task.after(memory, readings).ground.sinking == 0
+    assert task.after(memory, readings).ground.steps_under_ground == 0
 
 
 def test_distance_is_the_share_of_what_was_asked_for():
@@ -337,7 +337,7 @@ def test_roaming_follows_commands_from_the_middle_of_the_lane():
     assert abs(environment.physics.data.qpos[0] - middle) < 0.1 * middle
     assert_array_equal(memory.core.desired, memory.command.schedule[0])
     assert "distance" not in environment.task.progress and "tracking" in environment.task.progress
-    walked = memory._replace(core=memory.core._replace(steps=200, tracking=np.float64(120.0)))
+    walked = memory._replace(core=memory.core._replace(steps=200, all_tracking=np.float64(120.0)))
     assert task.stream_state(walked).outcome == pytest.approx(0.6)
     fell = walked._replace(health=memory.health._replace(fell=np.True_))
     assert task.stream_state(fell).outcome == pytest.approx(0.12)

@@ -112,14 +112,14 @@ def test_a_goal_that_is_reached_counts_and_gives_way_to_the_next():
     there = moved(environment, goals[0] + (0.0, 0.69 * unit))
     assert (there.command.reached, task.terms(there, readings)["goal"]) == (1, 1.0)
     progress = task.terms(there, readings)["progress"]
-    assert there.command.gained > 1.0 >= progress > 0.99, "more than the target velocity earns no more"
+    assert there.command.speed_share > 1.0 >= progress > 0.99, "more than the target velocity earns no more"
     assert_allclose(np.hypot(*there.command.to_goal), np.hypot(*(goals[1] - there.core.place[:2])))
-    away = moved(environment, start - (goals[0] - start)).command.gained
+    away = moved(environment, start - (goals[0] - start)).command.speed_share
     far, leak = np.hypot(*(goals[0] - start)), task.context.leak
     assert away == pytest.approx(-leak * far / task.context.pace, rel=0.1), "a step back costs its whole displacement"
     step = task.context.units[0] * task.scene.control_timestep
     direction = (goals[0] - start) / np.hypot(*memory.command.to_goal)
-    assert moved(environment, start + 0.4 * step * direction).command.gained == pytest.approx(0.4 * leak)
+    assert moved(environment, start + 0.4 * step * direction).command.speed_share == pytest.approx(0.4 * leak)
 
 
 def test_at_the_end_of_the_chain_it_goes_back():

@@ -108,7 +108,7 @@ def test_methods_of_a_task_are_given_its_own_memory():
     environment.reset()
     environment.step(np.zeros(18))
     task, memory = environment.task.definition, environment.task.memory
-    assert task.judged(memory) == task.task.judged(memory.task) == 1
+    assert task.judged_steps(memory) == task.task.judged_steps(memory.task) == 1
     assert task.phase(memory) == task.task.phase(memory.task)
 
 

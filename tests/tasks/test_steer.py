@@ -149,7 +149,7 @@ def test_tracking_is_the_product_of_course_and_turning(wanted, motion, tracking)
     ],
 )
 def test_progress_is_the_projection_of_the_motion_onto_the_command(wanted, motion, along):
-    assert_allclose(command.along(np.array(wanted), np.array(motion)), along, atol=1e-12)
+    assert_allclose(command.projected_share(np.array(wanted), np.array(motion)), along, atol=1e-12)
 
 
 def test_progress_is_paid_from_the_first_step_and_at_most_in_full():

@@ -187,9 +187,9 @@ def _end(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
         ("0", f"the ground carries the torso with more than {health.lying:g} of the weight"),
     ]
     if isinstance(task_class.ground, ground.Lanes):
-        lines.append(("0", f"a foot stays under the ground for {ground.SINKING} steps, a contact artifact"))
+        lines.append(("0", f"a foot stays under the ground for {ground.SUNK_STEPS} steps, a contact artifact"))
         lines.append(
-            ("1", f"the torso is {ground.OFF_LANE:g} h from the lane's middle, or {ground.END:g} h from an end")
+            ("1", f"the torso is {ground.OFF_LANE:g} h from the lane's middle, or {ground.LANE_END:g} h from an end")
         )
     return table(("discount", "where"), [*lines, ("1", "the time limit is reached")])
 

@@ -29,6 +29,6 @@ def privileged_columns(task: Task, critic_blocks: Sequence[str]) -> np.ndarray:
     """
     if not critic_blocks:
         return np.arange(0)
-    slices = blocks.places(privileged.sizes(task))
+    slices = blocks.slices(privileged.sizes(task))
     names = checks.names("critic_blocks", critic_blocks, slices, "block")
     return np.concatenate([np.arange(slices[name].start, slices[name].stop) for name in names])

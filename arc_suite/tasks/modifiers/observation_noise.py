@@ -8,7 +8,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import noise
-from arc_suite.tasks.blocks import Block, places
+from arc_suite.tasks.blocks import Block, slices
 from arc_suite.tasks.modifiers.draws import Episode
 from arc_suite.tasks.modifiers.excluded_blocks import check_exclusion
 from arc_suite.tasks.modifiers.modifier import Modifier
@@ -53,11 +53,13 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
         noisy = {name: block for name, block in blocks.items() if block.noise is not None}
         levels = cls._check_levels(settings["observation_noise"], noisy)
         excluded = check_exclusion(settings["exclude_blocks"], blocks)
-        numbers = places({name: block.size for name, block in noisy.items()})  # of the noise of all blocks
+        # Slices of the noise of all blocks: a block has the same noise, whichever other blocks have noise.
+        slices_of_all = slices({name: block.size for name, block in noisy.items()})
         names = [name for name in noisy if levels.get(name) and name not in excluded]
         widths = {name: levels[name] * noisy[name].widths for name in names}
-        slices = {name: numbers[name] for name in names}
-        return cls(levels, widths, slices, max((numbers[name].stop for name in names), default=0))
+        slices_of_names = {name: slices_of_all[name] for name in names}
+        total = max((part.stop for part in slices_of_names.values()), default=0)
+        return cls(levels, widths, slices_of_names, total)
 
     @classmethod
     def _check_levels(cls, value, noisy: Mapping[str, Block]) -> dict[str, float]:
