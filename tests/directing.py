@@ -20,7 +20,7 @@ from arc_suite.bodies.families import sound_body  # noqa: E402
 from arc_suite.cpg import Demonstrator  # noqa: E402
 from arc_suite.cpg.selection import suited_preset  # noqa: E402
 from arc_suite.envs.vector import VectorEnv  # noqa: E402
-from arc_suite.models.posture import room  # noqa: E402
+from arc_suite.models.posture import measure_room  # noqa: E402
 from arc_suite.robots import ROBOTS, gaits  # noqa: E402
 from arc_suite.tasks import gait_and_pose  # noqa: E402
 
@@ -74,7 +74,7 @@ def standing(body) -> dict:
     shares = random.uniform(-1.0, 1.0, (12, 6))
     shares[6:] /= abs(shares[6:]).sum(axis=-1, keepdims=True)  # some of all numbers, some of one
     shares[:6] *= np.eye(6)
-    low, high = room(body).T
+    low, high = measure_room(body).T
     asked = np.where(shares < 0.0, -low, high) * shares
     run = Run(body, len(asked))
     run.envs.command("command", (0.0, 0.0, 0.0))
@@ -91,7 +91,7 @@ def standing(body) -> dict:
 
 def walking(body) -> dict:
     """Return what poses add to the error of motion of a body that walks, and its largest error of attitude."""
-    low, high = room(body, planted=False).T
+    low, high = measure_room(body, planted=False).T
     poses = [pose for pose in POSES if (low - 1e-9 <= pose).all() and (pose <= high + 1e-9).all()]
     asked = np.repeat([np.zeros(6), *poses], len(WALKS), axis=0)
     walks = np.tile(WALKS, (len(poses) + 1, 1))

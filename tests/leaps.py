@@ -18,7 +18,7 @@ from arc_suite.arenas import terrain
 from arc_suite.bodies.families import sound_body
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
 
 TRENCH, HURDLE = 0.8, 0.2  # standing heights
@@ -50,7 +50,7 @@ def crossed(body, kind: str, preset: str) -> int:
     uneven = task.scene.arena.height(x, np.tile(lanes[:, None], (1, x.shape[1]))) != 0.0
     first = uneven.argmax(axis=1)
     ends = [start + np.argmin(places[start:]) for places, start in zip(uneven, first, strict=True)]
-    goals = x[0, ends] - standing(body).soles[:, 0].min() + 0.2 * height
+    goals = x[0, ends] - measure_standing(body).soles[:, 0].min() + 0.2 * height
     pace = task.parameters.target_velocity * task.scene.control_timestep
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of bodies that cannot leap

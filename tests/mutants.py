@@ -33,7 +33,7 @@ MUTANTS = {
     "a scaled robot keeps its name": 'name=«f"{stem}_{how}"→body.name»',
     # Models.
     "contact margin doubled": "default=«0.005→0.01»",
-    "ballast touches the floor": '"mass": solid.mass, **«_TOUCHES_NOTHING→touches_floor»}',
+    "ballast touches the floor": '"mass": ballast.mass, **«_TOUCHES_NOTHING→touches_floor»}',
     "wrong number of substeps": "2, 1000, default=«25→24»",
     "joints of a giant as fast as a mite's": "«_STIFFNESS / control_timestep(body)→7.0»",
     "contacts of a giant as hard as a mite's": '"solref": («simulation.contact_time→0.02», 1.0)',

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import models, rotations
 from arc_suite.models.direct import GEOMS
-from arc_suite.models.standing import stood
+from arc_suite.models.standing import standing_qpos
 from arc_suite.robots.spec import Body, Link
 
 # Kinds of shapes by MuJoCo's number.
@@ -92,7 +92,7 @@ class Material(NamedTuple):
 
 def describe_body(body: Body) -> tuple[list[Part], dict[str, Material]]:
     """Return the parts of a body in the order of its `part_names`, and the materials of what they show by name."""
-    model = models.parsed(body, decorated=True).compile()
+    model = models.model_spec(body, decorated=True).compile()
     ids = [model.body(name).id for name in body.part_names]
     found = _sketched(model, body) if body.source else [_part(model, index, ids) for index in ids]
     names = sorted({shape.material for part in found for shape in part.shapes})
@@ -155,7 +155,7 @@ def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:
     A shape belongs to the nearest part above it.
     """
     data = mujoco.MjData(model)
-    data.qpos[:] = stood(model)
+    data.qpos[:] = standing_qpos(model)
     mujoco.mj_kinematics(model, data)
     owners = {model.body(name).id: part for part, name in enumerate(body.part_names)}
     for index in range(1, model.nbody):

@@ -140,7 +140,7 @@ def _direction(task: Task) -> dict[str, Any]:
         "glide": reference.glide,
         "step": reference.step,
         "rate": (body.torso.standing_height / GRAVITY) ** 0.5 / reference.step,
-        "names": posture.NAMES,
+        "names": posture.POSE_NAMES,
         "room": player_controls.pose_room(body),
         "frequency": task.parameters.gait_frequency,
         "gaits": player_controls.gaits_by_name(task),

@@ -16,12 +16,12 @@ TEMPO_RANGE = (0.6, 1.4)  # of a gait, multiples of the prescribed frequency
 
 def is_directed(task: Task) -> bool:
     """Return whether pose and gait of a task are by command."""
-    return task.commands.get("pose") == len(posture.NAMES) and "gait" in task.commands
+    return task.commands.get("pose") == len(posture.POSE_NAMES) and "gait" in task.commands
 
 
 def pose_room(body: Body) -> np.ndarray:
     """Return how far each number of a pose can go, (6, 2) in whole hundredths, with feet that may slide."""
-    return np.trunc((100.0 * posture.room(body, planted=False)).round(4)) / 100.0
+    return np.trunc((100.0 * posture.measure_room(body, planted=False)).round(4)) / 100.0
 
 
 def gaits_by_name(task: Task) -> dict[str, list[float]]:

@@ -53,7 +53,7 @@ def describe_ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str,
         high: the opposite corner.
     """
     arena = environment.task.definition.scene.arena
-    model = models.parsed(environment.task.body, arena, decorated=True).compile()
+    model = models.model_spec(environment.task.body, arena, decorated=True).compile()
     data = mujoco.MjData(model)
     data.mocap_pos[:] = environment.physics.data.mocap_pos
     mujoco.mj_kinematics(model, data)

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks, registry, rotations
 from arc_suite.bodies import tokens
-from arc_suite.bodies.groups import Group, Member, Place, grouped, scatter
+from arc_suite.bodies.groups import Group, Member, Place, group_by_batch, scatter
 from arc_suite.bodies.tokens import Description, Tokens
 from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
@@ -49,17 +49,17 @@ class BodiesTask(NamedTuple):
 
     def split(self, observation: np.ndarray) -> dict[str, np.ndarray]:
         """Return an observation (..., 664) as named blocks, views of it."""
-        return tokens.split(observation)
+        return tokens.split_flat(observation)
 
 
 class BodiesEnv(KnownAttributes, BaseVectorEnv):
     """Environments of different bodies, `gymnasium.make_vec("arc_suite/bodies-<task>-v0", num_envs=n, bodies=...)`.
 
     Observations are legs (num_envs, 12, 12), torso (num_envs, 12) and command (num_envs, 6), float32 without
-    dimension and 0 where a body has no leg or joint; see `bodies.tokens.Tokens.observed`. Actions are (num_envs, 12, 4)
-    in [-1, 1], positions of joints as with `actions="position"`; entries without a joint are ignored. `description`
-    holds what does not change. With `flat=True`, for plain learners, observations are vectors (num_envs, 664) that
-    include legs and torso of the description, and actions are (num_envs, 48).
+    dimension and 0 where a body has no leg or joint; see `bodies.tokens.Tokens.make_tokens`. Actions are
+    (num_envs, 12, 4) in [-1, 1], positions of joints as with `actions="position"`; entries without a joint are
+    ignored. `description` holds what does not change. With `flat=True`, for plain learners, observations are vectors
+    (num_envs, 664) that include legs and torso of the description, and actions are (num_envs, 48).
 
     An environment of seed s is bit-equal to an environment of its body and seed in a `VectorEnv` with
     `actions="position"`: states, rewards, infos, and the tokens of the observation. Bodies whose models have one
@@ -122,7 +122,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         if len(found) > num_envs:
             raise ValueError(f"num_envs: expected at least one for each of {len(found)} bodies, got {num_envs}")
         for body in found:
-            tokens.slots(body)
+            tokens.joint_slots(body)
         settings = {"actions": "position", **checks.mapping("task_kwargs", task_kwargs)}
         checks.name(settings["actions"], ["position"], "actions of different bodies")
         seed = settings.pop("random", None)
@@ -144,13 +144,13 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self.tasks = tuple(members[which].task for which in which_body)
         self.task = BodiesTask(self.tasks[0].name, self.tasks[0].step_limit)
         self._tokens, self._flat = Tokens.of(self.tasks), flat
-        for indices in grouped([members[which] for which in which_body]):
+        for indices in group_by_batch([members[which] for which in which_body]):
             group = Group([members[which_body[index]] for index in indices], task_name, **options)
-            self._places.append(Place(group, np.array(indices), self._tokens.part(indices)))
+            self._places.append(Place(group, np.array(indices), self._tokens.select(indices)))
         first = self._places[0].group
         self.step_limit = float(max(np.max(place.group.step_limit) for place in self._places))
         self.autoreset_mode, self.metadata, self.render_mode = first.autoreset_mode, first.metadata, render_mode
-        described = [tokens.described(member.task) for member in members]
+        described = [tokens.body_description(member.task) for member in members]
         columns = zip(*(described[which] for which in which_body), strict=True)
         self.description = Description(*map(np.stack, columns))
         self.single_observation_space, self.single_action_space = _spaces(flat)
@@ -198,7 +198,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         for place in self._places:
             group, indices, _ = place
             _, reward[indices], terminated[indices], truncated[indices], own = group.step(
-                place.tokens.actions(actions[indices])
+                place.tokens.body_actions(actions[indices])
             )
             if "final_obs" in own:
                 own["final_obs"] = self._last(place, own["final_obs"])
@@ -350,19 +350,19 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def _gathered_tokens(self) -> dict[str, np.ndarray]:
         gathered = np.empty(self._tokens.places.shape, np.float32)
         for group, indices, own in self._places:
-            gathered[indices] = own.gathered(group._observation)
-        return self._tokens.observed(gathered)
+            gathered[indices] = own.gather_inputs(group._observation)
+        return self._tokens.make_tokens(gathered)
 
     def _vectors(self, found: Mapping[str, np.ndarray], indices=slice(None)) -> np.ndarray:
         """Flat observations of the tokens of some environments."""
-        return tokens.flat(found, self.description.legs[indices], self.description.torso[indices])
+        return tokens.flatten_tokens(found, self.description.legs[indices], self.description.torso[indices])
 
     def _last(self, place: Place, vectors: np.ndarray) -> np.ndarray:
         """The last observations of a group's episodes, objects (environments,), None where none ended."""
         found = np.full(len(vectors), None, object)
         for index in [i for i, vector in enumerate(vectors) if vector is not None]:
-            own = place.tokens.part([index])
-            seen = own.observed(own.gathered(vectors[index][None]))
+            own = place.tokens.select([index])
+            seen = own.make_tokens(own.gather_inputs(vectors[index][None]))
             last = self._vectors(seen, place.indices[[index]])[0]
             found[index] = last if self._flat else {name: array[0] for name, array in seen.items()}
         return found

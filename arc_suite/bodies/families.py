@@ -10,11 +10,11 @@ from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body, SpecError
 
-TRIES = 100  # draws of one seed
+MAX_DRAWS = 100  # draws of one seed
 
 
 def sound_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
-    """Return a random body without overlaps, the same for the same arguments; see `generator.drawn`.
+    """Return a random body without overlaps, the same for the same arguments; see `generator.draw_body`.
 
     The first draw is `generator.random_body`. Later ones, as of `varied_body`, keep its numbers of legs and links.
 
@@ -33,11 +33,11 @@ def sound_body(seed: int, legs: int | None = None, links: int | None = None, lay
     first = generator.random_body(seed, legs, links, layout)
     legs, links = len(first.legs), len(first.legs[0].links)
     # The generator of (seed, 0) is that of the seed.
-    return sound(lambda random: generator.drawn(random, legs, links, layout), "random", seed, overlaps)
+    return sound(lambda random: generator.draw_body(random, legs, links, layout), "random", seed, overlaps)
 
 
 def varied_body(seed: int) -> Body:
-    """Return a random body of a wide family, the same for the same seed; see `robots.varied.drawn`.
+    """Return a random body of a wide family, the same for the same seed; see `varied.draw_varied_body`.
 
     Every body passes `soundness.flaws`. Draw k of seed s comes from `numpy.random.default_rng((s, k))`, and the
     first sound one is the body.
@@ -51,7 +51,7 @@ def varied_body(seed: int) -> Body:
     Raises:
         ValueError: not a seed.
     """
-    return sound(varied.drawn, "varied", seed)
+    return sound(varied.draw_varied_body, "varied", seed)
 
 
 def sound(
@@ -72,14 +72,14 @@ def sound(
         ValueError: not a seed, or a family without sound bodies.
     """
     checks.seed(seed)
-    for attempt in range(TRIES):
+    for attempt in range(MAX_DRAWS):
         try:
             body = draw(np.random.default_rng((seed, attempt))).replace(name=f"{family}_{seed}")
         except SpecError:
             continue
         if not any(faults(body)):
             return body
-    raise ValueError(f"{family}:{seed}: none of {TRIES} draws stands and can take steps; see arc-suite check")
+    raise ValueError(f"{family}:{seed}: none of {MAX_DRAWS} draws stands and can take steps; see arc-suite check")
 
 
 def few_legs(seed: int) -> Body:

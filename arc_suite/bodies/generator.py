@@ -91,7 +91,7 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
     else:
         half_length, half_width = _SPACING * _HEIGHT * legs / 4.0, 0.4 * _HEIGHT
     proportions = Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, PROFILES[links], (_REACH,) * legs)
-    return proportioned(f"walker_{legs}x{links}", legs, layout, proportions)
+    return build_body(f"walker_{legs}x{links}", legs, layout, proportions)
 
 
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
@@ -110,10 +110,10 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         ValueError: a value out of range.
     """
     random = np.random.default_rng(checks.seed(seed))
-    return drawn(random, legs, links, layout).replace(name=f"random_{seed}")
+    return draw_body(random, legs, links, layout).replace(name=f"random_{seed}")
 
 
-def drawn(
+def draw_body(
     random: np.random.Generator, legs: int | None = None, links: int | None = None, layout: str | None = None
 ) -> Body:
     """Draw a body, `random`.
@@ -162,7 +162,7 @@ def drawn(
         ],
         reaches=tuple(map(float, reaches)),
     )
-    return proportioned("random", legs, layout, proportions)
+    return build_body("random", legs, layout, proportions)
 
 
 def scaled(body: Body, factor: float) -> Body:
@@ -218,15 +218,15 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
         ValueError: a value out of range, or a length grown out of range.
     """
     random, amount = np.random.default_rng(checks.seed(seed)), checks.number("amount", amount, 0.0, 0.5)
-    return deformed(body, amount * random.standard_normal(deformations(body)))
+    return deform_legs(body, amount * random.standard_normal(deformation_count(body)))
 
 
-def deformations(body: Body) -> int:
+def deformation_count(body: Body) -> int:
     """Return how many changes `deformed` takes: for every leg without a mirror image before it, its links and one."""
     return sum(len(leg.links) + 1 for leg, _ in _with_images(body))
 
 
-def deformed(body: Body, changes: np.ndarray) -> Body:
+def deform_legs(body: Body, changes: np.ndarray) -> Body:
     """Return a body with legs of other lengths and headings; mirrored legs stay mirrored, and feet at their height.
 
     Args:
@@ -289,14 +289,14 @@ def _check_layout(layout: str | None, legs: int) -> str:
     return checks.name(layout, LAYOUTS, "layout")
 
 
-def proportioned(name: str, legs: int, layout: str, proportions: Proportions) -> Body:
+def build_body(name: str, legs: int, layout: str, proportions: Proportions) -> Body:
     """Return a body of given proportions; checked legs and layout are as in `generate`."""
     p = proportions
     if layout == "radial":
-        mounts = around(legs, 0.8 * p.half_length, 0.8 * p.half_width)
+        mounts = radial_mounts(legs, 0.8 * p.half_length, 0.8 * p.half_width)
         all_legs = tuple(_leg(f"leg{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
     else:
-        mounts = left_side(legs // 2, 0.8 * p.half_length, 0.6 * p.half_width, p.fan)
+        mounts = left_mounts(legs // 2, 0.8 * p.half_length, 0.6 * p.half_width, p.fan)
         left = tuple(_leg(f"l{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
         all_legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
     size = (p.half_length, p.half_width, p.thickness * p.height)
@@ -304,14 +304,14 @@ def proportioned(name: str, legs: int, layout: str, proportions: Proportions) ->
     return Body(name=name, torso=Torso(standing_height=p.height, solids=(chassis,)), legs=all_legs)
 
 
-def places(legs: int, layout: str) -> np.ndarray:
+def mount_shares(legs: int, layout: str) -> np.ndarray:
     """Return how far ahead the legs of `Proportions.reaches` are mounted: from 1, in front, to -1."""
     if layout == "pairs":
         return np.linspace(1.0, -1.0, legs // 2)
     return np.cos(np.radians(_headings(legs)))
 
 
-def left_side(pairs: int, along: float, across: float, fan: float) -> list[tuple[Vector, float]]:
+def left_mounts(pairs: int, along: float, across: float, fan: float) -> list[tuple[Vector, float]]:
     """Return mounts and headings, degrees, of the legs on the left of a long torso, the first in front.
 
     Args:
@@ -324,7 +324,7 @@ def left_side(pairs: int, along: float, across: float, fan: float) -> list[tuple
     return [((along * share, across, 0.0), 90.0 - fan * share) for share in shares]
 
 
-def around(legs: int, along: float, across: float) -> list[tuple[Vector, float]]:
+def radial_mounts(legs: int, along: float, across: float) -> list[tuple[Vector, float]]:
     """Return mounts and headings, degrees, of legs all around a torso, counter-clockwise.
 
     Args:

@@ -49,7 +49,7 @@ class Place(NamedTuple):
     tokens: Tokens
 
 
-def grouped(members: Sequence[Member]) -> list[list[int]]:
+def group_by_batch(members: Sequence[Member]) -> list[list[int]]:
     """Indices of environments that share a batch."""
     groups: dict[Any, list[int]] = {}
     keys: dict[int, Any] = {}

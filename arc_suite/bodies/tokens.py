@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite.models.sizing import position_gains, sized
-from arc_suite.models.standing import GRAVITY, standing
+from arc_suite.models.sizing import position_gains, size_body
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks
 from arc_suite.tasks.blocks import Block
@@ -81,10 +81,10 @@ class Description(NamedTuple):
     reach: np.ndarray
 
 
-def padded(body: Body, values: np.ndarray) -> np.ndarray:
+def pad_joints(body: Body, values: np.ndarray) -> np.ndarray:
     """Return values (joints, ...) of a body's joints as (12, 4, ...), 0 where there is none."""
     array = np.zeros((LEGS * JOINTS, *np.shape(values)[1:]))
-    array[slots(body)] = values
+    array[joint_slots(body)] = values
     return array.reshape(LEGS, JOINTS, *array.shape[1:])
 
 
@@ -93,7 +93,7 @@ def privileged_sizes(task: Task) -> dict[str, int]:
     return {name: _padding(block).size for name, block in task.privileged_blocks.items()}
 
 
-def padded_privileged(task: Task, vectors: np.ndarray) -> np.ndarray:
+def pad_privileged(task: Task, vectors: np.ndarray) -> np.ndarray:
     """Return privileged observations (environments, size) with 12 legs of 4 joints, 0 where there is none."""
     return spread(privileged_padding(task), vectors)
 
@@ -120,7 +120,7 @@ def _slots(body: Body) -> tuple[int, ...]:
     return joint_places(body, LEGS, JOINTS)
 
 
-def slots(body: Body) -> np.ndarray:
+def joint_slots(body: Body) -> np.ndarray:
     """Return the places (joints,) of a body's joints among the 12 x 4 of all legs.
 
     Raises:
@@ -129,11 +129,11 @@ def slots(body: Body) -> np.ndarray:
     return np.array(_slots(body))
 
 
-def flat(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) -> np.ndarray:
+def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) -> np.ndarray:
     """Return tokens and a description as one vector (environments, 664), blocks as in `FLAT`.
 
     Args:
-        tokens: see `Tokens.observed`.
+        tokens: see `Tokens.make_tokens`.
         legs: (environments, 12, 41) of the description.
         torso: (environments, 10) of the description.
     """
@@ -141,7 +141,7 @@ def flat(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) 
     return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=-1)
 
 
-def split(vectors) -> dict[str, Any]:
+def split_flat(vectors) -> dict[str, Any]:
     """Return vectors (..., 664) of NumPy or JAX as the blocks of `FLAT`, by name."""
     return {name: vectors[..., part] for name, part in blocks.slices(FLAT).items()}
 
@@ -153,7 +153,7 @@ def leg_inputs(vectors):
         vectors: (..., 664) of `flat`, of NumPy or JAX; normalized ones keep the number of joints as it is.
     """
     numpy = vectors.__array_namespace__()
-    legs, torso, command, leg_descriptions, torso_description = split(vectors).values()
+    legs, torso, command, leg_descriptions, torso_description = split_flat(vectors).values()
     leading = vectors.shape[:-1]
     descriptions = leg_descriptions.reshape(*leading, LEGS, LEG_DESCRIPTION)
     shared = numpy.concatenate([torso, command, torso_description], axis=-1)[..., None, :]
@@ -165,7 +165,7 @@ def leg_inputs(vectors):
     return inputs, mask
 
 
-def of_all_legs(values: np.ndarray, counts: float) -> np.ndarray:
+def repeat_for_legs(values: np.ndarray, counts: float) -> np.ndarray:
     """Return numbers (81,) of the inputs of one leg as those (664,) of the vector; `counts` for numbers of joints."""
     leg, description, torso, command, about = np.split(values, np.cumsum((LEG, LEG_DESCRIPTION, TORSO, COMMAND)))
     description = description.copy()
@@ -174,7 +174,7 @@ def of_all_legs(values: np.ndarray, counts: float) -> np.ndarray:
     return np.concatenate(parts).astype(np.float32)
 
 
-def described(task: Task) -> Description:
+def body_description(task: Task) -> Description:
     """Return the description of the body of a task, in the gait that the task prescribes; no leading axes.
 
     Raises:
@@ -182,16 +182,16 @@ def described(task: Task) -> Description:
     """
     if task.parameters is None:
         raise ValueError(f"task {task.name}: expected one that prescribes a gait")
-    body, pose, duty = task.scene.body, standing(task.scene.body), task.parameters.duty_factor
+    body, pose, duty = task.scene.body, measure_standing(task.scene.body), task.parameters.duty_factor
     height, first = pose.height, body.torso.solids[0]
     count, rate = len(body.legs), math.sqrt(GRAVITY / pose.height)
-    stiffness, damping = position_gains(sized(body), pose.inertias)
+    stiffness, damping = position_gains(size_body(body), pose.inertias)
     ranges = np.radians([joint.range_deg for joint in body.joints])
     feet, mounts = np.array([leg.foot_position for leg in body.legs]), np.array([leg.mount for leg in body.legs])
     away = feet[:, :2] / np.maximum(np.hypot(feet[:, 0], feet[:, 1]), 1e-9)[:, None]
     counts = np.eye(JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]
-    jacobians = padded(body, np.concatenate([jacobian.T for jacobian in pose.jacobians]))[:count]
-    by_leg = (padded(body, values)[:count] for values in (ranges, stiffness, damping * rate))
+    jacobians = pad_joints(body, np.concatenate([jacobian.T for jacobian in pose.jacobians]))[:count]
+    by_leg = (pad_joints(body, values)[:count] for values in (ranges, stiffness, damping * rate))
     parts = [feet / height, mounts / height, away, counts, jacobians.swapaxes(1, 2) / height, *by_leg]
     legs = np.zeros((LEGS, LEG_DESCRIPTION))
     legs[:count] = np.concatenate([part.reshape(count, -1) for part in parts] + [np.full((count, 1), duty)], axis=-1)
@@ -200,8 +200,8 @@ def described(task: Task) -> Description:
     return Description(
         legs=legs.astype(np.float32),
         torso=np.array((count / LEGS, *lengths, duty), np.float32),
-        mask=padded(body, np.ones(len(ranges))).astype(bool),
-        reach=padded(body, abs(ranges).max(axis=-1)).astype(np.float32),
+        mask=pad_joints(body, np.ones(len(ranges))).astype(bool),
+        reach=pad_joints(body, abs(ranges).max(axis=-1)).astype(np.float32),
     )
 
 
@@ -254,13 +254,13 @@ class Tokens(NamedTuple):
             raise ValueError("history: expected 0 for different bodies, as tokens of legs hold the present alone")
         if any(name not in task.blocks or task.blocks[name].kinds != kinds for name, kinds in BLOCKS.items()):
             raise ValueError(f"task {task.name}: expected the blocks {', '.join(BLOCKS)}, got {', '.join(task.blocks)}")
-        body, parameters, pose = task.scene.body, task.parameters, standing(task.scene.body)
+        body, parameters, pose = task.scene.body, task.parameters, measure_standing(task.scene.body)
         # Forces are in N, or in weights where a task has a command.
         weight = 1.0 if "command" in task.blocks else pose.mass * GRAVITY
         phases = np.zeros(LEGS)
         phases[: len(body.legs)] = parameters.phase_offsets
         middle = math.pi * parameters.duty_factor
-        mask = padded(body, np.ones(len(body.joint_names)))
+        mask = pad_joints(body, np.ones(len(body.joint_names)))
         units = velocity_units(body, parameters.target_velocity)
         numbers = (
             mask,
@@ -288,12 +288,12 @@ class Tokens(NamedTuple):
         upward = np.zeros(LEGS, int)
         rigid_parts = task.blocks["contact_forces"].parts[0]
         upward[: len(body.legs)] = [forces[rigid_parts.places(name)[_UPWARD]] for name in body.foot_names]
-        joints = [padded(body, places).ravel() for places in (angles, speeds)]
+        joints = [pad_joints(body, places).ravel() for places in (angles, speeds)]
         command = numbers.get("command", [])
         places = [height, orientation, linear, angular, *joints, upward, numbers["gait_clock"], command]
         return np.concatenate(places).astype(int)
 
-    def gathered(self, vectors: np.ndarray) -> np.ndarray:
+    def gather_inputs(self, vectors: np.ndarray) -> np.ndarray:
         """Return the numbers (environments, n) of observation vectors (environments, size) that tokens are made from.
 
         Vectors of bodies with different joints have different sizes; these numbers have one layout.
@@ -301,11 +301,11 @@ class Tokens(NamedTuple):
         return np.take_along_axis(vectors, self.places, axis=-1)
 
     @staticmethod
-    def parts(gathered: np.ndarray) -> list[np.ndarray]:
+    def split_inputs(gathered: np.ndarray) -> list[np.ndarray]:
         """Return gathered numbers (..., n), or their places, in the parts that `places` names."""
         return np.split(gathered, np.cumsum((5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2)), axis=-1)
 
-    def observed(self, gathered: np.ndarray) -> dict[str, np.ndarray]:
+    def make_tokens(self, gathered: np.ndarray) -> dict[str, np.ndarray]:
         """Return the tokens of gathered numbers (environments, n).
 
         Returns:
@@ -315,7 +315,7 @@ class Tokens(NamedTuple):
             command (environments, 6): the desired velocity and the present one, as the torso heads, in units of
             the command.
         """
-        pose, velocities, angles, speeds, forces, clock, command = self.parts(gathered.astype(np.float32))
+        pose, velocities, angles, speeds, forces, clock, command = self.split_inputs(gathered.astype(np.float32))
         angles, speeds = (array.reshape(self.mask.shape) * self.mask for array in (angles, speeds))
         sine = clock[:, :1] * self.offset[..., 1] + clock[:, 1:] * self.offset[..., 0]
         cosine = clock[:, 1:] * self.offset[..., 1] - clock[:, :1] * self.offset[..., 0]
@@ -341,11 +341,11 @@ class Tokens(NamedTuple):
             command = np.stack([*desired, *motion], axis=-1)
         return {"legs": legs, "torso": torso, "command": command}
 
-    def part(self, indices) -> Self:
+    def select(self, indices) -> Self:
         """Return the tokens of some environments."""
         return type(self)(*(values[indices] for values in self))
 
-    def actions(self, actions: np.ndarray) -> np.ndarray:
+    def body_actions(self, actions: np.ndarray) -> np.ndarray:
         """Return the bodies' own actions (environments, joints) of padded ones (environments, 12, 4)."""
         flat = actions.reshape(len(actions), -1)
         return flat[self.mask.reshape(flat.shape) > 0.0].reshape(len(actions), -1)

@@ -10,8 +10,8 @@ from arc_suite.bodies import tokens
 from arc_suite.bodies.tokens import Tokens
 from arc_suite.cpg.law import Clocked, checked, proprioception, torques
 from arc_suite.envs.setup import Setup
-from arc_suite.models.sizing import position_gains, sized
-from arc_suite.models.standing import standing
+from arc_suite.models.sizing import position_gains, size_body
+from arc_suite.models.standing import measure_standing
 from arc_suite.policies import network
 from arc_suite.policies.graph import Graph
 from arc_suite.policies.network import PACKAGED, Network
@@ -62,11 +62,11 @@ class Universal:
                 a block that the network needs.
         """
         self.network, self.task = trained, task
-        described, body = tokens.described(task), task.scene.body
+        described, body = tokens.body_description(task), task.scene.body
         self.descriptions = described.legs[None], described.torso[None]
         self.reach = described.reach[described.mask]
         self.tokens = Tokens.of([task])
-        self.gains = position_gains(sized(body), standing(body).inertias)
+        self.gains = position_gains(size_body(body), measure_standing(body).inertias)
         self._positions = traced(self._traced, task.size)
 
     @property
@@ -93,14 +93,14 @@ class Universal:
 
     def _traced(self, vectors: Any) -> Any:
         """Write the nodes of positions (1, joints) for a traced observation (1, size)."""
-        seen = self.tokens.observed(self.tokens.gathered(vectors))
-        flat: Any = tokens.flat(seen, *self.descriptions)
-        return self.tokens.actions(repeated(self.network.graph, flat))  # type: ignore[arg-type]
+        seen = self.tokens.make_tokens(self.tokens.gather_inputs(vectors))
+        flat: Any = tokens.flatten_tokens(seen, *self.descriptions)
+        return self.tokens.body_actions(repeated(self.network.graph, flat))  # type: ignore[arg-type]
 
     def _traced_torques(self, vectors: Any) -> Any:
         """Write the nodes of torques (1, joints) for a traced observation (1, size)."""
-        _, _, *proprioceived, _, _, _ = self.tokens.parts(self.tokens.gathered(vectors))
-        angles, speeds = map(self.tokens.actions, proprioceived)
+        _, _, *proprioceived, _, _, _ = self.tokens.split_inputs(self.tokens.gather_inputs(vectors))
+        angles, speeds = map(self.tokens.body_actions, proprioceived)
         return torques(self.reach * self._traced(vectors), angles, speeds, *self.gains)
 
 

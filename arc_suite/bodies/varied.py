@@ -58,7 +58,7 @@ class _Shape(NamedTuple):
     profile: tuple[tuple[float, float], ...]
 
 
-def drawn(random: np.random.Generator) -> Body:
+def draw_varied_body(random: np.random.Generator) -> Body:
     """Draw a body, `varied`.
 
     Eight in ten are put together. The others are robots of the suite, mutated by 0.05 to 0.2 and 0.25 to 4 times as
@@ -107,10 +107,10 @@ def _made(random: np.random.Generator) -> Body:
     shapes = [_Shape(height, foot, float(each), profile) for each in reaches]
     fan = random.uniform(10.0, 50.0)
     if layout == "radial":
-        places = generator.around(legs, 0.8 * half_length, 0.8 * half_width)
+        places = generator.radial_mounts(legs, 0.8 * half_length, 0.8 * half_width)
         names = [f"leg{i + 1}" for i in range(legs)]
     else:
-        places = generator.left_side(count, 0.8 * half_length, 0.6 * half_width, fan)
+        places = generator.left_mounts(count, 0.8 * half_length, 0.6 * half_width, fan)
         names = [f"l{i + 1}" for i in range(count)]
     parts = zip(names, places, shapes, joints, strict=True)
     made = tuple(_leg(name, *place, shape, jointed) for name, place, shape, jointed in parts)

@@ -15,7 +15,7 @@ import contextlib
 from absl import flags
 
 from arc_suite import checks, files
-from arc_suite.importing import imported
+from arc_suite.importing import import_robot
 from arc_suite.robots.spec_files import body_to_json
 
 FLAGS = flags.FLAGS
@@ -34,7 +34,7 @@ def main(robot: str | None = None) -> None:
         if FLAGS.output is not None:
             checks.extension(FLAGS.output, [".json"])
             output_path = stack.enter_context(files.writing(FLAGS.output))
-        body, notes = imported(robot, FLAGS.home, feet)
+        body, notes = import_robot(robot, FLAGS.home, feet)
         if output_path is not None:
             output_path.write_text(body_to_json(body), encoding="utf-8")
     print(f"{robot}: {body.name}")

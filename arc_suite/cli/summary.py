@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.energy import torques
 
@@ -15,7 +15,7 @@ _STRONG_TORQUE = 50.0
 
 def body_summary(body: Body) -> str:
     """Return a table of a body's size, gait and flaws, as text of several lines."""
-    pose = standing(body)
+    pose = measure_standing(body)
     task = Setup.of(body).definition
     parameters = task.parameters
     link_counts = sorted({len(leg.joints) for leg in body.legs})
@@ -40,7 +40,7 @@ def body_summary(body: Body) -> str:
 
 def transport_footnote(bodies: Iterable[Body]) -> str:
     """Return the line under a table with costs of transport; "" if no body has strong motors."""
-    torque_by_name = {body.name: torques(body).max() / standing(body).height for body in bodies}
+    torque_by_name = {body.name: torques(body).max() / measure_standing(body).height for body in bodies}
     strong_bodies = [
         f"{name} ({torque:.0f} times weight times height)"
         for name, torque in torque_by_name.items()

@@ -80,8 +80,8 @@ class Balanced(Stepping):
         if feet is not None:
             places = np.array([feet[rank] for rank in body.ranks]) * self.pose.height
             places[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
-        legs = Legs.of(self.body, posture.USED)
-        return legs, places, legs.at_ease(places, np.eye(3), self._damping)
+        legs = Legs.of(self.body, posture.JOINT_RANGE_SHARE)
+        return legs, places, legs.relaxed_joint_angles(places, np.eye(3), self._damping)
 
     def balanced(self, motion, vertical, observation: Mapping) -> tuple:
         """Return the velocity that feet give, and shifts of footholds; see `Stepping`."""

@@ -9,8 +9,8 @@ import numpy as np
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import proprioception
-from arc_suite.models.sizing import sized
-from arc_suite.models.standing import posed
+from arc_suite.models.sizing import size_body
+from arc_suite.models.standing import pose_mechanics
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import velocity_units
 
@@ -85,8 +85,8 @@ class CommandLaw(ABC):
         Raises:
             ValueError: a gait without a cycle, or without stance or swing.
         """
-        gait, self.parameters, self.body = gait_of(task), parameters, sized(task.scene.body)
-        self.pose, self.step = posed(self.body, angles), task.scene.control_timestep
+        gait, self.parameters, self.body = gait_of(task), parameters, size_body(task.scene.body)
+        self.pose, self.step = pose_mechanics(self.body, angles), task.scene.control_timestep
         self.cycles, self.duty_factor = gait.frequency * self.step, gait.duty_factor
         self.smoothing, self.onset = min(1.0, self.cycles / _SMOOTHING), self.cycles / _ONSET
         self.stance, self.offsets = gait.duty_factor / gait.frequency, gait.offsets + parameters.lead

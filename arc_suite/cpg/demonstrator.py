@@ -12,7 +12,7 @@ from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import law, preset_of
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepare_task
-from arc_suite.models.soundness import hopeless
+from arc_suite.models.soundness import hopeless_flaws
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -58,7 +58,7 @@ class Demonstrator:
         if isinstance(preset, str) or preset is None:
             preset = preset_of(body, preset)
         # Presets of the published law were found for a body as it is.
-        if not isinstance(preset, Preset) and (found := hopeless(body)):
+        if not isinstance(preset, Preset) and (found := hopeless_flaws(body)):
             raise ValueError(f"{body.name} cannot walk: {found[0].text}")
         task = task or prepare_task(body, "walk")[0]
         self._body, self._lies, self.law = body, task.lies, law(task, preset)

@@ -165,7 +165,9 @@ class Leaping(Sighted):
         flying = self.places + numpy.stack([shifts, 0.0 * shifts, 0.0 * shifts], axis=-1) + offsets[now][:, None]
         feet = _where(step > made.stretched, flying, planted)
         aims = numpy.broadcast_to(leaps.aims(len(self.places)), (*feet.shape, 3))
-        angles = self.righted(self.legs.reached(before.angles, feet, aims, posture.DAMPING * height, _STEPS))
+        angles = self.righted(
+            self.legs.solve_joint_angles(before.angles, feet, aims, posture.IK_DAMPING * height, _STEPS)
+        )
         return {"feet": feet, "angles": angles, "shifts": 0.0 * shifts}
 
     def _driven(self, step):

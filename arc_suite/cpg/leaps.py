@@ -15,8 +15,8 @@ from arc_suite import rotations
 from arc_suite.cpg.drives import drive
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
-from arc_suite.models.sizing import GRAVITY, control_timestep, simulation, sized
-from arc_suite.models.standing import posed, stood
+from arc_suite.models.sizing import GRAVITY, control_timestep, simulation, size_body
+from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compiled
@@ -92,7 +92,7 @@ def movement(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> Movement:
     soles, weights = legs.soles(rest)[0], aims(len(rest))
 
     def reached(angles, offset):
-        return legs.reached(angles, soles + offset * height, weights, posture.DAMPING * height, _ROUNDS)
+        return legs.solve_joint_angles(angles, soles + offset * height, weights, posture.IK_DAMPING * height, _ROUNDS)
 
     crouched = reached(rest, low)
     stretched = reached(crouched, np.array((-leap.forward, 0.0, -_UP)))
@@ -113,7 +113,9 @@ def keyframes(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> np.ndarra
     """Return the targets (steps, joints) of joints in the control steps of a leap from a pose (legs, links), rad."""
     made, soles, height = movement(body, legs, rest, leap), legs.soles(rest)[0], body.torso.standing_height
     goals = soles + made.offsets[:, None]
-    angles = legs.reached(np.tile(rest, (len(goals), 1, 1)), goals, aims(len(rest)), posture.DAMPING * height, _ROUNDS)
+    angles = legs.solve_joint_angles(
+        np.tile(rest, (len(goals), 1, 1)), goals, aims(len(rest)), posture.IK_DAMPING * height, _ROUNDS
+    )
     stretch = slice(made.crouched, made.stretched)
     angles[stretch] += made.driven
     return legs.by_joint(angles)
@@ -148,19 +150,19 @@ def flights(body: Body, rest: np.ndarray, angles: np.ndarray, crouched: Sequence
         angles: (leaps, steps, joints) targets by control step, rad; the last one is held.
         crouched: control step of each at which its crouch ends.
     """
-    body = sized(body)
+    body = size_body(body)
     places, tilts, soles = _simulated(body, rest, angles)
     return [_measured(body, *each, control_timestep(body)) for each in zip(places, tilts, soles, crouched, strict=True)]
 
 
 def _simulated(body: Body, rest: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places of torsos (leaps, steps, 3) and of soles (leaps, steps, legs, 3), m, and cosines of tilts between."""
-    model, pose, count = compiled(body), posed(body, rest), len(rest)
+    model, pose, count = compiled(body), pose_mechanics(body, rest), len(rest)
     layout, driven = readings.layout(model, body), drive(body, pose.inertias)
     batch = Batch(model, len(angles), 1)
     data, every = batch.data, np.ones(len(angles), bool)
     start = np.concatenate([(0.0, 0.0, -pose.soles[:, 2].min(), 1.0, 0.0, 0.0, 0.0), rest])
-    qpos = np.tile(readings.positions(start, layout, stood(model)), (len(angles), 1))
+    qpos = np.tile(readings.positions(start, layout, standing_qpos(model)), (len(angles), 1))
     batch.reset(every, qpos, np.zeros_like(data.qvel))
     radii, found = np.array([leg.foot.radius for leg in body.legs])[:, None] * (0.0, 0.0, 1.0), []
     for target, later in zip(angles.swapaxes(0, 1)[:-1], angles.swapaxes(0, 1)[1:], strict=True):
@@ -200,7 +202,7 @@ def best(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure:
         choice: leaps to try.
         measure: `distance` or `clearance`.
     """
-    legs = Legs.of(sized(body))
+    legs = Legs.of(size_body(body))
     angles = legs.by_leg(np.array(rest))
     made = [keyframes(body, legs, angles, leap) for leap in choice]
     longest = max(map(len, made))

@@ -14,7 +14,7 @@ from arc_suite import rotations
 from arc_suite.cpg import footholds
 from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.models import posture
-from arc_suite.models.kinematics import Legs, flows, rises, weights
+from arc_suite.models.kinematics import Legs, path_weights, point_velocities, tilt_heights
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.sensors import SCAN
@@ -90,7 +90,7 @@ class Sighted(CommandLaw):
         self.duty_factor -= parameters.longer
         self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.pose.height
         soles = np.where((True, True, False), self.pose.soles, -ride)
-        angles = self.legs.at_ease(soles, np.diag((0.2, 0.2, 1.0)), posture.DAMPING * ride)
+        angles = self.legs.relaxed_joint_angles(soles, np.diag((0.2, 0.2, 1.0)), posture.IK_DAMPING * ride)
         self.places = self.legs.soles(angles)[0]
         scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
         self._first = Paths(self.places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
@@ -107,8 +107,10 @@ class Sighted(CommandLaw):
         cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0  # in the next control step
         predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
         feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
-        aims = weights(flows(motion, feet), _ACROSS)
-        angles = self.righted(self.legs.reached(paths.angles, feet, aims, posture.DAMPING * height, _STEPS))
+        aims = path_weights(point_velocities(motion, feet), _ACROSS)
+        angles = self.righted(
+            self.legs.solve_joint_angles(paths.angles, feet, aims, posture.IK_DAMPING * height, _STEPS)
+        )
         targets = self.legs.by_joint(paths.angles)
         change = self.legs.by_joint(angles) - targets
         return paths._replace(feet=feet, angles=angles, shifts=shifts), targets, change
@@ -148,14 +150,16 @@ class Sighted(CommandLaw):
         feet, stands = paths.feet, cycle < duty
         left = numpy.where(stands, 0.0, (1.0 - cycle) / self.cycles)  # control steps from then to landing
         early = numpy.minimum(left, _EARLY)
-        drift = flows(predicted, self.places) * self.step  # of the torso over the ground, a control step
+        drift = point_velocities(predicted, self.places) * self.step  # of the torso over the ground, a control step
         held = stands | (left + 1.0 < _HELD / self.cycles)
         goal, shifts = self._landing(paths, motion, drift * (left + 1.0)[..., None], held)
         goal = goal + drift * early[..., None]
         swung = feet[..., :2] + (goal - feet[..., :2]) / (numpy.floor(left - early) + 1.0)[..., None]
         stood = (cycle / self.cycles).clip(max=1.0)[..., None]  # control steps, at most the latest
-        stood = feet[..., :2] - flows(motion, feet) * self.step * stood
-        tilt = rises(rotations.matrix(quaternion)[:, 2], self.places)  # by the world's vertical in the torso's frame
+        stood = feet[..., :2] - point_velocities(motion, feet) * self.step * stood
+        tilt = tilt_heights(
+            rotations.matrix(quaternion)[:, 2], self.places
+        )  # by the world's vertical in the torso's frame
         progress = ((cycle - duty) / (1.0 - duty)).clip(0.0)
         lift = size * self.parameters.lift * self.pose.height * numpy.sin(np.pi * progress)
         heights = self.places[:, 2] + lift + self.parameters.attitude * tilt
@@ -172,7 +176,7 @@ class Sighted(CommandLaw):
             held: (environments, legs) whether the last choice stays.
         """
         numpy = motion.__array_namespace__()
-        half = 0.5 * self.stance * flows(motion, self.places)
+        half = 0.5 * self.stance * point_velocities(motion, self.places)
         along = half / numpy.maximum(numpy.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
         landing, view = self.places[:, :2] + half, footholds.View(paths.heights, paths.moved, self._reach)
         near, height = self.places[:, :2], self.pose.height

@@ -14,10 +14,10 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
-from arc_suite.models.kinematics import damped_changes, flows, rises, weights
-from arc_suite.models.sizing import sized
-from arc_suite.models.standing import posed
-from arc_suite.models.stride import lifted, swung
+from arc_suite.models.kinematics import damped_changes, path_weights, point_velocities, tilt_heights
+from arc_suite.models.sizing import size_body
+from arc_suite.models.standing import pose_mechanics
+from arc_suite.models.stride import cycle_angles, lift_angles
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -79,7 +79,7 @@ class Steered(CommandLaw):
 
     def __init__(self, task: Task, parameters: SteeringParameters):
         """Fit the law to a task; see `CommandLaw`."""
-        body = sized(task.scene.body)
+        body = size_body(task.scene.body)
         self.neutral = _neutral(body, parameters.share)
         super().__init__(task, parameters, tuple(self.neutral))
         self.legs = list(self._legs())
@@ -93,9 +93,9 @@ class Steered(CommandLaw):
     def planned(self, none: tuple, request: Request, observation: Mapping) -> tuple:
         """Return the target angles (environments, joints), rad, and their change in a step; see `CommandLaw`."""
         numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
-        paths = 0.5 * self.stance * flows(request.motion * self.units, self.feet)
+        paths = 0.5 * self.stance * point_velocities(request.motion * self.units, self.feet)
         # The low side of the torso is pushed up: its feet go down.
-        lows = -rises(rotations.matrix(quaternion)[:, 2], self.feet) / self.pose.height
+        lows = -tilt_heights(rotations.matrix(quaternion)[:, 2], self.feet) / self.pose.height
         unload = self.parameters.unload / self.parameters.lift
         now, later = [], []
         for index, leg in enumerate(self.legs):
@@ -104,7 +104,7 @@ class Steered(CommandLaw):
             raised = ((1.0 - able) * unload - self.parameters.attitude * low) * leg.lift
             for targets, phase in ((now, request.phase), (later, request.phase + request.advance)):
                 cycle = (phase + self.offsets[index]) % 1.0
-                targets.append(raised + swung(cycle[:, None], self.duty_factor, sweep, leg.lift))
+                targets.append(raised + cycle_angles(cycle[:, None], self.duty_factor, sweep, leg.lift))
         now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
         return none, self.neutral + now, later - now
 
@@ -116,7 +116,7 @@ class Steered(CommandLaw):
             first = joints.stop
             below, above = -0.95 * low[joints], 0.95 * high[joints]
             room = np.minimum(np.minimum(below, above), self.parameters.sweep).clip(1e-3)
-            yield _Leg(jacobian, room, lifted(jacobian, self.parameters.lift * self.pose.height, below, above))
+            yield _Leg(jacobian, room, lift_angles(jacobian, self.parameters.lift * self.pose.height, below, above))
 
 
 def _sweep(leg: _Leg, path, level: float):
@@ -125,7 +125,7 @@ def _sweep(leg: _Leg, path, level: float):
     numpy = path.__array_namespace__()
     length = numpy.hypot(path[:, 0], path[:, 1])[:, None]
     along = path / numpy.maximum(length, 1e-9)
-    weighted = weights(path, _ACROSS, level) @ leg.jacobian
+    weighted = path_weights(path, _ACROSS, level) @ leg.jacobian
     damping = np.diag(_damping(leg))
     turned = weighted.swapaxes(-1, -2)
     angles = damped_changes(weighted, turned[..., :1] * length[..., None], damping)[..., 0]
@@ -154,7 +154,7 @@ def _neutral(body: Body, share: float) -> np.ndarray:
     low, high = low + share * (high - low), high - share * (high - low)
     angles = np.zeros_like(low).clip(low, high)
     for _ in range(50):
-        pose, first = posed(body, angles), 0
+        pose, first = pose_mechanics(body, angles), 0
         aim = np.median(pose.soles[:, 2])
         for leg, jacobian, sole in zip(body.legs, pose.jacobians, pose.soles, strict=True):
             last, rise = first + len(leg.joints), jacobian[2]

@@ -15,7 +15,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.models import posture
-from arc_suite.models.kinematics import Legs, flows, rises, weights
+from arc_suite.models.kinematics import Legs, path_weights, point_velocities, tilt_heights
 from arc_suite.models.standing import GRAVITY
 from arc_suite.tasks.contract import Task
 
@@ -60,7 +60,7 @@ class Stepping(CommandLaw):
         most: largest request, in units of the command.
     """
 
-    across, shorter, attitude, damping, most = 1.0, 0.0, 0.0, posture.DAMPING, np.inf
+    across, shorter, attitude, damping, most = 1.0, 0.0, 0.0, posture.IK_DAMPING, np.inf
 
     def __init__(self, task: Task, parameters):
         """Fit the law to a task; see `CommandLaw`."""
@@ -69,7 +69,10 @@ class Stepping(CommandLaw):
         # In place of an integral; with both, gaits are disturbed.
         self.proportional = 0.0 if parameters.integral else min(1.0, parameters.gain[0])
         if self.directed:
-            self.reads, self._rest = (*self.reads, *task.gait_and_pose.observed), posture.rest(task.scene.body)
+            self.reads, self._rest = (
+                (*self.reads, *task.gait_and_pose.observed),
+                posture.find_rest_pose(task.scene.body),
+            )
         self._damping, self.lift = self.damping * self.pose.height, parameters.lift * self.pose.height
         self.legs, self.places, self.angles = self._eased(task)
 
@@ -87,15 +90,15 @@ class Stepping(CommandLaw):
         cycle, duty, stance = self._timing(request, observation)
         pose = observation["pose"] if self.directed else None
         # Balance is about the attitude that is asked for.
-        tilted = vertical if pose is None else (posture.attitude(pose[:, 3:]) @ vertical[..., None])[..., 0]
+        tilted = vertical if pose is None else (posture.rotation_of(pose[:, 3:]) @ vertical[..., None])[..., 0]
         motion, shift = self.balanced(request.motion, tilted, observation)
         feet = self.next_feet(cycle, motion, shift, request.size, tilted, duty, stance)
         off = paths.off
         if pose is not None:
             off, pose = self._corrected(off, pose, observation["posture"][:, 0], vertical)
-            feet = posture.moved(feet, pose, self.pose.height)
-        aims = weights(flows(motion, self.places), self.across)
-        angles = self.legs.reached(paths.angles, feet, aims, self._damping, _STEPS)
+            feet = posture.move_ground_points(feet, pose, self.pose.height)
+        aims = path_weights(point_velocities(motion, self.places), self.across)
+        angles = self.legs.solve_joint_angles(paths.angles, feet, aims, self._damping, _STEPS)
         targets = self.legs.by_joint(paths.angles)
         return Paths(angles, off), targets, self.legs.by_joint(angles) - targets
 
@@ -125,7 +128,8 @@ class Stepping(CommandLaw):
         """The integral of the error of a pose (environments, 6), and the pose that makes up for both."""
         numpy, p = pose.__array_namespace__(), self.parameters
         shown = numpy.concatenate(
-            [(height / self.pose.height - self._rest.ride)[:, None], posture.tilt(vertical)], axis=-1
+            [(height / self.pose.height - self._rest.ride_height)[:, None], posture.roll_and_pitch_of(vertical)],
+            axis=-1,
         )
         error = (pose[:, _FEEDBACK] - shown).clip(-_LARGEST, _LARGEST)
         off = (off + p.integral * self.cycles * error).clip(-_MOST_OFF, _MOST_OFF)
@@ -147,10 +151,10 @@ class Stepping(CommandLaw):
         numpy = cycle.__array_namespace__()
         stands, swung = cycle < duty, ((cycle - duty) / (1.0 - duty)).clip(0.0)
         along = numpy.where(stands, 1.0 - 2.0 * cycle / duty, 2.0 * swung - 1.0)[..., None]  # from 1 to -1 in stance
-        half = 0.5 * stance * flows(motion, self.places)
+        half = 0.5 * stance * point_velocities(motion, self.places)
         ground = self.places[:, :2] + size[..., None] * (along * half + self._kept(along) * shift[:, None])
         lift = self.lift * numpy.sin(np.pi * swung)
-        heights = self.places[:, 2] + size * (lift + self.attitude * rises(vertical, self.places))
+        heights = self.places[:, 2] + size * (lift + self.attitude * tilt_heights(vertical, self.places))
         return numpy.concatenate([ground, heights[..., None]], axis=-1)
 
     def _kept(self, along):
@@ -166,7 +170,7 @@ class Directed(Stepping):
     most = 2.0  # of a request, in units of the command: feedback on a body that cannot go on would throw it
 
     def _eased(self, task: Task) -> tuple:
-        return self._rest.legs, self._rest.places, self._rest.angles
+        return self._rest.legs, self._rest.sole_positions, self._rest.joint_angles
 
     def constants(self) -> dict:
         """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
@@ -184,7 +188,7 @@ class Directed(Stepping):
             "onset": self.onset,
             "lead": p.lead,
             "height": self.pose.height,
-            "ride": self._rest.ride,
+            "ride": self._rest.ride_height,
             "lift": self.lift,
             "across": self.across,
             "damping_of_feet": self._damping,

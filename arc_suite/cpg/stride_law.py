@@ -15,9 +15,9 @@ from arc_suite import checks, rotations
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import Drive, Pattern, joint_targets, proprioception
-from arc_suite.models.sizing import sized
-from arc_suite.models.standing import GRAVITY, standing
-from arc_suite.models.stride import LIFT, strokes
+from arc_suite.models.sizing import size_body
+from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.stride import FOOT_LIFT, strokes
 from arc_suite.tasks.contract import Task
 
 _LEAST_FROUDE = 1e-3
@@ -73,8 +73,8 @@ class Stride(NamedTuple):
                 f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {checks.preview(froude)}"
             )
         body, gait = task.scene.body, gait_of(task)
-        pose = standing(body)  # of the body as it came, for which the task has it at hand
-        body = sized(body)
+        pose = measure_standing(body)  # of the body as it came, for which the task has it at hand
+        body = size_body(body)
         speed = gait.pace * froude * math.sqrt(GRAVITY * pose.height)
         # A foot on the ground covers from +reach to -reach while its stance lasts.
         reach = 0.5 * speed * gait.duty_factor / gait.frequency or 1e-6 * pose.height
@@ -82,7 +82,7 @@ class Stride(NamedTuple):
         moves, raised = strokes(task.scene.body, reach), []
         for jacobian, (sweep, lift) in zip(pose.jacobians, moves, strict=True):
             able = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)
-            raised.append((1.0 - able) * UNLOAD / LIFT * lift)
+            raised.append((1.0 - able) * UNLOAD / FOOT_LIFT * lift)
         sweeps, lifts = map(np.concatenate, zip(*moves, strict=True))
         lateral = pose.soles[:, 1] / max(abs(pose.soles[:, 1]).max(), 1e-9)
         return cls(

@@ -9,7 +9,7 @@ import mujoco
 
 from arc_suite import checks, registry
 from arc_suite.models.sizing import simulation
-from arc_suite.models.standing import stood
+from arc_suite.models.standing import standing_qpos
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import modified_task, parameters
 from arc_suite.tasks.contract import STEPS, Task
@@ -51,7 +51,7 @@ def prepare_task(
         body=body,
         arena=arena,
         layout=layout(model, body),
-        standing=stood(model),
+        standing=standing_qpos(model),
         control_timestep=control_timestep,
         substeps=substeps,
         model={name: getattr(model, name).copy() for name in CHANGEABLE},

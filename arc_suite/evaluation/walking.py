@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.models.stride import LEAST_SHARE
+from arc_suite.models.stride import MIN_SPEED_SHARE
 from arc_suite.tasks import Task
 
 MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
@@ -130,7 +130,7 @@ def has_fallen(terminated, quaternions):
 
 def is_slow(speed: float) -> bool:
     """Return whether a speed, as a share of the target's, is too low for a walk."""
-    return not speed >= LEAST_SHARE  # true of NaN
+    return not speed >= MIN_SPEED_SHARE  # true of NaN
 
 
 def target(task: Task, blocks: Mapping[str, np.ndarray], place: np.ndarray) -> np.ndarray:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.importing import motors, notes, opening, poses, sketch, tree, urdf, writing
-from arc_suite.importing.naming import clean, names_of
-from arc_suite.importing.opening import Opened
+from arc_suite.importing.naming import choose_names, clean_name
+from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
 from arc_suite.importing.tree import Robot
 from arc_suite.robots import ROBOTS, sources
@@ -27,7 +27,7 @@ _MASSES = (1e-6, 1e9)  # kg
 _UNNAMED = "MuJoCo Model"  # of MJCF without a name
 
 
-class Imported(NamedTuple):
+class ImportedRobot(NamedTuple):
     """A robot of others.
 
     Attributes:
@@ -39,7 +39,7 @@ class Imported(NamedTuple):
     notes: tuple[str, ...]
 
 
-def imported(path: str | os.PathLike, home: str | None = None, feet: Sequence[str] = ()) -> Imported:
+def import_robot(path: str | os.PathLike, home: str | None = None, feet: Sequence[str] = ()) -> ImportedRobot:
     """Return the legged robot of an MJCF or URDF file.
 
     Args:
@@ -72,39 +72,39 @@ def body_of(path: str | os.PathLike) -> Body:
 
 @functools.lru_cache(maxsize=64)
 def _body(path: str, _content: bytes) -> Body:
-    return imported(path).body
+    return import_robot(path).body
 
 
-def _imported(path: Path, home: str | None, feet: Sequence[str]) -> Imported:
+def _imported(path: Path, home: str | None, feet: Sequence[str]) -> ImportedRobot:
     file, robot, stance = _standing(path, home, feet)
     _check_world(robot)
     _check_hinges(robot, stance)
-    names = names_of(robot, stance.legs)
-    driven = motors.motors_of(robot, stance)
+    names = choose_names(robot, stance.legs)
+    driven = motors.find_motors(robot, stance)
     order = _order(robot, stance, file.order)
     body = Body(
         name=_name(robot, path),
-        torso=sketch.torso(robot, stance),
-        legs=sketch.legs(robot, stance, names, driven.servos),
-        camera=sketch.camera(stance),
+        torso=sketch.sketch_torso(robot, stance),
+        legs=sketch.sketch_legs(robot, stance, names, driven.servos),
+        camera=sketch.sketch_camera(stance),
         simulation=_simulation(float(robot.model.opt.timestep)),
-        source=writing.source(robot, stance, names, file.meshes),
+        source=writing.write_source(robot, stance, names, file.meshes),
         held=tuple(Held(name=names.joints[joint], servo=driven.servos[joint]) for joint in names.held),
         file_joints=tuple(robot.name(joint) for joint in order),
     )
-    told = notes.notes(robot, stance, names, order)
-    return Imported(
-        sources.check(body), (*told, *driven.notes, *file.notes, *notes.left_out(file, robot, stance, names))
+    told = notes.import_notes(robot, stance, names, order)
+    return ImportedRobot(
+        sources.check(body), (*told, *driven.notes, *file.notes, *notes.omission_notes(file, robot, stance, names))
     )
 
 
-def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[Opened, Robot, Stance]:
+def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[RobotFile, Robot, Stance]:
     """Return the robot of a file as it stands; a URDF in which it does not may have another axis that points up."""
 
-    def tried(turn: str) -> tuple[Opened, Robot, Stance]:
-        file = opening.opened(path, turn)
+    def tried(turn: str) -> tuple[RobotFile, Robot, Stance]:
+        file = opening.open_robot(path, turn)
         robot = tree.robot_of(file.model, file.root, file.notes)
-        return file, robot, poses.stance(robot, home, feet)
+        return file, robot, poses.find_stance(robot, home, feet)
 
     try:
         return tried(urdf.LEVEL)
@@ -137,7 +137,7 @@ def _check_hinges(robot: Robot, stance: Stance) -> None:
 def _name(robot: Robot, path: Path) -> str:
     """Return the model's name, or that of the file, cleaned; a robot's own would give the body its numbers."""
     given = robot.model.names[: robot.model.names.index(b"\0")].decode("utf-8", "replace")
-    name = clean("" if given == _UNNAMED else given) or clean(path.stem) or "robot"
+    name = clean_name("" if given == _UNNAMED else given) or clean_name(path.stem) or "robot"
     return f"{name[: MAX_NAME - 9]}_imported" if name in ROBOTS else name
 
 
@@ -154,5 +154,5 @@ def _order(robot: Robot, stance: Stance, given: tuple[str, ...]) -> list[int]:
     """Return the joints of the legs in the order of the file: of its actuators, or of its joints."""
     legs = stance.joints
     named = {robot.name(joint): joint for joint in robot.joints}
-    orders = (motors.actuated(robot), [named[name] for name in given if name in named], robot.joints)
+    orders = (motors.actuated_joints(robot), [named[name] for name in given if name in named], robot.joints)
     return next([joint for joint in order if joint in legs] for order in orders if set(legs) <= set(order))

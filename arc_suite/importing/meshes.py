@@ -11,7 +11,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.importing.tree import colliding, vertices
+from arc_suite.importing.tree import colliding_geoms, vertices
 from arc_suite.robots.spec import MAX_SOURCE
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
@@ -51,7 +51,7 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
         spec: of the file; nothing of it is changed.
         model: compiled from it.
     """
-    geoms = [geom for geom in colliding(model) if model.geom_type[geom] == _MESH]
+    geoms = [geom for geom in colliding_geoms(model) if model.geom_type[geom] == _MESH]
     if not geoms:
         return {}
     names = {geom: model.mesh(int(model.geom_dataid[geom])).name for geom in geoms}

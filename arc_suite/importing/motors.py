@@ -41,7 +41,7 @@ class Motors(NamedTuple):
     notes: tuple[str, ...]
 
 
-def motors_of(robot: Robot, stance: Stance) -> Motors:
+def find_motors(robot: Robot, stance: Stance) -> Motors:
     """Return the servos of a robot's joints."""
     inertias, loads = _mechanics(robot, stance)
     given, limits = dict(_gains(robot)), _limits(robot)
@@ -110,12 +110,12 @@ def _driven(robot: Robot) -> Iterator[tuple[int, int, float]]:
             yield actuator, joint, abs(float(model.actuator_gear[actuator, 0]))
 
 
-def actuated(robot: Robot) -> list[int]:
+def actuated_joints(robot: Robot) -> list[int]:
     """Return the joints that actuators drive, in their order."""
     return list(dict.fromkeys(joint for _, joint, _ in _driven(robot)))
 
 
-def count(robot: Robot) -> int:
+def count_joint_actuators(robot: Robot) -> int:
     """Return how many actuators drive a joint of the robot."""
     return sum(1 for _ in _driven(robot))
 

@@ -26,7 +26,7 @@ class Names(NamedTuple):
     held: tuple[int, ...]
 
 
-def names_of(robot: Robot, legs: tuple[Leg, ...]) -> Names:
+def choose_names(robot: Robot, legs: tuple[Leg, ...]) -> Names:
     """Return the names of a robot's parts; a body with several joints of a leg has the name of its last link."""
     labels, joints, bodies = _leg_names(legs), {}, {robot.root: "torso"}
     for label, leg in zip(labels, legs, strict=True):
@@ -61,14 +61,14 @@ def _leg_names(legs: tuple[Leg, ...]) -> tuple[str, ...]:
     return tuple(f"leg{place}" for place in range(1, len(legs) + 1))  # two feet are equally far in front
 
 
-def clean(text: str) -> str:
+def clean_name(text: str) -> str:
     """Return a name out of [a-z0-9_], at most as long as names are; "" where nothing of it is left."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")[:MAX_NAME].strip("_")
 
 
 def _unique(text: str, kind: str, taken: set[str]) -> str:
     """Return a clean name that is not taken, and take it."""
-    base = clean(text) or kind
+    base = clean_name(text) or kind
     name, count = base, 1
     while name in taken:
         count += 1

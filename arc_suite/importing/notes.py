@@ -6,13 +6,13 @@ import numpy as np
 
 from arc_suite.importing import motors
 from arc_suite.importing.naming import Names
-from arc_suite.importing.opening import Opened
+from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
 from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import GRAVITY
 
 
-def notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int]) -> Iterator[str]:
+def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int]) -> Iterator[str]:
     """Yield the legs, the map of the joints, and the standing pose.
 
     Args:
@@ -31,7 +31,7 @@ def notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int]) -> I
     yield f"standing pose: {stance.origin}, torso {stance.height:.3g} m above the floor"
 
 
-def left_out(file: Opened, robot: Robot, stance: Stance, names: Names) -> Iterator[str]:
+def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) -> Iterator[str]:
     """Yield what does not come in, or not as it is in the file."""
     model = file.model
     others = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody)) - 1
@@ -44,7 +44,7 @@ def left_out(file: Opened, robot: Robot, stance: Stance, names: Names) -> Iterat
     counts = {
         "tendons": model.ntendon,
         "equality constraints": model.neq,
-        "actuators that are no motors of single joints": model.nu - motors.count(robot),
+        "actuators that are no motors of single joints": model.nu - motors.count_joint_actuators(robot),
         "shapes in a fluid": int(swims * (model.geom_fluid[:, 0] > 0.0).sum()),
         "sensors": model.nsensor,
         "other bodies in the world": others,

@@ -21,7 +21,7 @@ _LINE = re.compile(r",? line \d+")
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
 
 
-class Opened(NamedTuple):
+class RobotFile(NamedTuple):
     """A robot's file.
 
     Attributes:
@@ -39,7 +39,7 @@ class Opened(NamedTuple):
     notes: tuple[str, ...]
 
 
-def opened(path: Path, turn: str = urdf.LEVEL) -> Opened:
+def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
     """Return the robot of an MJCF or a URDF file.
 
     Args:
@@ -54,7 +54,7 @@ def opened(path: Path, turn: str = urdf.LEVEL) -> Opened:
     spec, order, notes = _read(path, element, turn)
     model, left_out = _compiled(spec)
     model, root, freed = _freed(spec, model)
-    return Opened(model, root, meshes_of(spec, model), order, (*notes, *left_out, *freed))
+    return RobotFile(model, root, meshes_of(spec, model), order, (*notes, *left_out, *freed))
 
 
 def content(path: Path) -> bytes:
@@ -92,7 +92,7 @@ def _read(
 ) -> tuple[mujoco.MjSpec, tuple[str, ...], tuple[str, ...]]:
     """Return the file as a spec that is not compiled, its joints in its order, and notes."""
     if element.tag == "robot":
-        cured, order, notes = urdf.cured(element, path.parent, turn)
+        cured, order, notes = urdf.repair_urdf(element, path.parent, turn)
         return _said(lambda: mujoco.MjSpec.from_string(cured), lines=False), order, notes
     spec = _said(lambda: mujoco.MjSpec.from_file(str(path)))
     _drop_looks(spec)

@@ -90,7 +90,7 @@ class _Unfit(Exception):
     """A pose in which the robot does not stand; the message says why."""
 
 
-def stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
+def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
     """Return the pose in which a robot stands.
 
     The first of keyframes, zero angles, a search for bent knees, and the middles of the ranges in which all feet
@@ -204,7 +204,7 @@ def _standing(
         raise _Unfit(f"joint {robot.name(outside[0])} is out of its range")
     data = robot.placed(qpos)
     named, ends = bool(ends), ends or _ends(robot)
-    found = {chain: tree.lowest(robot, data, geoms) for chain, geoms in ends.items() if chain}
+    found = {chain: tree.lowest_point(robot, data, geoms) for chain, geoms in ends.items() if chain}
     if not found:
         raise _Unfit("no chain of joints ends in a collider")
     height = -min(point[2] for point, _ in found.values())
@@ -254,19 +254,19 @@ def _is_wheel(robot: Robot, data: mujoco.MjData, joint: int, point: np.ndarray, 
 def _sole(robot: Robot, data: mujoco.MjData, geoms: Sequence[int], height: float) -> tuple[np.ndarray, float]:
     """Return the middle of what touches the floor (3,), and the radius of a ball in its place."""
     model = robot.model
-    point, geom = tree.lowest(robot, data, geoms)
-    touching = [each for each in geoms if tree.lowest(robot, data, [each])[0][2] < point[2] + _LEVEL * height]
+    point, geom = tree.lowest_point(robot, data, geoms)
+    touching = [each for each in geoms if tree.lowest_point(robot, data, [each])[0][2] < point[2] + _LEVEL * height]
     kind, radius = model.geom_type[geom], float(model.geom_size[geom][0])
     if kind == _BALLS[0] and len(touching) == 1:
         return point, radius
     around = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     tilts = np.stack((_TILT * np.cos(around), _TILT * np.sin(around), np.full(16, -1.0)), axis=1)
     tilts /= np.linalg.norm(tilts, axis=1, keepdims=True)
-    felt = np.array([tree.support(model, data, each, tilt) for tilt in tilts for each in touching])
+    felt = np.array([tree.support_point(model, data, each, tilt) for tilt in tilts for each in touching])
     middle = np.array((*(0.5 * (felt[:, :2].max(axis=0) + felt[:, :2].min(axis=0))), point[2]))
     if kind in _BALLS:
         return middle, radius
-    half = 0.5 * (tree.support(model, data, geom, -tree.DOWN)[2] - point[2])
+    half = 0.5 * (tree.support_point(model, data, geom, -tree.DOWN)[2] - point[2])
     return middle, float(min(half, _SOLE * height))
 
 
@@ -285,7 +285,7 @@ def _check_torso(robot: Robot, data: mujoco.MjData, legs: tuple[Leg, ...], heigh
     own = {joint for leg in legs for joint in leg.joints}
     chains = {geom: robot.chains[int(robot.model.geom_bodyid[geom])] for geom in robot.colliders}
     rest = [geom for geom, chain in chains.items() if not own.intersection(chain)]
-    if rest and tree.lowest(robot, data, rest)[0][2] < -height:
+    if rest and tree.lowest_point(robot, data, rest)[0][2] < -height:
         raise _Unfit("the torso is lower than the feet")
     margin = stability_margin(data.subtree_com[robot.root], [leg.sole for leg in legs])
     if margin < (_LEAST_MARGIN if len(legs) > 2 else -_OFF) * height:
@@ -313,7 +313,7 @@ def _searched(robot: Robot, ends: dict, front: int, rear: int) -> np.ndarray | N
     """
     zero = robot.clipped(robot.model.qpos0 * 0.0)
     data = robot.placed(zero)
-    lows = {chain: tree.lowest(robot, data, geoms) for chain, geoms in ends.items() if len(chain) > 1}
+    lows = {chain: tree.lowest_point(robot, data, geoms) for chain, geoms in ends.items() if len(chain) > 1}
     deepest = min((point[2] for point, _ in lows.values()), default=0.0)
     qpos = _middle(robot)
     for chain, (point, geom) in lows.items():

@@ -18,7 +18,7 @@ _CAMERA = np.array((0.0, -4.0, 1.6))  # by the larger of height and span; that o
 _ROUND = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 
 
-def legs(robot: Robot, stance: Stance, names: Names, servos: dict[int, Servo]) -> tuple[spec.Leg, ...]:
+def sketch_legs(robot: Robot, stance: Stance, names: Names, servos: dict[int, Servo]) -> tuple[spec.Leg, ...]:
     """Return the legs of the spec, in the order of the file."""
     data = robot.placed(stance.qpos)
     return tuple(
@@ -73,13 +73,13 @@ def _radius(robot: Robot, leg: Leg, joint: int) -> float:
     return min((float(model.geom_size[geom][0]) for geom in own), default=_SHARE * leg.radius)
 
 
-def torso(robot: Robot, stance: Stance) -> Torso:
+def sketch_torso(robot: Robot, stance: Stance) -> Torso:
     """Return the torso: one box around its colliders, or around the mounts of its legs if it has none."""
     data = robot.placed(stance.qpos)
     own = [geom for geom in robot.colliders if not robot.chains[int(robot.model.geom_bodyid[geom])]]
     axes = np.eye(3)
-    far = [np.diag([tree.support(robot.model, data, geom, axis) @ axes for axis in axes]) for geom in own]
-    near = [np.diag([tree.support(robot.model, data, geom, -axis) @ axes for axis in axes]) for geom in own]
+    far = [np.diag([tree.support_point(robot.model, data, geom, axis) @ axes for axis in axes]) for geom in own]
+    near = [np.diag([tree.support_point(robot.model, data, geom, -axis) @ axes for axis in axes]) for geom in own]
     mounts = [data.xanchor[leg.joints[0]] for leg in stance.legs]
     high, low = np.max(far or mounts, axis=0), np.min(near or mounts, axis=0)
     half = np.maximum(0.5 * (high - low), 0.05 * stance.height)
@@ -87,7 +87,7 @@ def torso(robot: Robot, stance: Stance) -> Torso:
     return Torso(standing_height=stance.height, solids=(trunk,))
 
 
-def camera(stance: Stance) -> TrackingCamera:
+def sketch_camera(stance: Stance) -> TrackingCamera:
     """Return a camera from which all feet are seen."""
     size = max(*(abs(leg.center[:2]).max() for leg in stance.legs), stance.height)
     return TrackingCamera(position=_floats(size * _CAMERA))

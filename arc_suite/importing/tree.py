@@ -83,7 +83,7 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
             first = int(model.body_jntadr[body])
             chains[body] = (*chains[parent], *range(first, first + int(model.body_jntnum[body])))
     joints = tuple(sorted({joint for chain in chains.values() for joint in chain}))
-    colliders = tuple(geom for geom in colliding(model) if int(model.geom_bodyid[geom]) in chains)
+    colliders = tuple(geom for geom in colliding_geoms(model) if int(model.geom_bodyid[geom]) in chains)
     robot = Robot(model, root, tuple(chains), joints, colliders, chains)
     balls = [robot.name(joint) for joint in joints if model.jnt_type[joint] == BALL]
     if balls:
@@ -93,14 +93,14 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
     return robot
 
 
-def colliding(model: mujoco.MjModel) -> list[int]:
+def colliding_geoms(model: mujoco.MjModel) -> list[int]:
     """Return the geoms that can touch others: by their masks, or as one of a contact pair."""
     touches = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     touches[[*model.pair_geom1, *model.pair_geom2]] = True
     return np.flatnonzero(touches).tolist()
 
 
-def support(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> np.ndarray:
+def support_point(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> np.ndarray:
     """Return the farthest point (3,) of a geom along a direction (3,), in the world."""
     turn, size = data.geom_xmat[geom].reshape(3, 3), model.geom_size[geom]
     along = turn.T @ direction
@@ -135,7 +135,7 @@ def vertices(model: mujoco.MjModel, mesh: int) -> np.ndarray:
     return model.mesh_vert[start : start + model.mesh_vertnum[mesh]]
 
 
-def lowest(robot: Robot, data: mujoco.MjData, geoms: Sequence[int]) -> tuple[np.ndarray, int]:
+def lowest_point(robot: Robot, data: mujoco.MjData, geoms: Sequence[int]) -> tuple[np.ndarray, int]:
     """Return the lowest point (3,) of geoms, and the one that has it."""
-    points = [(support(robot.model, data, geom, DOWN), geom) for geom in geoms]
+    points = [(support_point(robot.model, data, geom, DOWN), geom) for geom in geoms]
     return min(points, key=lambda point: point[0][2])

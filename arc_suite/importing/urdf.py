@@ -39,7 +39,9 @@ _COMPILER = {
 }
 
 
-def cured(robot: ElementTree.Element, folder: Path, turn: str = LEVEL) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+def repair_urdf(
+    robot: ElementTree.Element, folder: Path, turn: str = LEVEL
+) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return a URDF that MuJoCo reads, its moving joints in the order of the file, and notes.
 
     Args:

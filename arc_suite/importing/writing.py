@@ -42,7 +42,7 @@ _GEOM: dict[str, Any] = {
 }  # fmt: skip
 
 
-def source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, Mesh]) -> str:
+def write_source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, Mesh]) -> str:
     """Return the MJCF of a robot: one free body, its joints and colliders, a site in each foot, the keyframe `home`."""
     root = ElementTree.Element("mujoco")
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")

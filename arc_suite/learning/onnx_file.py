@@ -72,7 +72,7 @@ def _driven(body: Body, model: Any) -> dict:
     home = source.angles_at_home(body)
     servos = {
         name: {"alias": joint.alias, "home": home[name], "reach": reach} | dataclasses.asdict(joint.servo)
-        for name, joint, reach in zip(body.joint_names, body.joints, sizing.reaches(body).tolist(), strict=True)
+        for name, joint, reach in zip(body.joint_names, body.joints, sizing.action_reaches(body).tolist(), strict=True)
     }
     return {"servos": servos, "file_joints": list(body.file_joints)}
 

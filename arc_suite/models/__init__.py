@@ -1,6 +1,6 @@
 """From a spec to MJCF: builder, standing pose, sizing, visuals."""
 
-from arc_suite.models.assembly import assemble, parsed, text
-from arc_suite.models.mjcf_text import written
+from arc_suite.models.assembly import assemble, model_spec, text
+from arc_suite.models.mjcf_text import to_mjcf
 
-__all__ = ["assemble", "parsed", "text", "written"]
+__all__ = ["assemble", "model_spec", "text", "to_mjcf"]

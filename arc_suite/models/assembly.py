@@ -20,14 +20,14 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
         decorated: add visuals, which leave the dynamics unchanged but cost about a tenth of the speed.
 
     Returns:
-        The model; `mjcf_text.written` makes a text of it.
+        The model; `mjcf_text.to_mjcf` makes a text of it.
 
     Raises:
         ValueError: an imported body, of which there is a text alone.
     """
     if body.source:
         raise ValueError(f"{body.name} was imported: `models.text` has its MJCF")
-    body = sizing.sized(body)
+    body = sizing.size_body(body)
     root = builder.build(body)
     if arena is None:
         root.find("joint", "root").remove()
@@ -42,20 +42,20 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
 def text(body: Body, arena: Arena | None = FLAT, decorated: bool = False) -> str:
     """Return the MJCF of a body in an arena, as MuJoCo and dm_control's PyMJCF read it; see `assemble`."""
     if body.source:
-        tree = source.tree(sizing.sized(body), arena, decorated)
+        tree = source.mjcf_tree(sizing.size_body(body), arena, decorated)
         ElementTree.indent(tree)
         return ElementTree.tostring(tree, encoding="unicode") + "\n"
-    return mjcf_text.written(assemble(body, arena, decorated))
+    return mjcf_text.to_mjcf(assemble(body, arena, decorated))
 
 
-def parsed(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mujoco.MjSpec:
+def model_spec(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mujoco.MjSpec:
     """Assemble a body in an arena as `assemble` does, and return MuJoCo's own spec of the model.
 
     Heights of the ground go in as numbers. MuJoCo's parser reports "unknown error" of a long list
     when the heap cannot grow in place, although the memory is there.
     """
     if body.source:
-        return source.parsed(sizing.sized(body), arena, decorated)
+        return source.model_spec(sizing.size_body(body), arena, decorated)
     root = assemble(body, arena, decorated)
     fields = root.find_all("hfield")
     heights = [np.reshape(field.elevation, (field.nrow, field.ncol)) for field in fields]

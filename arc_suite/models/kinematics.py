@@ -86,7 +86,7 @@ class Legs(NamedTuple):
         sole = place - self.radii[:, None] * (0.0, 0.0, 1.0)
         return sole, numpy.stack([numpy.cross(axis, sole - anchor) for axis, anchor in joints], axis=-1)
 
-    def reached(self, angles, goals, weights, damping: float, steps: int) -> np.ndarray:
+    def solve_joint_angles(self, angles, goals, weights, damping: float, steps: int) -> np.ndarray:
         """Return the angles (..., legs, links), by damped least squares from given ones, that bring soles near goals.
 
         Args:
@@ -107,16 +107,16 @@ class Legs(NamedTuple):
             angles = (angles + change).clip(self.low, self.high)
         return angles
 
-    def at_ease(self, places, weights, damping: float) -> np.ndarray:
+    def relaxed_joint_angles(self, places, weights, damping: float) -> np.ndarray:
         """Return the angles (legs, links), rad, near the middle of the joints' ranges, that bring soles near places.
 
         Args:
             places: (legs, 3) m.
-            weights: (3, 3) as for `reached`, of all legs.
+            weights: (3, 3) as for `solve_joint_angles`, of all legs.
             damping: m.
         """
         weights = np.tile(weights, (len(places), 1, 1))
-        return self.reached(0.5 * (self.low + self.high), places, weights, damping, _SETTLING)
+        return self.solve_joint_angles(0.5 * (self.low + self.high), places, weights, damping, _SETTLING)
 
 
 def least_changes(jacobian, missing, damping: float) -> np.ndarray:
@@ -161,7 +161,7 @@ def _rotations(axes, angles) -> np.ndarray:
     return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
 
 
-def flows(motion, places):
+def point_velocities(motion, places):
     """Return velocities (environments, places, 2) of places (..., places, 2 or 3) of a body in motion.
 
     Args:
@@ -173,7 +173,7 @@ def flows(motion, places):
     return stack([forward - turning * places[..., 1], left + turning * places[..., 0]], axis=-1)
 
 
-def rises(vertical, places):
+def tilt_heights(vertical, places):
     """Return by how much the torso's tilt raises places of it, (environments, places), m.
 
     Args:
@@ -183,7 +183,7 @@ def rises(vertical, places):
     return vertical[:, :1] * places[:, 0] + vertical[:, 1:2] * places[:, 1]
 
 
-def weights(paths, across: float, level: float = 1.0):
+def path_weights(paths, across: float, level: float = 1.0):
     """Return weights (..., 3, 3) of an error along paths (..., 2), across them, and in height.
 
     Args:

@@ -5,7 +5,7 @@ from dm_control import mjcf
 from lxml import etree
 
 
-def written(root: mjcf.RootElement) -> str:
+def to_mjcf(root: mjcf.RootElement) -> str:
     """Return a model of `assemble` as MJCF, with the standing pose as the keyframe `home`.
 
     PyMJCF calls the global defaults "/" when it writes, and refuses that name when it reads. MuJoCo needs no name.

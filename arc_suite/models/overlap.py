@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.models.standing import compiled
+from arc_suite.models.standing import compile_body
 from arc_suite.models.stride import fitted_gait, half_stroke, strokes
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -45,7 +45,7 @@ def overlaps(body: Body, spread: float = 1.0) -> Iterator[Overlap]:
     if body.source:  # whose parts are a sketch of colliders of any shape
         return
     names, pairs = _names(body), _pairs(body)
-    model = copy.copy(compiled(body))
+    model = copy.copy(compile_body(body))
     model.body_pos[[model.body(leg.part_names[0]).id for leg in body.legs], :2] *= spread
     data = mujoco.MjData(model)
     nearest = model.geom_rbound[pairs].sum(axis=1)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from arc_suite.models import stride
-from arc_suite.models.standing import GRAVITY, Standing, by_leg, standing
+from arc_suite.models.standing import GRAVITY, PoseMechanics, by_leg, measure_standing
 from arc_suite.robots.spec import Body, Joint, Leg, Motor, Simulation, TrackingCamera
 
 # A body of this height has MuJoCo's own constants; others are scaled from it.
@@ -80,13 +80,13 @@ def position_gains(body: Body, inertias: np.ndarray) -> tuple[np.ndarray, np.nda
     return inertia * frequency**2 / gear, (2.0 * inertia * frequency - friction).clip(0.0) / gear
 
 
-def reaches(body: Body) -> np.ndarray:
+def action_reaches(body: Body) -> np.ndarray:
     """Return the angles (joints,) that actions of 1 ask for: to the farther limit from the standing pose, rad."""
     return abs(np.radians([joint.range_deg for joint in body.joints])).max(axis=-1)
 
 
 @functools.lru_cache(maxsize=256)
-def sized(body: Body) -> Body:
+def size_body(body: Body) -> Body:
     """Return the body with all open fields sized.
 
     Args:
@@ -99,8 +99,8 @@ def sized(body: Body) -> Body:
     complete = all(None not in (j.armature, j.damping, j.torque) for j in body.joints)
     if complete and body.simulation and body.camera:
         return body
-    pose, frequency = standing(body), natural_frequency(body)
-    moved = zip(body.legs, by_leg(body, pose.inertias), by_leg(body, loads(body)), strict=True)
+    pose, frequency = measure_standing(body), natural_frequency(body)
+    moved = zip(body.legs, by_leg(body, pose.inertias), by_leg(body, sizing_loads(body)), strict=True)
     return body.replace(
         legs=tuple(_sized_leg(leg, body.agility, *numbers, frequency) for leg, *numbers in moved),
         simulation=simulation(body),
@@ -108,10 +108,13 @@ def sized(body: Body) -> Body:
     )
 
 
-def loads(body: Body) -> np.ndarray:
+sized = size_body  # the former name, which other packages import
+
+
+def sizing_loads(body: Body) -> np.ndarray:
     """Return the torques (joints,) that joints are sized for, N m: the largest of a stride, and never nothing."""
-    pose = standing(body)
-    every = np.maximum(stride.loads(body), pose.inertias * stride.accelerations(body))
+    pose = measure_standing(body)
+    every = np.maximum(stride.stride_loads(body), pose.inertias * stride.swing_accelerations(body))
     least = _LEAST_LEVER * pose.height * pose.mass * GRAVITY / len(body.legs)
     return np.concatenate([own.clip(min=_LEAST_SHARE * max(*own, least)) for own in by_leg(body, every)])
 
@@ -136,6 +139,6 @@ def _sized_joint(joint: Joint, agility: float, inertia: float, load: float, freq
     return joint.replace(motor=motor, armature=armature, damping=damping)
 
 
-def _camera(pose: Standing) -> TrackingCamera:
+def _camera(pose: PoseMechanics) -> TrackingCamera:
     size = max(abs(pose.soles[:, :2]).max(), pose.height)
     return TrackingCamera(position=(0.0, -4.0 * float(size), 1.6 * float(size)))

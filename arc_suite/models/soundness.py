@@ -9,7 +9,7 @@ import numpy as np
 from arc_suite.models import sizing, stride
 from arc_suite.models.outline import torso_box
 from arc_suite.models.overlap import overlaps
-from arc_suite.models.standing import Standing, by_leg, standing
+from arc_suite.models.standing import PoseMechanics, by_leg, measure_standing
 from arc_suite.robots.spec import Body, Leg, Link
 
 # Shares of the standing height.
@@ -47,18 +47,18 @@ class Flaw(NamedTuple):
 
 def flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body, none for one that should walk."""
-    pose = standing(body)
+    pose = measure_standing(body)
     return [flaw for check in (_height, _legs, _support, _motors, _joints, _parts) for flaw in check(body, pose)]
 
 
-def hopeless(body: Body) -> list[Flaw]:
+def hopeless_flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body with which none can walk; quicker than `flaws`, as neither motors nor overlaps are."""
-    pose = standing(body)
+    pose = measure_standing(body)
     found = [flaw for check in (_height, _support, _joints) for flaw in check(body, pose)]
     return [flaw for flaw in found if flaw.hopeless]
 
 
-def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
+def _height(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find feet above or below the floor, and parts of the torso below the feet."""
     height, soles = pose.height, pose.soles[:, 2]
     gap = float(height + soles.min())
@@ -80,7 +80,7 @@ def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
         yield Flaw(text, deeper > _GAP * height)
 
 
-def _support(body: Body, pose: Standing) -> Iterator[Flaw]:
+def _support(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find a center of mass outside the polygon of the feet, or too near its edge."""
     if len(body.legs) < 3:
         yield Flaw(f"{len(body.legs)} feet span no area to stand on: 3 or more legs fit", False)
@@ -121,7 +121,7 @@ def _displacement(x: float, y: float) -> str:
     return " and ".join(f"{abs(way):.2g} m {high if way > 0.0 else low}" for way, high, low in parts if abs(way) > 1e-6)
 
 
-def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
+def _motors(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find motors too weak to hold the standing pose where no joint limit holds it, or too weak for a stride."""
     joints = body.joints
     given = np.array([joint.torque or np.inf for joint in joints])
@@ -134,13 +134,13 @@ def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
         return
     if body.source:  # whose servos walk with less: the share below was measured on torques
         return
-    loads = _BRISK * sizing.loads(body)
-    if (reached := _reached(body, (given / loads).clip(max=1.0))) < stride.LEAST_SHARE:
+    loads = _BRISK * sizing.sizing_loads(body)
+    if (reached := _reached(body, (given / loads).clip(max=1.0))) < stride.MIN_SPEED_SHARE:
         slow = f"weak: reaches about {reached:.1f} of the target speed, as "
         yield _short(body, given, loads, "a brisk stride takes", slow)
 
 
-def _legs(body: Body, pose: Standing) -> Iterator[Flaw]:
+def _legs(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find too few legs for any demonstrator."""
     if len(body.legs) < _LEAST_LEGS:
         yield Flaw(f"no demonstrator keeps its balance on {len(body.legs)} legs: 3 and more walk", False)
@@ -154,7 +154,7 @@ def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str, effe
     if body.source:
         return Flaw(f"{effect}the servo of {body.joint_names[worst]} lacks {lacks}{others}", False)
     cure = _unpowered(body, given < needed)
-    fits = sizing.sized(cure).joints[worst].motor.gear
+    fits = sizing.size_body(cure).joints[worst].motor.gear
     return Flaw(
         f"{effect}the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure
     )
@@ -166,7 +166,7 @@ def _reached(body: Body, shares: np.ndarray) -> float:
     In each leg the joint that bears most and the one that sweeps most decide; the others hardly matter.
     """
     moves = stride.strokes(body, stride.half_stroke(body, stride.fitted_gait(body)))
-    legs = zip(by_leg(body, shares), by_leg(body, stride.loads(body)), moves, strict=True)
+    legs = zip(by_leg(body, shares), by_leg(body, stride.stride_loads(body)), moves, strict=True)
     return float(np.mean([own[[borne.argmax(), abs(sweep).argmax()]].min() for own, borne, (sweep, _) in legs]))
 
 
@@ -199,7 +199,7 @@ def _lengthened(body: Body, missing: np.ndarray) -> Body:
     return body.replace(legs=tuple(legs))
 
 
-def _joints(body: Body, pose: Standing) -> Iterator[Flaw]:
+def _joints(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find legs that cannot take a step."""
     reaches = np.array([_reach(leg, jacobian) for leg, jacobian in zip(body.legs, pose.jacobians, strict=True)])
     forward, up = reaches.max(axis=0) / pose.height
@@ -217,7 +217,7 @@ def _reach(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
     return sweep.max(), np.maximum(jacobian[2] * low, jacobian[2] * high).max()
 
 
-def _parts(body: Body, pose: Standing) -> Iterator[Flaw]:
+def _parts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find legs that overlap, with each other or with the torso."""
     found = max(overlaps(body), key=lambda each: each.depth, default=None)
     if found is None:

@@ -14,7 +14,7 @@ from dm_control import mjcf
 
 from arc_suite.arenas import Arena
 from arc_suite.models import builder, visuals
-from arc_suite.models.mjcf_text import exact, written
+from arc_suite.models.mjcf_text import exact, to_mjcf
 from arc_suite.models.outline import CORNERS, outline
 from arc_suite.models.visuals import scene
 from arc_suite.robots.spec import Body, Servo, SpecError
@@ -25,7 +25,7 @@ _OF_SCENES = ("option", "keyframe")  # sections that a scene has itself
 _INERT = {"mass": "0", "group": "2", "contype": "0", "conaffinity": "0"}
 
 
-def tree(body: Body, arena: Arena | None, decorated: bool = False, releases: bool = False) -> ElementTree.Element:
+def mjcf_tree(body: Body, arena: Arena | None, decorated: bool = False, releases: bool = False) -> ElementTree.Element:
     """Return the MJCF of an imported body.
 
     Args:
@@ -37,7 +37,7 @@ def tree(body: Body, arena: Arena | None, decorated: bool = False, releases: boo
     Raises:
         SpecError: a source that MuJoCo cannot read, or that lacks a part of the body.
     """
-    bare(body)  # finds out at once whether MuJoCo reads it
+    compile_source(body)  # finds out at once whether MuJoCo reads it
     root = ElementTree.fromstring(body.source)
     root.set("model", body.name)
     bodies = {part.get("name"): part for part in root.iter("body")}
@@ -59,18 +59,18 @@ def tree(body: Body, arena: Arena | None, decorated: bool = False, releases: boo
     return root
 
 
-def parsed(body: Body, arena: Arena, decorated: bool = False) -> mujoco.MjSpec:
+def model_spec(body: Body, arena: Arena, decorated: bool = False) -> mujoco.MjSpec:
     """Return the spec of an imported body's model; without looks, its servos have releases. See `tree`."""
-    root = tree(body, arena, decorated, releases=not decorated)
+    root = mjcf_tree(body, arena, decorated, releases=not decorated)
     heights = [np.array(field.attrib.pop("elevation").split(), float) for field in root.iter("hfield")]
     spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-    for field, values in zip(spec.hfields, heights, strict=True):  # as numbers: see `assembly.parsed`
+    for field, values in zip(spec.hfields, heights, strict=True):  # as numbers: see `assembly.model_spec`
         field.userdata = values.reshape(field.nrow, field.ncol)[::-1].ravel()
     return spec
 
 
 @functools.lru_cache(maxsize=64)
-def bare(body: Body) -> mujoco.MjModel:
+def compile_source(body: Body) -> mujoco.MjModel:
     """Return the compiled model of a source as it is, whose keyframe is the standing pose.
 
     Raises:
@@ -90,7 +90,7 @@ def bare(body: Body) -> mujoco.MjModel:
 
 def angles_at_home(body: Body) -> dict[str, float]:
     """Return the positions of a source's joints in the standing pose by name: rad, or m of a slide."""
-    model = bare(body)
+    model = compile_source(body)
     hinges = (joint for joint in range(model.njnt) if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE)
     return {model.joint(joint).name: float(model.key(HOME).qpos[model.jnt_qposadr[joint]]) for joint in hinges}
 
@@ -135,7 +135,7 @@ def _cameras(body: Body) -> dict[str, dict]:
 
     MuJoCo keeps a camera where it is seen from the center of mass in the pose of all joints at zero.
     """
-    model = bare(body)
+    model = compile_source(body)
     data, centers = mujoco.MjData(model), []
     for qpos in (model.qpos0, model.key(HOME).qpos):
         data.qpos[:] = qpos
@@ -178,7 +178,7 @@ def _ground(body: Body, arena: Arena | None, decorated: bool) -> ElementTree.Ele
         if arena is not None:
             scene.add_scene(root, body.torso.standing_height)
         visuals.add_materials(root, body)
-    return ElementTree.fromstring(written(root))
+    return ElementTree.fromstring(to_mjcf(root))
 
 
 def _add_ground(root: ElementTree.Element, torso: ElementTree.Element, ground: ElementTree.Element) -> None:

@@ -13,7 +13,7 @@ from arc_suite.robots.spec import Body
 GRAVITY = 9.81  # m/s^2
 
 
-class Standing(NamedTuple):
+class PoseMechanics(NamedTuple):
     """Mechanics of the standing pose, in the torso's frame and SI units; joints are the actuated ones.
 
     Attributes:
@@ -42,12 +42,15 @@ class Standing(NamedTuple):
 
 
 @functools.lru_cache(maxsize=256)
-def standing(body: Body) -> Standing:
+def measure_standing(body: Body) -> PoseMechanics:
     """Return the mechanics of a body's standing pose; armature, damping, motors and constants do not matter."""
-    return posed(body)
+    return pose_mechanics(body)
 
 
-def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None = None) -> Standing:
+standing = measure_standing  # the former name, which other packages import
+
+
+def pose_mechanics(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None = None) -> PoseMechanics:
     """Return the mechanics of a pose, as of the standing one.
 
     Args:
@@ -55,22 +58,24 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
         angles: (joints,) rad, in place of zero for all of them; the torso stays where it is.
         feet: (legs,) whether each foot carries; None for all of them.
     """
-    (pose,) = mechanics(body, [(angles, feet)])
+    (pose,) = mechanics_of_poses(body, [(angles, feet)])
     return pose
 
 
-def mechanics(body: Body, poses: Iterable[tuple[np.ndarray | None, np.ndarray | None]]) -> Iterator[Standing]:
+def mechanics_of_poses(
+    body: Body, poses: Iterable[tuple[np.ndarray | None, np.ndarray | None]]
+) -> Iterator[PoseMechanics]:
     """Yield the mechanics of poses, for which MuJoCo's data are made once: that takes longer than a pose.
 
     Args:
         body: the spec.
         poses: angles and feet of each; see `posed`.
     """
-    model = compiled(body)
+    model = compile_body(body)
     places = _places(body)
     data = mujoco.MjData(model)
     for angles, feet in poses:
-        data.qpos[:] = stood(model)
+        data.qpos[:] = standing_qpos(model)
         if angles is not None:
             data.qpos[places.angles] += angles
         mujoco.mj_forward(model, data)
@@ -79,7 +84,7 @@ def mechanics(body: Body, poses: Iterable[tuple[np.ndarray | None, np.ndarray | 
 
 def _measure(
     body: Body, model: mujoco.MjModel, data: mujoco.MjData, places: "_Places", feet: np.ndarray | None
-) -> Standing:
+) -> PoseMechanics:
     """Return the mechanics of the pose in which the data are."""
     origin = data.xpos[1]
     soles, jacobians = [], []
@@ -99,7 +104,7 @@ def _measure(
     if carrying.any():
         loads[carrying] = foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - center[:2])
     torques_of_feet = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
-    return Standing(
+    return PoseMechanics(
         height=body.torso.standing_height,
         mass=mass,
         center=center,
@@ -110,7 +115,7 @@ def _measure(
     )
 
 
-def stood(model: mujoco.MjModel) -> np.ndarray:
+def standing_qpos(model: mujoco.MjModel) -> np.ndarray:
     """Return the positions (nq,) in which a body stands: of an imported one the keyframe of its source."""
     return model.key_qpos[0].copy() if model.nkey else model.qpos0.copy()
 
@@ -134,7 +139,7 @@ class _Places(NamedTuple):
 
 @functools.lru_cache(maxsize=256)
 def _places(body: Body) -> _Places:
-    model = compiled(body)
+    model = compile_body(body)
     joints = [model.joint(name) for name in body.joint_names]
     dofs = np.array([joint.dofadr[0] for joint in joints])
     dofs_by_leg = []
@@ -151,14 +156,14 @@ def by_leg(body: Body, values: np.ndarray) -> list[np.ndarray]:
 
 
 @functools.lru_cache(maxsize=256)
-def compiled(body: Body) -> mujoco.MjModel:
+def compile_body(body: Body) -> mujoco.MjModel:
     """Return the body of `builder.build` without motors, contacts and constants; geoms are ordered as in the spec.
 
     MuJoCo's own `MjSpec` is fast here; PyMJCF would double the time of building the model. An imported body's is that
     of its source.
     """
     if body.source:
-        return source.bare(body)
+        return source.compile_source(body)
     return direct.write(builder.parts(body)).compile()
 
 

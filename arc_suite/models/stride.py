@@ -11,12 +11,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from arc_suite.models.kinematics import damped_changes
-from arc_suite.models.standing import GRAVITY, mechanics, standing
+from arc_suite.models.standing import GRAVITY, measure_standing, mechanics_of_poses
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body, Leg
 
 # Of the target speed; a body that moves at this speed heads within 45 degrees of the target's.
-LEAST_SHARE = 0.7
+MIN_SPEED_SHARE = 0.7
 TARGET_FROUDE = 0.2  # speed that a walk asks for, of sqrt(g h); published robots: 0.18 to 0.27
 
 # Of sqrt(g / h), by the kind of motor; published: 0.2 to 0.41. Real robots have quick motors, and fall in slow gaits.
@@ -26,11 +26,11 @@ _FREQUENCY, _FREQUENCY_OF_SERVOS = 0.27, 0.36
 # 0.55 to 0.8 this one lets the most bodies walk.
 DUTY_FACTOR = 0.65
 
-LIFT = 0.12  # of h: how far a foot is lifted in mid-swing; at 0.2 the cost of transport doubles
+FOOT_LIFT = 0.12  # of h: how far a foot is lifted in mid-swing; at 0.2 the cost of transport doubles
 _MOMENTS = 12  # of a cycle, at which loads are found
 
-LARGEST_SWEEP = 0.5  # rad, of a joint to either side
-LARGEST_LIFT = 0.9  # rad
+MAX_SWEEP = 0.5  # rad, of a joint to either side
+MAX_LIFT = 0.9  # rad
 _USED = 0.9  # share of a joint's range that targets may use
 
 # How much it matters that a foot moves as wanted along x, y and z. In stance it is not to rise or
@@ -62,17 +62,17 @@ def half_stroke(body: Body, gait: gaits.Gait) -> float:
     return 0.5 * TARGET_FROUDE / gait_frequency(body) * gait.duty_factor * body.torso.standing_height
 
 
-def poses(body: Body) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def stride_poses(body: Body) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield joint angles (joints,), rad, and which feet stand (legs,), at moments of a cycle of the fitted gait."""
     gait = fitted_gait(body)
     moves = strokes(body, half_stroke(body, gait))
     for moment in np.arange(_MOMENTS) / _MOMENTS:
         cycle = (moment + np.array(gait.offsets)) % 1.0
-        angles = [swung(place, gait.duty_factor, *move) for place, move in zip(cycle, moves, strict=True)]
+        angles = [cycle_angles(place, gait.duty_factor, *move) for place, move in zip(cycle, moves, strict=True)]
         yield np.concatenate(angles), cycle < gait.duty_factor
 
 
-def swung(cycle, duty_factor: float, sweep, lift):
+def cycle_angles(cycle, duty_factor: float, sweep, lift):
     """Return how far joints (..., n) are from rest, rad, at phases (..., 1) of a leg's cycle.
 
     Args:
@@ -87,15 +87,15 @@ def swung(cycle, duty_factor: float, sweep, lift):
     return angles + numpy.where(stands, 0.0, numpy.sin(np.pi * progress)) * lift
 
 
-def loads(body: Body) -> np.ndarray:
+def stride_loads(body: Body) -> np.ndarray:
     """Return the largest torques (joints,) that hold the body in any pose of its stride, N m.
 
     The feet that stand carry it, and every leg hangs at its hip.
     """
-    return np.max([abs(pose.loads) for pose in mechanics(body, poses(body))], axis=0)
+    return np.max([abs(pose.loads) for pose in mechanics_of_poses(body, stride_poses(body))], axis=0)
 
 
-def accelerations(body: Body) -> np.ndarray:
+def swing_accelerations(body: Body) -> np.ndarray:
     """Return the largest angular accelerations (joints,) of a swing, rad/s^2.
 
     A foot is lifted as a sine of time, and turns from going back to going forward in half of the swing.
@@ -113,21 +113,21 @@ def strokes(body: Body, ahead: float) -> list[tuple[np.ndarray, np.ndarray]]:
         body: the spec.
         ahead: how far a foot is to be swept from its place at rest, m.
     """
-    pose, found = standing(body), []
+    pose, found = measure_standing(body), []
     for leg, jacobian in zip(body.legs, pose.jacobians, strict=True):
         low, high = target_ranges(leg)
-        found.append((swept(leg, jacobian, ahead), lifted(jacobian, LIFT * pose.height, -low, high)))
+        found.append((sweep_angles(leg, jacobian, ahead), lift_angles(jacobian, FOOT_LIFT * pose.height, -low, high)))
     return found
 
 
-def swept(leg: Leg, jacobian, reach: float) -> np.ndarray:
+def sweep_angles(leg: Leg, jacobian, reach: float) -> np.ndarray:
     """Return the joint angles (joints of the leg,) that bring a leg's foot forward by `reach`, and back if negated."""
     low, high = target_ranges(leg)
-    room = np.minimum(np.minimum(-low, high), LARGEST_SWEEP)
+    room = np.minimum(np.minimum(-low, high), MAX_SWEEP)
     return _towards(jacobian, (reach, 0.0, 0.0), _SWEEP_WEIGHTS, room, room)
 
 
-def lifted(jacobian, height: float, below, above) -> np.ndarray:
+def lift_angles(jacobian, height: float, below, above) -> np.ndarray:
     """Return the joint angles (joints of the leg,) that lift a leg's foot by a height, m.
 
     Args:
@@ -136,7 +136,7 @@ def lifted(jacobian, height: float, below, above) -> np.ndarray:
         below: (joints of the leg,) room that targets have below the pose, rad.
         above: the same above it.
     """
-    below, above = np.minimum(below, LARGEST_LIFT), np.minimum(above, LARGEST_LIFT)
+    below, above = np.minimum(below, MAX_LIFT), np.minimum(above, MAX_LIFT)
     return _towards(jacobian, (0.0, 0.0, height), _LIFT_WEIGHTS, below, above)
 
 

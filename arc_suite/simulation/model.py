@@ -11,7 +11,7 @@ import numpy as np
 from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.models import direct
-from arc_suite.models.sizing import sized
+from arc_suite.models.sizing import size_body
 from arc_suite.robots.spec import Body
 
 _MOST = 1e6  # of a value of a model's field
@@ -64,7 +64,7 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
 @functools.lru_cache(maxsize=32)
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
     quick = arena == FLAT and not body.source
-    spec = direct.on_flat_ground(sized(body)) if quick else models.parsed(body, arena)
+    spec = direct.on_flat_ground(size_body(body)) if quick else models.model_spec(body, arena)
     model = spec.compile()
     list_contacts(spec, model, all_geoms=arena.lists_contacts)
     model = spec.compile()

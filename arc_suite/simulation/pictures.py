@@ -71,7 +71,7 @@ class Decorated(dm_mujoco.Physics):
             quality: of the pictures.
             ground: red, green, blue and alpha of a ground without a grid; None keeps the grid.
         """
-        decorated = cls.from_model(wrapper.MjModel(models.parsed(body, arena, decorated=True).compile()))
+        decorated = cls.from_model(wrapper.MjModel(models.model_spec(body, arena, decorated=True).compile()))
         drawing = decorated.model.vis.quality
         drawing.shadowsize, drawing.offsamples = quality.shadows, 0
         drawing.numslices, drawing.numstacks = quality.faces

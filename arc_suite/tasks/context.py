@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite.arenas import Arena
-from arc_suite.models.standing import GRAVITY, standing
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.fitting import velocity_units
 
@@ -47,7 +47,7 @@ class Context(NamedTuple):
     def of(cls, scene, parameters, step_limit: float, reference: Any = None) -> "Context":
         """Return the context of a task in a `contract.Scene` that prescribes `parameters.Parameters`."""
         body = scene.body
-        pose = standing(body)
+        pose = measure_standing(body)
         units = velocity_units(body, parameters.target_velocity)
         leak = min(parameters.gait_frequency * scene.control_timestep, 1.0)
         return cls(

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.models.sizing import sized
-from arc_suite.models.standing import GRAVITY, standing
+from arc_suite.models.sizing import size_body
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots.spec import Body
 
 MIN_PATH = 0.05  # share of the path at the target velocity; shorter paths count as so long
@@ -66,5 +66,5 @@ def cost_of_transport(memory: Energy, path, target_path):
 
 def torques(body: Body) -> np.ndarray:
     """Return the greatest torques (joints,) of a body's motors over its weight, m."""
-    gears = np.array([joint.torque for joint in sized(body).joints])
-    return gears / (standing(body).mass * GRAVITY)
+    gears = np.array([joint.torque for joint in size_body(body).joints])
+    return gears / (measure_standing(body).mass * GRAVITY)

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from arc_suite.models.standing import GRAVITY, standing
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.models.stride import TARGET_FROUDE, fitted_gait, gait_frequency
 from arc_suite.robots.spec import Body
 
@@ -72,6 +72,6 @@ def velocity_units(body: Body, target_velocity: float) -> np.ndarray:
 
 def reach(body: Body) -> float:
     """Return R, the mean horizontal distance of the feet from the center of mass in the standing pose, m."""
-    pose = standing(body)
+    pose = measure_standing(body)
     x, y = (pose.soles - pose.center)[:, :2].T
     return float(np.hypot(x, y).mean())

@@ -167,20 +167,20 @@ class GaitAndPose:
     def reference(self, scene, parameters) -> Reference:
         """Return the reference of a body, in a task with `parameters.Parameters`."""
         body = scene.body
-        rest = posture.rest(body)
+        rest = posture.find_rest_pose(body)
         height = body.torso.standing_height
         step = scene.control_timestep
         prescribed = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))
         choices = Choices(
-            room=self.poses * posture.room(body, planted=False),
+            room=self.poses * posture.measure_room(body, planted=False),
             gaits=to_clock_units(self._drawn_gaits(body, prescribed), step),
             frequency_range=(1.0, 1.0) if self.gaits == () else _FREQUENCY_RANGE,
         )
         return Reference(
-            ride=rest.ride,
-            feet=rest.places[:, :2],
-            angles=rest.legs.by_joint(rest.angles),
-            turns=posture.turns(body),
+            ride=rest.ride_height,
+            feet=rest.sole_positions[:, :2],
+            angles=rest.legs.by_joint(rest.joint_angles),
+            turns=posture.linearize_joint_angles(body),
             glide=_GLIDE_SPEED * math.sqrt(GRAVITY / height) * step,
             step=step,
             gait=to_clock_units(prescribed, step),
@@ -412,7 +412,7 @@ def measure_pose(context: Context, readings):
     cosine = (feet_x * rest_x + feet_y * rest_y).sum(axis=-1)
     yaw = xp.arctan2(sine, cosine)
     rise = readings.torso_height / height - reference.ride
-    tilt = posture.tilt(rotations.matrix(readings.torso_quaternion)[..., 2, :])
+    tilt = posture.roll_and_pitch_of(rotations.matrix(readings.torso_quaternion)[..., 2, :])
     return xp.concatenate([rise[..., None], shift, tilt, yaw[..., None]], axis=-1)
 
 

@@ -268,7 +268,7 @@ class Level(Ground):
         """Return the pose of the start, lying or standing."""
         if not self.lies:
             return scene.standing
-        height, angles = posture.belly(scene.body)
+        height, angles = posture.find_belly_pose(scene.body)
         qpos = scene.standing.copy()
         qpos[2] = height
         qpos[scene.layout.joint_angles] += angles

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.models.standing import by_leg, standing
+from arc_suite.models.standing import by_leg, measure_standing
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
@@ -127,14 +127,14 @@ def _pair_legs(body: Body, symmetry: Symmetry | None) -> tuple[np.ndarray, np.nd
     indices = np.arange(len(body.legs))
     if symmetry is None:
         return indices, np.zeros(len(indices), bool)
-    is_right = standing(body).soles[:, 1] < 0.0
+    is_right = measure_standing(body).soles[:, 1] < 0.0
     return np.where(is_right, mirror.image(body).legs, indices), is_right
 
 
 def _viewing_legs(body: Body, indices: np.ndarray) -> Iterator[ViewingLeg]:
     """Yield the legs with these indices (n,), aligned with the first of them."""
     jacobians = _sole_jacobians(body)
-    soles = standing(body).soles[:, :2]  # m
+    soles = measure_standing(body).soles[:, :2]  # m
     one_hot_joints = by_leg(body, np.eye(len(body.joint_names)))  # (joints of the leg, joints) of each leg
     first_jacobian = jacobians[indices[0]]
     for index in indices:
@@ -165,7 +165,7 @@ def _align(jacobian: np.ndarray, first: np.ndarray) -> tuple[float, np.ndarray]:
 def _sole_jacobians(body: Body) -> list[np.ndarray]:
     """Return the velocities (joints, 3) of each sole per joint velocity; 0 for joints that only other legs have."""
     most = max(len(leg.joints) for leg in body.legs)
-    return [_pad(jacobian.T, most) for jacobian in standing(body).jacobians]
+    return [_pad(jacobian.T, most) for jacobian in measure_standing(body).jacobians]
 
 
 def _pad(array: np.ndarray, count: int) -> np.ndarray:

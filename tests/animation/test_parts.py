@@ -7,7 +7,7 @@ import pytest
 
 from arc_suite import models, rotations
 from arc_suite.animation import pages, parts
-from arc_suite.models.standing import stood
+from arc_suite.models.standing import standing_qpos
 from arc_suite.tasks import readings
 
 BODIES = {"four legs": imports.quadruped, "six legs": imports.hexapod, "an arm": imports.with_arm}
@@ -31,11 +31,11 @@ def test_shapes_are_where_the_simulation_has_them(name):
     found, materials = parts.describe_body(body)
     assert [part.name for part in found] == list(body.part_names)
     assert set(materials) == {"shell", "limb", "glow"}
-    model = models.parsed(body, decorated=True).compile()
+    model = models.model_spec(body, decorated=True).compile()
     data, layout = mujoco.MjData(model), readings.layout(model, body)
     random = np.random.default_rng(0)
     pose = np.concatenate([(1.0, 2.0, 3.0, 0.5, -0.5, 0.5, 0.5), random.uniform(-0.5, 0.5, len(body.joint_names))])
-    data.qpos[:] = readings.positions(pose, layout, stood(model))
+    data.qpos[:] = readings.positions(pose, layout, standing_qpos(model))
     np.testing.assert_allclose(readings.pose(data.qpos, layout), pose, atol=1e-12)
     mujoco.mj_kinematics(model, data)
     places, turns = bent(found, pose)

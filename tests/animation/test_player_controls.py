@@ -17,9 +17,9 @@ BODIES = [*ROBOTS.values(), generator.random_body(4)]
 def test_torsos_stay_above_the_ground(body):
     low, high = player_controls.pose_room(body).T
     assert (low <= 0.0).all() and (high >= 0.0).all() and (high > low).any()
-    ride, height = posture.rest(body).ride, body.torso.standing_height
+    ride, height = posture.find_rest_pose(body).ride_height, body.torso.standing_height
     assert (ride + low[0]) * height + torso_box(body)[0][2] > 0.07 * height
-    kept = posture.room(body, planted=False)
+    kept = posture.measure_room(body, planted=False)
     np.testing.assert_allclose(player_controls.pose_room(body)[1:], kept[1:], atol=1e-9)  # which stays as it was
     assert (kept[0, 0] <= low[0] + 1e-9) and kept[0, 1] == pytest.approx(high[0])
 

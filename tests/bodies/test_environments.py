@@ -73,7 +73,7 @@ def assert_each_alone(env, singles, actions):
             assert same(result, expected[:4]), index
             assert env.resampled()[index] == single.resampled()[0]
             assert_infos_equal(info, expected[4], index, env)
-            observed = of_each[index].observed(of_each[index].gathered(expected[0]))
+            observed = of_each[index].make_tokens(of_each[index].gather_inputs(expected[0]))
             assert same({name: array[[index]] for name, array in observation.items()}, observed), index
             ends += expected[2][0], expected[3][0]
     return ends
@@ -86,7 +86,7 @@ def assert_infos_equal(info, expected, index, env):
             assert_infos_equal(info[name], value, index, env)
         elif name == "final_obs":
             of_one = tokens.Tokens.of([env.tasks[index]])
-            observed = of_one.observed(of_one.gathered(value[0][None]))
+            observed = of_one.make_tokens(of_one.gather_inputs(value[0][None]))
             assert same(info[name][index], {part: array[0] for part, array in observed.items()})
         else:
             assert same(np.asarray(info[name][index]), np.asarray(value[0])), name

@@ -10,7 +10,7 @@ from refusals import refused
 
 from arc_suite import models
 from arc_suite.bodies import generator
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import SpecError
 from arc_suite.tasks.fitting import fitted_parameters
@@ -104,7 +104,7 @@ def test_random_bodies_are_sound_and_within_their_ranges(seed):
         assert leg.foot_position[2] - leg.foot.radius == pytest.approx(-height, abs=1e-12)
         out = math.dist(leg.foot_position[:2], leg.mount[:2])
         assert 0.7 * 0.75 - 1e-9 <= out / height <= 1.2 * 1.3 + 1e-9
-    assert standing(body).margin >= 0.08 * height
+    assert measure_standing(body).margin >= 0.08 * height
 
 
 def test_random_bodies_are_of_all_kinds():
@@ -137,8 +137,8 @@ def test_scaled_bodies_have_all_lengths_multiplied():
     body = ROBOTS["queen"]
     double = generator.scaled(body, 2.0)
     assert double.torso.standing_height == 1.5
-    assert standing(double).mass == pytest.approx(8.0 * standing(body).mass, rel=1e-9)
-    np.testing.assert_allclose(standing(double).soles, 2.0 * standing(body).soles, rtol=1e-12)
+    assert measure_standing(double).mass == pytest.approx(8.0 * measure_standing(body).mass, rel=1e-9)
+    np.testing.assert_allclose(measure_standing(double).soles, 2.0 * measure_standing(body).soles, rtol=1e-12)
     assert double.simulation is None  # sized anew
     back = generator.scaled(generator.scaled(generator.generate(4, 2), 2.0), 0.5)
     assert back == generator.generate(4, 2).replace(name="walker_4x2_scaled")

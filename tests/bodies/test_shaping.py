@@ -10,7 +10,7 @@ import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.bodies.shaping import link_names, shaped
 from arc_suite.models.soundness import flaws
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Ballast, Solid
 from arc_suite.robots.spec_files import EXAMPLES, load_body
@@ -27,9 +27,9 @@ def test_a_link_becomes_longer_and_the_feet_stand_on_the_floor():
     assert body.name == "walker_6x3_shaped"
     np.testing.assert_allclose(lengths(body, "lower"), 1.5 * np.array(lengths(WALKER, "lower")))
     np.testing.assert_allclose(lengths(body, "upper"), lengths(WALKER, "upper"))
-    pose = standing(body)
+    pose = measure_standing(body)
     np.testing.assert_allclose(pose.soles[:, 2], -pose.height, atol=1e-9)
-    assert pose.height > standing(WALKER).height and flaws(body) == []
+    assert pose.height > measure_standing(WALKER).height and flaws(body) == []
 
 
 def test_the_torso_takes_the_mounts_of_the_legs_along():

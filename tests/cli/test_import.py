@@ -4,7 +4,7 @@ import pathlib
 
 import programs
 
-from arc_suite.importing import imported
+from arc_suite.importing import import_robot
 from arc_suite.robots.spec_files import load_body
 
 FOLDER = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"
@@ -19,7 +19,7 @@ def test_it_tells_what_the_robot_has_become(tmp_path):
     path = tmp_path / "go2.json"
     name, *notes = programs.passed(run(GO2, "-o", path)).splitlines()
     assert name == f"{GO2}: quadruped_15_kg"
-    assert [note.removeprefix("  ") for note in notes] == list(imported(GO2).notes)
+    assert [note.removeprefix("  ") for note in notes] == list(import_robot(GO2).notes)
     for part in (
         "legs: 4 (l1, r1, l2, r2)",
         "FL_hip_joint l1_joint1",
@@ -28,7 +28,7 @@ def test_it_tells_what_the_robot_has_become(tmp_path):
         "left out",
     ):
         assert any(part in note for note in notes), part
-    assert load_body(path) == imported(GO2).body
+    assert load_body(path) == import_robot(GO2).body
 
 
 def test_without_output_it_writes_nothing(tmp_path):

@@ -35,7 +35,7 @@ def test_leaper_lifts_its_rear_feet():
     feet = law.next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), rest, law.duty_factor, law.stance)
     weights = np.tile(np.eye(3), (len(body.legs), 1, 1))
     angles = np.tile(law.angles, (len(cycle), 1, 1))
-    soles, _ = law.legs.soles(law.legs.reached(angles, feet, weights, 0.01, 20))
+    soles, _ = law.legs.soles(law.legs.solve_joint_angles(angles, feet, weights, 0.01, 20))
     assert np.ptp(soles[:, 2:, 2], axis=0).min() >= 0.2 * body.torso.standing_height
 
 

@@ -6,12 +6,12 @@ import pytest
 from arc_suite.cpg import Demonstrator, leaps
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.kinematics import Legs
-from arc_suite.models.sizing import sized
+from arc_suite.models.sizing import size_body
 from arc_suite.robots import ROBOTS
 
 
 def test_keyframes_crouch_and_come_back():
-    body = sized(ROBOTS["queen"])
+    body = size_body(ROBOTS["queen"])
     legs = Legs.of(body)
     rest = legs.by_leg(np.zeros(len(body.joint_names)))
     angles = leaps.keyframes(body, legs, rest, leaps.Leap())

@@ -19,7 +19,7 @@ from arc_suite.animation import clips as export
 from arc_suite.animation.clips.catalog import CLIPS
 from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
-from arc_suite.importing import imported
+from arc_suite.importing import import_robot
 from arc_suite.robots import ROBOTS, spec_files
 from arc_suite.simulation.model import compiled
 
@@ -40,7 +40,7 @@ def chosen(kind: str) -> dict:
     elif not kind:
         found |= {name: (body, export.DEFAULT) for name, body in examples.items()}
         found |= {f"random_{seed}": (generator.random_body(seed), FEW) for seed in range(100)}
-        found |= {path.stem: (imported(path).body, FEW) for path in sorted(OTHERS.iterdir())}
+        found |= {path.stem: (import_robot(path).body, FEW) for path in sorted(OTHERS.iterdir())}
     return found
 
 

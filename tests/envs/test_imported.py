@@ -19,7 +19,7 @@ from arc_suite.envs.prepare import prepare_task, symmetry
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models import source
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import SpecError
 from arc_suite.tasks import TASKS
 
@@ -196,7 +196,7 @@ def test_late_actions_arrive_at_servos():
 
 def test_energy_is_the_work_of_the_servos():
     opened, work = environment(QUADRUPED), 0.0
-    weight = standing(QUADRUPED).mass * 9.81
+    weight = measure_standing(QUADRUPED).mass * 9.81
     angles = opened.task.definition.read(opened.physics.data.ptr).joint_angles.copy()
     for action in np.random.default_rng(0).uniform(-0.2, 0.2, (20, 12)):
         opened.step(action)

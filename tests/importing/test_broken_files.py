@@ -4,7 +4,7 @@ import pathlib
 
 import pytest
 
-from arc_suite.importing import imported
+from arc_suite.importing import import_robot
 from arc_suite.robots.spec import SpecError
 
 FOLDER = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"
@@ -118,7 +118,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", CURED)
 def test_it_comes_in_with_a_note(case, tmp_path):
     *edit, note = CURED[case]
-    body, notes = imported(broken(tmp_path, *edit))
+    body, notes = import_robot(broken(tmp_path, *edit))
     assert len(body.legs) in (4, 6) and 0.1 < body.torso.standing_height < 0.4
     assert any(note in line for line in notes), notes
 
@@ -128,7 +128,7 @@ def test_it_is_refused_in_one_line(case, tmp_path):
     *edit, words = REFUSED[case]
     path = broken(tmp_path, *edit)
     with pytest.raises(SpecError) as caught:
-        imported(path)
+        import_robot(path)
     line = str(caught.value)
     assert line.startswith(f"{path}: ") and words in line, line
     assert "\n" not in line and len(line) - len(str(path)) < 400, line
@@ -136,6 +136,6 @@ def test_it_is_refused_in_one_line(case, tmp_path):
 
 def test_a_file_that_is_not_there_is_an_error_of_the_system(tmp_path):
     with pytest.raises(OSError, match="no such file"):
-        imported(tmp_path / "go2.xml")
+        import_robot(tmp_path / "go2.xml")
     with pytest.raises(OSError, match="directory"):
-        imported(tmp_path)
+        import_robot(tmp_path)

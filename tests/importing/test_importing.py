@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from arc_suite import registry
-from arc_suite.importing import imported
+from arc_suite.importing import import_robot
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots import sources
 from arc_suite.robots.spec import SpecError
@@ -84,25 +84,25 @@ def model(body):
 
 @THREE
 def test_the_physics_are_the_files_to_the_last_bit(path):
-    assert reference().same_bits(path, imported(path).body) == 200
+    assert reference().same_bits(path, import_robot(path).body) == 200
 
 
 def test_they_are_so_with_meshes_springs_and_masses_of_geoms(odd):
-    body = imported(odd).body
+    body = import_robot(odd).body
     assert reference().same_bits(odd, body) == 200
     assert model(body).body_mass.sum() == pytest.approx(mujoco.MjModel.from_xml_path(str(odd)).body_subtreemass[2])
 
 
 @THREE
 def test_a_file_of_the_body_gives_the_same_body(path):
-    body = imported(path).body
+    body = import_robot(path).body
     assert body_from_json(body_to_json(body)) == body
     assert sources.check(body) is body
 
 
 @THREE
 def test_parts_and_joints_have_the_names_and_places_of_the_sketch(path):
-    body = imported(path).body
+    body = import_robot(path).body
     found = model(body)
     data = mujoco.MjData(found)
     mujoco.mj_resetDataKeyframe(found, data, 0)
@@ -125,7 +125,7 @@ def test_parts_and_joints_have_the_names_and_places_of_the_sketch(path):
 
 @THREE
 def test_legs_are_named_from_front_to_rear_and_all_stand(path):
-    body = imported(path).body
+    body = import_robot(path).body
     feet = {leg.name: leg.foot_position for leg in body.legs}
     for side, sign in (("l", 1), ("r", -1)):
         own = [feet[f"{side}{rank + 1}"] for rank in range(len(feet) // 2)]
@@ -136,13 +136,13 @@ def test_legs_are_named_from_front_to_rear_and_all_stand(path):
 
 
 def test_ranges_count_from_the_standing_pose():
-    knee = imported(GO2).body.legs[0].joints[2]
+    knee = import_robot(GO2).body.legs[0].joints[2]
     assert knee.range_deg == pytest.approx(np.degrees((-2.7227 + 1.8, -0.83776 + 1.8)))
     assert knee.alias == "FL_calf_joint" and (knee.armature, knee.damping) == (0.032, 0.2)
 
 
 def test_parts_of_an_odd_robot_have_names(odd):
-    body, notes = imported(odd)
+    body, notes = import_robot(odd)
     assert body.name == "odd_robot"
     assert [leg.name for leg in body.legs] == ["l1", "r1", "l2", "r2"]
     found = model(body)
@@ -155,15 +155,15 @@ def test_parts_of_an_odd_robot_have_names(odd):
 
 
 def test_the_order_of_joints_is_that_of_the_files_motors(odd):
-    body, notes = imported(odd)
+    body, notes = import_robot(odd)
     assert body.file_joints[:5] == ("FL knee", "FR knee", "HL knee", "HR knee", "FL pitch")
     assert {joint.alias for leg in body.legs for joint in leg.joints} == set(body.file_joints)
     assert "joint map: places of the file in an action: [2, 5, 8, 11, 1, 4, 7, 10, 0, 3, 6, 9]" in notes
-    assert imported(A1).body.file_joints[:3] == ("FR_hip_joint", "FR_thigh_joint", "FR_calf_joint")
+    assert import_robot(A1).body.file_joints[:3] == ("FR_hip_joint", "FR_thigh_joint", "FR_calf_joint")
 
 
 def test_gains_and_limits_are_those_of_position_actuators(odd):
-    body, notes = imported(odd)
+    body, notes = import_robot(odd)
     servo = body.legs[0].joints[0].servo
     assert (servo.stiffness, servo.damping, servo.limit) == (40.0, 1.5, 20.0)
     assert body.held[0].servo.limit == 5.0
@@ -172,10 +172,10 @@ def test_gains_and_limits_are_those_of_position_actuators(odd):
 
 
 def test_gains_that_the_file_does_not_have_are_sized():
-    knee = imported(GO2).body.legs[0].joints[2]
+    knee = import_robot(GO2).body.legs[0].joints[2]
     assert knee.servo.limit == 45.43
     assert 0.0 < knee.servo.stiffness <= 10.0 * knee.servo.limit
-    notes = imported(A1).notes
+    notes = import_robot(A1).notes
     assert "limits: 1000 N m of 12 motors is a placeholder, far above their load" in notes
 
 
@@ -183,27 +183,27 @@ def test_a_keyframe_that_is_named_is_the_standing_pose(tmp_path):
     path = tmp_path / "go2.xml"
     keys = '<key name="low" qpos="0 0 0.2 1 0 0 0 0 1.2 -2.4 0 1.2 -2.4 0 1.2 -2.4 0 1.2 -2.4"/></keyframe>'
     path.write_text(GO2.read_text().replace("</keyframe>", keys))
-    high, low = imported(path), imported(path, home="low")
+    high, low = import_robot(path), import_robot(path, home="low")
     assert low.body.torso.standing_height < 0.8 * high.body.torso.standing_height
     assert any(note.startswith("standing pose: keyframe low, torso 0.1") for note in low.notes)
     with pytest.raises(
         SpecError, match=r"go2\.xml: unknown keyframe 'lo'; did you mean 'low'\? \(there are: lying, home, low\)$"
     ):
-        imported(path, home="lo")
+        import_robot(path, home="lo")
 
 
 def test_feet_can_be_named_by_geom_or_body():
-    assert imported(GO2, feet=["FL", "FR", "RL", "RR"]).body == imported(GO2).body
-    assert imported(GO2, feet=["FL_calf", "FR_calf", "RL_calf", "RR_calf"]).body == imported(GO2).body
+    assert import_robot(GO2, feet=["FL", "FR", "RL", "RR"]).body == import_robot(GO2).body
+    assert import_robot(GO2, feet=["FL_calf", "FR_calf", "RL_calf", "RR_calf"]).body == import_robot(GO2).body
     with pytest.raises(SpecError, match=r"go2_like\.xml: unknown foot 'FL_claf'; did you mean 'FL_calf'\?"):
-        imported(GO2, feet=["FL_claf"])
+        import_robot(GO2, feet=["FL_claf"])
 
 
 def test_two_feet_of_four_do_not_stand():
     with pytest.raises(
         SpecError, match=r"no standing pose \(keyframe home: the center of mass is -0.194 m inside of the feet"
     ):
-        imported(GO2, feet=["FL", "FR"])
+        import_robot(GO2, feet=["FL", "FR"])
 
 
 def test_a_urdf_whose_y_axis_points_up_is_turned(tmp_path):
@@ -211,9 +211,9 @@ def test_a_urdf_whose_y_axis_points_up_is_turned(tmp_path):
     turned = '<link name="first"/><joint name="turn" type="fixed"><origin rpy="-1.5707963267948966 0 0"/>'
     turned += '<parent link="first"/><child link="base"/></joint></robot>'
     path.write_text(A1.read_text().replace("</robot>", turned))
-    body, notes = imported(path)
+    body, notes = import_robot(path)
     assert "turned: the file's y axis points up, the torso's frame has z there" in notes
-    assert body.torso.standing_height == pytest.approx(imported(A1).body.torso.standing_height, rel=0.02)
+    assert body.torso.standing_height == pytest.approx(import_robot(A1).body.torso.standing_height, rel=0.02)
     assert reference().same_bits(path, body) == 200
 
 
@@ -223,14 +223,14 @@ def test_a_urdf_whose_y_axis_points_up_is_turned(tmp_path):
 def test_names_are_cleaned_and_no_robots(given, name, tmp_path):
     path = tmp_path / "a.xml"
     path.write_text(GO2.read_text().replace("quadruped 15 kg", given))
-    assert imported(path).body.name == name
+    assert import_robot(path).body.name == name
 
 
 def test_paths_are_bodies_everywhere_and_follow_the_file(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(GO2.read_text())
     body = registry.body_of(str(path))
-    assert body == imported(path).body
+    assert body == import_robot(path).body
     assert registry.body_of(path) is body
     path.write_text(GO2.read_text().replace("quadruped 15 kg", "other"))
     assert registry.body_of(path).name == "other"
@@ -248,7 +248,7 @@ def test_a_mesh_that_touches_by_a_contact_pair_alone_is_a_collider(tmp_path):
     text = text.replace("</worldbody>", '</worldbody><contact><pair geom1="tip" geom2="plate"/></contact>', 1)
     path = tmp_path / "tipped.xml"
     path.write_text(text)
-    model = mujoco.MjModel.from_xml_string(imported(path).body.source)
+    model = mujoco.MjModel.from_xml_string(import_robot(path).body.source)
     meshes = [geom for geom in range(model.ngeom) if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH]
     assert [model.body(model.geom_bodyid[geom]).name for geom in meshes] == ["l1_link3"]
     assert (model.geom_contype[meshes], model.geom_conaffinity[meshes]) == (1, 0)

@@ -50,7 +50,7 @@ def test_a_robot_that_is_registered_joins_no_family(monkeypatch):
 
 def seen(body):
     """What a network sees of a body, in units of its size."""
-    description = tokens.described(Setup.of(body).definition)
+    description = tokens.body_description(Setup.of(body).definition)
     return np.concatenate([description.legs.ravel(), description.torso])
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.bodies import generator
 from arc_suite.models.kinematics import Legs, damped_changes, least_changes
-from arc_suite.models.standing import posed
+from arc_suite.models.standing import pose_mechanics
 from arc_suite.robots import ROBOTS
 
 BODIES = [*ROBOTS.values(), *map(generator.random_body, (1, 2, 8))]
@@ -16,7 +16,7 @@ BODIES = [*ROBOTS.values(), *map(generator.random_body, (1, 2, 8))]
 def test_soles_and_jacobians_are_those_of_the_model(body):
     legs = Legs.of(body)
     angles = np.random.RandomState(0).uniform(-0.5, 0.5, len(body.joint_names))
-    pose, (soles, jacobians) = posed(body, angles), legs.soles(legs.by_leg(angles))
+    pose, (soles, jacobians) = pose_mechanics(body, angles), legs.soles(legs.by_leg(angles))
     assert_allclose(soles, pose.soles, atol=1e-12)
     for leg, expected in enumerate(pose.jacobians):
         assert_allclose(jacobians[leg][:, legs.moves[leg]], expected, atol=1e-12)
@@ -29,7 +29,7 @@ def test_three_joints_reach_places_near_by(robot):
     middle, height = 0.5 * (legs.low + legs.high), ROBOTS[robot].torso.standing_height
     goals = legs.soles(middle + 0.2 * random.uniform(-1.0, 1.0, (5, *middle.shape)) * (legs.high - legs.low))[0]
     weights = np.tile(np.eye(3), (*goals.shape[:2], 1, 1))
-    found = legs.reached(np.broadcast_to(middle, goals.shape), goals, weights, 0.02 * height, 30)
+    found = legs.solve_joint_angles(np.broadcast_to(middle, goals.shape), goals, weights, 0.02 * height, 30)
     assert_allclose(legs.soles(found)[0], goals, atol=0.01 * height)
     assert ((found >= legs.low) & (found <= legs.high)).all()
 
@@ -40,7 +40,7 @@ def test_what_is_out_of_reach_stays_within_bounds(body):
     middle = 0.5 * (legs.low + legs.high)
     goals = legs.soles(middle)[0] + (0.0, 0.0, 10.0 * body.torso.standing_height)
     weights = np.tile(np.eye(3), (len(goals), 1, 1))
-    found = legs.reached(middle, goals, weights, 0.02, 20)
+    found = legs.solve_joint_angles(middle, goals, weights, 0.02, 20)
     assert np.isfinite(found).all() and ((found >= legs.low) & (found <= legs.high)).all()
 
 

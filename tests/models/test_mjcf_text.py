@@ -10,7 +10,7 @@ from saved_models import saved, without_keyframe
 
 from arc_suite import models, registry
 from arc_suite.arenas import ARENAS, FLAT
-from arc_suite.models.sizing import sized
+from arc_suite.models.sizing import size_body
 from arc_suite.robots import ROBOTS
 
 BODIES = [*ROBOTS, "spider", "random:3"]
@@ -39,7 +39,7 @@ def accelerations(model, joints):
 @pytest.mark.parametrize("decorated", [False, True])
 def test_pymjcf_and_mujoco_read_the_same_model(name, decorated):
     root = models.assemble(registry.body_of(name), decorated=decorated)
-    text, before = models.written(root), mujoco.MjModel.from_xml_string(root.to_xml_string())
+    text, before = models.to_mjcf(root), mujoco.MjModel.from_xml_string(root.to_xml_string())
     assert saved(by_pymjcf(text)) == saved(mujoco.MjModel.from_xml_string(text))
     assert saved(without_keyframe(text)) == saved(before)
     assert "class=" not in text
@@ -47,9 +47,9 @@ def test_pymjcf_and_mujoco_read_the_same_model(name, decorated):
 
 @pytest.mark.parametrize("arena", ARENAS)
 def test_arenas_are_in_the_text(arena, tmp_path):
-    body = sized(registry.body_of("tick"))
+    body = size_body(registry.body_of("tick"))
     root, path = models.assemble(body, ARENAS[arena](body)), tmp_path / "model.xml"
-    path.write_text(models.written(root))
+    path.write_text(models.to_mjcf(root))
     assert saved(without_keyframe(path.read_text())) == saved(mujoco.MjModel.from_xml_string(root.to_xml_string()))
     grounds = [geom.name for geom in mjcf.from_path(path).worldbody.geom]
     assert grounds and all(name.startswith("floor") for name in grounds)
@@ -58,7 +58,7 @@ def test_arenas_are_in_the_text(arena, tmp_path):
 @pytest.mark.parametrize("name", BODIES)
 def test_home_is_the_standing_pose(name):
     body = registry.body_of(name)
-    model = mujoco.MjModel.from_xml_string(models.written(models.assemble(body)))
+    model = mujoco.MjModel.from_xml_string(models.to_mjcf(models.assemble(body)))
     assert model.key("home").qpos == pytest.approx([0.0, 0.0, body.torso.standing_height, 1.0, *[0.0] * (model.nq - 4)])
 
 
@@ -73,7 +73,7 @@ def test_a_scene_of_dm_control_takes_a_body_without_arena(decorated):
     floor = models.assemble(body).find("geom", "floor")
     scene.worldbody.add("geom", **floor.get_attributes())
     for name in ("first", "second"):
-        text = models.written(models.assemble(body.replace(name=name), None, decorated))
+        text = models.to_mjcf(models.assemble(body.replace(name=name), None, decorated))
         site = scene.worldbody.add("site", pos=(0.0, 9.0 * (name == "second"), 0.0))
         site.attach(mjcf.from_xml_string(text)).add("freejoint", name="root")
     model = mjcf.Physics.from_mjcf_model(scene).model.ptr
@@ -87,10 +87,10 @@ def test_a_scene_of_dm_control_takes_a_body_without_arena(decorated):
 @pytest.mark.filterwarnings("error")
 def test_a_spec_of_mujoco_takes_a_body_without_arena_and_its_dynamics_stay():
     body = registry.body_of("queen")
-    whole = models.written(models.assemble(body))
+    whole = models.to_mjcf(models.assemble(body))
     scene = mujoco.MjSpec.from_string(whole)
     scene.delete(scene.body("torso"))
-    child = mujoco.MjSpec.from_string(models.written(models.assemble(body, None)))
+    child = mujoco.MjSpec.from_string(models.to_mjcf(models.assemble(body, None)))
     scene.attach(child, frame=scene.worldbody.add_frame(), prefix="queen-")
     scene.body("queen-torso").add_freejoint().name = "queen-root"
     model = scene.compile()
@@ -103,12 +103,12 @@ def test_a_spec_of_mujoco_takes_a_body_without_arena_and_its_dynamics_stay():
 
 
 def test_a_body_without_arena_leaves_the_rest_to_the_scene():
-    text = models.written(models.assemble(registry.body_of("tick"), None, decorated=True))
+    text = models.to_mjcf(models.assemble(registry.body_of("tick"), None, decorated=True))
     model = mujoco.MjModel.from_xml_string(text)
     assert (model.nq, model.nu, model.nlight, model.ntex, model.nkey) == (18, 18, 0, 0, 0)
     assert (model.geom_bodyid > 0).all()
     assert "<option" not in text and "<visual>" not in text
-    assert "<option" in models.written(models.assemble(registry.body_of("tick"), FLAT))
+    assert "<option" in models.to_mjcf(models.assemble(registry.body_of("tick"), FLAT))
 
 
 @pytest.mark.parametrize("body", [imports.hexapod, imports.with_arm])
@@ -117,7 +117,7 @@ def test_the_text_of_an_imported_body_has_its_bits(body, decorated):
     """PyMJCF reads it, too; what weakens motors in simulations is not in it."""
     body = body()
     text = models.text(body, FLAT, decorated)
-    model, parsed = mujoco.MjModel.from_xml_string(text), models.parsed(body, FLAT, decorated).compile()
+    model, parsed = mujoco.MjModel.from_xml_string(text), models.model_spec(body, FLAT, decorated).compile()
     servos = [*body.joint_names, *(joint.name for joint in body.held)]
     assert [model.actuator(index).name for index in range(model.nu)] == servos
     for name in ("qpos0", "key_qpos", "body_mass", "body_inertia", "geom_pos", "geom_quat", "mesh_vert", "cam_pos"):
@@ -129,7 +129,7 @@ def test_the_text_of_an_imported_body_has_its_bits(body, decorated):
 
 def test_releases_stand_before_the_servos_of_an_arm():
     body = imports.with_arm()
-    model, joints = models.parsed(body).compile(), list(body.joint_names)
+    model, joints = models.model_spec(body).compile(), list(body.joint_names)
     names = [model.actuator(index).name for index in range(model.nu)]
     assert names == [*joints, *(f"{joint}-release" for joint in joints), "arm"]
 

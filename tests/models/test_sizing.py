@@ -9,8 +9,8 @@ import pytest
 from arc_suite import models
 from arc_suite.bodies import generator
 from arc_suite.models import stride
-from arc_suite.models.sizing import control_timestep, natural_frequency, sized
-from arc_suite.models.standing import posed, stability_margin, standing
+from arc_suite.models.sizing import control_timestep, natural_frequency, size_body
+from arc_suite.models.standing import measure_standing, pose_mechanics, stability_margin
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Motor, Simulation
 
@@ -23,7 +23,7 @@ def compiled(body):
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_published_robots_are_not_sized(robot):
-    assert sized(ROBOTS[robot]) is ROBOTS[robot]
+    assert size_body(ROBOTS[robot]) is ROBOTS[robot]
     assert ROBOTS[robot].simulation == Simulation(
         timestep=0.002, contact_time=0.02, contact_width=0.001, contact_margin=0.005
     )
@@ -46,7 +46,7 @@ def test_motors_armature_and_damping_follow_the_rules():
     data = mujoco.MjData(model)
     weight = 9.81 * model.body_mass.sum()
     largest = np.zeros(18)
-    for angles, stands in stride.poses(BODY):
+    for angles, stands in stride.stride_poses(BODY):
         data.qpos[7:] = angles
         mujoco.mj_forward(model, data)
         feet = [model.body(f"{leg.name}_foot").id for leg in BODY.legs]
@@ -61,8 +61,8 @@ def test_motors_armature_and_damping_follow_the_rules():
             mujoco.mj_jacBody(model, data, jacobian, None, foot)
             torques -= force * jacobian[2, 6:]
         largest = np.maximum(largest, abs(torques))
-    inertias = standing(BODY).inertias
-    loads = np.maximum(largest, inertias * stride.accelerations(BODY)).reshape(6, 3)
+    inertias = measure_standing(BODY).inertias
+    loads = np.maximum(largest, inertias * stride.swing_accelerations(BODY)).reshape(6, 3)
     loads = np.maximum(loads, 0.25 * loads.max(axis=1, keepdims=True)).ravel()
     assert model.actuator_gear[:, 0] == pytest.approx(30.0 * loads, rel=1e-6)
     frequency = natural_frequency(BODY)
@@ -74,27 +74,27 @@ def test_motors_armature_and_damping_follow_the_rules():
 
 def test_loads_are_those_of_a_stride():
     """Of six legs of three joints, at the target velocity: 0.65 of a cycle on the ground, at 0.27 sqrt(g / h)."""
-    poses = list(stride.poses(BODY))
+    poses = list(stride.stride_poses(BODY))
     stands = np.array([feet for _, feet in poses])
     assert stands.mean() == pytest.approx(0.65, abs=0.02)
     assert stands.sum(axis=1).min() == 3
     ahead = stride.half_stroke(BODY, stride.fitted_gait(BODY))
     assert ahead == pytest.approx(0.5 * 0.2 / 0.27 * 0.65 * 0.4)
-    soles = np.array([posed(BODY, angles).soles for angles, _ in poses]) - standing(BODY).soles
+    soles = np.array([pose_mechanics(BODY, angles).soles for angles, _ in poses]) - measure_standing(BODY).soles
     assert abs(soles[stands][:, 0]).max() == pytest.approx(ahead, rel=0.1)
     assert soles[~stands][:, 2].max() == pytest.approx(0.12 * 0.4, rel=0.3)
     # On three feet each bears twice as much as on six, and two to three times on the single one of its side.
-    share = stride.loads(BODY).reshape(6, 3)[:, 1:] / abs(standing(BODY).loads.reshape(6, 3)[:, 1:])
+    share = stride.stride_loads(BODY).reshape(6, 3)[:, 1:] / abs(measure_standing(BODY).loads.reshape(6, 3)[:, 1:])
     assert share.min() > 2.0 and share.max() < 3.1
 
 
 def test_armature_follows_from_the_load_and_not_from_a_motor_that_is_given():
-    legs = sized(BODY).legs
+    legs = size_body(BODY).legs
     strong = tuple(
         leg.replace(links=tuple(link.replace(joint=link.joint.replace(motor=Motor(gear=99.0))) for link in leg.links))
         for leg in BODY.legs
     )
-    for leg, other in zip(legs, sized(BODY.replace(legs=strong)).legs, strict=True):
+    for leg, other in zip(legs, size_body(BODY.replace(legs=strong)).legs, strict=True):
         assert [joint.armature for joint in leg.joints] == [joint.armature for joint in other.joints]
         assert {joint.motor.gear for joint in other.joints} == {99.0}
 
@@ -104,15 +104,15 @@ def test_what_a_body_says_is_kept():
     legs = list(BODY.legs)
     legs[0] = legs[0].replace(links=(legs[0].links[0], legs[0].links[1].replace(joint=knee), legs[0].links[2]))
     simulation = Simulation(timestep=0.001)
-    body = sized(BODY.replace(legs=tuple(legs), simulation=simulation))
+    body = size_body(BODY.replace(legs=tuple(legs), simulation=simulation))
     assert body.legs[0].links[1].joint == knee
     assert body.simulation == simulation
     assert body.legs[1].links[1].joint.motor is not None
-    assert sized(body) is body
+    assert size_body(body) is body
 
 
 def test_sizing_keeps_dimensionless_ratios_when_a_body_grows():
-    small, large = (sized(generator.scaled(BODY, scale)) for scale in (0.1, 10.0))
+    small, large = (size_body(generator.scaled(BODY, scale)) for scale in (0.1, 10.0))
     for leg, giant in zip(small.legs, large.legs, strict=True):
         for joint, other in zip(leg.joints, giant.joints, strict=True):
             # torque ~ mass x length, inertia ~ mass x length^2, time ~ sqrt(length); mass ~ length^3
@@ -123,22 +123,22 @@ def test_sizing_keeps_dimensionless_ratios_when_a_body_grows():
 
 @pytest.mark.parametrize(("scale", "density"), [(0.05, 10.0), (0.025, 300.0), (100.0, 10.0), (100.0, 1e9)])
 def test_sizing_finds_no_number_that_a_spec_refuses(scale, density):
-    body = sized(generator.scaled(BODY.replace(density=density), scale))  # 2 cm, 1 cm and 40 m high
+    body = size_body(generator.scaled(BODY.replace(density=density), scale))  # 2 cm, 1 cm and 40 m high
     assert min(joint.motor.gear for leg in body.legs for joint in leg.joints) > 0.0
     wide = generator.scaled(generator.generate(12, 3, "radial"), 100.0)
-    assert sized(wide).camera.position[1] < -100.0
+    assert size_body(wide).camera.position[1] < -100.0
     tall = BODY.replace(torso=BODY.torso.replace(standing_height=100.0), density=density)
-    assert sized(tall).simulation.contact_margin > 1.0
+    assert size_body(tall).simulation.contact_margin > 1.0
 
 
 def test_a_leg_in_which_nothing_carries_gets_motors_too():
-    body = sized(generator.generate(6, 1))
-    gears = {round(leg.joints[0].motor.gear / standing(body).mass, 6) for leg in body.legs}
+    body = size_body(generator.generate(6, 1))
+    gears = {round(leg.joints[0].motor.gear / measure_standing(body).mass, 6) for leg in body.legs}
     assert min(gears) > 0.01
 
 
 def test_stance_is_measured():
-    pose = standing(BODY)
+    pose = measure_standing(BODY)
     model = compiled(BODY)
     assert pose.mass == pytest.approx(model.body_mass.sum(), rel=1e-12)
     assert pose.height == 0.4

@@ -22,7 +22,7 @@ FIELDS += ("jnt_type", "jnt_axis", "jnt_pos", "jnt_bodyid", "qpos0")
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 def test_what_stands_is_what_is_built(body):
     built = mujoco.MjModel.from_xml_string(models.assemble(body).to_xml_string())
-    stands = standing.compiled(body)
+    stands = standing.compile_body(body)
     for field in FIELDS:
         np.testing.assert_array_equal(getattr(stands, field), getattr(built, field), err_msg=field)
     names = [[model.body(i).name for i in range(model.nbody)] for model in (stands, built)]

@@ -6,13 +6,13 @@ import pathlib
 import pytest
 from refusals import refused
 
-from arc_suite.importing import imported
+from arc_suite.importing import import_robot
 from arc_suite.robots import sources
 from arc_suite.robots.spec import MAX_SOURCE, SpecError
 from arc_suite.robots.spec_files import MAX_BYTES, MAX_IMPORTED, body_from_json, body_to_json, load_body, save_body
 
 ROBOT = pathlib.Path(__file__).parents[1] / "fixtures" / "robots" / "go2_like.xml"
-BODY = imported(ROBOT).body
+BODY = import_robot(ROBOT).body
 KNEE = 'name="l1_joint3"'
 
 # By what is written in place of what: the line.

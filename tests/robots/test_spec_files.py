@@ -9,17 +9,17 @@ import pytest
 from refusals import refused
 
 from arc_suite.bodies import generator
-from arc_suite.models.sizing import sized
+from arc_suite.models.sizing import size_body
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import SpecError
 from arc_suite.robots.spec_files import EXAMPLES, MAX_BYTES, body_from_json, body_to_json, load_body, save_body
 
-SOUND = json.loads(body_to_json(sized(generator.generate(4, 2))))
+SOUND = json.loads(body_to_json(size_body(generator.generate(4, 2))))
 
 
 @pytest.mark.parametrize(
     "body",
-    [*ROBOTS.values(), generator.generate(12, 4), generator.random_body(3), sized(generator.random_body(4))],
+    [*ROBOTS.values(), generator.generate(12, 4), generator.random_body(3), size_body(generator.random_body(4))],
     ids=lambda body: body.name,
 )
 def test_bodies_survive_the_way_there_and_back(body, tmp_path):

@@ -29,7 +29,7 @@ from studies.pages import table_writer  # noqa: E402
 from arc_suite.cpg import Demonstrator  # noqa: E402
 from arc_suite.envs.setup import Setup  # noqa: E402
 from arc_suite.evaluation import protocol, walking  # noqa: E402
-from arc_suite.importing import imported  # noqa: E402
+from arc_suite.importing import import_robot  # noqa: E402
 from arc_suite.models.soundness import flaws  # noqa: E402
 from arc_suite.robots.spec import Body  # noqa: E402
 
@@ -96,7 +96,7 @@ class Row(NamedTuple):
 def row(robot: zoo.Robot, folder: pathlib.Path) -> Row:
     """Import a file and try the body; an error that is no single line is shown by its type."""
     path = zoo.place(robot, folder)
-    found, refusal = attempt(imported, path, feet=robot.feet)
+    found, refusal = attempt(import_robot, path, feet=robot.feet)
     if found is None:
         return Row(robot, refusal)
     body = found.body

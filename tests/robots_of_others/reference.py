@@ -53,7 +53,7 @@ def _equal(ours: mujoco.MjModel, theirs: mujoco.MjModel, home: np.ndarray, rando
 def _robot(path: pathlib.Path, turn: str) -> mujoco.MjSpec:
     """Return the file's robot alone, free to move."""
     if path.suffix == ".urdf":
-        cured, *_ = urdf.cured(ElementTree.parse(path).getroot(), path.parent, turn)
+        cured, *_ = urdf.repair_urdf(ElementTree.parse(path).getroot(), path.parent, turn)
         spec = mujoco.MjSpec.from_string(cured)
     else:
         spec = mujoco.MjSpec.from_file(str(path))

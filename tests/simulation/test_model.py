@@ -17,7 +17,7 @@ from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.bodies.generator import random_body
 from arc_suite.cpg import Demonstrator
 from arc_suite.models import direct
-from arc_suite.models.sizing import sized
+from arc_suite.models.sizing import size_body
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 from arc_suite.simulation.model import compiled, euler_suffices, list_contacts
@@ -39,7 +39,7 @@ def test_the_model_on_flat_ground_is_that_of_the_builder_byte_for_byte(body):
     body = load_body(body) if body in EXAMPLES else registry.body_of(body)
     spec = mujoco.MjSpec.from_string(models.assemble(body).to_xml_string())
     model = spec.compile()
-    assert saved(direct.on_flat_ground(sized(body)).compile()) == saved(model)
+    assert saved(direct.on_flat_ground(size_body(body)).compile()) == saved(model)
     list_contacts(spec, model)
     listed = spec.compile()
     listed.opt.integrator = compiled(body).opt.integrator

@@ -44,7 +44,7 @@ def test_tracks_agree_with_the_reward(robot):
     assert_array_equal(track.joint_velocities[-1], environment.physics.data.qvel[6:])
     gears = environment.physics.model.ptr.actuator_gear[:, 0]
     assert_allclose(track.torques, track.actions * gears)
-    assert track.mass == pytest.approx(poses.standing(ROBOTS[robot]).mass, 1e-9)
+    assert track.mass == pytest.approx(poses.measure_standing(ROBOTS[robot]).mass, 1e-9)
     assert 0.05 < track.contacts.mean() < 0.95
     assert (track.foot_positions[track.contacts][:, 2] < track.foot_radii[0] + 0.011).all()  # within the contact margin
 

@@ -12,7 +12,7 @@ import arc_suite
 from arc_suite import models, policies, rotations
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.models.stride import fitted_gait
 from arc_suite.robots import ROBOTS, gaits, spec_files
 from arc_suite.robots.spec_files import body_to_json, load_body
@@ -242,5 +242,5 @@ def test_random_actions_upset_no_body(seed):
 
 def test_one_link_legs_are_built_and_stand():
     body = generator.generate(6, 1)
-    assert standing(body).margin > 0.08 * body.torso.standing_height
+    assert measure_standing(body).margin > 0.08 * body.torso.standing_height
     track(body, 4.0)  # no promise that it walks

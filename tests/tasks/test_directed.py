@@ -9,7 +9,7 @@ import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.models.posture import moved, room
+from arc_suite.models.posture import measure_room, move_ground_points
 from arc_suite.robots import ROBOTS, gaits, mirror
 from arc_suite.tasks import mirrors
 from arc_suite.tasks.gait_and_pose import CYCLE, glide_gait, to_clock_units
@@ -135,17 +135,17 @@ def test_settings_that_do_not_fit(settings, message):
 
 
 def test_the_room_of_a_body():
-    planted, sliding = room(ROBOTS["queen"]), room(ROBOTS["queen"], planted=False)
+    planted, sliding = measure_room(ROBOTS["queen"]), measure_room(ROBOTS["queen"], planted=False)
     assert_allclose(planted[:, 0], (-0.12, -0.27, -0.21, -0.06, -0.12, -0.3), atol=1e-9)
     assert_allclose(sliding[0], (-0.48, 0.09), atol=1e-9)
     assert (planted[:, 0] >= sliding[:, 0]).all() and (planted[:, 1] <= sliding[:, 1]).all()
     body = generator.generate(6, 3)
-    assert_allclose(room(generator.scaled(body, 3.0)), room(body), atol=1e-9)
+    assert_allclose(measure_room(generator.scaled(body, 3.0)), measure_room(body), atol=1e-9)
 
 
 def test_drawn_poses_lie_within_the_room():
     task = arc_suite.load("queen", "directed", {"poses": 1.0}).task.definition
-    low, high = room(ROBOTS["queen"], planted=False).T
+    low, high = measure_room(ROBOTS["queen"], planted=False).T
     starts = [task.start(np.random.RandomState(seed), None) for seed in range(30)]
     poses = np.concatenate([start.memory.gait_and_pose.poses for start in starts])
     assert ((low - 1e-9 <= poses) & (poses <= high + 1e-9)).all()
@@ -154,9 +154,9 @@ def test_drawn_poses_lie_within_the_room():
 
 def test_a_pose_moves_the_ground_under_the_torso():
     places = np.array([[0.3, 0.2, -0.5]])
-    assert_allclose(moved(places, np.array((0.1, 0.0, 0.0, 0.0, 0.0, 0.0)), 0.5), [[0.3, 0.2, -0.55]])
+    assert_allclose(move_ground_points(places, np.array((0.1, 0.0, 0.0, 0.0, 0.0, 0.0)), 0.5), [[0.3, 0.2, -0.55]])
     # With its nose down, what lies ahead is higher in its frame.
-    assert moved(places, np.array((0.0, 0.0, 0.0, 0.0, 0.1, 0.0)), 0.5)[0, 2] > -0.5
+    assert move_ground_points(places, np.array((0.0, 0.0, 0.0, 0.0, 0.1, 0.0)), 0.5)[0, 2] > -0.5
 
 
 def test_the_mirror_image_of_a_directed_walk():

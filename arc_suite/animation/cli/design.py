@@ -31,7 +31,7 @@ from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, m
 from arc_suite.cli.flags import MAX_COUNT, ROBOT_HELP, named_values
 from arc_suite.cli.program import progress, resumable, say
 from arc_suite.journal import Journal
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import MAX_LENGTH, MAX_NAME, Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation.cores import use_one_thread
@@ -98,7 +98,7 @@ def budget_from_flags(around: Body | None) -> Budget:
     if around is None:
         limits = {"mass": DEFAULT_MASS, "span": DEFAULT_SPAN}
     else:
-        limits = {"mass": standing(around).mass, "span": float(extent(around).max())}
+        limits = {"mass": measure_standing(around).mass, "span": float(extent(around).max())}
     for name in Budget._fields:
         if FLAGS[name].value is not None:
             limits[name] = FLAGS[name].value

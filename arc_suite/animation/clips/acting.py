@@ -15,7 +15,7 @@ from arc_suite.cpg.selection import presets_of
 from arc_suite.models import sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
-from arc_suite.models.standing import posed, stood
+from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import readings
@@ -86,7 +86,7 @@ def death(body: Body, rest: Pose) -> Motion:
 
 def _simulate_leap(body: Body, rest: Pose, candidates: tuple[leaps.Leap, ...], measure: str) -> Recording:
     """Return the best of some leaps by a measure of `leaps`, from rest to rest."""
-    legs = Legs.of(sizing.sized(body))
+    legs = Legs.of(sizing.size_body(body))
     best_leap = leaps.found(body, tuple(rest.joints.tolist()), candidates, measure)
     leap_joints = leaps.keyframes(body, legs, legs.by_leg(rest.joints), best_leap)
     rest_joints = np.tile(rest.joints, (_to_steps(body, _HOLD_DURATION), 1))
@@ -123,8 +123,8 @@ def _ease_in(steps: int) -> np.ndarray:
 
 def _loaded_targets(body: Body, rest: Pose) -> np.ndarray:
     """Return the target angles (joints,), rad, at which position control holds a pose under the body's weight."""
-    sized_body = sizing.sized(body)
-    standing_pose = posed(sized_body, rest.joints)
+    sized_body = sizing.size_body(body)
+    standing_pose = pose_mechanics(sized_body, rest.joints)
     torque_limits = np.array([joint.torque for joint in sized_body.joints])  # N m
     stiffness = drive(sized_body, standing_pose.inertias).stiffness  # shares of the torque limits per rad
     return rest.joints + standing_pose.loads / (torque_limits * stiffness)
@@ -142,8 +142,8 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     Returns:
         A pose for every substep.
     """
-    sized_body = sizing.sized(body)
-    joint_drive = drive(sized_body, posed(sized_body, rest.joints).inertias)
+    sized_body = sizing.size_body(body)
+    joint_drive = drive(sized_body, pose_mechanics(sized_body, rest.joints).inertias)
     control_timestep = sizing.control_timestep(body)
     substeps = sized_body.simulation.substeps
     joint_count = len(body.joint_names)
@@ -152,7 +152,7 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     model.dof_damping[6:] *= damping_share  # the first six are the torso's
     layout = readings.layout(model, body)
     data = mujoco.MjData(model)
-    data.qpos[:] = readings.positions(np.concatenate(rest), layout, stood(model))
+    data.qpos[:] = readings.positions(np.concatenate(rest), layout, standing_qpos(model))
     positions = [data.qpos.copy()]
     for target, next_target in zip(targets[:-1], targets[1:], strict=True):
         angles = readings.pose(data.qpos, layout)[7:]

@@ -7,7 +7,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.clips import Clip
-from arc_suite.models.standing import stood
+from arc_suite.models.standing import standing_qpos
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl, pictures
@@ -98,7 +98,7 @@ def _render(body: Body, clip: Clip, frames, headings, size: int, transparent: bo
     poses[:, :2] = rotations.to_heading_frame(poses[:, :2], -headings)
     poses[:, 3:7] = rotations.turn_about_z(poses[:, 3:7], headings)
     model = compiled(body)
-    positions = readings.positions(poses, readings.layout(model, body), stood(model))
+    positions = readings.positions(poses, readings.layout(model, body), standing_qpos(model))
     framed_positions = positions[: _count_frames(clip)]
     stage = opengl.call(lambda: _prepare_stage(body, framed_positions, transparent))
     try:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from arc_suite.animation.clips.root_motion import Motion
-from arc_suite.models.standing import stood
+from arc_suite.models.standing import standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import readings
 
@@ -49,7 +49,7 @@ def sole_heights(model: mujoco.MjModel, body: Body, poses: np.ndarray) -> np.nda
     data = mujoco.MjData(model)
     foot_ids = [model.body(name).id for name in body.foot_names]
     foot_radii = [leg.foot.radius for leg in body.legs]
-    positions = readings.positions(poses, readings.layout(model, body), stood(model))
+    positions = readings.positions(poses, readings.layout(model, body), standing_qpos(model))
     center_heights = np.empty((len(poses), len(foot_ids)))
     for sample, qpos in enumerate(positions):
         data.qpos[:] = qpos

@@ -1,7 +1,7 @@
 """Motions drawn over standing feet, from the pose at rest: breaths, looks, leans, blows, strikes.
 
 A gesture is a table of tracks. A track has keys of time and value; between keys the value is eased. Lengths are in
-standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.NAMES`.
+standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.POSE_NAMES`.
 """
 
 import itertools
@@ -17,9 +17,9 @@ from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
 
-_HEIGHT = posture.NAMES.index("height")
-_LEFT = posture.NAMES.index("left")
-_ROLL = posture.NAMES.index("roll")
+_HEIGHT = posture.POSE_NAMES.index("height")
+_LEFT = posture.POSE_NAMES.index("left")
+_ROLL = posture.POSE_NAMES.index("roll")
 
 _SAMPLES_PER_CONTROL_STEP = 4
 _SMOOTHING_ROUNDS = 3  # of a mean over three samples
@@ -111,7 +111,7 @@ def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration:
     Args:
         body: the spec.
         rest: pose from which it moves.
-        tracks: by a number of the pose, see `posture.NAMES`: pairs of a time, sqrt(h / g), and a value, standing
+        tracks: by a number of the pose, see `posture.POSE_NAMES`: pairs of a time, sqrt(h / g), and a value, standing
             heights or rad.
         duration: sqrt(h / g).
 
@@ -223,13 +223,13 @@ def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> Motion:
     Args:
         body: the spec.
         rest: pose from which it turns.
-        number: of the pose that changes; see `posture.NAMES`.
+        number: of the pose that changes; see `posture.POSE_NAMES`.
         sign: of the change.
 
     Raises:
         ValueError: the legs have no room for it.
     """
-    lowest, highest = posture.room(body, planted=False)[posture.NAMES.index(number)]  # rad
+    lowest, highest = posture.measure_room(body, planted=False)[posture.POSE_NAMES.index(number)]  # rad
     room = abs(highest if sign > 0.0 else lowest)
     turn = sign * min(_MAX_TURN, _TURN_ROOM_SHARE * room)
     if abs(turn) < _MIN_TURN:
@@ -293,9 +293,11 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
 
     angles = np.tile(rest_angles, (len(poses), 1, 1))
     for share in np.linspace(0.0, 1.0, _STAGES + 1)[1:]:
-        goals = posture.moved(rest_feet + share * lift_vectors, share * poses, standing_height) @ to_torso
-        angles = legs.reached(angles, goals, _SOLE_WEIGHTS, posture.DAMPING * standing_height, _ITERATIONS_PER_STAGE)
-    attitudes = posture.attitude(poses[:, 3:])
+        goals = posture.move_ground_points(rest_feet + share * lift_vectors, share * poses, standing_height) @ to_torso
+        angles = legs.solve_joint_angles(
+            angles, goals, _SOLE_WEIGHTS, posture.IK_DAMPING * standing_height, _ITERATIONS_PER_STAGE
+        )
+    attitudes = posture.rotation_of(poses[:, 3:])
     misses = (legs.soles(angles)[0] - goals) @ to_root @ attitudes.swapaxes(-1, -2)
     return FollowingLegs(joints=legs.by_joint(angles), misses=abs(misses))
 
@@ -394,7 +396,7 @@ def _sample_times(body: Body, duration: float) -> np.ndarray:
 def _poses_of_tracks(times: np.ndarray, tracks: Mapping[str, tuple]) -> np.ndarray:
     """Return poses (samples, 6) of the torso by tracks of their numbers; numbers without a track are 0."""
     zero_track = ((0.0, 0.0),)
-    return np.stack([_track_values(times, tracks.get(name, zero_track)) for name in posture.NAMES], axis=-1)
+    return np.stack([_track_values(times, tracks.get(name, zero_track)) for name in posture.POSE_NAMES], axis=-1)
 
 
 def _track_values(times: np.ndarray, track: tuple) -> np.ndarray:

@@ -201,7 +201,7 @@ def _solve_joint_angles(
         goals = feet + corrections * (share, share, 1.0)
         goals[..., 2] = np.maximum(goals[..., 2], legs.radii)
         goals_in_torso = (torso_rotations.swapaxes(-1, -2) @ (goals - torso_positions)[..., None])[..., 0]
-        candidates = legs_to_centers.reached(
+        candidates = legs_to_centers.solve_joint_angles(
             start_angles, goals_in_torso, _FOOT_WEIGHTS, _DAMPING * standing_height, _ITERATIONS
         )
         misses_in_torso = legs_to_centers.soles(candidates)[0] - goals_in_torso

@@ -250,7 +250,7 @@ class Recorder:
 
     def _limit_crouch(self, depth: float) -> float:
         """Return a depth, standing heights, or as far as the legs fold."""
-        lowest_height = posture.room(self.body, planted=False)[0, 0]  # from rest, standing heights
+        lowest_height = posture.measure_room(self.body, planted=False)[0, 0]  # from rest, standing heights
         room = _CROUCH_ROOM_SHARE * abs(lowest_height)
         if room < _MIN_CROUCH:
             raise ValueError(f"the legs fold by {room:.2f} of their height; a crouch takes {_MIN_CROUCH:g}")

@@ -12,7 +12,7 @@ import numpy as np
 from arc_suite.bodies import generator
 from arc_suite.bodies.generator import Proportions
 from arc_suite.models.outline import outline
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import Body
 
 GENE_DEVIATIONS = 2.0  # standard deviations of a variant's lengths, that a gene spans to either side of its middle
@@ -69,7 +69,7 @@ class ProportionGenes:
         links = self._whole_number(numbers, "links")
         is_radial = legs % 2 == 1 or numbers["layout"] >= _MIN_RADIAL
         layout = "radial" if is_radial else "pairs"
-        leg_positions = generator.places(legs, layout)  # along the body, from -1 at the rear to 1 in front
+        leg_positions = generator.mount_shares(legs, layout)  # along the body, from -1 at the rear to 1 in front
         reach_factors = np.interp(
             leg_positions,
             (-1.0, 0.0, 1.0),
@@ -88,7 +88,7 @@ class ProportionGenes:
             profile=profile,
             reaches=(numbers["reach"] * reach_factors).tolist(),
         )
-        return generator.proportioned("design", legs, layout, proportions)
+        return generator.build_body("design", legs, layout, proportions)
 
     def size_share(self, genes: np.ndarray) -> float:
         """Return the size of the body as a share of the largest size within a budget."""
@@ -114,12 +114,12 @@ class VariantGenes:
         """Take the body, and the standard deviation of logarithms of lengths and of headings in rad."""
         self._body = body
         self._amount = amount
-        self.names = tuple(f"deformation_{number}" for number in range(1, generator.deformations(body) + 1))
+        self.names = tuple(f"deformation_{number}" for number in range(1, generator.deformation_count(body) + 1))
 
     def shape(self, genes: np.ndarray) -> Body:
         """Return the variant of genes (n,) from 0 to 1; genes of 0.5 leave the body as it is."""
         changes = self._amount * GENE_DEVIATIONS * (2.0 * genes - 1.0)
-        return generator.deformed(self._body, changes)
+        return generator.deform_legs(self._body, changes)
 
     def size_share(self, genes: np.ndarray) -> None:
         """Return None: variants have the size of the body."""
@@ -155,7 +155,7 @@ def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: st
     # The density comes before the scale: small parts of the shape's own density could be too light to be allowed. The
     # scale multiplies masses by its third power.
     ballast = sum(weight.mass for weight in shape.ballast)  # kg, does not depend on the density
-    density = shape.density * (budget.mass / factor**3 - ballast) / (standing(shape).mass - ballast)
+    density = shape.density * (budget.mass / factor**3 - ballast) / (measure_standing(shape).mass - ballast)
     body = shape.replace(density=density)
     if factor != 1.0:
         body = generator.scaled(body, factor)

@@ -238,7 +238,7 @@ class AnyLegs(NamedTuple):
     def normalize(self, moments: Moments) -> Normalizer:
         """Return the normalizer of 664 numbers, the same for every leg; it does not change the number of joints."""
         mean, factor, limit = moments.normalizer()
-        return Normalizer(tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), limit)
+        return Normalizer(tokens.repeat_for_legs(mean, 0.0), tokens.repeat_for_legs(factor, 1.0), limit)
 
     def exported(self, parameters, x):
         """Write the nodes of a network of actions, which compute the legs that the body has."""

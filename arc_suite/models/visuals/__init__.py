@@ -6,7 +6,7 @@ import numpy as np
 from dm_control import mjcf
 
 from arc_suite.models.visuals import bastion, leaper, queen, tick
-from arc_suite.models.visuals.generic import generic
+from arc_suite.models.visuals.generic import generic_visuals
 from arc_suite.models.visuals.scene import add_scene
 from arc_suite.models.visuals.spec import Visuals
 from arc_suite.robots import palettes
@@ -58,7 +58,7 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
 
 
 def _visuals(body: Body) -> Visuals:
-    return VISUALS.get(body.name) or generic(body)
+    return VISUALS.get(body.name) or generic_visuals(body)
 
 
 def add_materials(root: mjcf.RootElement, body: Body) -> None:

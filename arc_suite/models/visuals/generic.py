@@ -7,7 +7,7 @@ from arc_suite.models.visuals.spec import Ornament, Visuals
 from arc_suite.robots.spec import Body
 
 
-def generic(body: Body) -> Visuals:
+def generic_visuals(body: Body) -> Visuals:
     """Return visuals for a body: slate armor, violet joints, and an eye on a snout in front of the torso."""
     corners = solid_corners(body.torso.solids[0])
     center, half = corners.mean(axis=0), np.ptp(corners, axis=0) / 2.0

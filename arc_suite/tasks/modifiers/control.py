@@ -6,8 +6,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.models.sizing import position_gains, reaches, sized
-from arc_suite.models.standing import standing
+from arc_suite.models.sizing import action_reaches, position_gains, size_body
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.modifiers.draws import Episode, interpolate
@@ -74,8 +74,8 @@ class Control(_ControlFields, Modifier):
         if actions == "torque" and gains != (1.0, 1.0):
             value = checks.preview(settings["gains"])
             raise ValueError(f"gains: torques have none, expected actions='position', got {value}")
-        stiffness, damping = position_gains(sized(body), standing(body).inertias)
-        return cls(gains, actions, bool(body.source), stiffness, damping, reaches(body))
+        stiffness, damping = position_gains(size_body(body), measure_standing(body).inertias)
+        return cls(gains, actions, bool(body.source), stiffness, damping, action_reaches(body))
 
     @property
     def is_active(self) -> bool:

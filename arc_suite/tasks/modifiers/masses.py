@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from arc_suite.models.outline import torso_box
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.inertia import Inertia
@@ -112,7 +112,7 @@ class Masses(_MassesFields, Modifier):
             return {}
         xp = blocks["mass"].__array_namespace__()
         height = scene.body.torso.standing_height
-        body_mass = standing(scene.body).mass
+        body_mass = measure_standing(scene.body).mass
         torso = scene.layout.torso
         compiled_masses = scene.model["body_mass"]
         parts = np.arange(len(compiled_masses))[scene.layout.parts]
@@ -144,7 +144,7 @@ def _change_torso(scene: Scene, state: MassesState, model: Mapping[str, np.ndarr
     torso = torso._replace(center=torso.center + height * state.center_of_mass)
     payload_share = state.payload[0]
     if payload_share > 0.0:
-        payload = payload_share * state.mass[0] * standing(scene.body).mass  # kg
+        payload = payload_share * state.mass[0] * measure_standing(scene.body).mass  # kg
         torso = torso.with_point(payload, height * state.payload[1:])
     fields = {name: model[name].copy() for name in _INERTIA_FIELDS}
     for name, value in zip(_INERTIA_FIELDS, torso, strict=True):

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.markers import Marker
-from arc_suite.models.standing import GRAVITY, standing
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.modifiers.arrows import draw_arrow
@@ -65,7 +65,7 @@ class Pushes(_PushesFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        return cls(cls.check_number("force", settings), GRAVITY * standing(body).mass)
+        return cls(cls.check_number("force", settings), GRAVITY * measure_standing(body).mass)
 
     @property
     def is_active(self) -> bool:

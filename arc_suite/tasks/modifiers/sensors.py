@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite.models.sizing import reaches
+from arc_suite.models.sizing import action_reaches
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.modifiers.draws import Episode
@@ -49,7 +49,7 @@ class Sensors(_SensorsFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        return cls(cls.check_number("joint_offset", settings), reaches(body), bool(body.source))
+        return cls(cls.check_number("joint_offset", settings), action_reaches(body), bool(body.source))
 
     @property
     def is_active(self) -> bool:

@@ -7,9 +7,9 @@ import pytest
 
 from arc_suite.animation.design.axes import AXES, Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, body_within_budget, extent
-from arc_suite.bodies.generator import deformations, mutated, random_body
+from arc_suite.bodies.generator import deformation_count, mutated, random_body
 from arc_suite.models.soundness import flaws
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
 
 BUDGET = Budget(mass=12.0, span=1.5)
@@ -23,7 +23,7 @@ def bodies(space, budget, count, seed=0):
 def test_bodies_weigh_the_same_and_keep_the_span():
     spans = []
     for body in bodies(ProportionGenes(), BUDGET, 40):
-        assert math.isclose(standing(body).mass, 12.0, rel_tol=1e-9)
+        assert math.isclose(measure_standing(body).mass, 12.0, rel_tol=1e-9)
         assert all("overlap" in flaw.text for flaw in flaws(body)), body.name
         spans.append(extent(body).max())
     assert max(spans) <= 1.5 + 1e-9 and min(spans) >= 0.75 - 1e-9 and np.ptp(spans) > 0.3
@@ -55,8 +55,8 @@ def test_a_bound_on_the_height_is_kept():
 
 def test_variants_differ_are_no_larger_and_in_the_middle_are_the_creature():
     tick = ROBOTS["tick"]
-    budget = Budget(standing(tick).mass, float(extent(tick).max()))
-    body = body_within_budget(budget, VariantGenes(tick, 0.1), np.full(deformations(tick), 0.5), "tick_0")
+    budget = Budget(measure_standing(tick).mass, float(extent(tick).max()))
+    body = body_within_budget(budget, VariantGenes(tick, 0.1), np.full(deformation_count(tick), 0.5), "tick_0")
     plain = mutated(tick, 0, amount=0.0)
     assert body.replace(name=plain.name, density=plain.density) == plain
     assert math.isclose(body.density, tick.density, rel_tol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from arc_suite import rotations
 from arc_suite.animation.studio.creature import open_creature
 from arc_suite.animation.studio.sketch import Sketch, open_body
-from arc_suite.models.standing import stood
+from arc_suite.models.standing import standing_qpos
 from arc_suite.tasks import readings
 
 viser = pytest.importorskip("viser", reason="no viser here: make check-studio")
@@ -30,7 +30,7 @@ def test_frames_are_where_the_simulation_has_the_feet(server, body):
     model, data = physics.model.ptr, physics.data.ptr
     angles = np.random.default_rng(0).uniform(-0.3, 0.3, len(body.joint_names))
     pose = np.concatenate([(0.1, 0.2, 0.5, 1.0, 0.0, 0.0, 0.0), angles])
-    data.qpos[:] = readings.positions(pose, layout, stood(model))
+    data.qpos[:] = readings.positions(pose, layout, standing_qpos(model))
     mujoco.mj_kinematics(model, data)
     view.pose(data.qpos.copy(), [])
     places, turns = [], []
