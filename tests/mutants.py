@@ -93,7 +93,7 @@ MUTANTS = {
     "turned the wrong way": "2.0 * («w * z + x * y→x * y - w * z»)",
     # Modifiers.
     "a leg limp from the start": "(elapsed >= «FAILS_FROM→0»",
-    "kicks a step late": "% self.steps[..., -1:]« + 1→» == self.steps",
+    "kicks a step late": "step = elapsed % period« + 1→»",
     "weak motors give all": "ctrl = «strength * →»inputs.ctrl",
     "actions not delayed": "return state._replace(waiting=under_way[..., :-1, :]), «arrived→action»",
     "the same noise in every step": "key« ^ (step * _GOLDEN)→»",

@@ -1,4 +1,4 @@
-"""What bodies are to do: name -> task."""
+"""Tasks: what bodies are rewarded for, by name."""
 
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.suite import (
@@ -17,7 +17,21 @@ from arc_suite.tasks.suite import (
 )
 from arc_suite.tasks.walk import Walk
 
-_LANES = Rough, Slopes, Stairs, Gaps, Course, Leap
-TASKS = {task.name: task for task in (Walk, Steer, Directed, *_LANES, Shoved, Limp, Roam, Navigate)}
+_TASK_CLASSES: tuple[type[Task], ...] = (
+    Walk,
+    Steer,
+    Directed,
+    Rough,
+    Slopes,
+    Stairs,
+    Gaps,
+    Course,
+    Leap,
+    Shoved,
+    Limp,
+    Roam,
+    Navigate,
+)
+TASKS = {task.name: task for task in _TASK_CLASSES}
 
 __all__ = ["TASKS", "Task"]

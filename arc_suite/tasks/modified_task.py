@@ -1,7 +1,7 @@
-"""Tasks with modifiers: any task, disturbed, or with other motors or senses.
+"""Tasks with modifiers: any task with disturbances, or with other motors or sensors.
 
-A modified task wraps another, which may come from another package, and calls its modifiers in their order. Its memory
-holds that of the other.
+A modified task wraps another task, which may come from another package, and calls its modifiers in their order. Its
+memory holds the memory of the wrapped task.
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ from arc_suite.tasks.modifiers.draws import draw_episode
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.wrapper import Wrapper
 
-_Kind = TypeVar("_Kind", bound=Modifier)
+_ModifierClass = TypeVar("_ModifierClass", bound=Modifier)
 
 
 class Changes(NamedTuple):
@@ -31,7 +31,7 @@ class Changes(NamedTuple):
     Attributes:
         elapsed: (..., 1) uint32, control steps since the start.
         terminated: (...) whether the latest step has ended the episode in failure.
-        states: of the modifiers, in their order.
+        states: the state of each modifier, in their order.
     """
 
     elapsed: np.ndarray
@@ -43,7 +43,7 @@ class ModifiedMemory(NamedTuple):
     """Memory of a modified task.
 
     Attributes:
-        task: memory of the task that it wraps.
+        task: memory of the wrapped task.
         changes: memory of the modifiers.
     """
 
@@ -55,15 +55,16 @@ def add_modifiers(task: Task, settings: Mapping[str, Any]) -> Task:
     """Return a task with modifiers.
 
     Args:
-        task: any.
+        task: any task.
         settings: some of the settings in `modifiers.MODIFIERS`, by name.
 
     Raises:
         ValueError: an unknown name, or a value that does not fit.
     """
-    changes = fit_modifiers(settings, task.scene.body, task.blocks)
-    # A task by registration, which type checkers do not see.
-    return Modified(task, changes, tuple(change.is_active for change in changes))  # type: ignore[return-value]
+    modifiers = fit_modifiers(settings, task.scene.body, task.blocks)
+    are_active = tuple(modifier.is_active for modifier in modifiers)
+    # `Wrapper` is registered as a subclass of `Task`, which type checkers do not see.
+    return Modified(task, modifiers, are_active)  # type: ignore[return-value]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,9 +72,9 @@ class Modified(Wrapper):
     """A task with modifiers.
 
     Attributes:
-        changes: its modifiers, from the body outwards: actions pass from the last one to the first, all else from the
-            first one to the last.
-        are_active: which of them steps have to call; the same for all environments of a batch.
+        changes: its modifiers, from the body outwards. Actions pass from the last modifier to the first, everything
+            else from the first to the last.
+        are_active: whether steps have to call each modifier; the same for all environments of a batch.
     """
 
     from_body = ("changes",)
@@ -84,189 +85,201 @@ class Modified(Wrapper):
     @property
     def structure(self) -> Hashable:
         """Which modifiers there are, and the shape of their memory."""
-        return self.are_active, *((type(change), change.structure) for change in self.changes)
+        structures = tuple((type(modifier), modifier.structure) for modifier in self.changes)
+        return (self.are_active, *structures)
 
-    def modifier(self, kind: type[_Kind]) -> _Kind:
+    def modifier(self, kind: type[_ModifierClass]) -> _ModifierClass:
         """Return the modifier of a class."""
-        return self.changes[self._index(kind)]
+        return self.changes[self._index_of(kind)]  # type: ignore[return-value]
 
     def state(self, memory: ModifiedMemory, kind: type[Modifier]) -> Any:
         """Return the state of the modifier of a class."""
-        return memory.changes.states[self._index(kind)]
+        return memory.changes.states[self._index_of(kind)]
 
-    def _index(self, kind: type[Modifier]) -> int:
-        return next(index for index, change in enumerate(self.changes) if isinstance(change, kind))
+    def _index_of(self, kind: type[Modifier]) -> int:
+        """Return the index of the modifier of a class."""
+        for index, modifier in enumerate(self.changes):
+            if isinstance(modifier, kind):
+                return index
+        raise LookupError(f"task {self.name}: no modifier {kind.__name__}")
 
-    def _calling(self, method: str) -> list[int]:
-        """Return the indices of the active modifiers that have a method of their own."""
-        pairs = enumerate(zip(self.changes, self.are_active, strict=True))
-        return [
-            index
-            for index, (change, is_active) in pairs
-            if is_active and getattr(type(change), method) is not getattr(Modifier, method)
-        ]
+    def _indices_with(self, method: str) -> list[int]:
+        """Return the indices of the active modifiers whose class overrides a method of `Modifier`."""
+        indices = []
+        for index, modifier in enumerate(self.changes):
+            overrides = getattr(type(modifier), method) is not getattr(Modifier, method)
+            if self.are_active[index] and overrides:
+                indices.append(index)
+        return indices
 
-    @functools.cached_property
-    def _acting(self) -> list[int]:
-        return self._calling("act")[::-1]
-
-    @functools.cached_property
-    def _driving(self) -> list[int]:
-        return self._calling("drive")
+    # Indices of the modifiers that each part of a step calls, in the order of the calls.
 
     @functools.cached_property
-    def _sensing(self) -> list[int]:
-        return self._calling("sense")
+    def _indices_to_act(self) -> list[int]:
+        return self._indices_with("act")[::-1]
 
     @functools.cached_property
-    def _measuring(self) -> list[int]:
-        return self._calling("measure")
+    def _indices_to_drive(self) -> list[int]:
+        return self._indices_with("drive")
 
     @functools.cached_property
-    def _observing(self) -> list[int]:
-        return self._calling("observe")
+    def _indices_to_sense(self) -> list[int]:
+        return self._indices_with("sense")
 
     @functools.cached_property
-    def _remembering(self) -> list[int]:
-        return self._calling("remember")
+    def _indices_to_measure(self) -> list[int]:
+        return self._indices_with("measure")
+
+    @functools.cached_property
+    def _indices_to_observe(self) -> list[int]:
+        return self._indices_with("observe")
+
+    @functools.cached_property
+    def _indices_to_remember(self) -> list[int]:
+        return self._indices_with("remember")
 
     @property
     def actions(self) -> str:
-        """What an action asks of a motor."""
+        """What an action is: the "torque" of each motor, or the "position" of each joint."""
         return self.modifier(Control).actions
 
     @functools.cached_property
     def symmetry(self) -> Symmetry:
-        """The mirror maps of observations and actions; what is drawn is as likely on either side.
+        """The mirror maps of observations and actions.
 
         Raises:
-            ValueError: a modifier does not treat both sides alike, or as the other task.
+            ValueError: a modifier treats one side differently, or the wrapped task has no mirror maps.
         """
         image = mirror.image(self.scene.body)
-        for change in self.changes:
-            change.check_mirror(image)
+        for modifier in self.changes:
+            modifier.check_mirror(image)
         return super().symmetry
 
     @functools.cached_property
     def blocks(self) -> Mapping[str, Block]:
-        """The other task's blocks, as modifiers leave them."""
+        """The blocks of the wrapped task, as modifiers change them."""
         blocks = self.task.blocks
-        for index in self._calling("blocks"):
+        for index in self._indices_with("blocks"):
             blocks = self.changes[index].blocks(self.scene.body, blocks)
         return blocks
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
-        """Draw the other task's start, then what is random in the modifiers; see `modifiers.draws`."""
+        """Draw the start of the wrapped task, then the states of the modifiers; see `modifiers.draws`."""
         scene = self.scene
         start = self.task.start(random, stream)
         episode = draw_episode(scene, random)
+        states = tuple(modifier.draw(episode) for modifier in self.changes)
         fields = dict(start.model)
-        states = tuple(change.draw(episode) for change in self.changes)
-        for change, state in zip(self.changes, states, strict=True):
-            fields |= change.fields(scene, {**scene.model, **fields}, state)
-        memory = ModifiedMemory(start.memory, Changes(np.zeros(1, np.uint32), np.False_, states))
+        for modifier, state in zip(self.changes, states, strict=True):
+            fields |= modifier.fields(scene, {**scene.model, **fields}, state)
+        changes = Changes(elapsed=np.zeros(1, np.uint32), terminated=np.False_, states=states)
+        memory = ModifiedMemory(start.memory, changes)
         return start._replace(memory=memory, model=fields)
 
     def begin(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
-        """Return the other task's memory, and what modifiers measure and observe at the start."""
-        inner = self.task.begin(memory.task, readings)
-        return self._look(ModifiedMemory(inner, memory.changes), readings, is_start=True)
+        """Return the memory from which the first step starts."""
+        task_memory = self.task.begin(memory.task, readings)
+        return self._update_states(ModifiedMemory(task_memory, memory.changes), readings, is_start=True)
 
     def before(self, memory: ModifiedMemory, action) -> tuple[ModifiedMemory, Inputs]:
-        """Return the memory, and what the other task writes as modifiers change it.
+        """Return the memory, and the inputs from the wrapped task as modifiers change them.
 
-        The other task is given, and its reward judges, the torques commanded of the motors when they
-        arrive; weak and failing motors give less.
+        The action of the wrapped task, which its reward judges, is the torque that motors are commanded to give in this
+        step. It is delayed where actions are, and more than weak or failing motors give.
         """
         elapsed = memory.changes.elapsed
         states = list(memory.changes.states)
-        for index in self._acting:
+        for index in self._indices_to_act:
             states[index], action = self.changes[index].act(states[index], action, elapsed)
-        inner, inputs = self.task.before(memory.task, action)
-        for index in self._driving:
+        task_memory, inputs = self.task.before(memory.task, action)
+        for index in self._indices_to_drive:
             inputs = self.changes[index].drive(states[index], inputs, elapsed)
         changes = memory.changes._replace(elapsed=elapsed + np.uint32(1), states=tuple(states))
-        return ModifiedMemory(inner, changes), inputs
+        return ModifiedMemory(task_memory, changes), inputs
 
     def after(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
-        """Return the other task's memory, what modifiers measure and observe, and whether the body has fallen."""
-        inner = self.task.after(memory.task, readings)
-        changes = memory.changes
-        terminated, _ = self.task.ended(inner, readings)
-        # With the leading axes of the memory, even where the task returns one boolean for all environments.
-        changes = changes._replace(terminated=(changes.terminated & False) | terminated)
-        return self._look(ModifiedMemory(inner, changes), readings, is_start=False)
+        """Return the memory after a control step."""
+        task_memory = self.task.after(memory.task, readings)
+        is_terminated, _ = self.task.ended(task_memory, readings)
+        # One boolean for all environments becomes one for each: `all_false` has the leading axes of the memory.
+        all_false = memory.changes.terminated & False
+        changes = memory.changes._replace(terminated=all_false | is_terminated)
+        return self._update_states(ModifiedMemory(task_memory, changes), readings, is_start=False)
 
     def observe(self, memory: ModifiedMemory, readings: Readings) -> dict:
-        """Return the other task's blocks as sensors show them and modifiers change them."""
+        """Return the blocks that the wrapped task observes through the sensors, as modifiers change them."""
         elapsed = memory.changes.elapsed
         states = memory.changes.states
         observed = self.task.observe(memory.task, self._sense(states, readings))
-        for index in self._observing:
+        for index in self._indices_to_observe:
             observed = self.changes[index].observe(states[index], observed, elapsed)
         return observed
 
     def _sense(self, states, readings: Readings) -> Readings:
         """Return the readings as sensors show them."""
-        for index in self._sensing:
+        for index in self._indices_to_sense:
             readings = self.changes[index].sense(states[index], readings)
         return readings
 
-    def _look(self, memory: ModifiedMemory, readings: Readings, is_start: bool) -> ModifiedMemory:
-        """Return the memory with what modifiers measure, and what they remember of the observation."""
-        if self._measuring:
+    def _update_states(self, memory: ModifiedMemory, readings: Readings, is_start: bool) -> ModifiedMemory:
+        """Return the memory with the states that modifiers have after the readings, and after the observation."""
+        if self._indices_to_measure:
             states = list(memory.changes.states)
             sensed = self._sense(states, readings)
-            for index in self._measuring:
+            for index in self._indices_to_measure:
                 states[index] = self.changes[index].measure(states[index], sensed)
             memory = memory._replace(changes=memory.changes._replace(states=tuple(states)))
-        if self._remembering:
+        if self._indices_to_remember:
             states = list(memory.changes.states)
             observed = self.observe(memory, readings)
-            for index in self._remembering:
+            for index in self._indices_to_remember:
                 states[index] = self.changes[index].remember(states[index], observed, is_start)
             memory = memory._replace(changes=memory.changes._replace(states=tuple(states)))
         return memory
 
     @functools.cached_property
     def privileged_blocks(self) -> Mapping[str, Block]:
-        """The other task's, and those of the modifiers."""
+        """The privileged blocks of the wrapped task and of the modifiers, by name."""
         blocks = dict(self.task.privileged_blocks)
-        for change in self.changes:
-            blocks |= change.privileged_blocks(self.scene.body)
+        for modifier in self.changes:
+            blocks |= modifier.privileged_blocks(self.scene.body)
         return blocks
 
     def privileged(self, memory: ModifiedMemory, data) -> dict:
-        """Return the other task's blocks, and those of the modifiers."""
+        """Return the privileged observations of the wrapped task and of the modifiers, by name of the block."""
         blocks = dict(self.task.privileged(memory.task, data))
         heading = rotations.yaw(data.qpos[..., 3:7])
-        for change, state in zip(self.changes, memory.changes.states, strict=True):
-            blocks |= change.privileged(state, memory.changes.elapsed, heading)
+        for modifier, state in zip(self.changes, memory.changes.states, strict=True):
+            blocks |= modifier.privileged(state, memory.changes.elapsed, heading)
         return blocks
 
     def read_back(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
-        """Return the privileged blocks that changed fields of the model decide; see `Modifier.read_back`."""
-        changed = dict(self.task.read_back(blocks, fields))
-        for change in self.changes:
-            changed |= change.read_back(self.scene, blocks, fields)
-        return changed
+        """Return the privileged blocks whose values a user has changed in the model; see `Modifier.read_back`."""
+        changed_blocks = dict(self.task.read_back(blocks, fields))
+        for modifier in self.changes:
+            changed_blocks |= modifier.read_back(self.scene, blocks, fields)
+        return changed_blocks
 
     @property
     def read_back_fields(self) -> tuple[str, ...]:
         """The fields of the model that `read_back` takes."""
-        fields = [*self.task.read_back_fields, *(name for change in self.changes for name in change.read_back_fields)]
-        return tuple(dict.fromkeys(fields))
+        fields = list(self.task.read_back_fields)
+        for modifier in self.changes:
+            fields += modifier.read_back_fields
+        return tuple(dict.fromkeys(fields))  # each once, in this order
 
     def progress(self, memory: ModifiedMemory) -> dict:
-        """Return the other task's metrics, and whether the body `fell`, 0 or 1."""
+        """Return the metrics of the wrapped task, and whether the body `fell`, 0 or 1."""
         metrics = self.task.progress(memory.task)
-        return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
+        if "fell" in metrics:
+            return metrics
+        return metrics | {"fell": memory.changes.terminated * 1.0}
 
     def markers(self, memory: ModifiedMemory, readings: Readings) -> list[Marker]:
-        """Return the other task's markers, and those of the modifiers."""
+        """Return the markers of the wrapped task and of the modifiers."""
         markers = list(self.task.markers(memory.task, readings))
         elapsed = int(memory.changes.elapsed[0])
-        for index in self._calling("markers"):
+        for index in self._indices_with("markers"):
             state = memory.changes.states[index]
             markers += self.changes[index].markers(self.scene, state, readings, elapsed)
         return markers
@@ -275,6 +288,6 @@ class Modified(Wrapper):
         """Return the names of the legs whose motors have failed, of one environment."""
         legs = list(self.task.failed_legs(memory.task))
         elapsed = int(memory.changes.elapsed[0])
-        for change, state in zip(self.changes, memory.changes.states, strict=True):
-            legs += change.failed_legs(self.scene, state, elapsed)
+        for modifier, state in zip(self.changes, memory.changes.states, strict=True):
+            legs += modifier.failed_legs(self.scene, state, elapsed)
         return tuple(legs)

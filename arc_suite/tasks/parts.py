@@ -1,7 +1,7 @@
 """Parts of observation blocks: the size of each, and how it transforms.
 
 A part knows what its numbers are, such as a vector or angles of joints. From that follow its mirror image, what one leg
-sees of it, its places in vectors of many bodies, and the names of its entries. A task of another package uses these
+sees of it, its indices in vectors for many bodies, and the names of its entries. A task of another package uses these
 parts, or inherits from `Part`.
 """
 
@@ -19,35 +19,36 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
 from arc_suite.tasks.mirrors import Mirror
 
-HEADED = ("forward", "left", "up")  # axes of vectors as the torso heads
-WORLD = ("world x", "world y", "world z")
+HEADED = ("forward", "left", "up")  # axes of vectors relative to the heading of the torso
+WORLD = ("world x", "world y", "world z")  # axes of vectors in the world's frame
 ROTATIONS = ("roll", "pitch", "yaw")  # axes of angular velocities in the torso's frame
 
-_DIGITS = 9  # of a turn in steps between rays
+_RAY_STEP_DIGITS = 9  # decimals of a turn in steps between rays, so that whole steps stay whole
 
 
 class ViewingLeg(NamedTuple):
     """A leg for which observations are transformed, such that it sees what the first leg would see in its place.
 
     Attributes:
-        index: of the leg.
+        index: of the leg in the body.
         turn: angle by which planar vectors are turned, rad.
-        joints: (joints of a leg, joints) for each joint of the leg its place among those of the body, 1 or -1.
-        foot: (2,) place of its foot in the standing pose from the torso, forward and left, as it sees it, R.
+        joints: (joints of a leg, joints) matrix that takes the joints of the leg from those of the body: the sign of
+            the joint, 1 or -1, in its column, else 0.
+        foot: (2,) place of the leg's foot in the standing pose, from the torso, forward and left, R.
     """
 
-    index: int
+    index: int  # type: ignore[assignment]
     turn: float
     joints: np.ndarray
     foot: np.ndarray
 
 
 class Padding(NamedTuple):
-    """Places of the numbers of one body in vectors that bodies of up to so many legs and joints share.
+    """Where the numbers of one body lie in a longer vector, which has room for bodies with more legs and joints.
 
     Attributes:
-        size: of the shared vector.
-        places: (numbers of the body,) indices in it.
+        size: of the longer vector.
+        places: (numbers of the body,) index of each number in the longer vector.
     """
 
     size: int
@@ -77,18 +78,22 @@ class Part(ABC):
         """
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
-        """Return the weights (size, features) of what a leg sees: a feature is a sum of at most two numbers."""
+        """Return the weights (size, features) of what a leg sees: each feature is a sum of at most two numbers."""
         return np.eye(self.size)
 
     def constants(self, leg: ViewingLeg) -> np.ndarray:
-        """Return the constants (n,) that a leg sees after these features."""
+        """Return the constants (n,) that a leg sees after the features of `view`."""
         return np.zeros(0)
 
     def padding(self, legs: int, joints: int) -> Padding:
-        """Return the places of its numbers in vectors for bodies of up to so many legs, and joints of a leg.
+        """Return where its numbers lie in vectors that have room for more legs and joints.
+
+        Args:
+            legs: number of legs that the vectors have room for.
+            joints: number of joints of each of these legs.
 
         Raises:
-            ValueError: the body has more.
+            ValueError: the body has more legs, or a leg more joints.
         """
         return Padding(self.size, np.arange(self.size))
 
@@ -124,7 +129,7 @@ class Scalar(Part):
 
 @dataclasses.dataclass(frozen=True)
 class _Components(Part):
-    """Numbers along axes."""
+    """A vector: one number along each axis."""
 
     name: str = ""
     unit: str = ""
@@ -134,7 +139,8 @@ class _Components(Part):
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the names and units of the components."""
         for axis in self.axes:
-            yield (f"{self.name}, {axis}" if self.name else axis), self.unit
+            name = f"{self.name}, {axis}" if self.name else axis
+            yield name, self.unit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -207,7 +213,8 @@ class Quaternion(Part):
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the names of the components."""
-        yield from ((f"{self.name} {component}".strip(), "") for component in "wxyz")
+        for component in "wxyz":
+            yield f"{self.name} {component}".strip(), ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -232,20 +239,22 @@ class Joints(Part):
         return len(self.body.joint_names)
 
     def mirror(self, image: Image) -> Mirror:
-        """Return the map to the joints across."""
+        """Return the map to the joints on the other side."""
         return mirrors.joints(image) if self.signed else Mirror.permute(image.joints)
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights (joints, joints of a leg) of the leg's own joints; 0 for joints that it lacks."""
-        return (leg.joints if self.signed else abs(leg.joints)).T
+        weights = leg.joints if self.signed else abs(leg.joints)
+        return weights.T
 
     def padding(self, legs: int, joints: int) -> Padding:
-        """Return places by leg and joint."""
+        """Return the padding by leg and joint."""
         return Padding(legs * joints, np.array(joint_places(self.body, legs, joints)))
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each joint."""
-        yield from ((self.name.format(joint), self.unit) for joint in self.body.joint_names)
+        for joint in self.body.joint_names:
+            yield self.name.format(joint), self.unit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -268,7 +277,7 @@ class Legs(Part):
         return len(self.body.legs)
 
     def mirror(self, image: Image) -> Mirror:
-        """Return the map to the legs across."""
+        """Return the map to the legs on the other side."""
         return Mirror.permute(image.legs)
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
@@ -276,23 +285,26 @@ class Legs(Part):
         return np.eye(self.size)[:, [leg.index]]
 
     def padding(self, legs: int, joints: int) -> Padding:
-        """Return places by leg."""
+        """Return the padding by leg."""
         if self.size > legs:
             raise ValueError(f"{self.body.name}: expected at most {legs} legs, got {self.size}")
         return Padding(legs, np.arange(self.size))
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each leg."""
-        yield from ((self.name.format(leg.name), self.unit) for leg in self.body.legs)
+        for leg in self.body.legs:
+            yield self.name.format(leg.name), self.unit
 
 
 @dataclasses.dataclass(frozen=True)
 class RigidParts(Part):
-    """Parts for each rigid part of the body, one after the other. A leg sees those of the torso and its own.
+    """The same parts for each rigid part of the body. A leg sees those of the torso and of its own rigid parts.
+
+    A rigid part is the torso, a link or a foot, which moves as a whole.
 
     Attributes:
-        body: with the rigid parts.
-        parts: of each of them; {} in their names stands for the rigid part's name.
+        body: the body with the rigid parts.
+        parts: the parts of each rigid part; {} in their names stands for the name of the rigid part.
     """
 
     body: Body
@@ -301,7 +313,7 @@ class RigidParts(Part):
     @property
     def size(self) -> int:
         """How many numbers there are."""
-        return self._share * len(self.body.part_names)
+        return self._size_per_rigid_part * len(self.body.part_names)
 
     @property
     def has_frame(self) -> bool:
@@ -309,49 +321,58 @@ class RigidParts(Part):
         return all(part.has_frame for part in self.parts)
 
     @property
-    def _share(self) -> int:
-        """How many numbers a rigid part has."""
+    def _size_per_rigid_part(self) -> int:
+        """How many numbers each rigid part has."""
         return sum(part.size for part in self.parts)
 
     def mirror(self, image: Image) -> Mirror:
-        """Return the map to the rigid parts across."""
-        return mirrors.repeat(image.parts, mirrors.join([part.mirror(image) for part in self.parts]))
+        """Return the map to the rigid parts on the other side."""
+        mirror_of_one = mirrors.join([part.mirror(image) for part in self.parts])
+        return mirrors.repeat(image.parts, mirror_of_one)
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights of torso and leg; 0 for rigid parts that another leg has and this one lacks."""
-        most = max(len(indices) for indices in self._by_leg)
-        indices = [0, *self._by_leg[leg.index]]
-        single = diagonal(*(part.view(leg) for part in self.parts))
-        owners = np.zeros((len(self.body.part_names), 1 + most))
-        owners[indices, range(len(indices))] = 1.0
-        return np.kron(owners, single)
+        torso_index = 0
+        seen_indices = [torso_index, *self._indices_by_leg[leg.index]]
+        max_parts_of_leg = max(len(indices) for indices in self._indices_by_leg)
+        weights_of_one = diagonal(*(part.view(leg) for part in self.parts))
+        selection = np.zeros((len(self.body.part_names), 1 + max_parts_of_leg))
+        selection[seen_indices, np.arange(len(seen_indices))] = 1.0
+        return np.kron(selection, weights_of_one)
 
     def padding(self, legs: int, joints: int) -> Padding:
-        """Return places by leg: links of up to so many joints, and the foot."""
-        most = joints + 1
-        if len(self._by_leg) > legs or any(len(indices) > most for indices in self._by_leg):
+        """Return the padding by leg; a leg has room for a link with each joint, and a foot."""
+        slots_of_leg = joints + 1
+        if len(self._indices_by_leg) > legs or any(len(indices) > slots_of_leg for indices in self._indices_by_leg):
             raise ValueError(f"{self.body.name}: expected at most {legs} legs of at most {joints} links and a foot")
-        slots = [0]
-        for leg, indices in enumerate(self._by_leg):
-            slots += [1 + most * leg + place for place in range(len(indices))]
-        places = np.add.outer(self._share * np.array(slots), np.arange(self._share)).ravel()
-        return Padding(self._share * (1 + most * legs), places)
+        slots = [0]  # the torso's, then those of the legs
+        for leg_index, part_indices in enumerate(self._indices_by_leg):
+            first_slot = 1 + slots_of_leg * leg_index
+            slots += range(first_slot, first_slot + len(part_indices))
+        size = self._size_per_rigid_part
+        places = np.add.outer(size * np.array(slots), np.arange(size)).ravel()
+        return Padding(size * (1 + slots_of_leg * legs), places)
 
     def places(self, name: str) -> np.ndarray:
-        """Return the places of the numbers of a rigid part."""
-        return self._share * self.body.part_names.index(name) + np.arange(self._share)
+        """Return the indices of the numbers of a rigid part, given its name."""
+        size = self._size_per_rigid_part
+        return size * self.body.part_names.index(name) + np.arange(size)
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield names and units, by rigid part."""
         for rigid_part in self.body.part_names:
             for part in self.parts:
-                yield from ((name.format(rigid_part), unit) for name, unit in part.entries())
+                for name, unit in part.entries():
+                    yield name.format(rigid_part), unit
 
     @functools.cached_property
-    def _by_leg(self) -> list[list[int]]:
+    def _indices_by_leg(self) -> list[list[int]]:
         """Indices of the rigid parts of each leg."""
-        names = {name: index for index, name in enumerate(self.body.part_names)}
-        return [[names[leg.full_name(part)] for part in leg.parts] for leg in self.body.legs]
+        index_of_name = {name: index for index, name in enumerate(self.body.part_names)}
+        indices_by_leg = []
+        for leg in self.body.legs:
+            indices_by_leg.append([index_of_name[leg.full_name(part)] for part in leg.parts])
+        return indices_by_leg
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -360,9 +381,10 @@ class Phase(Part):
 
     Attributes:
         name: of the phase.
-        offsets: (legs,) by which legs are ahead of the clock, rad: a leg sees its own phase. None where offsets change:
-            a leg sees the clock. Offsets of legs across are then half a cycle apart.
-        default_angles: (joints,) of the pose around which the gait moves, rad, which must be symmetric; None for any.
+        offsets: (legs,) by which legs are ahead of the clock, rad: a leg sees its own phase. None where offsets change
+            with the gait: a leg sees the clock. Opposite legs are then half a cycle apart in each gait.
+        default_angles: (joints,) of the pose around which the gait moves, rad, which must be symmetric; None where the
+            pose does not count.
     """
 
     name: str = ""
@@ -381,9 +403,13 @@ class Phase(Part):
             raise ValueError("default_angles: expected mirrored poses left and right")
         if self.offsets is None:
             return Mirror.with_signs(-1, -1)
-        for sign in (1, -1):  # of the clock's sine and cosine, whose leads over the legs across are 0 or half a cycle
-            if np.allclose(np.exp(1j * self.offsets[image.legs]), sign * np.exp(1j * self.offsets)):
-                return Mirror.with_signs(sign, sign)
+        # Phases as complex numbers, in which half a cycle is a change of sign.
+        phases = np.exp(1j * self.offsets)
+        phases_of_opposite_legs = np.exp(1j * self.offsets[image.legs])
+        if np.allclose(phases_of_opposite_legs, phases):
+            return Mirror.with_signs(1, 1)
+        if np.allclose(phases_of_opposite_legs, -phases):
+            return Mirror.with_signs(-1, -1)
         raise ValueError("phase_offsets: expected legs across from each other to move together, or half a cycle apart")
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
@@ -392,7 +418,8 @@ class Phase(Part):
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield sine and cosine."""
-        yield from ((f"{function} of {self.name}".strip(), "") for function in ("sine", "cosine"))
+        for function in ("sine", "cosine"):
+            yield f"{function} of {self.name}".strip(), ""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -409,19 +436,20 @@ class _Points(Part):
         return self.points.shape[1]
 
     def mirror(self, image: Image) -> Mirror:
-        """Return the map to the points across."""
-        return Mirror.permute(_across(self.points))
+        """Return the map to the points on the other side."""
+        return Mirror.permute(_find_opposite_points(self.points))
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each point."""
-        yield from ((self.name.format(*point), self.unit) for point in self.points.T)
+        for forward, left in self.points.T:
+            yield self.name.format(forward, left), self.unit
 
 
 class Grid(_Points):
     """A number for each point of a grid in the torso's frame (n,), such as heights of the ground.
 
-    A turned grid has points between those of this one, which needs four numbers a feature. So a leg sees the grid as
-    the body does, in the mirror on the right, and the place of its foot in addition.
+    The points of a turned grid lie between those of this one: a feature would need four numbers. So a leg sees the grid
+    without a turn. In addition, it sees the place of its foot. Legs on the right see both in the mirror.
 
     Attributes:
         points: (2, n) forward and left, R.
@@ -435,9 +463,9 @@ class Grid(_Points):
 
 
 class Rays(_Points):
-    """A number for each ray around the torso (n,), the first ahead, then evenly to the left.
+    """A number for each ray around the torso (n,): the first forward, the others at equal angles to the left.
 
-    To a leg, rays turn as planar vectors do. Between two rays, their numbers are interpolated.
+    For a leg, rays turn as planar vectors do. Where a turned ray lies between two rays, their numbers are interpolated.
 
     Attributes:
         points: (2, n) directions, forward and left.
@@ -446,8 +474,8 @@ class Rays(_Points):
     """
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
-        """Return the weights of the two rays next to each ray of the leg."""
-        steps = round(leg.turn * self.size / (2.0 * math.pi), _DIGITS)
+        """Return the weights (rays, features) of the two rays next to each ray as the leg sees it."""
+        steps = round(leg.turn * self.size / (2.0 * math.pi), _RAY_STEP_DIGITS)  # between rays
         whole_steps = math.floor(steps)
         share = steps - whole_steps
         rays = np.eye(self.size)
@@ -456,7 +484,8 @@ class Rays(_Points):
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each ray."""
         degrees = np.degrees(np.arctan2(self.points[1], self.points[0])) % 360.0
-        yield from ((self.name.format(angle), self.unit) for angle in degrees)
+        for angle in degrees:
+            yield self.name.format(angle), self.unit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -464,8 +493,8 @@ class Repeated(Part):
     """The same parts of several control steps, the latest first.
 
     Attributes:
-        parts: of one control step.
-        count: of control steps.
+        parts: the parts of one control step.
+        count: number of control steps.
     """
 
     parts: tuple[Part, ...]
@@ -483,31 +512,34 @@ class Repeated(Part):
 
     def mirror(self, image: Image) -> Mirror:
         """Return the map of each control step."""
-        return mirrors.repeat(np.arange(self.count), mirrors.join([part.mirror(image) for part in self.parts]))
+        mirror_of_step = mirrors.join([part.mirror(image) for part in self.parts])
+        return mirrors.repeat(np.arange(self.count), mirror_of_step)
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
         """Return the weights of each control step."""
-        return np.kron(np.eye(self.count), diagonal(*(part.view(leg) for part in self.parts)))
+        weights_of_step = diagonal(*(part.view(leg) for part in self.parts))
+        return np.kron(np.eye(self.count), weights_of_step)
 
     def constants(self, leg: ViewingLeg) -> np.ndarray:
         """Return the constants of the parts, which are the same in each control step."""
         return np.concatenate([part.constants(leg) for part in self.parts])
 
     def padding(self, legs: int, joints: int) -> Padding:
-        """Return the places of each control step."""
-        step = join_padding([part.padding(legs, joints) for part in self.parts])
-        return join_padding([step] * self.count)
+        """Return the padding of each control step."""
+        padding_of_step = join_padding([part.padding(legs, joints) for part in self.parts])
+        return join_padding([padding_of_step] * self.count)
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the names and units of each control step."""
         for step in range(1, self.count + 1):
             for part in self.parts:
-                yield from ((f"{name}, {step} steps before", unit) for name, unit in part.entries())
+                for name, unit in part.entries():
+                    yield f"{name}, {step} steps before", unit
 
 
 @dataclasses.dataclass(frozen=True)
 class Unframed(Part):
-    """Numbers of which nobody knows how they transform: they have no mirror image, and legs cannot share a network.
+    """Numbers without a known frame: they have no mirror image, and legs that see them cannot share a network.
 
     Attributes:
         size: how many there are.
@@ -531,27 +563,40 @@ class Unframed(Part):
 
     def entries(self) -> Iterator[tuple[str, str]]:
         """Yield the name and the unit for each index."""
-        yield from ((self.name.format(index), self.unit) for index in range(self.size))
+        for index in range(self.size):
+            yield self.name.format(index), self.unit
 
 
 def joint_places(body: Body, legs: int, joints: int) -> tuple[int, ...]:
-    """Return the places (joints,) of a body's joints among those of so many legs of so many joints.
+    """Return the indices (joints,) of a body's joints in a vector that has room for more legs and joints.
+
+    Args:
+        body: the body.
+        legs: number of legs that the vector has room for.
+        joints: number of joints of each of these legs.
 
     Raises:
         ValueError: the body has more legs, or a leg more joints.
     """
     counts = [len(leg.joints) for leg in body.legs]
     if len(counts) > legs or max(counts) > joints:
-        most = f"at most {legs} legs of at most {joints} joints"
-        raise ValueError(f"{body.name}: expected {most}, got {len(counts)} legs of up to {max(counts)}")
-    return tuple(joints * leg + joint for leg, count in enumerate(counts) for joint in range(count))
+        expected = f"at most {legs} legs of at most {joints} joints"
+        raise ValueError(f"{body.name}: expected {expected}, got {len(counts)} legs of up to {max(counts)}")
+    places: list[int] = []
+    for leg_index, count in enumerate(counts):
+        first_place = joints * leg_index
+        places += range(first_place, first_place + count)
+    return tuple(places)
 
 
 def join_padding(paddings: Sequence[Padding]) -> Padding:
-    """Return the padding of vectors that are joined of the vectors of several parts."""
-    starts = np.cumsum([0, *(padding.size for padding in paddings)])
-    places = [start + padding.places for start, padding in zip(starts, paddings, strict=False)]
-    return Padding(int(starts[-1]), np.concatenate(places))
+    """Return the padding of concatenated vectors, given the padding of each."""
+    size = 0
+    places = []
+    for padding in paddings:
+        places.append(size + padding.places)
+        size += padding.size
+    return Padding(size, np.concatenate(places))
 
 
 def rotation(angle: float) -> np.ndarray:
@@ -562,18 +607,21 @@ def rotation(angle: float) -> np.ndarray:
 
 
 def diagonal(*matrices: np.ndarray) -> np.ndarray:
-    """Return the matrix with these on its diagonal, 0 elsewhere."""
-    joined = np.zeros(np.sum([matrix.shape for matrix in matrices], axis=0))
+    """Return the block diagonal matrix: some matrices one after the other on its diagonal, 0 elsewhere."""
+    total_shape = np.sum([matrix.shape for matrix in matrices], axis=0)
+    block_diagonal = np.zeros(total_shape)
     row = 0
     column = 0
     for matrix in matrices:
-        joined[row : row + len(matrix), column : column + matrix.shape[1]] = matrix
-        row += len(matrix)
-        column += matrix.shape[1]
-    return joined
+        rows, columns = matrix.shape
+        block_diagonal[row : row + rows, column : column + columns] = matrix
+        row += rows
+        column += columns
+    return block_diagonal
 
 
-def _across(points: np.ndarray) -> np.ndarray:
-    """Return for each of the points (2, n) the index of the one across the x axis."""
-    reflected = points * ((1.0,), (-1.0,))
-    return np.square(points[:, None, :] - reflected[:, :, None]).sum(axis=0).argmin(axis=1)
+def _find_opposite_points(points: np.ndarray) -> np.ndarray:
+    """Return for each of the points (2, n) the index (n,) of its reflection across the x axis."""
+    reflections = points * ((1.0,), (-1.0,))
+    squared_distances = np.square(points[:, None, :] - reflections[:, :, None]).sum(axis=0)
+    return squared_distances.argmin(axis=1)
