@@ -324,7 +324,7 @@ def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
     entry = _look_up(name, collections.ChainMap(additions, dict(suite)), kind)
     key = bare_name(name)
     if key in suite and key in additions:
-        module = MODULE_OF_NAME.get((kind, key)) or "__main__"
+        module = MODULE_OF_NAME.get((kind, key)) or "__main__"  # `register` stores None for the main program
         raise ValueError(f"{kind} {key!r}: the suite has one of this name, and {module} registers another")
     return entry
 

@@ -30,6 +30,7 @@ from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM
 
 _FLAT = "observations"  # dm_control's name of a flat observation
+_LEVEL = CURRICULUM[1]  # name of the setting that restarts the curriculum
 
 # Settings of dm_control's environments that this suite refuses, and why.
 _REFUSED_SETTINGS = {
@@ -98,7 +99,7 @@ class Environment(KnownAttributes, control.Environment):
         self._lock = Lock()
         step_limit = run.definition.step_limit
         scene = run.definition.scene
-        # Half a step less than the limit, so that rounding adds none; infinite if the limit is.
+        # Half a step less than the limit, so that rounding does not add a step; infinite if the limit is infinite.
         time_limit = (step_limit - 0.5) * scene.control_timestep
         run.set_physics(physics)
         super().__init__(
@@ -140,9 +141,9 @@ class Environment(KnownAttributes, control.Environment):
         Raises:
             ValueError: an unknown name, or a setting that cannot be changed.
         """
-        run = self.task
-        changes, task = checked_changes(run.opened, self.task_kwargs, run.next_changes, settings)
-        run.put_changes(changes, task, restart=CURRICULUM[1] in settings)
+        run = self.task  # dm_control calls a `TaskRun` the task
+        changes, next_task = checked_changes(run.opened, self.task_kwargs, run.next_changes, settings)
+        run.put_changes(changes, next_task, restart=_LEVEL in settings)
 
     @one_thread_at_a_time
     def snapshot(self) -> dict[str, np.ndarray]:
@@ -162,15 +163,15 @@ class Environment(KnownAttributes, control.Environment):
         Raises:
             ValueError: an array is missing or does not fit; the state has not changed.
         """
-        run = self.task
+        run = self.task  # dm_control calls a `TaskRun` the task
         if run.memory is None:
             super().reset()
         check_simulations = functools.partial(self.physics.checked, fields=run.definition.reads)
-        state, ((task,), (next_task,)) = snapshots.from_arrays(
+        state, (present_tasks, next_tasks) = snapshots.from_arrays(
             self._state(), run.definition, check_simulations, arrays, [run.opened], self.task_kwargs
         )
         self.physics.restore(state.simulations)
-        run.restore(state, task, next_task)
+        run.restore(state, present_tasks[0], next_tasks[0])
         self._step_count = int(state.environment_arrays["steps"][0])
         self._reset_next_step = bool(state.environment_arrays["ended"][0])
 
@@ -196,7 +197,7 @@ class Environment(KnownAttributes, control.Environment):
         return super().reset()
 
     def command(self, name: str, value) -> None:
-        """Set a command of the task from the next step on, until the next episode. A player's stick, for example, does.
+        """Set a command of the task from the next step on, until the next episode; for example from a player's stick.
 
         Any thread may call it while another is in a step, which still uses the earlier command.
 
@@ -244,7 +245,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         visualize_reward: whether rendered pictures show the reward as a color.
     """
 
-    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {
+    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {  # in pickles of earlier versions
         "_next": "_next_task",
         "_changes": "_present_changes",
         "_starting": "_is_starting",
@@ -271,7 +272,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._next_task = task
         self._present_changes = "{}"  # JSON of changed settings, as `next_changes` but of the present episode
         self.next_changes = "{}"
-        self._now = _Now()
+        self._now = _Now()  # what changes in every step
         self._stream = None  # state of the stream with which the present episode has started
         self._commands = LiveCommands()
         self.visualize_reward = False
@@ -329,14 +330,15 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """
         self._check_begun()
         blocks = self.definition.privileged(self.memory, self._physics.data.ptr)
-        changed_blocks = self.definition.read_back(blocks, self._physics.lasting)  # those that `change_model` has set
-        return blocks | changed_blocks
+        changed_fields = self._physics.lasting  # those that `change_model` has set
+        return blocks | self.definition.read_back(blocks, changed_fields)
 
     def privileged_vector(self) -> np.ndarray:
         """Return the present privileged observation as one vector (size,) float32."""
         return privileged.vector(self.definition, self.privileged)
 
     def _check_begun(self) -> None:
+        """Raise RuntimeError before the first reset."""
         if self._now.memory is None:
             raise RuntimeError("no episode has begun; call reset first")
 
@@ -372,7 +374,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self.definition = self._next_task
         self._present_changes = self.next_changes
         start = self.definition.start(self._random, self._stream)
-        if start.model:
+        if start.model:  # fields of the model that modifiers have drawn
             physics.change_model(start.model)
         data = physics.data.ptr
         data.qpos[:] = start.qpos
@@ -424,8 +426,8 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             raw_terms = dict.fromkeys(raw_terms, np.float64(0.0))
         self._now.terms, reward = terms.reward(raw_terms, weights, task.cost_limit)
         if self.visualize_reward:
-            greatest_reward = terms.greatest(weights)
-            physics.shown_reward = reward / (greatest_reward or 1.0)
+            greatest_reward = terms.greatest(weights) or 1.0  # it is 0 if all terms are costs
+            physics.shown_reward = reward / greatest_reward
         return reward
 
     def get_observation(self, physics):
@@ -504,7 +506,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._is_starting = False
         self.definition = task
         self._next_task = next_task
-        (self._stream,) = state.streams
+        self._stream = state.streams[0]
         present_texts, next_texts = state.settings
         self._present_changes = present_texts[0]
         self.next_changes = next_texts[0]
@@ -512,12 +514,15 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._stream_begins = bool(state.environment_arrays["streams_begin"][0])
 
     def _consume_commands(self) -> None:
+        """Put the live commands into the memory, if an episode has begun."""
         if self._now.memory is not None:
             self._now.memory = self._commands.consume(self.definition, self._now.memory)
 
     def _readings(self, physics):
         """Return the readings of the present state."""
-        return self._now.readings or self.definition.read(physics.data.ptr)
+        if self._now.readings is not None:
+            return self._now.readings
+        return self.definition.read(physics.data.ptr)
 
     def _begin(self, physics):
         """Lift the body out of the ground at the start of an episode, begin the memory, and return the readings."""

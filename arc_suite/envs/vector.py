@@ -34,6 +34,7 @@ from arc_suite.tasks.contract import CURRICULUM, Inputs
 
 _MAX_THREADS = 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
+_LEVEL = CURRICULUM[1]  # name of the setting that restarts the curriculum
 
 
 class VectorTask(TaskView, KnownAttributes):
@@ -104,7 +105,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         task: the task of the environments; its `split` returns an observation's blocks by name.
     """
 
-    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {
+    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {  # in pickles of earlier versions
         "_tells": "_has_privileged_info",
         "_opened": "_opened_tasks",
         "_next": "_next_tasks",
@@ -173,7 +174,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.step_limit = self._task.step_limit
         if max_episode_steps is not None:
             limit = checked_limit(max_episode_steps, self._tasks[0])
-            self.step_limit = np.minimum(self.step_limit, limit)[()]
+            self.step_limit = np.minimum(self.step_limit, limit)
 
         self.batch = Batch(model, self.num_envs, threads, self._task.reads)
         self.task = VectorTask(self)
@@ -267,15 +268,16 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._consume_commands()
         task = self._task
         earlier_memory = self._memory
+        # What each environment does in this step, (num_envs,) booleans: wait for a reset, move, or start an episode.
         must_wait = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
         is_stepping = ~(self._ended | self._resting)
-        is_starting = self._ended & ~(self._resting | must_wait)  # environments that start an episode in this step
+        is_starting = self._ended & ~(self._resting | must_wait)
 
-        memory, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
+        memory_of_inputs, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
         self._write_inputs(inputs, is_stepping)
         has_diverged = self.batch.step(task.scene.substeps, is_stepping)
         readings = task.read(self.batch.data)
-        memory = trees.where(is_stepping, task.after(memory, readings), earlier_memory)
+        memory = trees.where(is_stepping, task.after(memory_of_inputs, readings), earlier_memory)
         self._memory = memory
         self._steps += 1
 
@@ -292,16 +294,17 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._ended = must_wait | terminated | truncated
 
         info = {}
+        has_step_info = is_stepping  # environments whose terms and metrics are in the info itself
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             is_starting = self._ended
-            is_stepping = is_stepping & ~self._ended
+            has_step_info = is_stepping & ~self._ended
             final_info = self._step_info(is_starting, has_diverged) | self._privileged_info(is_starting)
             final = {"final_obs": _to_objects(observation, is_starting), "final_info": final_info}
             info |= _with_masks(final, is_starting)
-        info |= self._step_info(is_stepping, has_diverged)
+        info |= self._step_info(has_step_info, has_diverged)
         if is_starting.any():
             self._start_episodes(is_starting, observation)
-        info |= self._privileged_info(is_stepping | is_starting)
+        info |= self._privileged_info(has_step_info | is_starting)
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
@@ -378,7 +381,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """
         self._check_open("change settings")
         mask = self._checked_mask(mask, "mask")
-        self._put_changes(mask, self._checked_changes(settings), restart=CURRICULUM[1] in settings)
+        self._put_changes(mask, self._checked_changes(settings), restart=_LEVEL in settings)
 
     def _checked_changes(self, settings: Any) -> list[tuple[str, Task]]:
         """Return for each environment the JSON of all changed settings, and the task with them."""
@@ -536,6 +539,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             random.set_state(random_state)
 
     def _consume_commands(self) -> None:
+        """Put the live commands into the memory."""
         self._memory = self._commands.consume(self._task, self._memory)
 
     def _picture_of(self, index: int) -> np.ndarray:
@@ -566,18 +570,20 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._streams_begin &= ~mask
         self._take_over_settings(mask)
         qpos, qvel, memories, mocap_positions, models = zip(*starts, strict=True)
-        mocap_pos = None if mocap_positions[0] is None else np.stack(mocap_positions)
+        has_mocap = mocap_positions[0] is not None  # the same for all environments
+        mocap_pos = np.stack(mocap_positions) if has_mocap else None
         self.batch.reset(mask, np.stack(qpos), np.stack(qvel), mocap_pos, models)
 
-        # A task that is the same for all environments works on those of the mask alone. A stacked one needs all.
+        # A task that is the same for all environments gets those of the mask alone. A stacked task needs all of them.
         task = self._task
         memory = trees.map_leaves(lambda *leaves: np.stack(leaves), *memories)
-        part = mask  # the environments on which the task works
-        if task is not self._tasks[0]:
+        part = mask  # (num_envs,) the environments that the task gets
+        is_stacked = task is not self._tasks[0]
+        if is_stacked:
             part = np.ones(self.num_envs, bool)
             if self._memory is not None:
                 memory = _replace_entries(self._memory, mask, memory)
-        is_starting = mask[part]  # which of these start an episode
+        is_starting = mask[part]  # which environments of the part start an episode
 
         readings = task.read(self.batch.part(part))
         clear_qpos = task.clear_spawn(memory, readings)
@@ -589,9 +595,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         if not is_starting.all():
             memory = trees.map_leaves(lambda leaf: leaf[is_starting], memory)
-        if self._memory is not None:  # in the first reset all environments start
-            memory = _replace_entries(self._memory, mask, memory)
-        self._memory = memory
+        if self._memory is None:  # in the first reset, in which all environments start
+            self._memory = memory
+        else:
+            self._memory = _replace_entries(self._memory, mask, memory)
         self._steps[mask] = 0
         self._ended = self._ended & ~mask
         self._resting = self._resting & ~mask
@@ -648,6 +655,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         return _with_masks({"privileged": vectors}, mask)
 
     def _privileged_vectors(self) -> np.ndarray:
+        """Return the present privileged observations (num_envs, size) float32."""
         return privileged.vector(self._task, self._privileged_blocks(self._task, self._memory))
 
     def _privileged_blocks(self, definition: Task, memory: Any) -> dict[str, np.ndarray]:

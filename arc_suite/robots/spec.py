@@ -34,8 +34,15 @@ MAX_NAME = 32  # characters
 MAX_ALIAS = 100  # characters of a name in a foreign file
 MAX_SOURCE = 1 << 21  # bytes of the MJCF of an imported body; of 38 files the largest has 430,000
 _MIN_LENGTH = 1e-6  # m
+_MIN_NORM = 1e-6  # of a vector that is a direction
+_MAX_AXIS = 1e3  # of the numbers of a joint's axis, which has any length
 _MAX_DENSITY = 1e9  # kg/m^3
 _MIN_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
+_MAX_LEGS = 64
+_MAX_LINKS = 16  # of a leg
+_MAX_SHAPES = 64  # solids of a torso, and as many shapes of ballast
+_MAX_HELD_JOINTS = 256
+_MAX_FILE_JOINTS = 1024
 
 # Bounds of motors and joints, in SI units. They lie beyond the results of sizing for all bodies within the other
 # bounds, so that no error is about a number that sizing has computed.
@@ -198,6 +205,7 @@ class _Spec:
         self._check_conditions()
 
     def _check_fields(self, fields: Iterable[dataclasses.Field]) -> None:
+        """Replace the values of fields by their checked values; raise SpecError for one that is not valid."""
         for field in fields:
             value = getattr(self, field.name)
             if value is None and field.metadata["optional"]:
@@ -206,13 +214,14 @@ class _Spec:
                 value = field.metadata["check"](value, *field.metadata["args"])
             except SpecError as error:
                 raise SpecError(error.reason, field.name, self._label()) from None
-            object.__setattr__(self, field.name, value)
+            object.__setattr__(self, field.name, value)  # the dataclass is frozen
 
     def _check_conditions(self) -> None:
         """Raise SpecError if fields do not fit each other; subclasses with such conditions override this."""
 
-    def _fail(self, field: str, message: str) -> NoReturn:
-        raise SpecError(message, field, self._label())
+    def _fail(self, field: str, reason: str) -> NoReturn:
+        """Raise SpecError for a field."""
+        raise SpecError(reason, field, self._label())
 
     def _label(self) -> str:
         """Return how errors call the spec: `Joint(hip)`, or its class alone if it has no valid name."""
@@ -236,7 +245,11 @@ class _Spec:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Motor(_Spec):
-    """A torque motor: control in [-1, 1], torque = gear (N m) x control."""
+    """A torque motor.
+
+    Attributes:
+        gear: torque at a control of 1, N m; controls are in [-1, 1].
+    """
 
     gear: float = _number_field(_MIN_GEAR, _MAX_GEAR)
 
@@ -272,7 +285,7 @@ class Joint(_Spec):
     """
 
     name: str = _name_field()
-    axis: Vector = _field(_check_vector, 3, -1e3, 1e3)
+    axis: Vector = _field(_check_vector, 3, -_MAX_AXIS, _MAX_AXIS)
     range_deg: tuple[float, float] = _field(_check_vector, 2, -180.0, 180.0)
     armature: float | None = _number_field(0.0, _MAX_JOINT_CONSTANT, default=None, optional=True)
     damping: float | None = _number_field(0.0, _MAX_JOINT_CONSTANT, default=None, optional=True)
@@ -281,7 +294,7 @@ class Joint(_Spec):
     alias: str | None = _field(_check_text, 1, MAX_ALIAS, default=None, optional=True)
 
     def _check_conditions(self):
-        if math.hypot(*self.axis) < 1e-6:
+        if math.hypot(*self.axis) < _MIN_NORM:
             self._fail("axis", "expected a direction, got one of no length")
         if self.motor and self.servo:
             self._fail("servo", "expected a motor or a servo, got both")
@@ -329,7 +342,7 @@ class Link(_Spec):
     joint: Joint | None = _field(_check_instance, Joint, default=None, optional=True)
 
     def _check_conditions(self):
-        if math.hypot(*self.end) < 1e-6:
+        if math.hypot(*self.end) < _MIN_LENGTH:
             self._fail("end", "expected a point away from the link's origin")
 
     def mirrored(self) -> Link:
@@ -360,7 +373,7 @@ class Leg(_Spec):
 
     name: str = _name_field()
     mount: Vector = _position_field()
-    links: tuple[Link, ...] = _field(_check_items, Link, 1, 16)
+    links: tuple[Link, ...] = _field(_check_items, Link, 1, _MAX_LINKS)
     foot: Foot = _field(_check_instance, Foot)
     yaw_deg: float = _number_field(-360.0, 360.0, default=0.0)
 
@@ -475,7 +488,7 @@ class Torso(_Spec):
     """
 
     standing_height: float | None = _length_field(default=None, optional=True)
-    solids: tuple[Solid, ...] = _field(_check_items, Solid, 1, 64)
+    solids: tuple[Solid, ...] = _field(_check_items, Solid, 1, _MAX_SHAPES)
 
     def _check_conditions(self):
         _check_unique(self, "solids", [solid.name for solid in self.solids])
@@ -496,7 +509,7 @@ class TrackingCamera(_Spec):
     def _check_conditions(self):
         a, b, c, d, e, f = self.xyaxes
         cross_product = (b * f - c * e, c * d - a * f, a * e - b * d)
-        if math.hypot(*cross_product) < 1e-6:
+        if math.hypot(*cross_product) < _MIN_NORM:
             self._fail("xyaxes", f"expected two directions that are not parallel, got {_preview(self.xyaxes)}")
 
 
@@ -565,16 +578,16 @@ class Body(_Spec):
 
     name: str = _name_field()
     torso: Torso = _field(_check_instance, Torso)
-    legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, 64)
+    legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, _MAX_LEGS)
     camera: TrackingCamera | None = _field(_check_instance, TrackingCamera, default=None, optional=True)
     density: float = _number_field(1e-9, _MAX_DENSITY, default=DENSITY)
-    ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
+    ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, _MAX_SHAPES, default=())
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
     agility: float = _number_field(0.1, 10.0, default=1.0)
     palette: str | int | None = _field(_check_palette, default=None, optional=True)
     source: str | None = _field(_check_text, 1, MAX_SOURCE, default=None, optional=True)
-    held: tuple[Held, ...] = _field(_check_items, Held, 0, 256, default=())
-    file_joints: tuple[str, ...] = _field(_check_texts, 1024, default=())
+    held: tuple[Held, ...] = _field(_check_items, Held, 0, _MAX_HELD_JOINTS, default=())
+    file_joints: tuple[str, ...] = _field(_check_texts, _MAX_FILE_JOINTS, default=())
 
     def _check_conditions(self):
         _check_unique(self, "legs", [leg.name for leg in self.legs])
