@@ -83,7 +83,7 @@ def main(count: int = BODIES, agility: float = 1.0) -> bool:
     for body in tqdm([*ROBOTS.values(), *random], disable=None):
         told = flight(body)
         counts = [crossed(body, kind, preset) for kind in ("trenches", "hurdles") for preset in ("sighted", "leaping")]
-        measures = (told.landed * told.distance, told.landed * told.moved, told.clearance)
+        measures = (told.landed * told.distance, told.landed * told.torso_distance, told.clearance)
         print(f"| {body.name} | {' | '.join([*(f'{each:.2f}' for each in measures), *map(str, counts)])} |", flush=True)
         found[body.name] = counts[1]
     passed = [number >= ENOUGH for name, number in found.items() if name not in ROBOTS]

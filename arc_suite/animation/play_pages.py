@@ -158,16 +158,16 @@ def _law(task: Task, preset: str) -> dict[str, Any]:
 
 def _leaps(law: Directed) -> dict[str, Any]:
     """Targets of joints (steps, joints), rad, and the step at which the crouch ends, of the leaps that a body can."""
-    body, legs, rest = law.body, Legs.of(law.body), law.angles  # whose joints use all of their ranges in a leap
+    body, legs, rest = law.body, Legs.of(law.body), law.rest_angles  # whose joints use all of their ranges in a leap
     pose, made = tuple(legs.by_joint(rest).tolist()), {}
     ahead = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
     for name, choice, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", ahead, "distance")):
         try:
-            leap = leaps.found(body, pose, choice, measure)
+            leap = leaps.choose_leap(body, pose, choice, measure)
         except ValueError:
             continue  # and the page has no key for it
-        crouched = leaps.movement(body, legs, rest, leap).crouched
-        made[name] = {"crouched": crouched, "targets": leaps.keyframes(body, legs, rest, leap)}
+        crouched = leaps.plan_movement(body, legs, rest, leap).crouch_end
+        made[name] = {"crouched": crouched, "targets": leaps.leap_targets(body, legs, rest, leap)}
     return made
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite.bodies import tokens
 from arc_suite.bodies.tokens import Tokens
-from arc_suite.cpg.law import Clocked, checked, proprioception, torques
+from arc_suite.cpg.law import Clocked, proprioception, read_blocks, torques
 from arc_suite.envs.setup import Setup
 from arc_suite.models.sizing import position_gains, size_body
 from arc_suite.models.standing import measure_standing
@@ -83,12 +83,12 @@ class Universal:
         Raises:
             ValueError: an observation of another body, or without a block of the task.
         """
-        blocks = checked(observation, self.task.sizes, len(self.reach), len(self.task.scene.body.part_names))
+        blocks = read_blocks(observation, self.task.sizes, len(self.reach), len(self.task.scene.body.part_names))
         vectors = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
         positions = self._positions(vectors).astype(float)
         if self.task.actions == "position":
             return positions
-        _, angles, speeds = proprioception(checked(observation, Clocked.reads, len(self.reach)))
+        _, angles, speeds = proprioception(read_blocks(observation, Clocked.reads, len(self.reach)))
         return torques(self.reach * positions, angles, speeds, *self.gains)
 
     def _traced(self, vectors: Any) -> Any:

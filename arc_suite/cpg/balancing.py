@@ -71,8 +71,8 @@ class Balanced(Stepping):
         super().__init__(task, parameters)
         self.shorter, self.attitude, self.most = parameters.shorter, parameters.attitude, parameters.most
         self.duty_factor -= parameters.shorter
-        self.stance = self.duty_factor / gait_of(task).frequency
-        self._ride = -self.places[:, 2].mean()
+        self.stance_duration = self.duty_factor / gait_of(task).frequency
+        self._ride = -self.rest_soles[:, 2].mean()
         self._fall = math.sqrt(self._ride / GRAVITY)  # s, of an inverted pendulum as high
 
     def _eased(self, task: Task) -> tuple:
@@ -83,10 +83,10 @@ class Balanced(Stepping):
         legs = Legs.of(self.body, posture.JOINT_RANGE_SHARE)
         return legs, places, legs.relaxed_joint_angles(places, np.eye(3), self._damping)
 
-    def balanced(self, motion, vertical, observation: Mapping) -> tuple:
+    def balance(self, motion, vertical, observation: Mapping) -> tuple:
         """Return the velocity that feet give, and shifts of footholds; see `Stepping`."""
         numpy, p = motion.__array_namespace__(), self.parameters
-        motion, _ = super().balanced(motion, vertical, observation)
+        motion, _ = super().balance(motion, vertical, observation)
         motion = motion * (2.0 - numpy.hypot(vertical[:, :1], vertical[:, 1:2]) / _STEEP).clip(0.0, 1.0)
         surplus = observation["velocities"][:, :2] - observation["command"][:, :2] * self.units[:2]
         return motion, p.capture * self._fall * surplus - p.lean * self._ride * vertical[:, :2]

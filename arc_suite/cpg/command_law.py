@@ -86,10 +86,10 @@ class CommandLaw(ABC):
             ValueError: a gait without a cycle, or without stance or swing.
         """
         gait, self.parameters, self.body = gait_of(task), parameters, size_body(task.scene.body)
-        self.pose, self.step = pose_mechanics(self.body, angles), task.scene.control_timestep
-        self.cycles, self.duty_factor = gait.frequency * self.step, gait.duty_factor
-        self.smoothing, self.onset = min(1.0, self.cycles / _SMOOTHING), self.cycles / _ONSET
-        self.stance, self.offsets = gait.duty_factor / gait.frequency, gait.offsets + parameters.lead
+        self.pose, self.control_timestep = pose_mechanics(self.body, angles), task.scene.control_timestep
+        self.cycles_per_step, self.duty_factor = gait.frequency * self.control_timestep, gait.duty_factor
+        self.smoothing, self.onset = min(1.0, self.cycles_per_step / _SMOOTHING), self.cycles_per_step / _ONSET
+        self.stance_duration, self.offsets = gait.duty_factor / gait.frequency, gait.offsets + parameters.lead
         self.units = velocity_units(self.body, gait.target_velocity)
         self.drive = drive(self.body, self.pose.inertias)
 
@@ -108,19 +108,19 @@ class CommandLaw(ABC):
         """Return the next state, and the joints' target angles, rad, and velocities, rad/s, (environments, joints)."""
         state, request = self._requested(state, observation["command"], observation["gait_clock"])
         paths, targets, change = self.planned(state.paths, request, observation)
-        return state._replace(paths=paths), targets, change / self.step
+        return state._replace(paths=paths), targets, change / self.control_timestep
 
     def _requested(self, state: CommandLawState, command, clock) -> tuple[CommandLawState, Request]:
         """The next state, and what feet are to do, by proportional and integral feedback on the command."""
         numpy, wanted, motion = clock.__array_namespace__(), command[:, :3], command[:, 3:]
         going = clock.any(axis=-1, keepdims=True)
         smooth = state.command + self.smoothing * (wanted - state.command)
-        integral = state.integral + self.parameters.integral * self.cycles * (wanted - motion)
+        integral = state.integral + self.parameters.integral * self.cycles_per_step * (wanted - motion)
         integral = integral.clip(-1.0, 1.0) * going
         size = (state.size + numpy.where(going, 1.0, -1.0) * self.onset).clip(0.0, 1.0)
         # At rest the clock reads (0, 0), which is no phase.
         phase = numpy.where(going[:, 0], numpy.arctan2(clock[:, 0], clock[:, 1]) / (2.0 * np.pi), state.phase)
-        advance = self.cycles * going[:, 0]
+        advance = self.cycles_per_step * going[:, 0]
         requested = smooth + integral + np.array(self.parameters.gain) * (smooth - motion)
         requested = numpy.where(going, requested, state.motion)
         state = CommandLawState(smooth, integral, requested, size, phase + advance, state.paths)

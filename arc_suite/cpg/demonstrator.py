@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import registry
-from arc_suite.cpg.law import checked, restarted
+from arc_suite.cpg.law import read_blocks, restart_where
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import law, preset_of
 from arc_suite.envs import trees
@@ -69,7 +69,7 @@ class Demonstrator:
         if self._state is not None:
             mask = np.zeros(len(self._state[0]), bool)
             mask[indices] = True
-            self._state = restarted(self._state, self.law.initial(len(mask)), mask)
+            self._state = restart_where(self._state, self.law.initial(len(mask)), mask)
         self._started = list(indices)
 
     def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
@@ -85,7 +85,7 @@ class Demonstrator:
         Raises:
             ValueError: not named blocks, those of another body, or a block is missing.
         """
-        blocks = checked(observation, self.law.reads, len(self._body.joint_names), len(self._body.part_names))
+        blocks = read_blocks(observation, self.law.reads, len(self._body.joint_names), len(self._body.part_names))
         alone = blocks["posture"].ndim == 1
         if alone:
             blocks = {name: block[None] for name, block in blocks.items()}

@@ -8,9 +8,9 @@ from arc_suite.tasks.sensors import FORWARD, LEFT
 
 # By how much feet may land further ahead, in standing heights. Those ahead count half as much again as those behind,
 # since a foot that has far to go comes late.
-SHIFTS = np.array(sorted(0.08 * np.arange(-8, 9), key=lambda shift: 1.5 * shift if shift > 0.0 else -shift))
-AROUND = np.array((-0.12, 0.0, 0.12))  # standing heights along the path: ground that a foot needs
-DEEP = 0.25  # standing heights below the ground about the feet, at which ground is no foothold
+LANDING_SHIFTS = np.array(sorted(0.08 * np.arange(-8, 9), key=lambda shift: 1.5 * shift if shift > 0.0 else -shift))
+SUPPORT_POINTS = np.array((-0.12, 0.0, 0.12))  # standing heights along the path: ground that a foot needs
+MAX_FOOTHOLD_DROP = 0.25  # standing heights below the ground about the feet, at which ground is no foothold
 
 
 class View(NamedTuple):
@@ -46,7 +46,7 @@ class View(NamedTuple):
         return found
 
 
-def shifts(view: View, landing, along, places, height: float):
+def find_shifts(view: View, landing, along, places, height: float):
     """Return by how much feet should land further ahead, (environments, feet) m: the least that finds ground, or 0.
 
     Args:
@@ -56,20 +56,20 @@ def shifts(view: View, landing, along, places, height: float):
         places: (feet, 2) where feet stand at ease, m.
         height: the standing height, m.
     """
-    return landings(view, landing, along, places, height)[0]
+    return find_landings(view, landing, along, places, height)[0]
 
 
-def landings(view: View, landing, along, places, height: float, around=AROUND) -> tuple:
+def find_landings(view: View, landing, along, places, height: float, around=SUPPORT_POINTS) -> tuple:
     """Return `shifts`, and whether there is ground to land on, (environments, feet), with ground around, in h."""
     numpy = landing.__array_namespace__()
     at_ease = numpy.broadcast_to(numpy.asarray(places), landing.shape)
     level = numpy.median(view.ground(at_ease[..., 0], at_ease[..., 1]), axis=-1)
-    tried = (SHIFTS[:, None] + around).ravel() * height
+    tried = (LANDING_SHIFTS[:, None] + around).ravel() * height
     points = landing[..., None, :] + along[..., None, :] * tried[:, None]
-    ground = view.ground(points[..., 0], points[..., 1]).reshape(*landing.shape[:2], len(SHIFTS), len(around))
-    safe = (ground > level[:, None, None, None] - DEEP).all(axis=-1)
+    ground = view.ground(points[..., 0], points[..., 1]).reshape(*landing.shape[:2], len(LANDING_SHIFTS), len(around))
+    safe = (ground > level[:, None, None, None] - MAX_FOOTHOLD_DROP).all(axis=-1)
     found = safe.any(axis=-1)
-    return height * numpy.where(found, numpy.asarray(SHIFTS)[safe.argmax(axis=-1)], 0.0), found
+    return height * numpy.where(found, numpy.asarray(LANDING_SHIFTS)[safe.argmax(axis=-1)], 0.0), found
 
 
 def _index(place, places):

@@ -176,10 +176,10 @@ class Clocked:
         return Clock(state.steps + 1), self.control(state.steps, *proprioception(observation))
 
 
-def restarted(state, initial, mask):
+def restart_where(state, initial, mask):
     """Return a state, an array or a NamedTuple of states, that is `initial` where a mask (environments,) holds."""
     if isinstance(state, tuple):
-        return type(state)(*(restarted(*fields, mask) for fields in zip(state, initial, strict=True)))
+        return type(state)(*(restart_where(*fields, mask) for fields in zip(state, initial, strict=True)))
     return mask.__array_namespace__().where(mask.reshape(-1, *[1] * (state.ndim - 1)), initial, state)
 
 
@@ -193,7 +193,7 @@ def proprioception(observation: Mapping) -> tuple:
 _EXAMPLES = {"scan": "rough", "goal": "navigate", "ranges": "navigate"}
 
 
-def checked(observation, names: Iterable[str], joints: int, parts: int | None = None) -> dict[str, np.ndarray]:
+def read_blocks(observation, names: Iterable[str], joints: int, parts: int | None = None) -> dict[str, np.ndarray]:
     """Return blocks of an observation as float64.
 
     Args:

@@ -16,7 +16,7 @@ from arc_suite import rotations
 from arc_suite.cpg import footholds, leaps
 from arc_suite.cpg.command_law import Request
 from arc_suite.cpg.leaps import Leap
-from arc_suite.cpg.sighted import Paths, Sighted, SightedParameters
+from arc_suite.cpg.sighted import Sighted, SightedParameters, SightedState
 from arc_suite.models import posture
 from arc_suite.tasks.contract import Task
 
@@ -39,9 +39,9 @@ class LeapingParameters(NamedTuple):
     most: float = 0.36
 
 
-_LEAST = leaps.LEAST["distance"]  # least leap; a body with a shorter one gets a warning, and walks
+_LEAST = leaps.MIN_BY_MEASURE["distance"]  # least leap; a body with a shorter one gets a warning, and walks
 _GATHER = 4  # cycles on the spot before it walks on; it may leap after each
-_AROUND = 1.6 * footholds.AROUND
+_AROUND = 1.6 * footholds.SUPPORT_POINTS
 _PROBE = 0.1  # standing heights between the points ahead of a foot that are looked at
 _SUNK = 0.15  # standing heights below the others, at which a foot does not stand
 _STEPS = 3  # of inverse kinematics in a control step
@@ -59,7 +59,7 @@ class LeapingState(NamedTuple):
         moved: (environments,) of the torso since the leap began, forward, m.
     """
 
-    walk: Paths
+    walk: SightedState
     step: np.ndarray
     shifts: np.ndarray
     moved: np.ndarray
@@ -79,11 +79,11 @@ class Leaping(Sighted):
         """Fit the law to a task, and warn of a body that cannot leap; see `CommandLaw`."""
         super().__init__(task, parameters.walk)
         self.parameters, rest = parameters.walk, self._first.angles
-        self._leaping, self._cycle = parameters, math.ceil(1.0 / self.cycles)
+        self._leaping, self._cycle = parameters, math.ceil(1.0 / self.cycles_per_step)
         at_rest = tuple(self.legs.by_joint(rest).tolist())
-        self.leap, self.flight = leaps.best(task.scene.body, at_rest, parameters.choice)
-        self._movement = leaps.movement(self.body, self.legs, rest, self.leap)
-        self._last, far = len(self._movement.offsets), self.flight.distance * self.flight.landed
+        self.leap, self.flight = leaps.find_best_leap(task.scene.body, at_rest, parameters.choice)
+        self._movement = leaps.plan_movement(self.body, self.legs, rest, self.leap)
+        self._last, far = len(self._movement.sole_offsets), self.flight.distance * self.flight.landed
         self._leaps = far >= _LEAST
         if not self._leaps:
             text = f"{self.body.name} cannot leap: its feet get {far:.2f} h ahead, and {_LEAST} h are needed"
@@ -101,13 +101,13 @@ class Leaping(Sighted):
         if not self._leaps:
             return paths._replace(walk=walk), targets, change
         view = footholds.View(walk.heights, walk.moved, self._reach)
-        moved = paths.moved + observation["velocities"][:, 0] * self.step
+        moved = paths.moved + observation["velocities"][:, 0] * self.control_timestep
         moved = _where(_within(paths.step, 1, self._last - 1), moved, 0.0 * moved)
         found, safe = self._landings(view, moved)
         ready = safe.all(axis=-1) & (request.size[:, 0] >= 1.0) & self._close(view, observation)
         step = self._next(paths.step, ready)
         leaps_on = _within(step, 1, self._last)
-        flies = _within(step, self._movement.stretched, self._movement.landed)
+        flies = _within(step, self._movement.stretch_end, self._movement.landing_step)
         shifts = _where(leaps_on, _where(flies[:, None] & safe, found, paths.shifts), 0.0 * found)
         leapt = self._leapt(paths.walk, walk, step, shifts)
         walk = walk._replace(**{name: _where(leaps_on, each, getattr(walk, name)) for name, each in leapt.items()})
@@ -128,9 +128,9 @@ class Leaping(Sighted):
         """Shifts (environments, legs) of where feet land, m, and whether there is ground, given the way so far, m."""
         numpy, height = moved.__array_namespace__(), self.pose.height
         left = (self.flight.distance * height - moved).clip(0.0)
-        landing = self.places[:, :2] + numpy.stack([left, 0.0 * left], axis=-1)[:, None]
+        landing = self.rest_soles[:, :2] + numpy.stack([left, 0.0 * left], axis=-1)[:, None]
         along = numpy.broadcast_to(np.array((1.0, 0.0)), landing.shape)
-        shifts, safe = footholds.landings(view, landing, along, self.places[:, :2], height, _AROUND)
+        shifts, safe = footholds.find_landings(view, landing, along, self.rest_soles[:, :2], height, _AROUND)
         return shifts, safe & (abs(shifts) <= self._leaping.most * height)
 
     def _close(self, view: footholds.View, observation: Mapping):
@@ -142,12 +142,12 @@ class Leaping(Sighted):
         ahead = soles[..., :1] + height * _PROBE * np.arange(math.ceil((p.near + p.widest) / _PROBE) + 1)
         ground = view.ground(ahead, soles[..., 1:2] + 0.0 * ahead)
         level = numpy.median(ground[..., 0], axis=-1)[:, None, None]
-        missing = ground < level - footholds.DEEP
+        missing = ground < level - footholds.MAX_FOOTHOLD_DROP
         wide = _PROBE * missing.sum(axis=-1) >= p.widest
         close = missing[..., : math.ceil(p.near / _PROBE) + 1].any(axis=-1)
         return stands & (wide & close).any(axis=-1)
 
-    def _leapt(self, before: Paths, walk: Paths, step, shifts) -> dict:
+    def _leapt(self, before: SightedState, walk: SightedState, step, shifts) -> dict:
         """Feet, angles and shifts of the paths after a control step of a leap.
 
         Args:
@@ -157,23 +157,23 @@ class Leaping(Sighted):
             shifts: (environments, legs) of where feet land, m.
         """
         numpy, made, height = step.__array_namespace__(), self._movement, self.pose.height
-        offsets = numpy.concatenate([np.zeros((1, 3)), made.offsets])
+        offsets = numpy.concatenate([np.zeros((1, 3)), made.sole_offsets])
         now = step.clip(0, self._last)
-        level = numpy.broadcast_to(self.places[:, 2:], walk.feet[..., 2:].shape)
+        level = numpy.broadcast_to(self.rest_soles[:, 2:], walk.feet[..., 2:].shape)
         start = numpy.concatenate([walk.feet[..., :2], level], axis=-1)
         planted = _where(step == 1, start, before.feet) + (offsets[now] - offsets[(now - 1).clip(0)])[:, None]
-        flying = self.places + numpy.stack([shifts, 0.0 * shifts, 0.0 * shifts], axis=-1) + offsets[now][:, None]
-        feet = _where(step > made.stretched, flying, planted)
-        aims = numpy.broadcast_to(leaps.aims(len(self.places)), (*feet.shape, 3))
-        angles = self.righted(
+        flying = self.rest_soles + numpy.stack([shifts, 0.0 * shifts, 0.0 * shifts], axis=-1) + offsets[now][:, None]
+        feet = _where(step > made.stretch_end, flying, planted)
+        aims = numpy.broadcast_to(leaps.sole_weights(len(self.rest_soles)), (*feet.shape, 3))
+        angles = self.correct_bends(
             self.legs.solve_joint_angles(before.angles, feet, aims, posture.IK_DAMPING * height, _STEPS)
         )
         return {"feet": feet, "angles": angles, "shifts": 0.0 * shifts}
 
     def _driven(self, step):
         """What a control step (environments,) of a leap adds to the angles of all joints, rad."""
-        stretches = _within(step, self._movement.crouched + 1, self._movement.stretched)
-        return stretches[:, None] * self.legs.by_joint(self._movement.driven)
+        stretches = _within(step, self._movement.crouch_end + 1, self._movement.stretch_end)
+        return stretches[:, None] * self.legs.by_joint(self._movement.joint_drive)
 
 
 def _within(step, first: int, last: int):

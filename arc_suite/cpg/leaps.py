@@ -49,7 +49,7 @@ class Leap(NamedTuple):
 
 
 _JUMP = Leap(back=0.0, forward=0.0, ahead=0.0)
-LEAST = {"clearance": 0.1, "distance": 0.8}  # standing heights: of feet in a jump and in a leap
+MIN_BY_MEASURE = {"clearance": 0.1, "distance": 0.8}  # standing heights: of feet in a jump and in a leap
 JUMPS = tuple(_JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.35, 0.5) for drive in (1.5, 2.5, 4.0))
 
 _SINK, _HOLD, _SETTLE = 2.0, 0.5, 3.0  # durations of the crouch, of the wait in it, and of the landing
@@ -72,14 +72,14 @@ class Movement(NamedTuple):
         landed: at which feet are to be on the ground.
     """
 
-    offsets: np.ndarray
-    driven: np.ndarray
-    crouched: int
-    stretched: int
-    landed: int
+    sole_offsets: np.ndarray
+    joint_drive: np.ndarray
+    crouch_end: int
+    stretch_end: int
+    landing_step: int
 
 
-def movement(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> Movement:
+def plan_movement(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> Movement:
     """Return the plan of a leap from a pose (legs, links), rad, in which soles are level."""
     height = body.torso.standing_height
     unit = math.sqrt(height / GRAVITY) / control_timestep(body)
@@ -89,7 +89,7 @@ def movement(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> Movement:
     low, reach = np.array((leap.back, 0.0, leap.crouch)), np.array((leap.ahead, 0.0, 0.0))
     air = np.sin(np.pi * np.arange(1, fly + 1) / fly)[:, None] * (0.0, 0.0, leap.tuck)
     parts = [_eased(sink) * low, np.tile(low, (hold + stretch, 1)), air + reach, (1.0 - _eased(settle)) * reach]
-    soles, weights = legs.soles(rest)[0], aims(len(rest))
+    soles, weights = legs.soles(rest)[0], sole_weights(len(rest))
 
     def reached(angles, offset):
         return legs.solve_joint_angles(angles, soles + offset * height, weights, posture.IK_DAMPING * height, _ROUNDS)
@@ -100,7 +100,7 @@ def movement(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> Movement:
     return Movement(height * np.concatenate(parts), leap.drive * (stretched - crouched), *ends)
 
 
-def aims(legs: int) -> np.ndarray:
+def sole_weights(legs: int) -> np.ndarray:
     """Return the weights (legs, 3, 3) of the soles' places in inverse kinematics."""
     return np.tile(np.diag((_PLANE, _PLANE, 1.0)), (legs, 1, 1))
 
@@ -109,15 +109,15 @@ def _eased(steps: int) -> np.ndarray:
     return 0.5 - 0.5 * np.cos(np.pi * np.arange(1, steps + 1) / steps)[:, None]
 
 
-def keyframes(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> np.ndarray:
+def leap_targets(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> np.ndarray:
     """Return the targets (steps, joints) of joints in the control steps of a leap from a pose (legs, links), rad."""
-    made, soles, height = movement(body, legs, rest, leap), legs.soles(rest)[0], body.torso.standing_height
-    goals = soles + made.offsets[:, None]
+    made, soles, height = plan_movement(body, legs, rest, leap), legs.soles(rest)[0], body.torso.standing_height
+    goals = soles + made.sole_offsets[:, None]
     angles = legs.solve_joint_angles(
-        np.tile(rest, (len(goals), 1, 1)), goals, aims(len(rest)), posture.IK_DAMPING * height, _ROUNDS
+        np.tile(rest, (len(goals), 1, 1)), goals, sole_weights(len(rest)), posture.IK_DAMPING * height, _ROUNDS
     )
-    stretch = slice(made.crouched, made.stretched)
-    angles[stretch] += made.driven
+    stretch = slice(made.crouch_end, made.stretch_end)
+    angles[stretch] += made.joint_drive
     return legs.by_joint(angles)
 
 
@@ -134,14 +134,14 @@ class Flight(NamedTuple):
     """
 
     distance: float
-    moved: float
-    seconds: float
+    torso_distance: float
+    air_time: float
     clearance: float
     rise: float
     landed: bool
 
 
-def flights(body: Body, rest: np.ndarray, angles: np.ndarray, crouched: Sequence[int]) -> list[Flight]:
+def simulate_flights(body: Body, rest: np.ndarray, angles: np.ndarray, crouched: Sequence[int]) -> list[Flight]:
     """Return what leaps do to a body, by simulation.
 
     Args:
@@ -184,8 +184,8 @@ def _measured(body: Body, places, tilts, soles, crouched: int, step: float) -> F
     ahead = (soles[-1] - soles[crouched - 1])[:, 0].mean()
     return Flight(
         distance=float(ahead / height) if off.any() else 0.0,
-        moved=float((places[max(last - 1, first), 0] - places[first, 0]) / height),
-        seconds=step * (last - first),
+        torso_distance=float((places[max(last - 1, first), 0] - places[first, 0]) / height),
+        air_time=step * (last - first),
         clearance=float((soles[crouched:, :, 2].min(axis=-1)).max() / height),
         rise=float((places[:, 2].max() - places[0, 2]) / height),
         landed=bool(landed),
@@ -193,7 +193,7 @@ def _measured(body: Body, places, tilts, soles, crouched: int, step: float) -> F
 
 
 @functools.lru_cache(maxsize=64)
-def best(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure: str = "distance"):
+def find_best_leap(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure: str = "distance"):
     """Return the leap of a choice by which a body lands and gets farthest or highest, and its flight.
 
     Args:
@@ -204,23 +204,25 @@ def best(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure:
     """
     legs = Legs.of(size_body(body))
     angles = legs.by_leg(np.array(rest))
-    made = [keyframes(body, legs, angles, leap) for leap in choice]
+    made = [leap_targets(body, legs, angles, leap) for leap in choice]
     longest = max(map(len, made))
     targets = np.stack([np.concatenate([each, np.tile(each[-1], (longest - len(each), 1))]) for each in made])
-    crouched = [movement(body, legs, angles, leap).crouched for leap in choice]
-    found = flights(body, np.array(rest), targets, crouched)
+    crouched = [plan_movement(body, legs, angles, leap).crouch_end for leap in choice]
+    found = simulate_flights(body, np.array(rest), targets, crouched)
     return max(zip(choice, found, strict=True), key=lambda pair: pair[1].landed * getattr(pair[1], measure))
 
 
-def found(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure: str) -> Leap:
+def choose_leap(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure: str) -> Leap:
     """Return the leap of a choice by which a body gets farthest or highest; see `best`.
 
     Raises:
         ValueError: the body hardly leaves the ground, or does not land on its feet.
     """
-    leap, flight = best(body, rest, choice, measure)
+    leap, flight = find_best_leap(body, rest, choice, measure)
     if not flight.landed:
         raise ValueError("it does not land on its feet")
-    if (reached := getattr(flight, measure)) < LEAST[measure]:
-        raise ValueError(f"the {measure} of its feet is {reached:.2f} standing heights, less than {LEAST[measure]}")
+    if (reached := getattr(flight, measure)) < MIN_BY_MEASURE[measure]:
+        raise ValueError(
+            f"the {measure} of its feet is {reached:.2f} standing heights, less than {MIN_BY_MEASURE[measure]}"
+        )
     return leap

@@ -69,18 +69,18 @@ class Planned:
         p, command = self._parameters, observation["command"].copy()
         for index, (goal, ranges) in enumerate(zip(observation["goal"], observation["ranges"], strict=True)):
             goal = FAR * float(goal[2]) * goal[:2]
-            x, y = along(path(goal, seen(ranges), self._extent, p) or [goal], p.aim)
-            command[index, :3] = toward(math.atan2(y, x), p)
+            x, y = point_along_path(shortest_path(goal, locate_pillars(ranges), self._extent, p) or [goal], p.aim)
+            command[index, :3] = command_toward(math.atan2(y, x), p)
         return self._steered(state, {**observation, "command": command})
 
 
-def toward(bearing: float, parameters: PlanningParameters) -> tuple[float, float, float]:
+def command_toward(bearing: float, parameters: PlanningParameters) -> tuple[float, float, float]:
     """Return the command that leads to a bearing, rad: a turn to it, and a walk there meanwhile."""
     forward = max(parameters.forward * math.cos(bearing), -parameters.back)
     return forward, parameters.aside * math.sin(bearing), min(max(bearing, -1.0), 1.0)
 
 
-def seen(ranges: np.ndarray) -> np.ndarray:
+def locate_pillars(ranges: np.ndarray) -> np.ndarray:
     """Return the middles (n, 2) of pillars, forward and left of the torso, that the ranges (24,) tell of.
 
     Two neighboring rays that meet one pillar tell exactly where it is; a ray alone, that it is about
@@ -102,7 +102,9 @@ def seen(ranges: np.ndarray) -> np.ndarray:
     return np.array(middles).reshape(-1, 2)
 
 
-def path(goal: np.ndarray, circles: np.ndarray, extent: float, parameters: PlanningParameters) -> list[np.ndarray]:
+def shortest_path(
+    goal: np.ndarray, circles: np.ndarray, extent: float, parameters: PlanningParameters
+) -> list[np.ndarray]:
     """Return the corners of a shortest path from the torso to a goal around circles, by A*; none if there is none.
 
     Args:
@@ -168,7 +170,7 @@ def _nearest(start: np.ndarray, ends: np.ndarray, circles: np.ndarray) -> np.nda
     return np.hypot(between[..., 0], between[..., 1])
 
 
-def along(corners: Sequence[np.ndarray], distance: float) -> np.ndarray:
+def point_along_path(corners: Sequence[np.ndarray], distance: float) -> np.ndarray:
     """Return the point (2,) at a distance along a path from the torso; its end, if it is shorter."""
     place = np.zeros(2)
     for corner in corners:

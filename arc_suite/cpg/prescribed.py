@@ -101,25 +101,27 @@ class Prescribed(NamedTuple):
         if legs != offsets:
             raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
         try:
-            laid, added = pattern(body, preset), feedforward(body, preset)
-            crouch = pattern(body, preset._replace(center=preset.crouch)).center if preset.crouch else laid.center
+            laid, added = lay_out_pattern(body, preset), lay_out_feedforward(body, preset)
+            crouch = (
+                lay_out_pattern(body, preset._replace(center=preset.crouch)).center if preset.crouch else laid.center
+            )
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise ValueError(f"preset: does not fit {body.name}: {type(error).__name__}: {error}") from None
         return cls(laid, added, crouch, control_timestep(body), *(getattr(preset, name) for name in cls._fields[4:]))
 
     @classmethod
-    def stacked(cls, controls: Sequence[Self]) -> Self:
+    def stack(cls, controls: Sequence[Self]) -> Self:
         """Return several controls of one body as one, of a batch with an environment for each."""
 
-        def stack(values):
+        def stack_values(values):
             return np.stack([np.atleast_1d(value) for value in values])
 
         patterns, feedforwards, *numbers = zip(*controls, strict=True)
         added = next(filter(None, feedforwards), None)
         if added is not None:
             none = Feedforward(*map(np.zeros_like, added))
-            added = Feedforward(*map(stack, zip(*(each or none for each in feedforwards), strict=True)))
-        return cls(Pattern(*map(stack, zip(*patterns, strict=True))), added, *map(stack, numbers))
+            added = Feedforward(*map(stack_values, zip(*(each or none for each in feedforwards), strict=True)))
+        return cls(Pattern(*map(stack_values, zip(*patterns, strict=True))), added, *map(stack_values, numbers))
 
     def __call__(self, clock, quaternion, angles, velocities):
         """Return the actions (..., joints) after `clock` (...) control steps; few presets read the quaternion."""
@@ -152,7 +154,7 @@ class PrescribedLaw(Clocked):
         super().__init__(control._replace(pattern=laid, control_timestep=task.scene.control_timestep))
 
 
-def pattern(body: Body, preset: Preset) -> Pattern:
+def lay_out_pattern(body: Body, preset: Preset) -> Pattern:
     """Return a preset, laid out over a body's joints."""
 
     def by_rank(angle: ByRank, rank: int) -> float:
@@ -172,7 +174,7 @@ def pattern(body: Body, preset: Preset) -> Pattern:
     return Pattern(preset.frequency, preset.duty_factor, *np.array(rows).T)
 
 
-def feedforward(body: Body, preset: Preset) -> Feedforward | None:
+def lay_out_feedforward(body: Body, preset: Preset) -> Feedforward | None:
     """Return the torques that a preset adds to the PD loop's, laid out over a body's joints; None for none."""
     if preset.torques is None and not preset.steering:
         return None

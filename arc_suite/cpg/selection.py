@@ -12,7 +12,7 @@ from arc_suite.cpg.prescribed import PrescribedLaw, Preset
 from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.steering import Steered, SteeringParameters
-from arc_suite.cpg.stepping import Directed, directed
+from arc_suite.cpg.stepping import Directed, observes_gait_and_pose
 from arc_suite.cpg.stride_law import StrideLaw
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -47,7 +47,7 @@ def law(task: Task, preset: Any, laws: Mapping[type, Any] = LAWS):
         ValueError: the preset is of no class that has a law, or does not fit.
     """
     kind = law_class(preset, laws)
-    return (_DIRECTED.get(kind, kind) if directed(task) else kind)(task, preset)
+    return (_DIRECTED.get(kind, kind) if observes_gait_and_pose(task) else kind)(task, preset)
 
 
 def law_class(preset: Any, laws: Mapping[type, Any] = LAWS) -> Any:

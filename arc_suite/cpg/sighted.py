@@ -54,7 +54,7 @@ _ACROSS = 0.3  # weight of a foot's slip across its path against its motion alon
 _STEPS = 2  # of it in a control step
 
 
-class Paths(NamedTuple):
+class SightedState(NamedTuple):
     """The law's own state.
 
     Attributes:
@@ -81,7 +81,7 @@ class Sighted(CommandLaw):
         around: ground that a foot needs, standing heights along its path.
     """
 
-    around = footholds.AROUND
+    around = footholds.SUPPORT_POINTS
     reads = (*CommandLaw.reads, "scan")
 
     def __init__(self, task: Task, parameters: SightedParameters):
@@ -91,15 +91,15 @@ class Sighted(CommandLaw):
         self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.pose.height
         soles = np.where((True, True, False), self.pose.soles, -ride)
         angles = self.legs.relaxed_joint_angles(soles, np.diag((0.2, 0.2, 1.0)), posture.IK_DAMPING * ride)
-        self.places = self.legs.soles(angles)[0]
+        self.rest_soles = self.legs.soles(angles)[0]
         scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
-        self._first = Paths(self.places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
+        self._first = SightedState(self.rest_soles, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
 
-    def initial_paths(self, count: int) -> Paths:
+    def initial_paths(self, count: int) -> SightedState:
         """Return feet at ease, and nothing seen."""
-        return Paths(*(np.tile(first, (count, *[1] * first.ndim)) for first in self._first))
+        return SightedState(*(np.tile(first, (count, *[1] * first.ndim)) for first in self._first))
 
-    def planned(self, paths: Paths, request: Request, observation: Mapping) -> tuple:
+    def planned(self, paths: SightedState, request: Request, observation: Mapping) -> tuple:
         """Return the next paths of the feet, target angles (environments, joints), rad, and their change."""
         p, height = self.parameters, self.pose.height
         paths = self._looked(paths, observation["scan"], observation["velocities"][:, :2])
@@ -108,14 +108,14 @@ class Sighted(CommandLaw):
         predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
         feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
         aims = path_weights(point_velocities(motion, feet), _ACROSS)
-        angles = self.righted(
+        angles = self.correct_bends(
             self.legs.solve_joint_angles(paths.angles, feet, aims, posture.IK_DAMPING * height, _STEPS)
         )
         targets = self.legs.by_joint(paths.angles)
         change = self.legs.by_joint(angles) - targets
         return paths._replace(feet=feet, angles=angles, shifts=shifts), targets, change
 
-    def righted(self, angles):
+    def correct_bends(self, angles):
         """Return angles (environments, legs, links), with those at ease of legs that bend the other way.
 
         Legs of three links, stretched out to a place that they do not reach, may bend either way next, and stay so.
@@ -126,16 +126,16 @@ class Sighted(CommandLaw):
         bent, at_ease = (numpy.linalg.det(self.legs.soles(each)[1]) for each in (angles, self._first.angles))
         return numpy.where((bent * at_ease < 0.0)[..., None], self._first.angles, angles)
 
-    def _looked(self, paths: Paths, scan, velocity) -> Paths:
+    def _looked(self, paths: SightedState, scan, velocity) -> SightedState:
         """The paths with one more scan (environments, points), given the torso's velocity (environments, 2), m/s."""
         numpy = scan.__array_namespace__()
-        moved = paths.moved[:, :-1] + velocity[:, None] * self.step
+        moved = paths.moved[:, :-1] + velocity[:, None] * self.control_timestep
         return paths._replace(
             heights=numpy.concatenate([scan[:, None], paths.heights[:, :-1]], axis=1),
             moved=numpy.concatenate([numpy.zeros_like(moved[:, :1]), moved], axis=1),
         )
 
-    def _next_feet(self, paths: Paths, cycle, motion, predicted, size, quaternion) -> tuple:
+    def _next_feet(self, paths: SightedState, cycle, motion, predicted, size, quaternion) -> tuple:
         """Places (environments, legs, 3) of the soles in the next control step, m, and shifts of where they land.
 
         Args:
@@ -148,25 +148,27 @@ class Sighted(CommandLaw):
         """
         numpy, duty = cycle.__array_namespace__(), self.duty_factor
         feet, stands = paths.feet, cycle < duty
-        left = numpy.where(stands, 0.0, (1.0 - cycle) / self.cycles)  # control steps from then to landing
+        left = numpy.where(stands, 0.0, (1.0 - cycle) / self.cycles_per_step)  # control steps from then to landing
         early = numpy.minimum(left, _EARLY)
-        drift = point_velocities(predicted, self.places) * self.step  # of the torso over the ground, a control step
-        held = stands | (left + 1.0 < _HELD / self.cycles)
+        drift = (
+            point_velocities(predicted, self.rest_soles) * self.control_timestep
+        )  # of the torso over the ground, a control step
+        held = stands | (left + 1.0 < _HELD / self.cycles_per_step)
         goal, shifts = self._landing(paths, motion, drift * (left + 1.0)[..., None], held)
         goal = goal + drift * early[..., None]
         swung = feet[..., :2] + (goal - feet[..., :2]) / (numpy.floor(left - early) + 1.0)[..., None]
-        stood = (cycle / self.cycles).clip(max=1.0)[..., None]  # control steps, at most the latest
-        stood = feet[..., :2] - point_velocities(motion, feet) * self.step * stood
+        stood = (cycle / self.cycles_per_step).clip(max=1.0)[..., None]  # control steps, at most the latest
+        stood = feet[..., :2] - point_velocities(motion, feet) * self.control_timestep * stood
         tilt = tilt_heights(
-            rotations.matrix(quaternion)[:, 2], self.places
+            rotations.matrix(quaternion)[:, 2], self.rest_soles
         )  # by the world's vertical in the torso's frame
         progress = ((cycle - duty) / (1.0 - duty)).clip(0.0)
         lift = size * self.parameters.lift * self.pose.height * numpy.sin(np.pi * progress)
-        heights = self.places[:, 2] + lift + self.parameters.attitude * tilt
+        heights = self.rest_soles[:, 2] + lift + self.parameters.attitude * tilt
         ground = numpy.where(stands[..., None], stood, swung)
         return numpy.concatenate([ground, heights[..., None]], axis=-1), shifts
 
-    def _landing(self, paths: Paths, motion, moved, held) -> tuple:
+    def _landing(self, paths: SightedState, motion, moved, held) -> tuple:
         """Where feet land (environments, legs, 2), m from where the torso is then, and shifts (environments, legs).
 
         Args:
@@ -176,10 +178,10 @@ class Sighted(CommandLaw):
             held: (environments, legs) whether the last choice stays.
         """
         numpy = motion.__array_namespace__()
-        half = 0.5 * self.stance * point_velocities(motion, self.places)
+        half = 0.5 * self.stance_duration * point_velocities(motion, self.rest_soles)
         along = half / numpy.maximum(numpy.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
-        landing, view = self.places[:, :2] + half, footholds.View(paths.heights, paths.moved, self._reach)
-        near, height = self.places[:, :2], self.pose.height
-        found, _ = footholds.landings(view, landing + moved, along, near, height, self.around)
+        landing, view = self.rest_soles[:, :2] + half, footholds.View(paths.heights, paths.moved, self._reach)
+        near, height = self.rest_soles[:, :2], self.pose.height
+        found, _ = footholds.find_landings(view, landing + moved, along, near, height, self.around)
         shifts = numpy.where(held, paths.shifts, found)
         return landing + shifts[..., None] * along, shifts

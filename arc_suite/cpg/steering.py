@@ -93,7 +93,7 @@ class Steered(CommandLaw):
     def planned(self, none: tuple, request: Request, observation: Mapping) -> tuple:
         """Return the target angles (environments, joints), rad, and their change in a step; see `CommandLaw`."""
         numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
-        paths = 0.5 * self.stance * point_velocities(request.motion * self.units, self.feet)
+        paths = 0.5 * self.stance_duration * point_velocities(request.motion * self.units, self.feet)
         # The low side of the torso is pushed up: its feet go down.
         lows = -tilt_heights(rotations.matrix(quaternion)[:, 2], self.feet) / self.pose.height
         unload = self.parameters.unload / self.parameters.lift

@@ -26,12 +26,12 @@ _OF_LEGS = ("mount", "turn", "axes", "ends", "radius", "joints", "moves", "low",
 _FEEDBACK = np.array((0, 3, 4))  # numbers of a pose that the torso shows: height, roll and pitch
 
 
-def directed(task: Task) -> bool:
+def observes_gait_and_pose(task: Task) -> bool:
     """Return whether a task observes pose and gait by command."""
     return task.gait_and_pose is not None and task.blocks.keys() >= {*task.gait_and_pose.observed}
 
 
-class Paths(NamedTuple):
+class SteppingState(NamedTuple):
     """The own state of a law that steps.
 
     Attributes:
@@ -65,7 +65,7 @@ class Stepping(CommandLaw):
     def __init__(self, task: Task, parameters):
         """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
-        self.directed = directed(task)
+        self.directed = observes_gait_and_pose(task)
         # In place of an integral; with both, gaits are disturbed.
         self.proportional = 0.0 if parameters.integral else min(1.0, parameters.gain[0])
         if self.directed:
@@ -74,47 +74,47 @@ class Stepping(CommandLaw):
                 posture.find_rest_pose(task.scene.body),
             )
         self._damping, self.lift = self.damping * self.pose.height, parameters.lift * self.pose.height
-        self.legs, self.places, self.angles = self._eased(task)
+        self.legs, self.rest_soles, self.rest_angles = self._eased(task)
 
     @abstractmethod
     def _eased(self, task: Task) -> tuple[Legs, np.ndarray, np.ndarray]:
         """The legs, the places (legs, 3) of their soles at ease, m, and the angles (legs, links) then, rad."""
 
-    def initial_paths(self, count: int) -> Paths:
+    def initial_paths(self, count: int) -> SteppingState:
         """Return the angles at ease, and no error."""
-        return Paths(np.tile(self.angles, (count, 1, 1)), np.zeros((count, 3)))
+        return SteppingState(np.tile(self.rest_angles, (count, 1, 1)), np.zeros((count, 3)))
 
-    def planned(self, paths: Paths, request: Request, observation: Mapping) -> tuple:
+    def planned(self, paths: SteppingState, request: Request, observation: Mapping) -> tuple:
         """Return the next paths, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
         cycle, duty, stance = self._timing(request, observation)
         pose = observation["pose"] if self.directed else None
         # Balance is about the attitude that is asked for.
         tilted = vertical if pose is None else (posture.rotation_of(pose[:, 3:]) @ vertical[..., None])[..., 0]
-        motion, shift = self.balanced(request.motion, tilted, observation)
+        motion, shift = self.balance(request.motion, tilted, observation)
         feet = self.next_feet(cycle, motion, shift, request.size, tilted, duty, stance)
         off = paths.off
         if pose is not None:
             off, pose = self._corrected(off, pose, observation["posture"][:, 0], vertical)
             feet = posture.move_ground_points(feet, pose, self.pose.height)
-        aims = path_weights(point_velocities(motion, self.places), self.across)
+        aims = path_weights(point_velocities(motion, self.rest_soles), self.across)
         angles = self.legs.solve_joint_angles(paths.angles, feet, aims, self._damping, _STEPS)
         targets = self.legs.by_joint(paths.angles)
-        return Paths(angles, off), targets, self.legs.by_joint(angles) - targets
+        return SteppingState(angles, off), targets, self.legs.by_joint(angles) - targets
 
     def _timing(self, request: Request, observation: Mapping) -> tuple:
         """Phases (environments, legs) in the next control step, cycles, the duty factor, and the stance, s."""
         if not self.directed:
             cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0
-            return cycle, self.duty_factor, self.stance
+            return cycle, self.duty_factor, self.stance_duration
         legs, gait = len(self.offsets), observation["gait"]
         phase = gait.__array_namespace__().arctan2(gait[:, :legs], gait[:, legs : 2 * legs]) / (2.0 * np.pi)
         duty, frequency = gait[:, -2:-1] - self.shorter, gait[:, -1:] * (GRAVITY / self.pose.height) ** 0.5
         going = request.advance[:, None] > 0.0
-        cycle = (phase + self.parameters.lead + frequency * self.step * going) % 1.0
+        cycle = (phase + self.parameters.lead + frequency * self.control_timestep * going) % 1.0
         return cycle, duty, (duty / frequency)[..., None]
 
-    def balanced(self, motion, vertical, observation: Mapping) -> tuple:
+    def balance(self, motion, vertical, observation: Mapping) -> tuple:
         """Return the velocity (environments, 3) that feet give, m/s and rad/s, and shifts (environments, 2) of them, m.
 
         Args:
@@ -132,7 +132,7 @@ class Stepping(CommandLaw):
             axis=-1,
         )
         error = (pose[:, _FEEDBACK] - shown).clip(-_LARGEST, _LARGEST)
-        off = (off + p.integral * self.cycles * error).clip(-_MOST_OFF, _MOST_OFF)
+        off = (off + p.integral * self.cycles_per_step * error).clip(-_MOST_OFF, _MOST_OFF)
         added, zero = off + self.proportional * error, numpy.zeros_like(off[:, :1])
         return off, pose + numpy.concatenate([added[:, :1], zero, zero, added[:, 1:], zero], axis=-1)
 
@@ -151,10 +151,10 @@ class Stepping(CommandLaw):
         numpy = cycle.__array_namespace__()
         stands, swung = cycle < duty, ((cycle - duty) / (1.0 - duty)).clip(0.0)
         along = numpy.where(stands, 1.0 - 2.0 * cycle / duty, 2.0 * swung - 1.0)[..., None]  # from 1 to -1 in stance
-        half = 0.5 * stance * point_velocities(motion, self.places)
-        ground = self.places[:, :2] + size[..., None] * (along * half + self._kept(along) * shift[:, None])
+        half = 0.5 * stance * point_velocities(motion, self.rest_soles)
+        ground = self.rest_soles[:, :2] + size[..., None] * (along * half + self._kept(along) * shift[:, None])
         lift = self.lift * numpy.sin(np.pi * swung)
-        heights = self.places[:, 2] + size * (lift + self.attitude * tilt_heights(vertical, self.places))
+        heights = self.rest_soles[:, 2] + size * (lift + self.attitude * tilt_heights(vertical, self.rest_soles))
         return numpy.concatenate([ground, heights[..., None]], axis=-1)
 
     def _kept(self, along):
@@ -174,8 +174,8 @@ class Directed(Stepping):
 
     def constants(self) -> dict:
         """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
-        p, cycles = self.parameters, self.cycles
-        legs = zip(*self.legs, self.places, self.angles, strict=True)
+        p, cycles = self.parameters, self.cycles_per_step
+        legs = zip(*self.legs, self.rest_soles, self.rest_angles, strict=True)
         return {
             "legs": [dict(zip((*_OF_LEGS, "place", "angles"), leg, strict=True)) for leg in legs],
             **self.drive._asdict(),
@@ -196,5 +196,5 @@ class Directed(Stepping):
             "largest": _LARGEST,
             "most_off": _MOST_OFF,
             "rate": (GRAVITY / self.pose.height) ** 0.5,
-            "step": self.step,
+            "step": self.control_timestep,
         }

@@ -7,7 +7,7 @@ import dm_env
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg.law import Clocked, checked, proprioception
+from arc_suite.cpg.law import Clocked, proprioception, read_blocks
 from arc_suite.envs.calls import checked_action
 from arc_suite.tasks.modified_task import Modified
 from arc_suite.tasks.modifiers import Control
@@ -92,7 +92,7 @@ class Positioned:
             ValueError: an observation without the blocks of joint angles and velocities.
         """
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
-        _, angles, speeds = proprioception(checked(observation, Clocked.reads, torques.shape[-1]))
+        _, angles, speeds = proprioception(read_blocks(observation, Clocked.reads, torques.shape[-1]))
         return self._task.modifier(Control).positions(torques, angles, speeds)
 
     def snapshot(self) -> dict[str, np.ndarray]:

@@ -134,21 +134,23 @@ def test_leaps_follow_the_keyframes_of_python(script, name, speed, plays):
         play_pages.creature(body),
         policy("cpg", body, "steered", task=Setup.of(body, "directed").definition).law,
     )
-    legs, pose = Legs.of(law.body), tuple(law.legs.by_joint(law.angles).tolist())
+    legs, pose = Legs.of(law.body), tuple(law.legs.by_joint(law.rest_angles).tolist())
     choice, measure = {"jump": (leaps.JUMPS, "clearance"), "leap": (PRESETS[name]["leaping"].choice, "distance")}[plays]
-    leap, _ = leaps.best(body, pose, choice, measure)
-    targets = leaps.keyframes(body, legs, law.angles, leap)
+    leap, _ = leaps.find_best_leap(body, pose, choice, measure)
+    targets = leaps.leap_targets(body, legs, law.rest_angles, leap)
     asked = [upright(creature, [speed, 0.0, 0.0]) for _ in range(pressed + len(targets) + 40)]
     asked[pressed] |= {"leaps": True}
     episode = {"creature": creature, "ground": "level", "qvel": [], "desired": [0.0] * 3, "asked": asked}
     (found,) = nodes.run(script, [episode | {"qpos": creature["grounds"]["level"]["start"]}])
-    crouched = leaps.movement(body, legs, law.angles, leap).crouched  # until then joints go over from where they were
+    crouched = leaps.plan_movement(
+        body, legs, law.rest_angles, leap
+    ).crouch_end  # until then joints go over from where they were
     steps = slice(pressed + crouched, pressed + len(targets) - 1)
     angles, speeds = (
         np.array([observation[block][first:] for observation in found["observations"][steps]])
         for block, first in (("posture", 5), ("velocities", 6))
     )
-    aims = targets[crouched:-1], np.diff(targets, axis=0)[crouched:] / law.step
+    aims = targets[crouched:-1], np.diff(targets, axis=0)[crouched:] / law.control_timestep
     np.testing.assert_allclose(found["actions"][steps], law.drive.actions(*aims, angles, speeds), rtol=0.0, atol=1e-9)
     places, height = np.array(found["positions"])[:, :3] / body.torso.standing_height, slice(pressed, None)
     assert places[height, 2].max() > places[pressed - 1, 2] + 0.3 and not any(found["falls"])

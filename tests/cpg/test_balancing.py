@@ -32,9 +32,9 @@ def test_leaper_lifts_its_rear_feet():
     body, law = ROBOTS["leaper"], fitted(ROBOTS["leaper"])
     cycle = np.tile(np.linspace(0.0, 1.0, 21)[:, None], (1, len(body.legs)))
     rest = np.zeros((len(cycle), 3))
-    feet = law.next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), rest, law.duty_factor, law.stance)
+    feet = law.next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), rest, law.duty_factor, law.stance_duration)
     weights = np.tile(np.eye(3), (len(body.legs), 1, 1))
-    angles = np.tile(law.angles, (len(cycle), 1, 1))
+    angles = np.tile(law.rest_angles, (len(cycle), 1, 1))
     soles, _ = law.legs.soles(law.legs.solve_joint_angles(angles, feet, weights, 0.01, 20))
     assert np.ptp(soles[:, 2:, 2], axis=0).min() >= 0.2 * body.torso.standing_height
 
@@ -52,5 +52,5 @@ def test_it_is_a_preset_of_leaper_alone():
 def test_balance_has_no_scale():
     """A body ten times as large, of other joints' strength, plans the same angles for its feet."""
     laws = [fitted(body) for body in (ROBOTS["leaper"], generator.scaled(ROBOTS["leaper"], 10.0))]
-    assert_allclose(*(law.angles for law in laws), atol=1e-6)
-    assert_allclose(10.0 * laws[0].places, laws[1].places)
+    assert_allclose(*(law.rest_angles for law in laws), atol=1e-6)
+    assert_allclose(10.0 * laws[0].rest_soles, laws[1].rest_soles)

@@ -14,7 +14,7 @@ import arc_suite
 from arc_suite import rotations
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.prescribed import Bend, Prescribed, Preset, pattern
+from arc_suite.cpg.prescribed import Bend, Prescribed, Preset, lay_out_pattern
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.models.sizing import control_timestep
@@ -191,7 +191,7 @@ def test_ranks_and_sides_of_a_hip():
     medium = PRESETS["queen"]["medium"]
     led = medium._replace(sweep=(1.0, 2.0, 3.0), center=medium.center | {"hip": (10.0, 20.0, 30.0)})
     hips = [i for i, name in enumerate(ROBOTS["queen"].joint_names) if name.endswith("hip")]
-    laid = pattern(ROBOTS["queen"], led)
+    laid = lay_out_pattern(ROBOTS["queen"], led)
     assert_allclose(np.degrees(laid.sweep[hips]), [-1, -2, -3, 1, 2, 3])
     assert_allclose(np.degrees(laid.center[hips]), [-10, -20, -30, 10, 20, 30])
 
@@ -213,7 +213,7 @@ def test_settling_is_a_crouch_or_the_center():
 def test_stacked_controls_are_single_ones():
     body, presets = ROBOTS["queen"], [preset for preset in PRESETS["queen"].values() if isinstance(preset, Preset)]
     controls = [Prescribed.fit(body, preset) for preset in presets]
-    stacked = Prescribed.stacked(controls)
+    stacked = Prescribed.stack(controls)
     random = np.random.default_rng(0)
     for clock in (0, 3, 14, 15, 40, 500):
         quaternions = rotations.turn_about_z(UPRIGHT, random.uniform(-1.0, 1.0, len(presets)))

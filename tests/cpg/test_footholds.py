@@ -28,7 +28,7 @@ def shifted(seen, x):
     """By how much a foot that would land at x, ahead on the left, is shifted."""
     landing = np.array([[(x, 1.0), *PLACES[1:]]])
     along = np.tile((1.0, 0.0), (1, len(PLACES), 1))
-    return footholds.shifts(seen, landing, along, PLACES, HEIGHT)[0]
+    return footholds.find_shifts(seen, landing, along, PLACES, HEIGHT)[0]
 
 
 def test_level_ground_shifts_no_foot():
@@ -39,7 +39,7 @@ def test_level_ground_shifts_no_foot():
 def test_a_foot_over_a_trench_is_shifted_to_land_and_no_other(x):
     shifts = shifted(view((scan((1.2, 1.6)), 0.0)), x)
     assert_array_equal(shifts[1:], 0.0)
-    around = x + shifts[0] + footholds.AROUND * HEIGHT
+    around = x + shifts[0] + footholds.SUPPORT_POINTS * HEIGHT
     assert ((around < 1.2) | (around >= 1.6)).all()
 
 

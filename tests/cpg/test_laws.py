@@ -11,7 +11,7 @@ from tiers import tiers
 import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator, suited_preset
-from arc_suite.cpg.law import checked
+from arc_suite.cpg.law import read_blocks
 from arc_suite.cpg.selection import law, presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
@@ -44,7 +44,7 @@ def test_feet_do_not_jump_at_a_stop(robot, preset):
     for step in range(80):
         stops = np.arange(count) < step - 40
         environments.command("command", np.where(stops[:, None], 0.0, going))
-        blocks = checked(task.split(environments.step(actions)[0]), act.reads, joints)
+        blocks = read_blocks(task.split(environments.step(actions)[0]), act.reads, joints)
         resting = ~blocks["gait_clock"].any(axis=-1)
         assert_array_equal(resting, stops)
         blocks["gait_clock"][resting] = 0.0, -0.0
@@ -71,7 +71,7 @@ def test_jit_computes_what_numpy_computes(robot, task, preset):
     state, observation = fitted.initial(3), environments.reset(seed=0)[0]
     compiled, theirs = jax.jit(fitted.__call__), fitted.initial(3)
     for _ in range(40):
-        blocks = checked(environments.task.split(observation), fitted.reads, len(body.joint_names))
+        blocks = read_blocks(environments.task.split(observation), fitted.reads, len(body.joint_names))
         state, actions = fitted(state, blocks)
         theirs, found = compiled(theirs, blocks)
         assert_allclose(np.asarray(found), actions, atol=1e-9)

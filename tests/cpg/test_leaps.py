@@ -14,18 +14,18 @@ def test_keyframes_crouch_and_come_back():
     body = size_body(ROBOTS["queen"])
     legs = Legs.of(body)
     rest = legs.by_leg(np.zeros(len(body.joint_names)))
-    angles = leaps.keyframes(body, legs, rest, leaps.Leap())
-    made = leaps.movement(body, legs, rest, leaps.Leap())
-    assert made.crouched < made.stretched < made.landed < len(angles) == len(made.offsets)
-    low = legs.soles(legs.by_leg(angles[made.crouched - 1]))[0] - legs.soles(rest)[0]
+    angles = leaps.leap_targets(body, legs, rest, leaps.Leap())
+    made = leaps.plan_movement(body, legs, rest, leaps.Leap())
+    assert made.crouch_end < made.stretch_end < made.landing_step < len(angles) == len(made.sole_offsets)
+    low = legs.soles(legs.by_leg(angles[made.crouch_end - 1]))[0] - legs.soles(rest)[0]
     assert low[:, 2].min() > 0.3 * body.torso.standing_height  # soles come up to the torso
     np.testing.assert_allclose(angles[-1], legs.by_joint(rest), atol=0.05)
 
 
 def test_a_jump_leaves_the_ground_and_lands():
     rest = (0.0,) * len(ROBOTS["queen"].joint_names)
-    _, flight = leaps.best(ROBOTS["queen"], rest, leaps.JUMPS[-1:], "clearance")
-    assert flight.landed and flight.seconds > 0.2 and flight.clearance > 0.2
+    _, flight = leaps.find_best_leap(ROBOTS["queen"], rest, leaps.JUMPS[-1:], "clearance")
+    assert flight.landed and flight.air_time > 0.2 and flight.clearance > 0.2
     assert flight.rise > 0.2 and abs(flight.distance) < 0.5
 
 

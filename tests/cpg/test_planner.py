@@ -8,7 +8,7 @@ from crossings import walked
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.arenas.pillars import RADIUS
-from arc_suite.cpg.planner import along, path, seen, toward
+from arc_suite.cpg.planner import command_toward, locate_pillars, point_along_path, shortest_path
 from arc_suite.cpg.presets import DEFAULTS
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
@@ -36,13 +36,13 @@ def test_circles_are_found_out_of_ranges():
         distance, angle = random.uniform(1.2, 5.0), random.uniform(-math.pi, math.pi)
         middle = distance * np.array([math.cos(angle), math.sin(angle)])
         ranges = ranges_of([middle])
-        found, rays = seen(ranges), (ranges < 1.0).sum()
+        found, rays = locate_pillars(ranges), (ranges < 1.0).sum()
         assert len(found) == min(rays, 1)
         if rays:
             assert_allclose(found[0], middle, atol=1e-9 if rays > 1 else 1.5 * RADIUS)
     several = [(3.0, 0.5), (-0.5, -2.0), (0.0, 2.0), (2.0, -2.0)]
-    assert len(seen(ranges_of(several))) == 4
-    assert seen(np.ones(24)).shape == (0, 2)
+    assert len(locate_pillars(ranges_of(several))) == 4
+    assert locate_pillars(np.ones(24)).shape == (0, 2)
 
 
 def nearest(corners, circles):
@@ -59,33 +59,33 @@ def length(corners):
 
 def test_ways_are_straight_where_nothing_is_between_and_short_around_what_is():
     goal, none = np.array([5.0, 0.0]), np.zeros((0, 2))
-    assert_array_equal(path(goal, none, 1.1, PLAN), [goal])
-    assert_array_equal(path(goal, np.array([[2.5, 3.0]]), 1.1, PLAN), [goal])
+    assert_array_equal(shortest_path(goal, none, 1.1, PLAN), [goal])
+    assert_array_equal(shortest_path(goal, np.array([[2.5, 3.0]]), 1.1, PLAN), [goal])
     for side in (0.3, -0.3):
         circles = np.array([[2.5, side]])
-        corners = path(goal, circles, 1.1, PLAN)
+        corners = shortest_path(goal, circles, 1.1, PLAN)
         assert_array_equal(corners[-1], goal)
         assert nearest(corners, circles) > RADIUS + 1.1
         assert all(np.sign(corner[1]) == -np.sign(side) for corner in corners[:-1]), "around the nearer side"
         assert 5.0 < length(corners) < 6.5
     gate = np.array([[2.5, 1.8], [2.5, -1.8], [2.5, 5.4], [2.5, -5.4]])
-    through = path(goal, gate, 1.3, PLAN)
+    through = shortest_path(goal, gate, 1.3, PLAN)
     assert length(through) < 5.1 and nearest(through, gate) > 1.7
     wall = np.stack([np.full(21, 2.5), np.arange(-10.0, 11.0)], axis=-1)
-    assert path(goal, wall, 1.1, PLAN) == [] or length(path(goal, wall, 1.1, PLAN)) > 20.0
+    assert shortest_path(goal, wall, 1.1, PLAN) == [] or length(shortest_path(goal, wall, 1.1, PLAN)) > 20.0
 
 
 def test_the_point_that_is_steered_for_lies_along_the_way():
     corners = [np.array([1.0, 0.0]), np.array([1.0, 2.0])]
     for distance, point in ((0.4, (0.4, 0.0)), (1.5, (1.0, 0.5)), (9.0, (1.0, 2.0))):
-        assert_allclose(along(corners, distance), point)
+        assert_allclose(point_along_path(corners, distance), point)
 
 
 def test_commands_turn_to_where_they_lead():
-    assert toward(0.0, PLAN) == (PLAN.forward, 0.0, 0.0)
-    forward, left, turn = toward(2.0, PLAN)
+    assert command_toward(0.0, PLAN) == (PLAN.forward, 0.0, 0.0)
+    forward, left, turn = command_toward(2.0, PLAN)
     assert forward < 0.0 < left and turn == 1.0
-    assert toward(-2.0, PLAN) == (forward, -left, -turn)
+    assert command_toward(-2.0, PLAN) == (forward, -left, -turn)
 
 
 @pytest.mark.release

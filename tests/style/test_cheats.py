@@ -11,7 +11,7 @@ from tiers import tiers
 import arc_suite
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.law import joint_targets, proprioception, torques
-from arc_suite.cpg.prescribed import pattern
+from arc_suite.cpg.prescribed import lay_out_pattern
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
@@ -22,7 +22,7 @@ class Scripted:
 
     def __init__(self, robot, cheat):
         body, self.preset, self.cheat = ROBOTS[robot], PRESETS[robot]["medium"], cheat
-        honest = pattern(body, self.preset)
+        honest = lay_out_pattern(body, self.preset)
         changes = {"hop": {"offset": 0.0 * honest.offset}, "back": {"sweep": -honest.sweep}}
         self.pattern = honest._replace(**changes.get(cheat, {}))
         self.limp = len(body.legs[0].joints)

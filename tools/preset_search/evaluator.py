@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, rotations
-from arc_suite.cpg.law import Clocked, checked, proprioception
+from arc_suite.cpg.law import Clocked, proprioception, read_blocks
 from arc_suite.cpg.prescribed import Prescribed, Preset
 from arc_suite.envs.setup import Setup
 
@@ -66,9 +66,9 @@ class Evaluator:
         split = self._environment.task.split
         joints = len(self._body.joint_names)
         controls = [Prescribed.fit(self._body, preset) for preset in presets]
-        control = Prescribed.stacked([control for control in controls for _ in range(episodes)])
+        control = Prescribed.stack([control for control in controls for _ in range(episodes)])
         observations, _ = self._environment.reset(seed=[*seeds] * num_presets)
-        sensed = proprioception(checked(split(observations), Clocked.reads, joints))
+        sensed = proprioception(read_blocks(split(observations), Clocked.reads, joints))
         is_upright = np.ones(num_envs, bool)
         totals = np.zeros(num_envs)
         lengths = np.zeros(num_envs)  # steps that count
@@ -80,7 +80,7 @@ class Evaluator:
             counts = is_upright & (step >= self._skipped)
             totals += rewards * counts
             lengths += counts
-            sensed = proprioception(checked(split(observations), Clocked.reads, joints))
+            sensed = proprioception(read_blocks(split(observations), Clocked.reads, joints))
             uprightness = rotations.upright(sensed[0])
             costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # missing if all environments were reset
             costs["tilt"] = 1.0 - uprightness**2

@@ -87,8 +87,8 @@ def death(body: Body, rest: Pose) -> Motion:
 def _simulate_leap(body: Body, rest: Pose, candidates: tuple[leaps.Leap, ...], measure: str) -> Recording:
     """Return the best of some leaps by a measure of `leaps`, from rest to rest."""
     legs = Legs.of(sizing.size_body(body))
-    best_leap = leaps.found(body, tuple(rest.joints.tolist()), candidates, measure)
-    leap_joints = leaps.keyframes(body, legs, legs.by_leg(rest.joints), best_leap)
+    best_leap = leaps.choose_leap(body, tuple(rest.joints.tolist()), candidates, measure)
+    leap_joints = leaps.leap_targets(body, legs, legs.by_leg(rest.joints), best_leap)
     rest_joints = np.tile(rest.joints, (_to_steps(body, _HOLD_DURATION), 1))
     joints = np.concatenate([leap_joints, rest_joints])
     return _simulate(body, rest, joints + _loaded_targets(body, rest) - rest.joints)

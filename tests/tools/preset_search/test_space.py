@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from preset_search import Space
 from preset_search.space import HARMONICS, SPACES, Torques, round_vector
 
-from arc_suite.cpg.prescribed import feedforward, pattern
+from arc_suite.cpg.prescribed import lay_out_feedforward, lay_out_pattern
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.robots import ROBOTS
 
@@ -17,7 +17,7 @@ def test_space_holds_the_preset_that_it_is_about(robot):
     space = Space(body, medium)
     assert len(space.ranges()) == space.vector().size
     same = space.preset(space.vector())
-    for ours, published in zip(pattern(body, same), pattern(body, medium), strict=True):
+    for ours, published in zip(lay_out_pattern(body, same), lay_out_pattern(body, medium), strict=True):
         assert_allclose(ours, published, atol=1e-12)
     for name in ("stiffness", "damping", "settle", "ramp", "ramp_start", "frequency"):
         assert getattr(same, name) == getattr(medium, name)
@@ -54,7 +54,7 @@ def test_torques_are_searched_about_tuned_and_refined_is_such(robot):
     ranks, joints = max(body.ranks) + 1, len(body.legs[0].joints)
     assert origin.size == len(space.ranges()) == ranks * joints * 2 * HARMONICS + 1
     begun, refined = space.preset(origin), PRESETS[robot]["refined"]
-    added = feedforward(body, begun)
+    added = lay_out_feedforward(body, begun)
     assert not added.cosines.any() and not added.sines.any() and added.steering.any()
     for name in begun._fields:
         if name not in ("torques", "steering"):
