@@ -3,8 +3,13 @@
 import itertools
 from collections.abc import Iterable
 
-BLUE, VERMILION = "#0072B2", "#D55E00"
-INK, FAINT, PALE = "#333333", "#8C8C8C", "#E3E3E3"
+BLUE = "#0072B2"
+VERMILION = "#D55E00"
+INK = "#333333"  # dark gray
+FAINT = "#8C8C8C"  # middle gray
+PALE = "#E3E3E3"  # light gray
+
+# By the name of a reward's term.
 TERM_COLORS = {
     "forward": BLUE,
     "healthy": "#56B4E9",
@@ -17,11 +22,12 @@ TERM_COLORS = {
     "vertical_velocity": "#332288",
     "posture": "#999933",
 }
-_SPARE = ("#44AA99", "#AA4499", "#DDCC77", "#6699CC")
+_MORE_COLORS = ("#44AA99", "#AA4499", "#DDCC77", "#6699CC")  # of terms that have none, after the unused ones
 
 
 def term_colors(names: Iterable[str]) -> dict[str, str]:
-    """Return colors of a reward's terms by name; those that have none of their own get what others have not."""
+    """Return the colors of a reward's terms by name; a term without a color of its own gets an unused one."""
     names = list(names)
-    free = itertools.cycle([*(color for name, color in TERM_COLORS.items() if name not in names), *_SPARE])
-    return {name: TERM_COLORS.get(name) or next(free) for name in names}
+    unused_colors = [color for name, color in TERM_COLORS.items() if name not in names]
+    next_color = itertools.cycle([*unused_colors, *_MORE_COLORS])
+    return {name: TERM_COLORS[name] if name in TERM_COLORS else next(next_color) for name in names}

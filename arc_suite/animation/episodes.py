@@ -9,8 +9,8 @@ from arc_suite.animation import player_controls
 from arc_suite.markers import Marker
 from arc_suite.simulation.episode_loop import play_episode
 
-MAX_SECONDS_PER_PICTURE = 0.5  # s of simulated time between two pictures; a slower machine shows slow motion
-_ENDS = ("start", "end")  # of a debug marker
+# s of simulated time between two pictures; a machine that needs longer for it shows slow motion.
+MAX_SECONDS_PER_PICTURE = 0.5
 
 
 class Episodes:
@@ -33,27 +33,35 @@ class Episodes:
             environment: of `arc_suite.load`.
             act: maps a `TimeStep` to an action.
         """
-        self.environment, self._act = environment, act
+        self.environment = environment
+        self._act = act
         self.follows_velocities = environment.task.definition.commands.get("command") == 3
+        self.control_timestep = environment.control_timestep()
         self.desired: np.ndarray | None = None
         self._pose: Sequence[float] | np.ndarray | None = None
-        self._gait: tuple[str | None, float] = None, 1.0
-        self.control_timestep = environment.control_timestep()
+        self._gait: str | None = None
+        self._tempo = 1.0
         self.restart()
 
     def restart(self) -> None:
         """Start the next episode, with the command that a person has set."""
         self._episode = play_episode(self.environment, self._act)
         self.timestep = next(self._episode)
-        self.episode_return, self.steps = 0.0, 0
-        self._command()
-        self._before, self._markers = self._qpos(), 2 * (self._asked(),)
+        self.episode_return = 0.0
+        self.steps = 0
+        self._send_commands()
+        self._previous_qpos = self._copy_qpos()
+        self._markers = self._task_markers()
+        self._previous_markers = self._markers
 
     def command(self, desired: Sequence[float] | np.ndarray | None) -> None:
         """Set the command, clipped to [-1, 1], or leave it to the task; a task without a command ignores it."""
-        if self.follows_velocities:
-            self.desired = None if desired is None else np.clip(desired, -1.0, 1.0)
-            self._command()
+        if not self.follows_velocities:
+            return
+        self.desired = None
+        if desired is not None:
+            self.desired = np.clip(desired, -1.0, 1.0)
+        self._send_commands()
 
     def direct(self, pose: Sequence[float] | np.ndarray | None, gait: str | None, tempo: float = 1.0) -> None:
         """Set pose and gait, or leave them to the task; one that has no such commands ignores it.
@@ -63,8 +71,10 @@ class Episodes:
             gait: its name.
             tempo: multiple of its frequency.
         """
-        self._pose, self._gait = pose, (gait, tempo)
-        self._command()
+        self._pose = pose
+        self._gait = gait
+        self._tempo = tempo
+        self._send_commands()
 
     def step(self, forces: np.ndarray | float = 0.0) -> None:
         """Advance by a control step, or start the next episode where the last one has ended.
@@ -75,39 +85,48 @@ class Episodes:
         if self.timestep.last():
             self.restart()
             return
-        self._before = self._qpos()
+        self._previous_qpos = self._copy_qpos()
         self.environment.physics.data.xfrc_applied[:] = forces
         self.timestep = next(self._episode)
         self.episode_return += self.timestep.reward
         self.steps += 1
-        self._markers = self._markers[1], self._asked()
+        self._previous_markers = self._markers
+        self._markers = self._task_markers()
 
     def qpos(self, share: float) -> np.ndarray:
         """Return the positions (nq,) at a share, 0 to 1, of the latest control step."""
         model = self.environment.physics.model.ptr
-        path, now = np.empty(model.nv), self._before.copy()
-        mujoco.mj_differentiatePos(model, path, 1.0, self._before, self._qpos())
-        mujoco.mj_integratePos(model, now, path, share)
-        return now
+        difference = np.empty(model.nv)
+        mujoco.mj_differentiatePos(model, difference, 1.0, self._previous_qpos, self._copy_qpos())
+        interpolated_qpos = self._previous_qpos.copy()
+        mujoco.mj_integratePos(model, interpolated_qpos, difference, share)
+        return interpolated_qpos
 
     def markers(self, share: float) -> list[Marker]:
         """Return the task's debug markers at a share, 0 to 1, of the latest control step."""
-        before, now = self._markers
-        without_ends = dict.fromkeys(_ENDS)
-        if [each._replace(**without_ends) for each in before] != [each._replace(**without_ends) for each in now]:
-            return now
-        return [
-            new._replace(**{end: (1.0 - share) * getattr(old, end) + share * getattr(new, end) for end in _ENDS})
-            for old, new in zip(before, now, strict=True)
-        ]
+        previous_looks = [_without_endpoints(marker) for marker in self._previous_markers]
+        looks = [_without_endpoints(marker) for marker in self._markers]
+        if previous_looks != looks:
+            return self._markers
+        interpolated_markers = []
+        for previous, present in zip(self._previous_markers, self._markers, strict=True):
+            start = (1.0 - share) * previous.start + share * present.start
+            end = (1.0 - share) * previous.end + share * present.end
+            interpolated_markers.append(present._replace(start=start, end=end))
+        return interpolated_markers
 
-    def _command(self) -> None:
+    def _send_commands(self) -> None:
         task = self.environment.task.definition
-        for name, value in player_controls.commands(task, self.desired, self._pose, *self._gait).items():
+        commands = player_controls.commands(task, self.desired, self._pose, self._gait, self._tempo)
+        for name, value in commands.items():
             self.environment.command(name, value)
 
-    def _asked(self) -> list[Marker]:
+    def _task_markers(self) -> list[Marker]:
         return self.environment.task.markers(self.environment.physics)
 
-    def _qpos(self) -> np.ndarray:
+    def _copy_qpos(self) -> np.ndarray:
         return self.environment.physics.data.qpos.copy()
+
+
+def _without_endpoints(marker: Marker) -> Marker:
+    return marker._replace(start=None, end=None)

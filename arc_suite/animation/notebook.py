@@ -16,9 +16,11 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import Policy
 from arc_suite.simulation import films
 
-_PAGE_STEPS, _FILM_STEPS = 400, 80
-_HEIGHT = 560  # of a page, pixels
-_SIZE = (240, 180)  # of a film, pixels
+_PAGE_STEPS = 400  # control steps
+_FILM_STEPS = 80  # control steps
+_PAGE_HEIGHT = 560  # pixels
+_FILM_SIZE = (240, 180)  # width and height, pixels
+_FILM_QUALITY = 35  # of WebP, up to 100
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,40 +56,49 @@ def show(
         ValueError: another environment or policy, a value out of range, or there is no viewer of pages.
         RenderingUnavailable: a film, and no OpenGL here.
     """
-    setup = _setup(environment)
-    played = setup.load()
-    actor = policies.acting(policy, played.task.definition)
-    name = policy if isinstance(policy, str) else "policy"
-    usual = _FILM_STEPS if film else _PAGE_STEPS
-    steps = checks.integer("steps", usual if steps is None else steps, 1)
+    setup = _setup_of(environment)
+    played_environment = setup.load()
+    actor = policies.acting(policy, played_environment.task.definition)
+    if steps is None:
+        steps = _FILM_STEPS if film else _PAGE_STEPS
+    steps = checks.integer("steps", steps, 1)
     if film:
-        return Inline(_film(played, actor, seed, steps))
-    pages.viewer_script()  # finds out at once whether there is one
-    track = style.record(played, actor, seed, steps)
-    page = pages.page({f"{setup.body.name}, {name}": track})
-    return Inline(_element("iframe", srcdoc=page, width="100%", height=str(_HEIGHT), style="border: 0"))
+        return Inline(_film(played_environment, actor, seed, steps))
+    pages.viewer_script()  # raises an error at once if there is none
+    track = style.record(played_environment, actor, seed, steps)
+    policy_name = policy if isinstance(policy, str) else "policy"
+    page = pages.page({f"{setup.body.name}, {policy_name}": track})
+    return Inline(_element("iframe", srcdoc=page, width="100%", height=str(_PAGE_HEIGHT), style="border: 0"))
 
 
-def _setup(environment) -> Setup:
-    made = getattr(environment, "unwrapped", environment)
-    made = getattr(made, "_env", made)  # of Gymnasium's adapter
-    if isinstance(made, VectorEnv):
-        return Setup.of(*made.arguments)
-    if isinstance(made, Environment):
-        return Setup.of(made.task.body, made.task.definition.name, made.task_kwargs)
+def _setup_of(environment) -> Setup:
+    """Return the setup of an environment, without its wrappers."""
+    bare_environment = getattr(environment, "unwrapped", environment)
+    bare_environment = getattr(bare_environment, "_env", bare_environment)  # of Gymnasium's adapter
+    if isinstance(bare_environment, VectorEnv):
+        return Setup.of(*bare_environment.arguments)
+    if isinstance(bare_environment, Environment):
+        task_name = bare_environment.task.definition.name
+        return Setup.of(bare_environment.task.body, task_name, bare_environment.task_kwargs)
     kinds = "arc_suite.load, gymnasium.make or gymnasium.make_vec"
     raise ValueError(f"environment: expected one of {kinds}, got {type(environment).__name__}")
 
 
 def _film(environment: Environment, policy: Policy, seed: int, steps: int) -> str:
+    """Return an element with a film of an episode."""
     body = environment.task.body.name
-    footage, file = films.Footage(body, environment, policies.alone(policy, seed), "profile", _SIZE), io.BytesIO()
+    act = policies.alone(policy, seed)
+    footage = films.Footage(body, environment, act, "profile", _FILM_SIZE)
+    file = io.BytesIO()
     with contextlib.closing(footage):
-        frame = films.frame_seconds(footage.control_timestep)
-        views = films.frames([footage], steps * footage.control_timestep, frame)
-        films.write_webp(file, [footage.view(), *itertools.chain(*views)], frame, quality=35)
+        frame_seconds = films.frame_seconds(footage.control_timestep)
+        film_seconds = steps * footage.control_timestep
+        first_picture = footage.view()
+        later_pictures = itertools.chain(*films.frames([footage], film_seconds, frame_seconds))
+        films.write_webp(file, [first_picture, *later_pictures], frame_seconds, quality=_FILM_QUALITY)
     source = f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"
-    return _element("img", src=source, width=str(_SIZE[0]), height=str(_SIZE[1]), alt=body)
+    width, height = _FILM_SIZE
+    return _element("img", src=source, width=str(width), height=str(height), alt=body)
 
 
 def _element(tag: str, **attributes: str) -> str:

@@ -16,13 +16,13 @@ import numpy as np
 
 from arc_suite import versions
 from arc_suite.animation.colors import term_colors
-from arc_suite.animation.parts import describe_body as described
+from arc_suite.animation.parts import describe_body
 from arc_suite.animation.scenery import describe_scenery
 from arc_suite.models.outline import outline
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
 
-_DIGITS = 6  # behind the point: micrometers, microradians
+_DECIMALS = 6  # of numbers in a page: micrometers, microradians
 
 
 def read_built_file(name: str) -> bytes:
@@ -33,23 +33,23 @@ def read_built_file(name: str) -> bytes:
     """
     file = resources.files("arc_suite.animation").joinpath("web", name)
     if not file.is_file():
-        cure = (
-            "`make web` builds it"
-            if versions.clone_folder()
-            else "install a wheel that `make dist` has built in a clone"
-        )
-        raise ValueError(f"no viewer for pages: {cure}, which needs Node")
+        if versions.clone_folder():
+            remedy = "`make web` builds it"
+        else:
+            remedy = "install a wheel that `make dist` has built in a clone"
+        raise ValueError(f"no viewer for pages: {remedy}, which needs Node")
     return file.read_bytes()
 
 
 def viewer_script() -> str:
-    """Return the script of the viewer, three.js included; errors as `built`."""
+    """Return the script of the viewer, three.js included; errors as `read_built_file`."""
     return read_built_file("viewer.js").decode()
 
 
 def template(name: str) -> string.Template:
-    """Return the frame of a page."""
-    return string.Template(resources.files("arc_suite.animation").joinpath(name).read_text(encoding="utf-8"))
+    """Return the HTML of a page, in which data and scripts are missing."""
+    file = resources.files("arc_suite.animation").joinpath(name)
+    return string.Template(file.read_text(encoding="utf-8"))
 
 
 def pack(value) -> str:
@@ -64,23 +64,21 @@ def page(tracks: Mapping[str, Track]) -> str:
     Raises:
         ValueError: the viewer has not been built.
     """
+    walks = [_walk(label, track) for label, track in tracks.items()]
     return template("page.html").substitute(
-        title=html.escape(", ".join(tracks)),
-        data=pack([_walk(label, track) for label, track in tracks.items()]),
-        viewer=viewer_script(),
+        title=html.escape(", ".join(tracks)), data=pack(walks), viewer=viewer_script()
     )
 
 
-def body_drawing(body: Body) -> dict[str, Any]:
-    """Return what a page draws of a body, its parts and their materials, with its height and reach, m."""
-    parts, materials = described(body)
-    sizes = {"height": body.torso.standing_height, "reach": float(abs(outline(body)).max())}
-    return sizes | {"parts": to_json_values(parts), "materials": to_json_values(materials)}
-
-
 def _walk(label: str, track: Track) -> dict[str, Any]:
-    """What the viewer takes of a track, in MuJoCo's axes."""
-    stance = track.parameters is not None
+    """Return what the viewer takes of a track, in MuJoCo's axes."""
+    stance = None
+    schedule = None
+    has_gait = track.parameters is not None
+    if has_gait:
+        stance = track.stance.astype(int).tolist()
+        schedule = track.schedule.astype(int).tolist()
+    weighted_terms = {name: track.weights[name] * values for name, values in track.terms.items()}
     return body_drawing(track.body) | {
         "label": label,
         "step": track.time_step,
@@ -89,31 +87,45 @@ def _walk(label: str, track: Track) -> dict[str, Any]:
         "quaternions": to_json_values(track.quaternions),
         "joints": to_json_values(track.joint_angles),
         "legs": list(track.legs),
-        "stance": track.stance.astype(int).tolist() if stance else None,
-        "schedule": track.schedule.astype(int).tolist() if stance else None,
-        "terms": {name: to_json_values(track.weights[name] * values) for name, values in track.terms.items()},
+        "stance": stance,
+        "schedule": schedule,
+        "terms": to_json_values(weighted_terms),
         "colors": term_colors(track.terms),
         "totals": to_json_values(track.rewards.cumsum()),
     }
 
 
-def to_json_values(value, digits: int | None = _DIGITS):
-    """Return a value of arrays, tuples and dictionaries as JSON has it.
+def body_drawing(body: Body) -> dict[str, Any]:
+    """Return what a page draws of a body: its parts and their materials, with its height and reach, m."""
+    parts, materials = describe_body(body)
+    return {
+        "height": body.torso.standing_height,
+        "reach": float(abs(outline(body)).max()),
+        "parts": to_json_values(parts),
+        "materials": to_json_values(materials),
+    }
+
+
+def to_json_values(value, decimals: int | None = _DECIMALS):
+    """Return a value of arrays, tuples and dictionaries as one of lists and dictionaries, as JSON has it.
 
     Args:
         value: of finite numbers, text, None and truth values.
-        digits: behind the point, to which numbers are rounded; None for all.
+        decimals: to which floating-point numbers are rounded; None for all.
     """
     if hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, dict):
-        return {name: to_json_values(item, digits) for name, item in value.items()}
+        return {name: to_json_values(item, decimals) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [to_json_values(item, digits) for item in value]
-    if isinstance(value, np.ndarray) and value.dtype.kind == "i":
-        return value.tolist()
+        return [to_json_values(item, decimals) for item in value]
     if isinstance(value, np.ndarray):
-        return (value.astype(float) if digits is None else value.astype(float).round(digits)).tolist()
-    if isinstance(value, float) and digits is not None:
-        return round(value, digits)
+        if value.dtype.kind == "i":
+            return value.tolist()
+        numbers = value.astype(float)
+        if decimals is not None:
+            numbers = numbers.round(decimals)
+        return numbers.tolist()
+    if isinstance(value, float) and decimals is not None:
+        return round(value, decimals)
     return value

@@ -1,6 +1,7 @@
 """A decorated body as plain data: rigid parts, the shapes that they show, and materials.
 
-The parts of an imported body are those of its kinematic sketch. Joints that are held stay as they stand.
+The parts of an imported body are those of its spec: torso, links and feet. Its other joints, which servos hold, stay as
+in the standing pose.
 """
 
 import itertools
@@ -15,11 +16,11 @@ from arc_suite.models.direct import GEOMS
 from arc_suite.models.standing import standing_qpos
 from arc_suite.robots.spec import Body, Link
 
-# Kinds of shapes by MuJoCo's number.
-KINDS = {int(geom): name for name, geom in GEOMS.items()}
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+KINDS = {int(geom): name for name, geom in GEOMS.items()}  # kinds of shapes by MuJoCo's number
 
-_AS_ABOVE = np.array((1.0, 0.0, 0.0, 0.0))
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))  # the quaternion of a part that is oriented as the one above
+_TORSO_POSITIONS = 7  # numbers of the torso in qpos; those of the joints follow
 
 
 class Hull(NamedTuple):
@@ -35,15 +36,15 @@ class Hull(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """Something to be seen.
+    """A visible shape.
 
     Attributes:
         kind: of `shapes.KINDS`, or hull.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
-        place: (3,) in the part's frame, m.
-        quaternion: (4,) in the same frame, w first.
+        place: (3,) position in the part's frame, m.
+        quaternion: (4,) orientation in the same frame, w first.
         material: name.
-        hull: of the kind hull; else None.
+        hull: polyhedron of the kind hull; else None.
     """
 
     kind: str
@@ -60,8 +61,8 @@ class Part(NamedTuple):
     Attributes:
         name: of the body in the MJCF.
         parent: index of the part above; None for the torso.
-        place: (3,) in the frame of the part above, m; of the torso, of the standing one.
-        quaternion: (4,) in the same frame, w first.
+        place: (3,) position in the frame of the part above, m; that of the torso is in the world, as the body stands.
+        quaternion: (4,) orientation in the same frame, w first.
         joint: index of its joint; None for the torso and for rigid parts.
         axis: (3,) of the joint; None without one.
         shapes: that it shows.
@@ -93,63 +94,119 @@ class Material(NamedTuple):
 def describe_body(body: Body) -> tuple[list[Part], dict[str, Material]]:
     """Return the parts of a body in the order of its `part_names`, and the materials of what they show by name."""
     model = models.model_spec(body, decorated=True).compile()
-    ids = [model.body(name).id for name in body.part_names]
-    found = _sketched(model, body) if body.source else [_part(model, index, ids) for index in ids]
-    names = sorted({shape.material for part in found for shape in part.shapes})
-    return found, {name: _material(model, name) for name in names}
+    is_imported = bool(body.source)
+    parts = _sketched_parts(model, body) if is_imported else _model_parts(model, body)
+    materials = sorted({shape.material for part in parts for shape in part.shapes})
+    return parts, {name: _material(model, name) for name in materials}
 
 
-def _part(model: mujoco.MjModel, index: int, ids: list[int]) -> Part:
-    parent = int(model.body_parentid[index])
-    # The torso's joint is free; others have a hinge or none.
-    joint = int(model.body_jntadr[index]) if parent and model.body_jntnum[index] else None
-    geoms = range(model.body_geomadr[index], model.body_geomadr[index] + model.body_geomnum[index])
+def part_frames(parts: Sequence[Part]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the positions (3,) and rotation matrices (3, 3) of parts in the world, in the standing pose."""
+    positions = []
+    orientations = []
+    for part in parts:
+        parent_position = np.zeros(3)
+        parent_orientation = np.eye(3)
+        if part.parent is not None:
+            parent_position = positions[part.parent]
+            parent_orientation = orientations[part.parent]
+        positions.append(parent_position + parent_orientation @ part.place)
+        orientations.append(parent_orientation @ rotations.matrix(part.quaternion))
+    return positions, orientations
+
+
+def simplify_hull(hull: Hull, max_points: int) -> Hull:
+    """Return the hull of the outermost of a hull's points, at most a number of them."""
+    if len(hull.points) <= max_points:
+        return hull
+    spec = mujoco.MjSpec()
+    spec.add_mesh(name="hull", uservert=hull.points.ravel(), maxhullvert=max_points)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull")
+    model = spec.compile()
+    simple_hull = _hull(model, 0)
+    # MuJoCo moves a mesh into the frame of its inertia.
+    points = simple_hull.points @ rotations.matrix(model.mesh_quat[0]).T + model.mesh_pos[0]
+    return simple_hull._replace(points=points)
+
+
+# Parts of a model.
+
+
+def _model_parts(model: mujoco.MjModel, body: Body) -> list[Part]:
+    """Return the parts of a model that was made from a body's spec."""
+    body_ids = [model.body(name).id for name in body.part_names]
+    return [_model_part(model, body_id, body_ids) for body_id in body_ids]
+
+
+def _model_part(model: mujoco.MjModel, body_id: int, body_ids: list[int]) -> Part:
+    """Return one part, given the ids of all of them."""
+    parent_id = int(model.body_parentid[body_id])
+    is_torso = parent_id == 0  # its parent is the world
+    has_hinge = not is_torso and model.body_jntnum[body_id] > 0
+    joint = None
+    axis = None
+    if has_hinge:
+        joint_id = int(model.body_jntadr[body_id])
+        joint = int(model.jnt_qposadr[joint_id]) - _TORSO_POSITIONS
+        axis = model.jnt_axis[joint_id]
+    first_geom = model.body_geomadr[body_id]
+    geoms = range(first_geom, first_geom + model.body_geomnum[body_id])
     return Part(
-        name=model.body(index).name,
-        parent=ids.index(parent) if parent else None,
-        place=model.body_pos[index],
-        quaternion=model.body_quat[index],
-        joint=None if joint is None else int(model.jnt_qposadr[joint]) - 7,
-        axis=None if joint is None else model.jnt_axis[joint],
+        name=model.body(body_id).name,
+        parent=None if is_torso else body_ids.index(parent_id),
+        place=model.body_pos[body_id],
+        quaternion=model.body_quat[body_id],
+        joint=joint,
+        axis=axis,
         shapes=tuple(_shape(model, geom) for geom in geoms),
     )
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> Shape:
-    material, place = model.material(model.geom_matid[geom]).name, (model.geom_pos[geom], model.geom_quat[geom])
+    kind = "hull"
+    hull = None
     if model.geom_type[geom] == _MESH:
-        return Shape("hull", model.geom_size[geom], *place, material, _hull(model, model.geom_dataid[geom]))
-    return Shape(KINDS[int(model.geom_type[geom])], model.geom_size[geom], *place, material)
+        hull = _hull(model, model.geom_dataid[geom])
+    else:
+        kind = KINDS[int(model.geom_type[geom])]
+    return Shape(
+        kind=kind,
+        size=model.geom_size[geom],
+        place=model.geom_pos[geom],
+        quaternion=model.geom_quat[geom],
+        material=model.material(model.geom_matid[geom]).name,
+        hull=hull,
+    )
 
 
-def _hull(model: mujoco.MjModel, index: int) -> Hull:
+def _hull(model: mujoco.MjModel, mesh: int) -> Hull:
     """Return the convex hull of a mesh, which is what touches; the mesh itself may have thirty times the points.
 
     MuJoCo's graph of a hull has the numbers of its points and faces, where the edges of each point begin, the points'
     indices in the mesh, the edges, and the corners of its faces as indices in the mesh.
     """
-    graph = model.mesh_graph[model.mesh_graphadr[index] :]
-    points, faces = graph[:2]
-    corners = graph[2 + 3 * points + 3 * faces :][: 3 * faces]
-    used, triangles = np.unique(corners, return_inverse=True)
-    points = model.mesh_vert[model.mesh_vertadr[index] + used].astype(float)
+    graph = model.mesh_graph[model.mesh_graphadr[mesh] :]
+    point_count, face_count = graph[:2]
+    first_corner = 2 + 3 * point_count + 3 * face_count
+    corners = graph[first_corner : first_corner + 3 * face_count]
+    mesh_indices, triangles = np.unique(corners, return_inverse=True)
+    points = model.mesh_vert[model.mesh_vertadr[mesh] + mesh_indices].astype(float)
     return Hull(points, triangles.reshape(-1, 3))
 
 
-def simplify_hull(hull: Hull, most: int) -> Hull:
-    """Return the hull of the outermost of a hull's points, at most a number of them."""
-    if len(hull.points) <= most:
-        return hull
-    spec = mujoco.MjSpec()
-    spec.add_mesh(name="hull", uservert=hull.points.ravel(), maxhullvert=most)
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull")
-    model = spec.compile()
-    found = _hull(model, 0)
-    # MuJoCo moves a mesh into the frame of its inertia.
-    return found._replace(points=found.points @ rotations.matrix(model.mesh_quat[0]).T + model.mesh_pos[0])
+def _material(model: mujoco.MjModel, name: str) -> Material:
+    index = model.material(name).id
+    return Material(
+        color=model.mat_rgba[index, :3],
+        emission=float(model.mat_emission[index]),
+        roughness=1.0 - float(model.mat_shininess[index]),
+    )
 
 
-def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:
+# Parts of an imported body.
+
+
+def _sketched_parts(model: mujoco.MjModel, body: Body) -> list[Part]:
     """Return the parts of an imported body, with the shapes of its model as it stands.
 
     A shape belongs to the nearest part above it.
@@ -157,44 +214,66 @@ def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:
     data = mujoco.MjData(model)
     data.qpos[:] = standing_qpos(model)
     mujoco.mj_kinematics(model, data)
-    owners = {model.body(name).id: part for part, name in enumerate(body.part_names)}
-    for index in range(1, model.nbody):
-        owners.setdefault(index, owners.get(int(model.body_parentid[index])))
-    shapes: list[list[Shape]] = [[] for _ in body.part_names]
-    bones = _bones(body, *(data.body("torso").xpos, data.body("torso").xquat))
-    places, turns = part_frames(bones)
-    for geom in np.flatnonzero(model.geom_bodyid).tolist():  # those of the world are the ground's
-        part, turn = owners[int(model.geom_bodyid[geom])], np.empty(4)
-        mujoco.mju_mat2Quat(turn, (turns[part].T @ data.geom_xmat[geom].reshape(3, 3)).ravel())
-        place = turns[part].T @ (data.geom_xpos[geom] - places[part])
-        shapes[part].append(_shape(model, geom)._replace(place=place, quaternion=turn))
-    return [bone._replace(shapes=tuple(own)) for bone, own in zip(bones, shapes, strict=True)]
+    bare_parts = _parts_without_shapes(body, data.body("torso").xpos, data.body("torso").xquat)
+    part_of_body = _nearest_parts(model, body)
+    positions, orientations = part_frames(bare_parts)
+    shapes_of_part: list[list[Shape]] = [[] for _ in bare_parts]
+    geoms_of_bodies = np.flatnonzero(model.geom_bodyid).tolist()  # without those of the world, which are the ground's
+    for geom in geoms_of_bodies:
+        part = part_of_body[int(model.geom_bodyid[geom])]
+        to_part = orientations[part].T
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, (to_part @ data.geom_xmat[geom].reshape(3, 3)).ravel())
+        position = to_part @ (data.geom_xpos[geom] - positions[part])
+        shapes_of_part[part].append(_shape(model, geom)._replace(place=position, quaternion=quaternion))
+    return [part._replace(shapes=tuple(shapes)) for part, shapes in zip(bare_parts, shapes_of_part, strict=True)]
 
 
-def _bones(body: Body, place: np.ndarray, quaternion: np.ndarray) -> list[Part]:
-    """Return the parts of a body's spec without shapes, given where the torso is."""
-    found, joints = [Part("torso", None, place.copy(), quaternion.copy(), None, None, ())], itertools.count()
+def _nearest_parts(model: mujoco.MjModel, body: Body) -> dict[int, int]:
+    """Return the index of the part that each body of a model belongs to: its own, or that of the nearest one above."""
+    part_of_body = {model.body(name).id: part for part, name in enumerate(body.part_names)}
+    for body_id in range(1, model.nbody):  # parents come first
+        if body_id not in part_of_body:
+            part_of_body[body_id] = part_of_body.get(int(model.body_parentid[body_id]))
+    return part_of_body
+
+
+def _parts_without_shapes(body: Body, torso_position: np.ndarray, torso_quaternion: np.ndarray) -> list[Part]:
+    """Return the parts of a body's spec, given where the torso is in the world."""
+    torso = Part(
+        name="torso",
+        parent=None,
+        place=torso_position.copy(),
+        quaternion=torso_quaternion.copy(),
+        joint=None,
+        axis=None,
+        shapes=(),
+    )
+    parts = [torso]
+    joint_numbers = itertools.count()
     for leg in body.legs:
-        parent, end, turn = 0, leg.mount, rotations.turn_about_z(_AS_ABOVE, np.radians(leg.yaw_deg))
-        for part in leg.parts:
-            hinge = part.joint if isinstance(part, Link) else None
-            joint, axis = (next(joints), np.array(hinge.axis) / np.linalg.norm(hinge.axis)) if hinge else (None, None)
-            found.append(Part(leg.full_name(part), parent, np.array(end), turn, joint, axis, ()))
-            parent, end, turn = len(found) - 1, part.end if isinstance(part, Link) else None, _AS_ABOVE
-    return found
-
-
-def part_frames(parts: Sequence[Part]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the places (3,) and rotation matrices (3, 3) of parts in the standing pose."""
-    places, turns = [], []
-    for part in parts:
-        place, turn = (np.zeros(3), np.eye(3)) if part.parent is None else (places[part.parent], turns[part.parent])
-        places.append(place + turn @ part.place)
-        turns.append(turn @ rotations.matrix(part.quaternion))
-    return places, turns
-
-
-def _material(model: mujoco.MjModel, name: str) -> Material:
-    index = model.material(name).id
-    roughness = 1.0 - float(model.mat_shininess[index])
-    return Material(model.mat_rgba[index, :3], float(model.mat_emission[index]), roughness)
+        parent = 0  # the torso
+        position = leg.mount
+        quaternion = rotations.turn_about_z(_NO_TURN, np.radians(leg.yaw_deg))
+        for link in leg.parts:  # the last one is a foot
+            hinge = link.joint if isinstance(link, Link) else None
+            joint = None
+            axis = None
+            if hinge:
+                joint = next(joint_numbers)
+                axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+            parts.append(
+                Part(
+                    name=leg.full_name(link),
+                    parent=parent,
+                    place=np.array(position),
+                    quaternion=quaternion,
+                    joint=joint,
+                    axis=axis,
+                    shapes=(),
+                )
+            )
+            parent = len(parts) - 1
+            position = link.end if isinstance(link, Link) else None
+            quaternion = _NO_TURN
+    return parts

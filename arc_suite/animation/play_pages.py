@@ -33,8 +33,11 @@ from arc_suite.tasks import Task, clock
 
 GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
 
-_DIRECTED, _TASK = "directed", "steer"  # whose command the player gives, to demonstrators and to others
-_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # that a page can observe
+# Tasks whose command the player gives.
+_DEMONSTRATOR_TASK = "directed"
+_NETWORK_TASK = "steer"
+_DEFAULT_PRESET = "steered"
+_OBSERVABLE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # by scripts of a page
 
 
 def page(creatures: Sequence[Mapping[str, Any]]) -> str:
@@ -54,9 +57,11 @@ def page(creatures: Sequence[Mapping[str, Any]]) -> str:
 
 def licenses() -> str:
     """Return the license of MuJoCo and its notices of third parties, from its wheel, as text of an HTML comment."""
-    files = sorted(file for file in metadata.files("mujoco") or () if file.parent.name == "licenses")
-    texts = [file.read_text(encoding="utf-8") for file in files]
-    return "\n\n".join(["This page contains MuJoCo and scripts of arc_suite.", *texts]).replace("-->", "-- >")
+    wheel_files = metadata.files("mujoco") or ()
+    license_files = sorted(file for file in wheel_files if file.parent.name == "licenses")
+    texts = [file.read_text(encoding="utf-8") for file in license_files]
+    all_texts = "\n\n".join(["This page contains MuJoCo and scripts of arc_suite.", *texts])
+    return all_texts.replace("-->", "-- >")  # which would end the comment
 
 
 def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict[str, Any]:
@@ -72,74 +77,93 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         ValueError: a policy or preset that a page cannot run, or that does not fit the body.
         OSError: a policy's file cannot be read.
     """
-    setup = Setup.of(body, _DIRECTED if policy == "cpg" else _TASK)
-    commanded = setup.definition
+    setup = Setup.of(body, _DEMONSTRATOR_TASK if policy == "cpg" else _NETWORK_TASK)
+    command_task = setup.definition
     if policy == "cpg":
-        task, driver = commanded, _law(commanded, preset or "steered")
+        task = command_task
+        driver = _describe_law(task, preset or _DEFAULT_PRESET)
     else:
-        task, driver = _graph(body, policy, commanded)
+        network = _load_network(body, policy, command_task)
+        task = network.setup.definition
+        driver = _describe_network(network)
+    scene = command_task.scene
+    feet = []
+    for leg in body.legs:
+        part_index = body.part_names.index(leg.full_name(leg.foot))
+        feet.append({"part": part_index, "radius": leg.foot.radius})
     return pages.body_drawing(body) | {
         "name": body.name,
-        "timestep": commanded.scene.control_timestep / commanded.scene.substeps,
-        "substeps": commanded.scene.substeps,
-        "feet": [
-            {"part": body.part_names.index(leg.full_name(leg.foot)), "radius": leg.foot.radius} for leg in body.legs
-        ],
-        "grounds": {name: _ground(setup, arena) for name, arena in GROUNDS.items()},
-        "task": pages.to_json_values(_task(task, commanded), digits=None),
-        "policy": pages.to_json_values(driver, digits=None),
+        "timestep": scene.control_timestep / scene.substeps,
+        "substeps": scene.substeps,
+        "feet": feet,
+        "grounds": {name: _describe_ground(setup, arena) for name, arena in GROUNDS.items()},
+        "task": pages.to_json_values(_describe_task(task, command_task), decimals=None),
+        "policy": pages.to_json_values(driver, decimals=None),
     }
 
 
-def _ground(setup: Setup, arena: str) -> dict[str, Any]:
-    """The MJCF of a body in an arena, with the integrator of simulations, and where the body starts."""
+# Grounds and tasks.
+
+
+def _describe_ground(setup: Setup, arena: str) -> dict[str, Any]:
+    """Return the MJCF of a body in an arena, with the integrator of simulations, and where the body starts."""
     task, model = Setup.of(setup.body, setup.task, {"arena": arena}).prepare()
-    text = models.text(setup.body, task.scene.arena)
+    xml = models.text(setup.body, task.scene.arena)
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
-        text = text.replace('integrator="implicitfast"', 'integrator="Euler"')
+        xml = xml.replace('integrator="implicitfast"', 'integrator="Euler"')
     data = mujoco.MjData(model)
     data.qpos[:] = task.scene.standing
     mujoco.mj_forward(model, data)
-    return {"xml": text, "start": pages.to_json_values(task.raise_off_ground(task.read(data)), digits=None)}
+    start_qpos = task.raise_off_ground(task.read(data))
+    return {"xml": xml, "start": pages.to_json_values(start_qpos, decimals=None)}
 
 
-def _task(task: Task, commanded: Task) -> dict[str, Any]:
-    """What a page computes of a task: its frame, clock, units and health; see web/task.js.
+def _describe_task(task: Task, command_task: Task) -> dict[str, Any]:
+    """Return what a page computes of a task: its frame, clock, units and health; see web/task.js.
 
     Args:
         task: of the policy.
-        commanded: of the same body, whose units and health hold where the task has none.
+        command_task: of the same body, whose units and health hold where the task has none.
     """
-    headed = "command" in task.commands
-    context, health = (task if headed else commanded).context, commanded.health  # type: ignore[attr-defined]  # of commands
-    scene, (force_unit,) = commanded.scene, context.force_unit
-    layout, angles = scene.layout, np.r_[scene.layout.joint_angles]
+    has_command = "command" in task.commands
+    # Tasks with commands have a context with their units, and health, which others lack.
+    context = task.context if has_command else command_task.context  # type: ignore[attr-defined]
+    health = command_task.health  # type: ignore[attr-defined]
+    (force_unit,) = context.force_unit  # (6,) forces, N, and torques, N m
+    scene = command_task.scene
+    layout = scene.layout
+    joint_positions = np.r_[layout.joint_angles]  # indices in qpos
     return {
-        "headed": headed,
+        "headed": has_command,
         "parts": np.r_[layout.parts],
-        "joints": angles,
+        "joints": joint_positions,
         "dofs": np.r_[layout.joint_velocities],
-        "home": scene.standing[angles],
+        "home": scene.standing[joint_positions],
         "step": scene.control_timestep,
         "turn": clock.TWO_PI * task.parameters.gait_frequency * scene.control_timestep,
         "units": context.units,
         "leak": context.leak,
-        "force_unit": force_unit if headed else np.ones(6),
+        "force_unit": force_unit if has_command else np.ones(6),
         "weight": force_unit[5],
         "lowest": health.lowest * context.height,
         "lying": health.lying,
         "least_upright": health.least_upright,
-        "direction": _direction(task) if player_controls.is_directed(task) else None,
+        "direction": _describe_pose_and_gait(task) if player_controls.is_directed(task) else None,
     }
 
 
-def _direction(task: Task) -> dict[str, Any]:
-    """What a page computes of pose and gait, and what the player chooses from; see web/direction.js and panel.js."""
-    body, reference = task.scene.body, task.context.reference  # type: ignore[attr-defined]  # of commands
+def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
+    """Return what a page computes of pose and gait, and what the player chooses from.
+
+    See web/direction.js and web/panel.js.
+    """
+    body = task.scene.body
+    reference = task.context.reference  # type: ignore[attr-defined]  # of tasks with commands
+    time_unit = (body.torso.standing_height / GRAVITY) ** 0.5  # s
     return {
         "glide": reference.glide,
         "step": reference.step,
-        "rate": (body.torso.standing_height / GRAVITY) ** 0.5 / reference.step,
+        "rate": time_unit / reference.step,
         "names": posture.POSE_NAMES,
         "room": player_controls.pose_room(body),
         "frequency": task.parameters.gait_frequency,
@@ -147,48 +171,80 @@ def _direction(task: Task) -> dict[str, Any]:
     }
 
 
-def _law(task: Task, preset: str) -> dict[str, Any]:
+# Demonstrators.
+
+
+def _describe_law(task: Task, preset: str) -> dict[str, Any]:
+    """Return the constants of a demonstrator's law; a ValueError if a page cannot run it."""
     law = Demonstrator(task, preset).law
     if not isinstance(law, Directed):
         raise ValueError(
             f"preset {preset!r}: a page runs steered, surefooted or reactive, which follow a command by joint angles"
         )
-    return {"kind": "law", "constants": law.constants() | {"leaps": _leaps(law)}}
+    return {"kind": "law", "constants": law.constants() | {"leaps": _describe_leaps(law)}}
 
 
-def _leaps(law: Directed) -> dict[str, Any]:
-    """Targets of joints (steps, joints), rad, and the step at which the crouch ends, of the leaps that a body can."""
-    body, legs, rest = law.body, Legs.of(law.body), law.rest_angles  # whose joints use all of their ranges in a leap
-    pose, made = tuple(legs.by_joint(rest).tolist()), {}
-    ahead = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
-    for name, choice, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", ahead, "distance")):
+def _describe_leaps(law: Directed) -> dict[str, Any]:
+    """Return the leaps that a body can, by name.
+
+    Each has the targets of joints (steps, joints), rad, and the step at which the crouch ends.
+    """
+    body = law.body
+    legs = Legs.of(body)  # whose joints use all of their ranges in a leap
+    rest_angles = tuple(legs.by_joint(law.rest_angles).tolist())
+    forward_leaps = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
+    leap_of_name = {}
+    for name, candidates, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", forward_leaps, "distance")):
         try:
-            leap = leaps.choose_leap(body, pose, choice, measure)
+            leap = leaps.choose_leap(body, rest_angles, candidates, measure)
         except ValueError:
             continue  # and the page has no key for it
-        crouched = leaps.plan_movement(body, legs, rest, leap).crouch_end
-        made[name] = {"crouched": crouched, "targets": leaps.leap_targets(body, legs, rest, leap)}
-    return made
+        leap_of_name[name] = {
+            "crouched": leaps.plan_movement(body, legs, law.rest_angles, leap).crouch_end,
+            "targets": leaps.leap_targets(body, legs, law.rest_angles, leap),
+        }
+    return leap_of_name
 
 
-def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
-    made = policies.policy(name, body, task=steer if name == universal.NAME else None)
+# Trained networks.
+
+
+def _load_network(body: Body, name: str, command_task: Task) -> Network:
+    """Return a trained network by name; a ValueError if a page cannot run it.
+
+    Args:
+        body: that it moves.
+        name: as for `policies.policy`.
+        command_task: of the body, with a command that the player gives.
+    """
+    policy = policies.policy(name, body, task=command_task if name == universal.NAME else None)
     if other_libraries.find(name):
-        made = policies.trained(name)
-    if isinstance(made, Universal):  # acts in the task that it was trained in
-        made = universal.for_body(made.network, Setup.of(body, made.network.setup.task))
-    if not isinstance(made, Network):
+        policy = policies.trained(name)  # the same policy as a network of this package
+    if isinstance(policy, Universal):  # acts in the task that it was trained in
+        policy = universal.for_body(policy.network, Setup.of(body, policy.network.setup.task))
+    if not isinstance(policy, Network):
         raise ValueError(f"policy {name}: a page runs cpg, ppo, universal, or one trained network")
-    blocks, task = made.blocks, made.setup.definition
-    if unknown := [block for block in blocks if block not in _BLOCKS]:
-        raise ValueError(f"policy {name}: observes {unknown[0]}, and a page has {', '.join(_BLOCKS)} alone")
-    if task.actions != steer.actions:
-        raise ValueError(f"policy {name}: its actions are a {task.actions} a joint, and a page takes {steer.actions}s")
-    nodes = [[node.operator, *node.inputs] for node in made.graph.nodes]
-    arrays = {array: _array(values) for array, values in made.graph.arrays.items()}
-    return task, {"kind": "graph", "constants": {"blocks": list(blocks), "nodes": nodes, "arrays": arrays}}
+    for block in policy.blocks:
+        if block not in _OBSERVABLE_BLOCKS:
+            available = ", ".join(_OBSERVABLE_BLOCKS)
+            raise ValueError(f"policy {name}: observes {block}, and a page has {available} alone")
+    actions = policy.setup.definition.actions
+    if actions != command_task.actions:
+        raise ValueError(
+            f"policy {name}: its actions are a {actions} a joint, and a page takes {command_task.actions}s"
+        )
+    return policy
 
 
-def _array(values: np.ndarray) -> dict[str, Any]:
-    data = base64.b64encode(values.astype(values.dtype.newbyteorder("<")).tobytes()).decode()
+def _describe_network(network: Network) -> dict[str, Any]:
+    """Return the graph of a network, with its arrays in base64."""
+    nodes = [[node.operator, *node.inputs] for node in network.graph.nodes]
+    arrays = {name: _encode_array(values) for name, values in network.graph.arrays.items()}
+    return {"kind": "graph", "constants": {"blocks": list(network.blocks), "nodes": nodes, "arrays": arrays}}
+
+
+def _encode_array(values: np.ndarray) -> dict[str, Any]:
+    """Return an array with its numbers in base64, little-endian."""
+    little_endian = values.astype(values.dtype.newbyteorder("<"))
+    data = base64.b64encode(little_endian.tobytes()).decode()
     return {"type": values.dtype.name, "shape": values.shape, "data": data}

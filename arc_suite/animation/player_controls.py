@@ -10,7 +10,7 @@ from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 
-OWN_GAIT = "own"  # the gait that a task prescribes
+OWN_GAIT = "own"  # name of the gait that a task prescribes
 TEMPO_RANGE = (0.6, 1.4)  # of a gait, multiples of the prescribed frequency
 
 
@@ -21,17 +21,19 @@ def is_directed(task: Task) -> bool:
 
 def pose_room(body: Body) -> np.ndarray:
     """Return how far each number of a pose can go, (6, 2) in whole hundredths, with feet that may slide."""
-    return np.trunc((100.0 * posture.measure_room(body, planted=False)).round(4)) / 100.0
+    hundredths = 100.0 * posture.measure_room(body, planted=False)
+    return np.trunc(hundredths.round(4)) / 100.0
 
 
 def gaits_by_name(task: Task) -> dict[str, list[float]]:
-    """Return offsets, cycles, and duty factor of the gaits that fit a body, by name; first its own."""
-    body, own = task.scene.body, task.parameters
-    made = {name: gaits.gait(body, name) for name in gaits.fitting_gaits(body)}
-    return {
-        OWN_GAIT: [*np.divide(own.phase_offsets, clock.TWO_PI), own.duty_factor],
-        **{name: [*gait.offsets, gait.duty_factor] for name, gait in made.items()},
-    }
+    """Return the phase offsets, cycles, and the duty factor of gaits, by name: the task's own, and those that fit."""
+    body = task.scene.body
+    own_offsets = np.divide(task.parameters.phase_offsets, clock.TWO_PI)
+    numbers_of_gait = {OWN_GAIT: [*own_offsets, task.parameters.duty_factor]}
+    for name in gaits.fitting_gaits(body):
+        gait = gaits.gait(body, name)
+        numbers_of_gait[name] = [*gait.offsets, gait.duty_factor]
+    return numbers_of_gait
 
 
 def commands(
@@ -50,16 +52,24 @@ def commands(
         gait: its name, or None; a gait that does not fit is replaced by the body's own.
         tempo: multiple of the prescribed frequency of a gait.
     """
-    asked: dict[str, Any] = {"command": desired} if task.commands.get("command") == 3 else {}
+    value_of_command: dict[str, Any] = {}
+    if task.commands.get("command") == 3:
+        value_of_command["command"] = desired
     if is_directed(task):
-        numbers = gaits_by_name(task)
-        own = [*numbers.get(gait, numbers[OWN_GAIT]), tempo * task.parameters.gait_frequency] if gait else None
-        asked |= {"pose": None if pose is None else _within(pose_room(task.scene.body), np.asarray(pose)), "gait": own}
-    return asked
+        value_of_command["pose"] = None
+        if pose is not None:
+            value_of_command["pose"] = _limit_pose(np.asarray(pose), pose_room(task.scene.body))
+        value_of_command["gait"] = None
+        if gait:
+            numbers_of_gait = gaits_by_name(task)
+            numbers = numbers_of_gait.get(gait, numbers_of_gait[OWN_GAIT])
+            value_of_command["gait"] = [*numbers, tempo * task.parameters.gait_frequency]
+    return value_of_command
 
 
-def _within(bounds: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """A pose (6,) reduced to bounds (6, 2); not all numbers go to their bounds at once."""
-    pose = pose.clip(*bounds.T)
-    most = abs(np.where(pose < 0.0, bounds[:, 0], bounds[:, 1]))
-    return pose / max(1.0, (abs(pose) / np.maximum(most, 1e-9)).sum())
+def _limit_pose(pose: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """Return a pose (6,) within a room (6, 2); the more numbers change, the less each of them does."""
+    pose = pose.clip(room[:, 0], room[:, 1])
+    limits = abs(np.where(pose < 0.0, room[:, 0], room[:, 1]))
+    limit_shares = abs(pose) / np.maximum(limits, 1e-9)
+    return pose / max(1.0, limit_shares.sum())

@@ -1,7 +1,7 @@
 """Scenery of a recorded episode as plain data: the ground, obstacles, and debug markers of the command."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,16 +12,17 @@ from arc_suite.markers import Marker
 from arc_suite.style.tracks import Track
 from arc_suite.tasks import Task
 
-_MARGIN = 12.0  # standing heights of ground around the path
-_SAME = 1e-3  # of the standing height, by which an episode that is repeated may differ from the recorded one
+_GROUND_MARGIN = 12.0  # standing heights of ground around the path
+_MAX_REPLAY_ERROR = 1e-3  # standing heights, by which the torso of a replay may be off
+_FLOOR_PREFIX = "floor"  # of the names of geoms of the ground and of obstacles
 
 
 def describe_scenery(track: Track) -> dict[str, Any]:
     """Return the scenery of an episode; lengths are in m and the world's axes.
 
-    The episode is started again by its seed, which places the obstacles, and replayed by its actions for the debug
-    markers. Markers end where the replay differs from the recording, for example with weak motors, as the
-    recorded actions are the applied ones.
+    The episode is started again by its seed, which places the obstacles. It is replayed by its actions for the debug
+    markers. They end where the replay differs from the recording, for example with weak motors, as the recorded actions
+    are the applied ones.
 
     Returns:
         A dictionary:
@@ -30,18 +31,20 @@ def describe_scenery(track: Track) -> dict[str, Any]:
             `fields`: height fields, each `low` (2,), `cell` (2,) and `heights` (rows, columns);
             `solids`: shapes, each `kind`, `size`, `place` and `color`, None for that of the ground times `shade`;
             `styles`: of marks, `shape`, `radius` and `color`;
-            `marks`: for every row of the track, of each mark the index of its style, start and end;
-            `failed`: for every row the names of the parts of legs whose motors have failed.
-            The last two are empty where all rows are.
+            `marks`: for every step of the track, of each mark the index of its style, start and end;
+            `failed`: for every step the names of the parts of legs whose motors have failed.
+            The last two are empty where they are empty in all steps.
     """
     environment = track.setup.load()
     environment.reset(track.seed)
-    margin = _MARGIN * track.body.torso.standing_height
-    low, high = track.positions[:, :2].min(axis=0) - margin, track.positions[:, :2].max(axis=0) + margin
-    found = describe_ground(environment, low, high)
-    styles, marks, failed = _marks(environment, track)
+    margin = _GROUND_MARGIN * track.body.torso.standing_height
+    path = track.positions[:, :2]
+    scenery = describe_ground(environment, path.min(axis=0) - margin, path.max(axis=0) + margin)
+    replay = _Replay(styles=[], marks=[], failed=[])
+    if _has_marks_or_failures(environment.task):
+        replay = _replay(environment, track)
     environment.close()
-    return found | {"styles": styles, "marks": marks, "failed": failed}
+    return scenery | replay._asdict()
 
 
 def describe_ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
@@ -55,68 +58,135 @@ def describe_ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str,
     arena = environment.task.definition.scene.arena
     model = models.model_spec(environment.task.body, arena, decorated=True).compile()
     data = mujoco.MjData(model)
-    data.mocap_pos[:] = environment.physics.data.mocap_pos
+    data.mocap_pos[:] = environment.physics.data.mocap_pos  # of obstacles
     mujoco.mj_kinematics(model, data)
-    found: dict[str, Any] = {"level": arena.is_level, "planes": [], "fields": [], "solids": []}
+    planes = []
+    fields = []
+    solids = []
     for geom in range(model.ngeom):
-        if not model.geom(geom).name.startswith("floor"):
+        if not model.geom(geom).name.startswith(_FLOOR_PREFIX):
             continue
-        kind, place, size = int(model.geom_type[geom]), data.geom_xpos[geom], model.geom_size[geom]
+        kind = int(model.geom_type[geom])
+        center = data.geom_xpos[geom]
         if kind == mujoco.mjtGeom.mjGEOM_PLANE:
-            found["planes"].append(float(place[2]))
+            planes.append(float(center[2]))
         elif kind == mujoco.mjtGeom.mjGEOM_HFIELD:
-            found["fields"].append(_field(model, model.geom_dataid[geom], place, low, high))
-        elif (place[:2] + size[:2].max() > low).all() and (place[:2] - size[:2].max() < high).all():
-            found["solids"].append(_solid(model, geom, KINDS[kind], place))
-    return found
+            fields.append(_describe_field(model, model.geom_dataid[geom], center, low, high))
+        else:
+            extent = model.geom_size[geom][:2].max()
+            is_inside = (center[:2] + extent > low).all() and (center[:2] - extent < high).all()
+            if is_inside:
+                solids.append(_describe_solid(model, geom, KINDS[kind], center))
+    return {"level": arena.is_level, "planes": planes, "fields": fields, "solids": solids}
 
 
-def _field(model: mujoco.MjModel, index: int, place, low, high) -> dict[str, Any]:
-    """The part of a height field that lies between two corners (2,)."""
-    shape = np.array((model.hfield_nrow[index], model.hfield_ncol[index]))
-    start = model.hfield_adr[index]
-    heights = model.hfield_data[start : start + shape.prod()].reshape(shape)
-    halves, (columns, rows) = model.hfield_size[index], shape[::-1]
-    cell = 2.0 * halves[:2] / (shape[::-1] - 1)
-    corner = place[:2] - halves[:2]
-    first = np.floor((low - corner) / cell).astype(int).clip(0, (columns - 2, rows - 2))
-    last = np.ceil((high - corner) / cell).astype(int).clip(first + 1, (columns - 1, rows - 1))
-    part = heights[first[1] : last[1] + 1, first[0] : last[0] + 1]
-    return {"low": corner + first * cell, "cell": cell, "heights": place[2] + halves[2] * part.astype(float)}
+def _describe_field(model: mujoco.MjModel, field: int, center, low, high) -> dict[str, Any]:
+    """Return the part of a height field that lies between two corners (2,), m."""
+    rows = model.hfield_nrow[field]
+    columns = model.hfield_ncol[field]
+    first_height = model.hfield_adr[field]
+    height_shares = model.hfield_data[first_height : first_height + rows * columns].reshape(rows, columns)
+    half_x, half_y, max_height, _ = model.hfield_size[field]
+    half_sides = np.array((half_x, half_y))
+    cells = np.array((columns - 1, rows - 1))  # along x and y
+    cell = 2.0 * half_sides / cells  # m
+    corner = center[:2] - half_sides
+    first = np.floor((low - corner) / cell).astype(int).clip(0, cells - 1)
+    last = np.ceil((high - corner) / cell).astype(int).clip(first + 1, cells)
+    first_column, first_row = first
+    last_column, last_row = last
+    visible_shares = height_shares[first_row : last_row + 1, first_column : last_column + 1]
+    return {
+        "low": corner + first * cell,
+        "cell": cell,
+        "heights": center[2] + max_height * visible_shares.astype(float),
+    }
 
 
-def _solid(model: mujoco.MjModel, geom: int, kind: str, place) -> dict[str, Any]:
-    """A shape of the ground, whose axes are the world's, or an obstacle."""
-    ground = model.body_mocapid[model.geom_bodyid[geom]] < 0
-    color = None if ground else model.mat_rgba[model.geom_matid[geom], :3]
-    shade = float(model.geom_rgba[geom, 0])
-    return {"kind": kind, "size": model.geom_size[geom], "place": place.copy(), "color": color, "shade": shade}
+def _describe_solid(model: mujoco.MjModel, geom: int, kind: str, center) -> dict[str, Any]:
+    """Return a shape of the ground, whose axes are the world's, or an obstacle."""
+    is_obstacle = model.body_mocapid[model.geom_bodyid[geom]] >= 0
+    return {
+        "kind": kind,
+        "size": model.geom_size[geom],
+        "place": center.copy(),
+        "color": model.mat_rgba[model.geom_matid[geom], :3] if is_obstacle else None,
+        "shade": float(model.geom_rgba[geom, 0]),
+    }
 
 
-def _marks(environment, track: Track) -> tuple[list, list, list]:
-    """The styles of marks, and of every row marks and parts of failed legs, of an environment at a track's start."""
-    physics, task, styles, rows, failed = environment.physics, environment.task, {}, [], []
-    shown = type(task.definition)
-    if shown.markers is Task.markers and shown.failed_legs is Task.failed_legs:
-        return [], [], []  # nothing is shown: nothing to replay for
-    parts = {leg.name: leg.part_names for leg in track.body.legs}
-    near = _SAME * track.body.torso.standing_height
-    for action, position in zip(track.actions, track.positions, strict=True):
+class _Replay(NamedTuple):
+    """What a replay shows, as of `describe_scenery`.
+
+    Attributes:
+        styles: of marks.
+        marks: for every step, of each mark the index of its style, start and end.
+        failed: for every step, the names of the parts of legs whose motors have failed.
+    """
+
+    styles: list[dict]
+    marks: list[list]
+    failed: list[list[str]]
+
+
+def _has_marks_or_failures(task) -> bool:
+    """Return whether a task has debug markers, or legs whose motors fail."""
+    kind = type(task.definition)
+    return kind.markers is not Task.markers or kind.failed_legs is not Task.failed_legs
+
+
+def _replay(environment, track: Track) -> _Replay:
+    """Return what an episode shows until it differs from its track, given its environment at the start."""
+    task = environment.task
+    part_names_of_leg = {leg.name: leg.part_names for leg in track.body.legs}
+    max_error = _MAX_REPLAY_ERROR * track.body.torso.standing_height
+    styles: dict[_Style, int] = {}
+    marks = []
+    failed = []
+    for action, recorded_position in zip(track.actions, track.positions, strict=True):
         environment.step(action)
-        if abs(physics.data.qpos[:3] - position).max() > near:
+        torso_position = environment.physics.data.qpos[:3]
+        if abs(torso_position - recorded_position).max() > max_error:
             break
-        rows.append(_styled(task.markers(physics), styles))
-        failed.append([name for leg in task.failed_legs() for name in parts[leg]])
-    looks = [dict(zip(("shape", "radius", "color"), style[:3], strict=True)) for style in styles]
-    return looks, rows if any(rows) else [], failed if any(failed) else []
+        marks.append(_describe_marks(task.markers(environment.physics), styles))
+        failed.append([name for leg in task.failed_legs() for name in part_names_of_leg[leg]])
+    return _Replay(
+        styles=[{"shape": style.shape, "radius": style.radius, "color": style.color} for style in styles],
+        marks=marks if any(marks) else [],
+        failed=failed if any(failed) else [],
+    )
 
 
-def _styled(marks: Sequence[Marker], styles: dict[tuple, int]) -> list[list]:
-    """Marks as indices of styles, start and end; styles that are new are added. None has two marks at once."""
-    row, counts = [], {}
-    for mark in marks:
-        style = (mark.shape, float(mark.radius), tuple(map(float, mark.color)))
-        counts[style] = counts.get(style, 0) + 1
-        index = styles.setdefault((*style, counts[style]), len(styles))
-        row.append([index, *np.concatenate([mark.start, mark.end]).tolist()])
-    return row
+class _Style(NamedTuple):
+    """How a mark looks.
+
+    Attributes:
+        shape: "arrow" or "cylinder".
+        radius: m.
+        color: red, green, blue and opacity, 0 to 1.
+        number: counts the marks of one step that look alike, from 1, as each of them needs a style of its own.
+    """
+
+    shape: str
+    radius: float
+    color: tuple[float, ...]
+    number: int
+
+
+def _describe_marks(markers: Sequence[Marker], styles: dict[_Style, int]) -> list[list]:
+    """Return the marks of one step: of each the index of its style, start and end.
+
+    Args:
+        markers: of the step.
+        styles: indices of styles; new styles are added.
+    """
+    marks = []
+    count_of_look: dict[tuple, int] = {}
+    for marker in markers:
+        look = (marker.shape, float(marker.radius), tuple(float(channel) for channel in marker.color))
+        count_of_look[look] = count_of_look.get(look, 0) + 1
+        style = _Style(*look, number=count_of_look[look])
+        index = styles.setdefault(style, len(styles))
+        endpoints = np.concatenate([marker.start, marker.end])  # m
+        marks.append([index, *endpoints.tolist()])
+    return marks

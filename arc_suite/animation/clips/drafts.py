@@ -108,7 +108,7 @@ def make_drafts(
     gaits, transition, turns = _make_recordings(recorder, names, progress, left_out)
     drafts = _cut_loops(body, gaits, left_out)
     for name, draft in list(drafts.items()):
-        reason = _why_misnamed(name, draft, recorder.velocity_units, drafts.get("walk"))
+        reason = _refusal_reason(name, draft, recorder.velocity_units, drafts.get("walk"))
         if reason:
             left_out[name] = reason
     drafts = {name: draft for name, draft in drafts.items() if name not in left_out}
@@ -121,7 +121,7 @@ def make_drafts(
         drafts = {name: draft.plant_feet(body) for name, draft in drafts.items()}
         planted_walk = drafts.get("walk")
     if transition is not None:
-        drafts |= _make_connected(body, transition, turns, names, walk, planted_walk, left_out)
+        drafts |= _make_clips_from_rest(body, transition, turns, names, walk, planted_walk, left_out)
     for name in names:
         clip = clip_of(name)
         if not isinstance(clip, Difference) or name in left_out:
@@ -239,7 +239,7 @@ def _straighten(name: str, motion: Motion) -> Motion:
     return loops.straighten_loop(motion, course=math.atan2(left, forward))
 
 
-def _why_misnamed(name: str, draft: Draft, velocity_units: np.ndarray | None, walk: Draft | None) -> str:
+def _refusal_reason(name: str, draft: Draft, velocity_units: np.ndarray | None, walk: Draft | None) -> str:
     """Return why a loop is not what its name says: it does not follow its command, or is as fast as the walk; or ""."""
     clip = clip_of(name)
     if velocity_units is not None and isinstance(clip, WalkLoop):
@@ -278,7 +278,7 @@ def _make_difference(draft: Draft, base: Draft, pose: Pose) -> Draft:
 # Clips that connect to idle, and some to the walk.
 
 
-def _make_connected(
+def _make_clips_from_rest(
     body: Body,
     transition: TransitionRecording,
     turns: Mapping[str, TurnRecording],
