@@ -1,7 +1,7 @@
 """Behavior cloning of a dataset: the simplest baseline of offline learning.
 
-No environment step is made: the steps of a run are updates of the network, towards the least squared distance from
-the dataset's actions.
+No environment step is made: the steps of a run are updates of the network. They reduce the squared distance from the
+dataset's actions.
 """
 
 import contextlib
@@ -14,10 +14,11 @@ from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.hyperparameters import BehaviorCloning
 from arc_suite.learning.agents.learner import RunContext, Slice, generator, restoring
 from arc_suite.learning.agents.normalizer import Moments
+from arc_suite.learning.agents.replay import Replay
 
-UPDATES_PER_SLICE = 500  # updates
+UPDATES_PER_SLICE = 500
 
-_CHUNK = 4096  # observations that are normalized at a time
+_TRANSITIONS_PER_READ = 4096
 
 
 def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
@@ -29,33 +30,46 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
     priors.check_prior_is_named(context.prior, True)
     with contextlib.closing(context.environment()) as environment:
         task = environment.task.definition
-    data = priors.open_replay(context, task)
-    moments = Moments.empty(task.size)
-    for first in range(0, len(data), _CHUNK):
-        moments = moments.with_vectors(
-            data.transitions_at(np.arange(first, min(first + _CHUNK, len(data)))).observations
-        )
-    normalize = moments.normalizer()
+    replay = priors.open_replay(context, task)
+    normalize = _observation_moments(replay, task.size).normalizer()
     architecture = Perceptron.of(task)
     state = dagger.begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
-    step = 0
+    step = 0  # updates so far
 
-    if (saved := context.checkpoint) is not None:
+    saved = context.checkpoint
+    if saved is not None:
         with restoring():
-            state, step = networks.restore_tree("state", state, saved), int(saved["step"])
+            state = networks.restore_tree("state", state, saved)
+            step = int(saved["step"])
 
     while True:
-        errors, end = [], min(context.next_evaluation(step), (step // UPDATES_PER_SLICE + 1) * UPDATES_PER_SLICE)
-        while step < end:
-            updates = min(dagger.UPDATES_PER_CALL, end - step)
+        slice_end = min(context.next_evaluation(step), (step // UPDATES_PER_SLICE + 1) * UPDATES_PER_SLICE)
+        errors = []  # of each call of `dagger.fit`
+        while step < slice_end:
+            updates = min(dagger.UPDATES_PER_CALL, slice_end - step)
             random = generator(context.seed, "update", step)
-            batch = data.transitions_at(random.integers(len(data), size=updates * hp.batch))
-            rates = hp.learning_rate * (1.0 - (step + np.arange(updates)) / context.steps)
-            known, orders = (normalize(batch.observations), batch.actions), np.arange(updates * hp.batch)
-            orders = orders.reshape(updates, hp.batch)
-            state, error = dagger.fit(architecture, state, *known, orders, rates.astype(np.float32))
+            batch = replay.transitions_at(random.integers(len(replay), size=updates * hp.batch))
+            progress = (step + np.arange(updates)) / context.steps
+            rates = hp.learning_rate * (1.0 - progress)
+            state, error = dagger.fit(
+                architecture,
+                state,
+                observations=normalize(batch.observations),
+                labels=batch.actions,
+                batches=np.arange(updates * hp.batch).reshape(updates, hp.batch),
+                rates=rates.astype(np.float32),
+            )
             errors.append(float(error))
             step += updates
         checkpoint = {**networks.flatten_tree("state", state), "step": np.array(step)}
         graph = architectures.policy_graph(architecture, normalize, state.layers)
         yield Slice(step, {"error": float(np.mean(errors))}, graph, checkpoint)
+
+
+def _observation_moments(replay: Replay, size: int) -> Moments:
+    """Return the moments of all observations (size,) of a dataset."""
+    moments = Moments.empty(size)
+    for first in range(0, len(replay), _TRANSITIONS_PER_READ):
+        indices = np.arange(first, min(first + _TRANSITIONS_PER_READ, len(replay)))
+        moments = moments.with_vectors(replay.transitions_at(indices).observations)
+    return moments
