@@ -1,4 +1,4 @@
-"""The interface of learners: what `learn` is given and what it yields; see `arc_suite.learning.agents`."""
+"""The interface of learners: what `learn` takes and what it yields; see `arc_suite.learning.agents`."""
 
 import contextlib
 import zlib
@@ -26,7 +26,7 @@ class Diverged(ValueError):
     """A value of the learner is not finite."""
 
     def __init__(self, what: str, step: int):
-        """Name the value and the environment step."""
+        """Make the message from a value in words, such as "an action is not finite", and the environment step."""
         super().__init__(f"the learner diverged: {what} at step {step}; the checkpoint before stays")
 
 
@@ -38,8 +38,8 @@ class RunContext(NamedTuple):
     """The run that a learner learns in.
 
     Attributes:
-        setup: body, or bodies, task and settings in which the policy is judged.
-        training: the same in which it learns; it sees the same blocks.
+        setup: body, or bodies, task and settings in which the policy is evaluated.
+        training: body, or bodies, task and settings in which the policy learns; it sees the same blocks.
         seed: of the run.
         steps: environment steps of the run.
         evaluate_every: environment steps between evaluations.
@@ -61,28 +61,29 @@ class RunContext(NamedTuple):
 
     @property
     def first_seed(self) -> int:
-        """The first seed of the environments to learn in, apart from those of evaluation and of other runs."""
+        """The first seed of the environments to learn in; no evaluation and no other run has it."""
         return seed_ranges.of_run(self.seed).start
 
     def environment(self, num_envs: int = 1, **options) -> VectorEnv | BodiesEnv:
-        """Return environments to learn in, seeded apart from evaluation and from other runs.
+        """Return environments to learn in, whose seeds no evaluation and no other run has.
 
-        Their `reset()` begins the first episodes; for the options see `VectorEnv`.
+        Their `reset()` begins the first episodes. For the options see `VectorEnv`.
         """
-        options = {"num_threads": self.threads, "autoreset_mode": AutoresetMode.SAME_STEP} | options
-        return self.training.make_vec(num_envs, seed=self.first_seed, **options)
+        defaults = {"num_threads": self.threads, "autoreset_mode": AutoresetMode.SAME_STEP}
+        return self.training.make_vec(num_envs, seed=self.first_seed, **(defaults | options))
 
     def next_evaluation(self, step: int) -> int:
         """Return the environment step of the first evaluation after `step`."""
-        return min((step // self.evaluate_every + 1) * self.evaluate_every, self.steps)
+        next_multiple = (step // self.evaluate_every + 1) * self.evaluate_every
+        return min(next_multiple, self.steps)
 
 
 class Slice(NamedTuple):
-    """A slice of learning, seconds long.
+    """A slice of learning, which takes seconds.
 
     Attributes:
         step: environment steps so far.
-        metrics: by name, always the same names: a line of training.csv; None for no line.
+        metrics: a line of training.csv, metrics by name; all lines have the same names. None for no line.
         policy: graph of the deterministic policy, from the flat observation to actions in [-1, 1].
         checkpoint: everything that learning resumes from, arrays by name.
     """

@@ -22,14 +22,16 @@ import numpy as np
 
 from arc_suite import archives, checks, files
 
-CONFIG, CHECKPOINT, LOCK = "config.json", "checkpoint.npz", ".lock"
+CONFIG = "config.json"
+CHECKPOINT = "checkpoint.npz"
+LOCK = ".lock"
 TABLES = ("evaluations", "training", "times")
-LEG_VIEWS = "leg_views"  # name in configurations: the version of what legs see; see `tasks.leg_views`
+LEG_VIEWS = "leg_views"  # name of a field of records: the version of what legs see; see `tasks.leg_views`
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
-_NUMBERS = {"evaluated", "wall", "cpu", "return"}  # of the progress, once they are known
-_FORMER = ("learner",)  # names in configurations of earlier versions that say nothing
-_MAX_BYTES = 1 << 34  # of a checkpoint, unpacked: the labels of imitation are the most
+_NUMBERS_OF_PROGRESS = {"evaluated", "wall", "cpu", "return"}  # those that a checkpoint may have
+_IGNORED_FIELDS = ("learner",)  # fields of records of earlier versions, which may differ
+_MAX_CHECKPOINT_BYTES = 1 << 34  # unpacked; the labels of imitation are the largest part
 
 
 class RunFolder:
@@ -38,23 +40,26 @@ class RunFolder:
     Attributes:
         path: of the folder.
         arrays: of the learner at the checkpoint; None before the first.
-        progress: plain values, given to `save` with the arrays.
+        progress: plain values that `save` wrote with the arrays.
     """
 
     def __init__(self, path: Path, arrays: dict[str, np.ndarray] | None, progress: dict[str, Any]):
         """Cut the tables back to the checkpoint."""
-        self.path, self.arrays, self.progress = path, arrays, progress
-        lengths = progress.get("tables", {})
+        self.path = path
+        self.arrays = arrays
+        self.progress = progress
+        lengths = progress.get("tables", {})  # of the tables at the checkpoint, bytes
         self._files = {name: (path / f"{name}.csv").open("ab", buffering=0) for name in TABLES}
         self._columns = {}
         for name, file in self._files.items():
-            if file.tell() < lengths.get(name, 0):
+            length = lengths.get(name, 0)
+            if file.tell() < length:
                 raise ValueError(
                     f"{path / name}.csv: shorter than at the checkpoint; delete {CHECKPOINT} to start over"
                 )
-            file.truncate(lengths.get(name, 0))
-            first = (path / f"{name}.csv").read_text(encoding="utf-8").partition("\n")[0]
-            self._columns[name] = first.split(",") if first else None
+            file.truncate(length)
+            header, _, _ = (path / f"{name}.csv").read_text(encoding="utf-8").partition("\n")
+            self._columns[name] = header.split(",") if header else None
 
     def append(self, table: str, line: Mapping[str, float]) -> None:
         """Add a line to a table; its first line names the columns.
@@ -67,7 +72,13 @@ class RunFolder:
             self._write(table, ",".join(line))
         if list(line) != self._columns[table]:
             raise ValueError(f"{self.path / table}.csv: expected columns {self._columns[table]}, got {list(line)}")
-        self._write(table, ",".join(_cell(value) for value in line.values()))
+        self._write(table, ",".join(_cell_text(value) for value in line.values()))
+
+    def _write(self, table: str, line: str) -> None:
+        try:
+            self._files[table].write(f"{line}\n".encode())
+        except OSError as error:
+            raise OSError(f"cannot write {self.path / table}.csv: {error.strerror.lower()}") from None
 
     def save(self, arrays: Mapping[str, np.ndarray], progress: Mapping[str, Any]) -> None:
         """Replace the checkpoint.
@@ -85,11 +96,10 @@ class RunFolder:
         for file in self._files.values():
             file.close()
 
-    def _write(self, table: str, line: str) -> None:
-        try:
-            self._files[table].write(f"{line}\n".encode())
-        except OSError as error:
-            raise OSError(f"cannot write {self.path / table}.csv: {error.strerror.lower()}") from None
+
+def _cell_text(value) -> str:
+    plain_value = value.item() if isinstance(value, np.generic) else value
+    return repr(plain_value)
 
 
 @contextlib.contextmanager
@@ -99,21 +109,22 @@ def open_run(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequen
     Args:
         path: of the folder.
         config: record of the configuration, plain values.
-        growing: names in it whose integers may be larger than in the folder.
+        growing: fields of the record whose integers may be larger than in the folder.
 
     Raises:
         ValueError: the folder is of another run or of none, or damaged, or another process writes to it.
         OSError: it cannot be read or written.
     """
     with contextlib.ExitStack() as stack:
-        stack.enter_context(_made(Path(path)))
+        stack.enter_context(_delete_unless_begun(Path(path)))
         path = files.folder(path)
         stack.enter_context(files.hold_lock(path / LOCK, f"{path}: another process goes on with this run"))
-        _configure(path, config, growing)
-        files.delete_temporaries(path / CHECKPOINT)  # megabytes
-        folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
-        stack.callback(folder.close)
-        yield folder
+        _write_config(path, config, growing)
+        files.delete_temporaries(path / CHECKPOINT)  # of a process that was killed; they take megabytes
+        arrays, progress = _read_checkpoint(path / CHECKPOINT)
+        run_files = RunFolder(path, arrays, progress)
+        stack.callback(run_files.close)
+        yield run_files
 
 
 def read_config(path: str | os.PathLike) -> dict[str, Any]:
@@ -137,33 +148,37 @@ def read_progress(path: str | os.PathLike) -> dict[str, Any]:
     Raises:
         ValueError: the checkpoint is damaged.
     """
-    return _checkpoint(Path(path) / CHECKPOINT, with_arrays=False)[1]
+    _, progress = _read_checkpoint(Path(path) / CHECKPOINT, with_arrays=False)
+    return progress
 
 
 def latest_returns(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the returns (episodes,) of the latest evaluation in a table of evaluations."""
-    return evaluations["return"][evaluations["step"] == evaluations["step"][-1]]
+    latest_step = evaluations["step"][-1]
+    return evaluations["return"][evaluations["step"] == latest_step]
 
 
 def check_same_run(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
-    """Compare a record with that of a folder.
+    """Check that a folder has the record of a configuration.
 
     Args:
         path: of the folder.
         config: record of a configuration.
-        left_out: names in it that may differ.
+        left_out: fields of it that may differ.
 
     Raises:
         ValueError: the folder is of another run, or of none.
     """
-    for name, there, here in _differences(read_config(path), json.loads(json.dumps(config))):
+    plain_config = json.loads(json.dumps(config))  # as a file has it: lists for tuples
+    for name, folder_value, value in _differences(read_config(path), plain_config):
         if name == LEG_VIEWS:
             raise ValueError(
                 f"{path}: of another version, whose legs saw some blocks as the body has them; write to another folder"
             )
-        if name.partition(".")[0] not in (*left_out, *_FORMER):
+        field, _, _ = name.partition(".")
+        if field not in (*left_out, *_IGNORED_FIELDS):
             raise ValueError(
-                f"{path}: of another run, with {name} {checks.preview(there)}, not {checks.preview(here)}; "
+                f"{path}: of another run, with {name} {checks.preview(folder_value)}, not {checks.preview(value)}; "
                 "write to another folder"
             )
 
@@ -171,12 +186,12 @@ def check_same_run(path: str | os.PathLike, config: Mapping[str, Any], left_out:
 def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> list[dict[str, str]]:
     """Return the lines of a table of a run's folder as text by column; none where there is no table.
 
-    A line that is still being written is left out.
+    A line without an end is left out, as it is still being written.
 
     Args:
         path: of the folder.
         name: of the table.
-        columns: that it must have.
+        columns: that the table must have, if it has a line.
 
     Raises:
         ValueError: a damaged table.
@@ -184,11 +199,13 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
     path = Path(path) / f"{name}.csv"
     try:
         text = path.read_text(encoding="utf-8") if path.exists() else ""
-        header, *others = text[: text.rfind("\n") + 1].splitlines() or [""]
-        found = header.split(",")
-        if others and (missing := [column for column in columns if column not in found]):
+        text_of_complete_lines = text[: text.rfind("\n") + 1]
+        header, *table_lines = text_of_complete_lines.splitlines() or [""]
+        table_columns = header.split(",")
+        missing = [column for column in columns if column not in table_columns]
+        if table_lines and missing:
             raise ValueError(f"expected a column {missing[0]}")
-        return [dict(zip(found, line.split(","), strict=True)) for line in others]
+        return [dict(zip(table_columns, line.split(","), strict=True)) for line in table_lines]
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: no table of a run: {checks.quote(error)}") from None
 
@@ -199,87 +216,99 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     Raises:
         ValueError: a damaged table.
     """
-    found = lines(path, name)
+    table_lines = lines(path, name)
+    columns = table_lines[0].keys() if table_lines else ()
     try:
-        return {column: np.array([line[column] for line in found], float) for column in (found or [{}])[0]}
+        return {column: np.array([line[column] for line in table_lines], float) for column in columns}
     except ValueError as error:
         raise ValueError(f"{Path(path) / name}.csv: no table of a run: {checks.quote(error)}") from None
 
 
 def check_latest_evaluation(path: str | os.PathLike, step: int) -> None:
-    """Check the step of the latest evaluation that a checkpoint tells by the table of evaluations.
+    """Check that the latest evaluation of a checkpoint is that of the table of evaluations.
+
+    Args:
+        path: of the folder.
+        step: environment step of the latest evaluation, by the checkpoint; 0 for none.
 
     Raises:
         ValueError: it is another one, so that evaluations would be left out.
     """
     steps = table(path, "evaluations").get("step", np.zeros(1))
-    if step != steps[-1]:
+    latest_step = steps[-1]
+    if step != latest_step:
         raise ValueError(
-            f"{Path(path) / CHECKPOINT} is damaged: evaluated: expected {steps[-1]:g}, as in evaluations.csv, "
+            f"{Path(path) / CHECKPOINT} is damaged: evaluated: expected {latest_step:g}, as in evaluations.csv, "
             f"got {checks.preview(step)}; delete it to start the run over"
         )
 
 
 def is_begun(path: str | os.PathLike) -> bool:
     """Return whether the run of a folder has begun: it has a checkpoint, or a line in a table."""
-    tables = [Path(path) / f"{name}.csv" for name in TABLES]
-    return (Path(path) / CHECKPOINT).exists() or any(each.exists() and each.stat().st_size for each in tables)
+    if (Path(path) / CHECKPOINT).exists():
+        return True
+    table_paths = [Path(path) / f"{name}.csv" for name in TABLES]
+    return any(table_path.exists() and table_path.stat().st_size for table_path in table_paths)
 
 
 @contextlib.contextmanager
-def _made(path: Path) -> Iterator[None]:
+def _delete_unless_begun(path: Path) -> Iterator[None]:
     """Delete a folder that was missing before, and parents that it needed, if an error comes before its run begins."""
-    missing = [each for each in (path, *path.parents) if not each.exists()]
+    missing_folders = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
         yield
     except Exception:
-        if missing and not is_begun(path):
+        if missing_folders and not is_begun(path):
             shutil.rmtree(path, ignore_errors=True)
-            for parent in missing[1:]:
+            missing_parents = missing_folders[1:]
+            for parent in missing_parents:
                 with contextlib.suppress(OSError):  # another run may be in it by now
                     parent.rmdir()
         raise
 
 
-def _configure(path: Path, config: Mapping[str, Any], growing: Sequence[str]) -> None:
+def _write_config(path: Path, config: Mapping[str, Any], growing: Sequence[str]) -> None:
     """Compare the record with the folder's, and write it if no run has begun or some of its integers have grown."""
-    others = sorted(each.name for each in path.iterdir() if not each.name.startswith("."))
-    if others and CONFIG not in others:
-        raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
+    names = sorted(file.name for file in path.iterdir() if not file.name.startswith("."))
+    if names and CONFIG not in names:
+        raise ValueError(f"{path}: no folder of a run, and not empty: it holds {names[0]}")
     if is_begun(path):
-        there = read_config(path)
-        grown = [name for name in growing if isinstance(there.get(name), int) and there[name] < config[name]]
-        check_same_run(path, config, grown)
-        if not grown:
+        folder_config = read_config(path)
+        larger_fields = [
+            field
+            for field in growing
+            if isinstance(folder_config.get(field), int) and folder_config[field] < config[field]
+        ]
+        check_same_run(path, config, left_out=larger_fields)
+        if not larger_fields:
             return
     with files.writing_json(path / CONFIG) as file:  # maybe over that of a run that was refused
         file.update(config)
 
 
-def _differences(there: Mapping, here: Mapping, above: str = "") -> Iterator[tuple[str, Any, Any]]:
-    for name in dict.fromkeys((*here, *there)):
-        one, other = there.get(name), here.get(name)
-        if isinstance(one, dict) and isinstance(other, dict):
-            yield from _differences(one, other, f"{above}{name}.")
-        elif one != other:
-            yield f"{above}{name}", one, other
+def _differences(folder_config: Mapping, config: Mapping, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield name, value in the folder and other value of fields that differ; names of nested fields have dots."""
+    for field in dict.fromkeys((*config, *folder_config)):
+        folder_value = folder_config.get(field)
+        value = config.get(field)
+        if isinstance(folder_value, dict) and isinstance(value, dict):
+            yield from _differences(folder_value, value, f"{prefix}{field}.")
+        elif folder_value != value:
+            yield f"{prefix}{field}", folder_value, value
 
 
-def _checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np.ndarray] | None, dict[str, Any]]:
+def _read_checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np.ndarray] | None, dict[str, Any]]:
+    """Return the arrays and the progress of a checkpoint; None and an empty progress where there is no file."""
     if not path.exists():
         return None, {}
     try:
-        arrays = archives.read(path, _MAX_BYTES, None if with_arrays else _PROGRESS)
+        arrays = archives.read(path, _MAX_CHECKPOINT_BYTES, None if with_arrays else _PROGRESS)
         progress = json.loads(str(arrays.pop(_PROGRESS)))
         lengths = checks.mapping("tables", checks.mapping(_PROGRESS, progress).get("tables"))
         for name in TABLES:
             checks.integer(f"length of {name}", lengths.get(name, 0), 0)
-        for name in _NUMBERS & progress.keys():
+        for name in _NUMBERS_OF_PROGRESS & progress.keys():
             checks.number(name, progress[name])
         return arrays, progress
     except (OSError, ValueError, KeyError, RecursionError) as error:
         raise ValueError(f"{path} is damaged: {checks.quote(error)}; delete it to start the run over") from None
-
-
-def _cell(value) -> str:
-    return repr(value.item() if isinstance(value, np.generic) else value)

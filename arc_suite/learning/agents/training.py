@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import checks, evaluation, files, seed_ranges
-from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import priors, run_folder
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
 from arc_suite.learning.agents.learner import UNLEARNED_PREFIXES, Damaged, Diverged, Slice
@@ -40,7 +39,7 @@ def train(
         progress: makes a progress bar as `tqdm` does.
         on_metrics: called after each line of training.csv, and after each evaluation, with the environment step and
             metrics by name; the metric of an evaluation is `return`.
-        stop: returns whether to stop; asked as soon as there is a checkpoint, and after each.
+        stop: returns whether to stop; called as soon as there is a checkpoint, and after each.
 
     Returns:
         Whether the run is finished.
@@ -52,105 +51,141 @@ def train(
     """
     if minutes is not None:
         checks.number("minutes", minutes, 0.0)
-    record, definition, setup = configuration.record(), configuration.definition, configuration.setup
+    folder = Path(folder)
+    algorithm = configuration.definition
+    record = configuration.record()
     if configuration.prior is not None:  # the data under an id may change
         record[PRIOR_SHA256] = priors.dataset_digest(configuration.prior)
-    training_seeds = _training_seeds(configuration, Path(folder))
+    training_seeds = _training_seeds(configuration, folder)
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
-    evaluation.check_ends(setup.definition.step_limit)
-    policy_setup = configuration.policy_setup
-    growing = ("steps",) if definition.extends else ()
-    with run_folder.open_run(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
-        state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
-        run_folder.check_latest_evaluation(folder, state["evaluated"])
+    evaluation.check_ends(configuration.setup.definition.step_limit)
+    growing_fields = ("steps",) if algorithm.extends else ()
+    with run_folder.open_run(folder, record, growing_fields) as run_files, contextlib.ExitStack() as stack:
+        progress_values = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
+        run_folder.check_latest_evaluation(folder, progress_values["evaluated"])
         context = configuration.context(folder, threads, run_files.arrays)
-        slices = stack.enter_context(contextlib.closing(definition.learn(definition.hyperparameters, context)))
-        options = {"num_threads": threads, "autoreset_mode": AutoresetMode.DISABLED}
-        vector = configuration.validation.make_vec(evaluation.CURVE_EPISODES, **options)
-        environment = stack.enter_context(contextlib.closing(vector))
-        sizes = dict((environment.task if setup.several else policy_setup.definition).sizes)
-        wall, cpu = time.monotonic() - state["wall"], time.process_time() - state["cpu"]
+        slices = stack.enter_context(contextlib.closing(algorithm.learn(algorithm.hyperparameters, context)))
+        evaluator = _Evaluator(configuration, threads, training_seeds)
+        stack.enter_context(contextlib.closing(evaluator))
+        # Where the clocks stood when the run began, if it had never stopped.
+        wall_start = time.monotonic() - progress_values["wall"]
+        cpu_start = time.process_time() - progress_values["cpu"]
         bar = progress(
-            total=context.steps, initial=state["evaluated"], desc=Path(folder).name, unit="step", unit_scale=True
+            total=context.steps, initial=progress_values["evaluated"], desc=folder.name, unit="step", unit_scale=True
         )
         stack.enter_context(bar)
-        saved = run_files.arrays is not None
-        while state["evaluated"] < context.steps:
-            if (saved and stop()) or (minutes is not None and time.process_time() - cpu > 60.0 * minutes):
+        has_checkpoint = run_files.arrays is not None
+        while progress_values["evaluated"] < context.steps:
+            is_time_up = minutes is not None and time.process_time() - cpu_start > 60.0 * minutes
+            if (has_checkpoint and stop()) or is_time_up:
                 return False
-            try:
-                found = next(slices)
-            except Damaged as error:
-                where = f"{run_files.path / run_folder.CHECKPOINT} is damaged"
-                raise ValueError(f"{where}: {error}; delete it to start the run over") from None
-            _check_finite(found)
-            bar.update(found.step - bar.n)
-            is_evaluated = found.step >= context.next_evaluation(state["evaluated"])
-            if found.metrics is not None:
-                run_files.append("training", {"step": found.step, **found.metrics})
-                on_metrics(found.step, found.metrics)
-                bar.set_postfix_str(_postfix(found.metrics, state), refresh=False)
+            learned_slice = _next_slice(slices, run_files)
+            step = learned_slice.step
+            metrics = learned_slice.metrics
+            _check_finite(learned_slice)
+            bar.update(step - bar.n)
+            is_evaluated = step >= context.next_evaluation(progress_values["evaluated"])
+            if metrics is not None:
+                run_files.append("training", {"step": step, **metrics})
+                on_metrics(step, metrics)
+                bar.set_postfix_str(_postfix(metrics, progress_values), refresh=False)
             if is_evaluated:
-                policy = Network(found.policy, policy_setup, sizes, training_seeds)
-                state["return"] = _evaluate(configuration, environment, run_files, found.step, policy)
-                state["evaluated"] = found.step
-                on_metrics(found.step, {"return": state["return"]})
-            state |= {"wall": time.monotonic() - wall, "cpu": time.process_time() - cpu}  # s of all processes of a run
-            if found.metrics is not None or is_evaluated:
-                seconds = {f"{name}_seconds": round(state[name], 3) for name in ("wall", "cpu")}
-                run_files.append("times", {"step": found.step, **seconds})
-            run_files.save(found.checkpoint, state)
-            saved = True
+                progress_values["return"] = evaluator.evaluate(learned_slice, run_files)
+                progress_values["evaluated"] = step
+                on_metrics(step, {"return": progress_values["return"]})
+            progress_values["wall"] = time.monotonic() - wall_start  # s, of all processes of a run
+            progress_values["cpu"] = time.process_time() - cpu_start  # s, of all processes of a run
+            if metrics is not None or is_evaluated:
+                seconds = {f"{name}_seconds": round(progress_values[name], 3) for name in ("wall", "cpu")}
+                run_files.append("times", {"step": step, **seconds})
+            run_files.save(learned_slice.checkpoint, progress_values)
+            has_checkpoint = True
     return True
 
 
-def _check_finite(found: Slice) -> None:
-    for name, metric in (found.metrics or {}).items():
+def _next_slice(slices: Iterator[Slice], run_files: RunFolder) -> Slice:
+    """Return the next slice of a learner; raise ValueError with the path of a damaged checkpoint."""
+    try:
+        return next(slices)
+    except Damaged as error:
+        path = run_files.path / run_folder.CHECKPOINT
+        raise ValueError(f"{path} is damaged: {error}; delete it to start the run over") from None
+
+
+def _check_finite(learned_slice: Slice) -> None:
+    """Raise Diverged for a metric or an array of the learner that is not finite."""
+    for name, metric in (learned_slice.metrics or {}).items():
         if not np.isfinite(metric):
-            raise Diverged(f"{name} is {metric}", found.step)
-    for name, array in found.checkpoint.items():
+            raise Diverged(f"{name} is {metric}", learned_slice.step)
+    for name, array in learned_slice.checkpoint.items():
         is_learned = array.dtype.kind == "f" and not name.startswith(UNLEARNED_PREFIXES)
         if is_learned and not np.isfinite(array).all():
-            raise Diverged(f"{name} is not finite", found.step)
+            raise Diverged(f"{name} is not finite", learned_slice.step)
 
 
-def _postfix(metrics: Mapping[str, float], state: Mapping[str, Any]) -> str:
-    """The return of the latest evaluation, and the first metrics of the learner."""
-    shown = {"return": state["return"]} if "return" in state else {}
-    shown |= dict(list(metrics.items())[:2])
-    return ", ".join(f"{name} {value:.4g}" for name, value in shown.items())
+def _postfix(metrics: Mapping[str, float], progress_values: Mapping[str, Any]) -> str:
+    """Return the text after a progress bar: the latest evaluation's return, and the learner's first two metrics."""
+    values = {}
+    if "return" in progress_values:
+        values["return"] = progress_values["return"]
+    values |= dict(list(metrics.items())[:2])
+    return ", ".join(f"{name} {value:.4g}" for name, value in values.items())
 
 
 def _training_seeds(configuration: Configuration, folder: Path) -> seed_ranges.Ranges | None:
-    """Seeds of the episodes of a run, of its prior data, and of the policy that it starts from; None if unknown.
+    """Return the seeds of the episodes that a policy learned from; None if they are not known.
 
-    Those of a run that has begun are in its record: the policy may be gone by now.
+    They are those of the run, of its prior data, and of the policy that it starts from. A run that has begun has them
+    in its record: the policy may be gone by now.
     """
     if run_folder.is_begun(folder):
         try:
             return seed_ranges.from_json(run_folder.read_config(folder).get(TRAINING_SEEDS))
         except (TypeError, ValueError):
             raise ValueError(f"{folder}: {TRAINING_SEEDS}: expected pairs of seeds") from None
-    found = [seed_ranges.of_run(configuration.seed)]
+    ranges = [seed_ranges.of_run(configuration.seed)]
     if configuration.prior is not None:
-        found.append(priors.dataset_seeds(configuration.prior))
-    if start := getattr(configuration.hyperparameters, "start", ""):
-        before = network.load(start).training_seeds
-        return None if before is None else tuple(dict.fromkeys((*before, *found)))
-    return tuple(found)
+        ranges.append(priors.dataset_seeds(configuration.prior))
+    start = getattr(configuration.hyperparameters, "start", "")
+    if not start:
+        return tuple(ranges)
+    start_ranges = network.load(start).training_seeds
+    if start_ranges is None:
+        return None
+    return tuple(dict.fromkeys((*start_ranges, *ranges)))
 
 
-def _evaluate(
-    configuration: Configuration, environment: VectorEnv, run_files: RunFolder, step: int, policy: Network
-) -> float:
-    """Evaluate a policy by the protocol, write it and its returns into the folder, and return their mean."""
-    network.save(run_files.path / network.FILE, policy)
-    kept = files.folder(run_files.path / checkpoints.FOLDER / str(step))
-    network.save(kept / network.FILE, policy)
-    episodes = evaluation.episodes_in_batch(environment, policy)
-    for seed, episode in enumerate(episodes):
-        numbers = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
-        run_files.append("evaluations", {"step": step, **numbers})
-    mean = float(np.mean([episode.total for episode in episodes]))
-    checkpoints.save(kept, Agent(configuration.algorithm, step, configuration.seed, mean))
-    return mean
+class _Evaluator:
+    """Evaluates the policies of a run while it learns."""
+
+    def __init__(self, configuration: Configuration, threads: int, training_seeds: seed_ranges.Ranges | None):
+        """Make the environments of evaluation."""
+        self._configuration = configuration
+        self._training_seeds = training_seeds
+        self._environment = configuration.validation.make_vec(
+            evaluation.CURVE_EPISODES, num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
+        )
+        # Tasks of one body are read as the policy has them, without the blocks that networks do not see.
+        task = self._environment.task if configuration.setup.several else configuration.policy_setup.definition
+        self._block_sizes = dict(task.sizes)
+
+    def close(self) -> None:
+        """Close the environments."""
+        self._environment.close()
+
+    def evaluate(self, learned_slice: Slice, run_files: RunFolder) -> float:
+        """Evaluate the policy of a slice, write it and its returns into the folder, and return their mean."""
+        step = learned_slice.step
+        policy_setup = self._configuration.policy_setup
+        policy = Network(learned_slice.policy, policy_setup, self._block_sizes, self._training_seeds)
+        network.save(run_files.path / network.FILE, policy)
+        checkpoint_folder = files.folder(run_files.path / checkpoints.FOLDER / str(step))
+        network.save(checkpoint_folder / network.FILE, policy)
+        episodes = evaluation.episodes_in_batch(self._environment, policy)
+        for seed, episode in enumerate(episodes):
+            numbers = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
+            run_files.append("evaluations", {"step": step, **numbers})
+        mean_return = float(np.mean([episode.total for episode in episodes]))
+        agent = Agent(self._configuration.algorithm, step, self._configuration.seed, mean_return)
+        checkpoints.save(checkpoint_folder, agent)
+        return mean_return
