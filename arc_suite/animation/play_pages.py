@@ -191,12 +191,12 @@ def _describe_leaps(law: Directed) -> dict[str, Any]:
     """
     body = law.body
     legs = Legs.of(body)  # whose joints use all of their ranges in a leap
-    rest_angles = tuple(legs.by_joint(law.rest_angles).tolist())
+    rest_joints = tuple(legs.by_joint(law.rest_angles).tolist())
     forward_leaps = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
     leap_of_name = {}
     for name, candidates, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", forward_leaps, "distance")):
         try:
-            leap = leaps.choose_leap(body, rest_angles, candidates, measure)
+            leap = leaps.choose_leap(body, rest_joints, candidates, measure)
         except ValueError:
             continue  # and the page has no key for it
         leap_of_name[name] = {

@@ -1,4 +1,4 @@
-"""Additive clips over other clips, as engines apply them: is every sole still on the ground?"""
+"""Additive clips over other clips, as engines apply them: loops over which no sole sinks into the ground."""
 
 from collections.abc import Mapping
 
@@ -17,30 +17,30 @@ _CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
 
 
 def find_bases(
-    body: Body, name: str, motions: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose
+    body: Body, name: str, motion_of_clip: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose
 ) -> list[str]:
     """Return the names of the loops over which an additive clip brings no sole deeper than 0.03 standing heights.
 
     Args:
         body: the spec.
         name: of the additive clip.
-        motions: of each clip, by name, with frames of one rate.
-        loops: whether each of them loops.
-        idle: first pose of the idle clip, which engines subtract.
+        motion_of_clip: motions by name, with frames of one rate.
+        loops: whether each clip loops, by name.
+        idle: first pose of the idle clip, which engines subtract from additive clips.
     """
     bases = []
-    for base in motions:
+    for base in motion_of_clip:
         if loops[base] and not is_additive(base):
-            depth = _measure_sole_depth(body, name, base, motions, idle)
+            depth = _measure_sole_depth(body, name, base, motion_of_clip, idle)
             if depth <= _MAX_SOLE_DEPTH:
                 bases.append(base)
     return bases
 
 
-def _measure_sole_depth(body: Body, name: str, base: str, motions: Mapping[str, Motion], idle: Pose) -> float:
+def _measure_sole_depth(body: Body, name: str, base: str, motion_of_clip: Mapping[str, Motion], idle: Pose) -> float:
     """Return how deep a sole is below the ground, standing heights, while an additive clip plays over a base loop."""
-    motion = motions[name]
-    base_motion = motions[base]
+    motion = motion_of_clip[name]
+    base_motion = motion_of_clip[base]
     frames = np.arange(len(motion.joints))
     base_frames_in_loop = len(base_motion.joints) - 1
     in_step = isinstance(clip_of(name), Difference) and isinstance(clip_of(base), WalkLoop)

@@ -102,19 +102,20 @@ def clips(
     names = [registry.bare_name(name) for name in names]
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
-    follows_command = "command" in setup.definition.blocks
-    if policy == "cpg" and preset is None and follows_command and not setup.kind.own_arena:
+    has_command = "command" in setup.definition.blocks
+    has_level_ground = not setup.kind.own_arena  # a task without an arena of its own
+    if policy == "cpg" and preset is None and has_command and has_level_ground:
         preset = _PRESET
     recorder = Recorder(setup, policy, preset)
     left_out: dict[str, str] = {}
     drafts = make_drafts(recorder, names, progress, left_out, straight, plant)
     _report_left_out(setup.body, names, left_out)
     clip_of_name = {name: _sample_clip(name, setup.body, drafts[name], fps) for name in names if name not in left_out}
-    motions = {name: clip.motion for name, clip in clip_of_name.items()}
-    loops = {name: clip.loops for name, clip in clip_of_name.items()}
+    motion_of_clip = {name: clip.motion for name, clip in clip_of_name.items()}
+    clip_loops = {name: clip.loops for name, clip in clip_of_name.items()}
     for name, clip in clip_of_name.items():
         if catalog.is_additive(name):
-            bases = additive.find_bases(setup.body, name, motions, loops, drafts["idle"].start)
+            bases = additive.find_bases(setup.body, name, motion_of_clip, clip_loops, drafts["idle"].start)
             clip_of_name[name] = clip._replace(additive_over=tuple(bases))
     return list(clip_of_name.values())
 

@@ -168,7 +168,7 @@ def _record_gait(recorder: Recorder, name: str) -> GaitRecording:
     if not isinstance(clip, WalkLoop):
         raise ValueError(f"{name} is no loop that is recorded")  # of a difference of another package
     if name == "walk" and not recorder.has_command:
-        return recorder.record_without_command()
+        return recorder.record_free_walk()
     return recorder.record_walk(clip.command, clip.failing, clip.crouch)
 
 

@@ -259,7 +259,7 @@ def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
     return joints
 
 
-class FollowingLegs(NamedTuple):
+class LegMotion(NamedTuple):
     """Legs that follow the torso.
 
     Attributes:
@@ -271,7 +271,7 @@ class FollowingLegs(NamedTuple):
     misses: np.ndarray
 
 
-def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None) -> FollowingLegs:
+def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None) -> LegMotion:
     """Return joint angles that hold feet in place under a torso that moves, and how far feet miss.
 
     Args:
@@ -299,7 +299,7 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
         )
     attitudes = posture.rotation_of(poses[:, 3:])
     misses = (legs.soles(angles)[0] - goals) @ to_root @ attitudes.swapaxes(-1, -2)
-    return FollowingLegs(joints=legs.by_joint(angles), misses=abs(misses))
+    return LegMotion(joints=legs.by_joint(angles), misses=abs(misses))
 
 
 def _follow_with_legs(

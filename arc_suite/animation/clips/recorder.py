@@ -159,7 +159,7 @@ class Recorder:
         phase = (_SETTLE_STEPS * clock.control_timestep / clock.cycle + clock.offset) % 1.0
         return GaitRecording(recording, clock.cycle, phase)
 
-    def record_without_command(self) -> GaitRecording:
+    def record_free_walk(self) -> GaitRecording:
         """Return a recording of the policy in a task without a command.
 
         Raises:
