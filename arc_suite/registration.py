@@ -106,8 +106,9 @@ def register(
     additions_by_kind = {kind: dict(additions) for kind, additions in all_additions.items() if additions}
     for kind, additions in additions_by_kind.items():
         _check_names(kind, additions, module)
-    for name, path in additions_by_kind.get("program", {}).items():
-        _check_program(name, path)
+    for name, module_name in additions_by_kind.get("program", {}).items():
+        if not isinstance(module_name, str):
+            raise ValueError(f"program {name!r}: expected the name of a module, got {checks.preview(module_name)}")
     law_by_preset_class = {
         _preset_class(name, law_class): law_class for name, law_class in additions_by_kind.get("law", {}).items()
     }
@@ -138,11 +139,6 @@ def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) ->
         is_of_same_module = module is not None and MODULE_OF_NAME.get((kind, name)) == module
         if name in table and not (is_same_value or is_of_same_module):  # registering a part again is fine
             raise ValueError(f"{kind} {checks.preview(name)} is already registered; choose another name")
-
-
-def _check_program(name: str, path) -> None:
-    if not isinstance(path, str):
-        raise ValueError(f"program {name!r}: expected the name of a module, got {checks.preview(path)}")
 
 
 def _preset_class(name: str, law_class) -> type:
@@ -245,10 +241,11 @@ def _register_body(
 
 def _check_parameters(body: Body, task: str, parameters: Mapping[str, Any]) -> None:
     """Raise ValueError for a robot's parameters of a task that are incomplete or do not fit the body."""
-    required_names = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
-    missing = sorted(required_names - parameters.keys()) if task == "walk" else []
-    if missing:
-        raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}")
+    if task == "walk":
+        required_names = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
+        missing = sorted(required_names - parameters.keys())
+        if missing:
+            raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}")
     TASKS[task].settings_for(body, parameters)
 
 

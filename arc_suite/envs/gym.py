@@ -94,6 +94,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             checked_limit(limit, environment.task.definition)
         pictures.check_camera(environment.physics.model.ptr, camera_id)
         self.metadata = {"render_modes": modes}  # else shimmy would write a rate into the class's dictionary
+        # From here on the dm_env is `self._env`.
         super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
         self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
         self.render_mode = render_mode
@@ -146,15 +147,15 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             The observation, and an info that is empty or has `privileged`.
 
         Raises:
-            ValueError: not a seed, or an option.
+            ValueError: a seed that is not valid, or an option.
             RuntimeError: another thread is at work in the environment.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("reset")
-        for name in checks.mapping("options", options):
-            raise ValueError(
-                f"unknown option of reset {checks.preview(name)}: one environment has none; vector ones have reset_mask"
-            )
+        option_names = list(checks.mapping("options", options))
+        if option_names:
+            name = checks.preview(option_names[0])
+            raise ValueError(f"unknown option of reset {name}: one environment has none; vector ones have reset_mask")
         observation = self._env.reset(seed).observation
         gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))
         self._episode_is_running = True
@@ -169,7 +170,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
         Returns:
             Observation, reward, terminated, truncated, and an info with floats `reward_<term>` and
-            `progress_<figure>`.
+            `progress_<metric>`.
 
         Raises:
             ValueError: an action of another shape or with NaN; nothing has changed then.
@@ -192,7 +193,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         """Set a command of the task from now on, until the next episode; see `arc_suite.envs.dm.Environment.command`.
 
         Raises:
-            ValueError: no such command, or a value of another size.
+            ValueError: an unknown command, or a value of another size.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("command")
@@ -209,7 +210,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         self._env.change_settings(settings)
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return the state as arrays by name, from which `restore` goes on.
+        """Return the state as arrays by name, for `restore`.
 
         The state of wrappers around this environment, such as `TimeLimit`, is not part of it.
 

@@ -18,6 +18,9 @@ from arc_suite.tasks.readings import layout
 from arc_suite.tasks.scene import CHANGEABLE, Scene
 
 
+_ROUNDING = 1e-6  # control steps, by which a time limit may exceed a number of steps without another one
+
+
 def prepare_task(
     domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None
 ) -> tuple[Task, mujoco.MjModel]:
@@ -73,12 +76,13 @@ def _take_modifier_settings(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _step_limit(time_limit, control_timestep: float) -> float:
-    """Return how many control steps fill a time limit, s: at least 1, and none that is needed only by rounding."""
+    """Return how many control steps fill a time limit, s: at least 1."""
     if time_limit is None:
         return STEPS
     if time_limit == math.inf:
         return math.inf
-    return max(1, math.ceil(parameters.positive("time_limit", time_limit) / control_timestep - 1e-6))
+    steps = parameters.positive("time_limit", time_limit) / control_timestep
+    return max(1, math.ceil(steps - _ROUNDING))
 
 
 # Settings that an environment never changes, and what to do in place of a change.
@@ -127,7 +131,9 @@ def with_changes(task: Task, settings: Mapping[str, Any], text: str) -> Task:
     """
     changes = checks.mapping("settings", json.loads(text))
     registry.check_stored_settings(changes)  # a snapshot may have come from a file
-    for name in changes.keys() & _CONSTANT_SETTINGS.keys():
+    refused_names = sorted(changes.keys() & _CONSTANT_SETTINGS.keys())
+    if refused_names:
+        name = refused_names[0]
         raise ValueError(f"setting {name!r}: environments keep it; {_CONSTANT_SETTINGS[name]}")
     if not changes:
         return task
@@ -145,8 +151,9 @@ def checked_limit(max_episode_steps: Any, task: Task) -> int:
     """Return the control step at which Gymnasium truncates episodes.
 
     Args:
-        max_episode_steps: the checked value.
-        task: whose episodes must last so long, unless the limit is at most the default of Gymnasium's ids.
+        max_episode_steps: any value, which is checked.
+        task: of the environment. Its episodes must last until that step; a limit up to 1000 is valid in any case, as it
+            is the default of Gymnasium's ids.
 
     Raises:
         ValueError: no integer from 1, or a step after the end of the task's episodes.

@@ -21,7 +21,9 @@ from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tasks.contract import STEPS, Task
 
-ATTRIBUTE = "arc_suite"  # name of an observation space's attribute with `to_dict` of the setup of an agent's training
+# Name of an attribute that `envs.sb3.VecEnv` gives its observation space: `Setup.to_dict` of the environments. An agent
+# saves its observation space, and with it the setup of its training.
+ATTRIBUTE = "arc_suite"
 HELD_OUT = 100_000  # first seed of the bodies of a family that serve for validation alone
 
 
@@ -110,9 +112,9 @@ class Setup:
         """
         if isinstance(self.domain, str):
             return self.domain
-        return (
-            registry.importable_name("robot", self.domain.name) if is_robot(self.domain) else body_to_json(self.domain)
-        )
+        if is_robot(self.domain):
+            return registry.importable_name("robot", self.domain.name)
+        return body_to_json(self.domain)
 
     @property
     def name(self) -> str:
@@ -181,8 +183,8 @@ class Setup:
     def validation(self, count: int) -> "Setup":
         """Return the setup for evaluations of a policy while it learns.
 
-        Several bodies of families are replaced by at most `count` bodies of these families that training never has.
-        Of several other bodies the first `count` remain.
+        Several bodies of families are replaced by at most `count` bodies of these families from the seed `HELD_OUT` on,
+        which training does not have. Of several other bodies the first `count` remain.
         """
         if not isinstance(self.domain, str):
             return self
@@ -250,9 +252,10 @@ class Setup:
             ValueError: a field is missing, has another type, is an unknown name, or a name whose module has not been
                 imported.
         """
-        for name, kind in (("robot", str), ("task", str), ("task_kwargs", dict)):
-            if not isinstance(fields.get(name), kind):
-                raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.preview(fields.get(name))}")
+        for name, field_type in (("robot", str), ("task", str), ("task_kwargs", dict)):
+            value = fields.get(name)
+            if not isinstance(value, field_type):
+                raise ValueError(f"expected {name} to be a {field_type.__name__}, got {checks.preview(value)}")
         robot = registry.check_stored_robot(fields["robot"])
         task = registry.refuse_import("task", fields["task"])
         settings = fields["task_kwargs"]
