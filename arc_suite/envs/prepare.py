@@ -17,7 +17,6 @@ from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
 from arc_suite.tasks.scene import CHANGEABLE, Scene
 
-
 _ROUNDING = 1e-6  # control steps, by which a time limit may exceed a number of steps without another one
 
 
