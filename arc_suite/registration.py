@@ -200,11 +200,7 @@ def _modifier_settings(modifier) -> Mapping[str, Any]:
 
 
 def _register_body(
-    body: Body,
-    parameters: Mapping[str, Mapping[str, Any]],
-    presets: Mapping[str, Any] | None,
-    visuals: Visuals | None,
-    laws: Mapping[type, Any],
+    body: Body, parameters: Mapping[str, Any], presets: Any, visuals: Visuals | None, laws: Mapping[type, Any]
 ) -> None:
     """Check a robot and all that belongs to it, then put it into the tables.
 

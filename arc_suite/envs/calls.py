@@ -23,6 +23,8 @@ class KnownAttributes:
     it may have new attributes.
     """
 
+    _sealed_by: str
+
     # Attributes' names in pickles of earlier versions -> their present names.
     _FORMER_NAMES: ClassVar[Mapping[str, str]] = {"_made": "_sealed_by"}
 

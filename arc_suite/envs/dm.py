@@ -245,7 +245,8 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         visualize_reward: whether rendered pictures show the reward as a color.
     """
 
-    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {  # in pickles of earlier versions
+    _FORMER_NAMES = {  # in pickles of earlier versions
+        **KnownAttributes._FORMER_NAMES,
         "_next": "_next_task",
         "_changes": "_present_changes",
         "_starting": "_is_starting",

@@ -47,7 +47,8 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
     _np_random_seed = -1  # until a seed is given: Gymnasium's sign for a stream of unknown seed
 
-    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {
+    _FORMER_NAMES = {  # in pickles of earlier versions
+        **KnownAttributes._FORMER_NAMES,
         "_tells": "_has_privileged_info",
         "_stepping": "_episode_is_running",
     }

@@ -45,7 +45,7 @@ def with_pixels(environment: gymnasium.Env | gymnasium.vector.VectorEnv):
         picture = environment.render()  # a tuple of pictures from a vector environment
         return {**_to_dict(observation), key: np.stack(picture) if is_vector else picture}
 
-    if not is_vector:
+    if not isinstance(environment, gymnasium.vector.VectorEnv):
         space = _space_with_picture(environment, environment.observation_space, key)
         return TransformObservation(environment, add_picture, space)
     single_space = _space_with_picture(environment, environment.single_observation_space, key)

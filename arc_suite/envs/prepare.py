@@ -42,7 +42,7 @@ def prepare_task(
     chosen_arena = task_settings.pop("arena", None)
     if chosen_arena is not None and task_class.own_arena:
         raise ValueError(f"arena: task {task_class.name} has a ground of its own, expected none")
-    modifier_settings = task_class.modifiers | _take_modifier_settings(task_settings)
+    modifier_settings = {**task_class.modifiers, **_take_modifier_settings(task_settings)}
     settings = task_class.settings_for(body, task_settings)
     arena = task_class.arena(body, settings) if chosen_arena is None else registry.arena_of(chosen_arena, body)
 

@@ -60,7 +60,7 @@ class State(NamedTuple):
     simulations: Mapping[str, np.ndarray]
     memory: Any
     streams: list
-    randoms: list[tuple]
+    randoms: list[Any]
     environment_arrays: Mapping[str, np.ndarray]
     settings: tuple[list[str], list[str]]
 
@@ -77,8 +77,8 @@ def to_arrays(state: State) -> dict[str, np.ndarray]:
     random_parts = zip(*(random[1:] for random in state.randoms), strict=True)  # without the generator's name
     for (name, random_array), values in zip(_RANDOM_ARRAYS.items(), random_parts, strict=True):
         arrays[name] = np.array(values, random_array.dtype)
-    present, upcoming = state.settings
-    if any(text != "{}" for text in [*present, *upcoming]):
+    present_texts, next_texts = state.settings
+    if any(text != "{}" for text in [*present_texts, *next_texts]):
         for name, texts in zip(_SETTINGS_ARRAYS, state.settings, strict=True):
             arrays[name] = np.array(texts)
     return arrays
@@ -116,11 +116,13 @@ def from_arrays(
         streams = []
         for index, opened_task in enumerate(opened_tasks):
             streams.append(_read_stream(opened_task.first(), _with_prefix(f"stream/{index}/", arrays)))
-        texts = tuple(_read_texts(arrays.get(name), len(opened_tasks)) for name in _SETTINGS_ARRAYS)
-        tasks = [_change_tasks(opened_tasks, settings, texts_of_episodes) for texts_of_episodes in texts]
+        present_texts, next_texts = (_read_texts(arrays.get(name), len(opened_tasks)) for name in _SETTINGS_ARRAYS)
+        present_tasks = _change_tasks(opened_tasks, settings, present_texts)
+        next_tasks = _change_tasks(opened_tasks, settings, next_texts)
     except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"snapshot: of another task or number of environments: {checks.quote(error)}") from None
-    return State(simulations, memory, streams, randoms, environment_arrays, texts), tasks
+    state = State(simulations, memory, streams, randoms, environment_arrays, (present_texts, next_texts))
+    return state, [present_tasks, next_tasks]
 
 
 def number(value: np.ndarray, like) -> Any:

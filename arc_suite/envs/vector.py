@@ -105,7 +105,8 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         task: the task of the environments; its `split` returns an observation's blocks by name.
     """
 
-    _FORMER_NAMES = KnownAttributes._FORMER_NAMES | {  # in pickles of earlier versions
+    _FORMER_NAMES = {  # in pickles of earlier versions
+        **KnownAttributes._FORMER_NAMES,
         "_tells": "_has_privileged_info",
         "_opened": "_opened_tasks",
         "_next": "_next_tasks",

@@ -15,13 +15,13 @@ from arc_suite.robots.spec import Body, SpecError
 
 MAX_DEPTH = 200  # of elements within elements
 _MAX_NUMBER = 1e15  # above what any robot has, below what overflows in products
-_MAX_SOLVER_ITERATIONS = 10_000
+_MAX_INTEGER = 10_000  # of iterations of solvers, and of a hull's vertices
 _MAX_QUOTE = 40  # characters of a name or value in an error
 
 # What an attribute may contain: one of these, or a tuple of the valid texts. Errors contain them.
 _NAME = "a name"
 _NUMBERS = "numbers"
-_INTEGER = f"an integer up to {_MAX_SOLVER_ITERATIONS}"
+_INTEGER = f"an integer up to {_MAX_INTEGER}"
 _SWITCH = ("enable", "disable")
 _BOOLEAN = ("true", "false")
 
@@ -195,8 +195,8 @@ def _is_valid(value: str, content: str | tuple[str, ...]) -> bool:
     if content == _NAME:
         return _VALID_NAME.fullmatch(value) is not None
     if content == _INTEGER:
-        is_short_integer = value.isascii() and value.isdecimal() and len(value) <= 5
-        return is_short_integer and int(value) <= _MAX_SOLVER_ITERATIONS
+        has_valid_digits = value.isascii() and value.isdecimal() and len(value) <= len(str(_MAX_INTEGER))
+        return has_valid_digits and int(value) <= _MAX_INTEGER
     return _are_numbers(value)
 
 
