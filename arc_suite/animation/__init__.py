@@ -2,12 +2,12 @@
 
 import importlib
 
-_HOMES = {"animate": "arc_suite.animation.clips", "show": "arc_suite.animation.notebook"}
+_MODULE_OF_NAME = {"animate": "arc_suite.animation.clips", "show": "arc_suite.animation.notebook"}
 
 __all__ = ["animate", "show"]  # noqa: F822  # made by __getattr__
 
 
 def __getattr__(name):
-    if name in _HOMES:  # not before: programs do not need all that these import
-        return getattr(importlib.import_module(_HOMES[name]), name)
+    if name in _MODULE_OF_NAME:  # imported here, as programs do not need all that these import
+        return getattr(importlib.import_module(_MODULE_OF_NAME[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -76,7 +76,7 @@ def _walk(label: str, track: Track) -> dict[str, Any]:
     schedule = None
     has_gait = track.parameters is not None
     if has_gait:
-        stance = track.stance.astype(int).tolist()
+        stance = track.stance.astype(int).tolist()  # (steps, legs) 1 or 0
         schedule = track.schedule.astype(int).tolist()
     weighted_terms = {name: track.weights[name] * values for name, values in track.terms.items()}
     return body_drawing(track.body) | {

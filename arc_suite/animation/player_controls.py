@@ -22,7 +22,7 @@ def is_directed(task: Task) -> bool:
 def pose_room(body: Body) -> np.ndarray:
     """Return how far each number of a pose can go, (6, 2) in whole hundredths, with feet that may slide."""
     hundredths = 100.0 * posture.measure_room(body, planted=False)
-    return np.trunc(hundredths.round(4)) / 100.0
+    return np.trunc(hundredths.round(4)) / 100.0  # rounded first, as 28.99999999 stands for 29
 
 
 def gaits_by_name(task: Task) -> dict[str, list[float]]:

@@ -1,7 +1,6 @@
 """Pictures of tracks: foot contacts against the schedule, reward by term, speed against target, path of the torso.
 
-Each function takes labeled tracks, one or two to compare, and returns a figure. Needs matplotlib
-(extra `animate`).
+Each function takes labeled tracks, one or two to compare, and returns a figure. Needs matplotlib (extra `animate`).
 """
 
 import functools
@@ -36,7 +35,12 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "savefig.dpi": 150,
 }
-_WIDTH = 9.5  # inches
+_WIDTH = 9.5  # inches, of a figure
+_GAIT_HEIGHT_PER_LEG = 0.36  # inches
+_GAIT_MARGIN = 0.75  # inches, above and below the legs of a track
+_REWARD_HEIGHT = 2.75  # inches, of a track
+_SPEED_HEIGHT = 3.5  # inches
+_LEGEND_HEIGHT = 0.55  # inches
 _SMALL_FONT = 8.5  # points
 _DASHES = (0, (5, 3))  # line style of a target
 _LEGEND_BELOW: dict[str, Any] = {"loc": "outside lower center", "handlelength": 1.4, "borderpad": 0.2}
@@ -57,9 +61,10 @@ _ARROWS: dict[str, Any] = {
     "headaxislength": 5,
 }
 _GAIT_WINDOW = 4.0  # s of foot contacts
-_SCHEDULE_BAR = 0.84  # height, in rows of a leg
+_SCHEDULE_BAR = 0.84  # height of a bar, of the distance between two legs
 _STANCE_BAR = 0.4
-_ARROW_DISTANCE = 0.08  # between two arrows on a path, of the picture's width
+_ARROW_DISTANCE = 0.08  # between two arrows on a path, of the width of the axes
+_ARROWS_IN_WIDTH = 25.0  # lengths of an arrow in the width of the axes
 
 
 def _in_our_style(draw):
@@ -80,7 +85,7 @@ def _in_our_style(draw):
 def gait(tracks: Mapping[str, Track]) -> Figure:
     """Draw the gait: bars of stance over time, by leg, on the prescribed schedule; four seconds amid the track."""
     most_legs = max(len(track.legs) for track in tracks.values())
-    figure, axes = _stack_axes(tracks, 0.36 * most_legs + 0.75)
+    figure, axes = _stack_axes(tracks, _GAIT_HEIGHT_PER_LEG * most_legs + _GAIT_MARGIN)
     for (label, track), axis in zip(tracks.items(), axes, strict=True):
         _draw_stances(axis, track)
         _write_gait_metrics(axis, track)
@@ -109,13 +114,16 @@ def _draw_stances(axis, track: Track) -> None:
     stance = track.stance[window]
     schedule = track.schedule[window]
     for leg in range(len(track.legs)):
-        for mask, height, color in (
-            (schedule[:, leg], _SCHEDULE_BAR, PALE),
-            (stance[:, leg] & schedule[:, leg], _STANCE_BAR, BLUE),
-            (stance[:, leg] & ~schedule[:, leg], _STANCE_BAR, VERMILION),
-        ):
-            spans = []
-            for first, end in _find_runs(mask):
+        leg_stance = stance[:, leg]
+        leg_schedule = schedule[:, leg]
+        bars = (  # when they show, their height and their color
+            (leg_schedule, _SCHEDULE_BAR, PALE),
+            (leg_stance & leg_schedule, _STANCE_BAR, BLUE),
+            (leg_stance & ~leg_schedule, _STANCE_BAR, VERMILION),
+        )
+        for is_shown, height, color in bars:
+            spans = []  # pairs of a start and a duration, s
+            for first, end in _find_runs(is_shown):
                 spans.append((start + track.time_step * first, track.time_step * (end - first)))
             axis.broken_barh(spans, (leg - height / 2, height), color=color, linewidth=0)
     axis.set_xlim(start, start + track.time_step * len(stance))
@@ -127,7 +135,7 @@ def _write_gait_metrics(axis, track: Track) -> None:
     delays = []
     for error in metrics.phase_error(track):
         delays.append("–" if np.isnan(error) else f"{error:+z.2f} cycles")
-    columns = (
+    columns = (  # x, heading, and a text for each leg
         (1.06, "compliance", [f"{100 * share:.0f} %" for share in metrics.gait_compliance(track)]),
         (
             1.195,
@@ -136,17 +144,18 @@ def _write_gait_metrics(axis, track: Track) -> None:
         ),
         (1.315, "late by", delays),
     )
-    font = {"transform": axis.get_yaxis_transform(), "ha": "center", "fontsize": _SMALL_FONT}
+    # x is in widths of the axes, y counts legs.
+    placement = {"transform": axis.get_yaxis_transform(), "ha": "center", "fontsize": _SMALL_FONT}
     for x, heading, texts in columns:
-        axis.text(x, -0.6, heading, va="bottom", color=FAINT, linespacing=1.25, **font)
+        axis.text(x, -0.6, heading, va="bottom", color=FAINT, linespacing=1.25, **placement)
         for leg, text in enumerate(texts):
-            axis.text(x, leg, text, va="center", **font)
+            axis.text(x, leg, text, va="center", **placement)
 
 
 @_in_our_style
 def reward(tracks: Mapping[str, Track]) -> Figure:
     """Draw the reward's weighted terms over time, gains stacked upwards and costs downwards, as means over a cycle."""
-    figure, axes = _stack_axes(tracks, 2.75, sharey=True)
+    figure, axes = _stack_axes(tracks, _REWARD_HEIGHT, sharey=True)
     for track, axis in zip(tracks.values(), axes, strict=True):
         term_handles = _draw_terms(axis, track)
         reward_label = f"{track.rewards.mean():+.3f}  reward"
@@ -183,7 +192,7 @@ def _draw_terms(axis, track: Track) -> list:
 @_in_our_style
 def speed(tracks: Mapping[str, Track]) -> Figure:
     """Draw forward speed over time against the target: its mean over a gait cycle, and the range of the steps in it."""
-    figure = Figure(figsize=(_WIDTH, 3.5), layout="constrained")
+    figure = Figure(figsize=(_WIDTH, _SPEED_HEIGHT), layout="constrained")
     axis = figure.subplots()
     target = _first_target_velocity(tracks)
     if not np.isnan(target):
@@ -210,9 +219,11 @@ def path(tracks: Mapping[str, Track]) -> Figure:
     points = np.concatenate([track.positions[:, :2] for track in tracks.values()])
     left, bottom = points.min(axis=0)
     right, top = points.max(axis=0)
-    width = 1.1 * max(right - left, 1.5 * (top - bottom), 1.0)  # m
-    height = max(1.3 * (top - bottom), 0.16 * width)  # m
-    figure = Figure(figsize=(_WIDTH, 0.92 * _WIDTH * height / width + 1.5), layout="constrained")
+    width = 1.1 * max(right - left, 1.5 * (top - bottom), 1.0)  # m, of the axes: a margin around the paths
+    height = max(1.3 * (top - bottom), 0.16 * width)  # m, of the axes
+    axes_width = 0.92 * _WIDTH  # inches
+    figure_height = axes_width * height / width + 1.5  # inches, with title and legend
+    figure = Figure(figsize=(_WIDTH, figure_height), layout="constrained")
     axis = figure.subplots()
     target_is_along_x = not np.isnan(_first_target_velocity(tracks))
     if target_is_along_x:
@@ -224,7 +235,7 @@ def path(tracks: Mapping[str, Track]) -> Figure:
         path_lengths = np.concatenate([[0.0], np.hypot(np.diff(x), np.diff(y)).cumsum()])
         arrows = np.flatnonzero(np.diff(path_lengths // (_ARROW_DISTANCE * width))) + 1
         forward_x, forward_y = metrics.forward_axes(track)[arrows, :2].T
-        axis.quiver(x[arrows], y[arrows], forward_x, forward_y, color=color, scale=25.0 / width, **_ARROWS)
+        axis.quiver(x[arrows], y[arrows], forward_x, forward_y, color=color, scale=_ARROWS_IN_WIDTH / width, **_ARROWS)
     start_x, start_y = points[0]
     axis.plot(start_x, start_y, "o", color=INK, markersize=5, zorder=5)
     axis.set_xlim(0.5 * (left + right - width), 0.5 * (left + right + width))
@@ -250,7 +261,7 @@ def _stack_axes(tracks: Mapping[str, Track], height: float, **shared):
         height: of the axes of a track, inches.
         shared: see `Figure.subplots`.
     """
-    figure = Figure(figsize=(_WIDTH, height * len(tracks) + 0.55), layout="constrained")
+    figure = Figure(figsize=(_WIDTH, height * len(tracks) + _LEGEND_HEIGHT), layout="constrained")
     axes = figure.subplots(len(tracks), squeeze=False, **shared)
     return figure, axes[:, 0]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import loops, planting, root_motion
+from arc_suite.animation.clips import planting, root_motion
 from arc_suite.animation.clips.catalog import (
     REST,
     SPEED_RATIOS,
@@ -22,6 +22,15 @@ from arc_suite.animation.clips.catalog import (
     recordings_for_clips,
 )
 from arc_suite.animation.clips.foot_contacts import MIN_RISE, TOUCH_DOWN, FootContact, find_foot_contacts, sole_heights
+from arc_suite.animation.clips.loops import (
+    GOOD_SEAM,
+    MAX_SEAM,
+    choose_cycles,
+    choose_start,
+    cut_loop,
+    find_closings,
+    straighten_loop,
+)
 from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording, TurnRecording
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
@@ -41,8 +50,8 @@ class Draft(NamedTuple):
 
     Attributes:
         motion: of the body.
-        cycles: of the gait; 0 without a gait.
-        cycle: s.
+        cycles: gait cycles that it holds; 0 without a gait.
+        cycle: duration of a gait cycle, s; NaN without a gait.
         loops: whether its last pose is its first one.
         stands: whether all feet stay on the ground, so that there are no foot contact events.
     """
@@ -94,7 +103,7 @@ def make_drafts(
     straight: bool = False,
     plant: bool = False,
 ) -> dict[str, Draft]:
-    """Record what clips need and return their drafts by name, and those of clips that these connect to.
+    """Record what clips need, and return their drafts by name, with those of the clips that they connect to.
 
     Args:
         recorder: of the body.
@@ -180,9 +189,9 @@ def _cut_loops(body: Body, gaits: Mapping[str, GaitRecording], left_out) -> dict
     with_clock = {name: gait for name, gait in gaits.items() if gait.phase is not None}
     drafts = {}
     if with_clock:
-        drafts = _cut_loops_in_step(body, with_clock, _MAX_CYCLES_IN_STEP, loops.MAX_SEAM, left_out)
+        drafts = _cut_loops_in_step(body, with_clock, _MAX_CYCLES_IN_STEP, MAX_SEAM, left_out)
     for name in gaits.keys() - with_clock.keys():
-        drafts |= _cut_loops_in_step(body, {name: gaits[name]}, _MAX_CYCLES_ALONE, loops.GOOD_SEAM, left_out)
+        drafts |= _cut_loops_in_step(body, {name: gaits[name]}, _MAX_CYCLES_ALONE, GOOD_SEAM, left_out)
     return drafts
 
 
@@ -195,23 +204,23 @@ def _cut_loops_in_step(
         body: the spec.
         gaits: recordings by name.
         most_cycles: in a loop.
-        good_seam: rad; see `loops.choose_cycles`.
+        good_seam: rad; see `choose_cycles`.
         left_out: takes the reasons why loops do not close.
     """
-    closings = {name: loops.find_closings(gait.recording, gait.cycle, most_cycles) for name, gait in gaits.items()}
-    cycles = loops.choose_cycles(closings, good_seam)
+    closings = {name: find_closings(gait.recording, gait.cycle, most_cycles) for name, gait in gaits.items()}
+    cycles = choose_cycles(closings, good_seam)
     drafts = {}
     for name, gait in gaits.items():
         closing = closings[name][cycles]
-        if closing.seam > loops.MAX_SEAM:
-            max_degrees = np.degrees(loops.MAX_SEAM)
+        if closing.seam > MAX_SEAM:
+            max_degrees = np.degrees(MAX_SEAM)
             degrees = np.degrees(closing.seam)
             left_out[name] = (
                 f"the pose does not return within {max_degrees:.0f} degrees: {degrees:.1f} after {cycles} cycles"
             )
             continue
-        first = loops.choose_start(gait.recording, closing.samples)
-        motion = loops.cut_loop(gait.recording, first, closing.samples)
+        first = choose_start(gait.recording, closing.samples)
+        motion = cut_loop(gait.recording, first, closing.samples)
         draft = Draft(motion, cycles, gait.cycle).put_on_ground(body)
         has_clock = gait.phase is not None
         begin = gait.samples_to_touchdown(first) if has_clock else _find_first_touchdown(body, draft)
@@ -236,7 +245,7 @@ def _straighten(name: str, motion: Motion) -> Motion:
     forward, left, turning = command
     if turning:
         return motion
-    return loops.straighten_loop(motion, course=math.atan2(left, forward))
+    return straighten_loop(motion, course=math.atan2(left, forward))
 
 
 def _refusal_reason(name: str, draft: Draft, velocity_units: np.ndarray | None, walk: Draft | None) -> str:
@@ -244,6 +253,7 @@ def _refusal_reason(name: str, draft: Draft, velocity_units: np.ndarray | None, 
     clip = clip_of(name)
     if velocity_units is not None and isinstance(clip, WalkLoop):
         command = np.array(clip.command)
+        # The velocity in the direction of the command, as a share of the command.
         share = command @ (draft.motion.twist / velocity_units) / (command @ command)
         if share < _MIN_SPEED_SHARE:
             percent = round(100.0 * share)
@@ -337,7 +347,7 @@ def _play(body: Body, clip: Acted, rest: Pose) -> Draft:
 def _act(body: Body, clip: Acted, rest: Pose, idle: Pose) -> Draft:
     """Return a motion from the pose at rest, which meets idle; see `Acted`."""
     draft = _play(body, clip, rest)
-    motion = draft.motion.lower(rest.position[2] - idle.position[2])
+    motion = draft.motion.lower(rest.position[2] - idle.position[2])  # as idle was, for its soles to be on the ground
     for end in clip.ends:
         motion = motion.end_with(idle, end, samples=len(motion.joints) // 3)
     return draft._replace(motion=motion)
@@ -372,7 +382,7 @@ def cut_passage(body: Body, clip: Passage, transition: TransitionRecording) -> D
     samples = clip.cycles * cycle_samples
     if clip.starts:
         first = transition.start
-        samples -= transition.delay  # it ends at a scheduled touchdown
+        samples -= transition.delay  # so that it ends at a scheduled touchdown
     else:
         first = transition.stop
     motion = root_motion.follow_mean_path(gait.recording, first, samples, window=cycle_samples)
