@@ -141,14 +141,14 @@ def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy
     define_preset()
 
 
-def bodies_from_flags(near: Iterable[str] = ("all",)) -> dict[str, Body]:
+def bodies_from_flags(suggestions: Iterable[str] = ("all",)) -> dict[str, Body]:
     """Return bodies by name: the body of `custom_body`, or those that --robot names, which may be "all".
 
     For names see `registry.bodies_of`. Warnings name the flaws of a body of --spec or --length, such as feet in the
     floor, as `arc-suite check` does.
 
     Args:
-        near: other values of --robot that an unknown robot may mean.
+        suggestions: other values of --robot that an unknown robot may mean.
 
     Raises:
         ValueError: as `custom_body`, or an unknown robot, or both a robot and a custom body.
@@ -165,7 +165,7 @@ def bodies_from_flags(near: Iterable[str] = ("all",)) -> dict[str, Body]:
         return {body.name: body}
     if FLAGS.robot == "all":
         return dict(ROBOTS)
-    bodies = registry.bodies_of(FLAGS.robot, near)
+    bodies = registry.bodies_of(FLAGS.robot, suggestions)
     bodies_by_name = {body.name: body for body in bodies}
     if len(bodies_by_name) < len(bodies):
         raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected a name for each body, got two of one name")
@@ -179,7 +179,7 @@ def only_body() -> Body:
         ValueError: as `bodies_from_flags`, or several bodies.
         OSError: as `bodies_from_flags`.
     """
-    return _only(bodies_from_flags(near=()))
+    return _only(bodies_from_flags(suggestions=()))
 
 
 def _only(values_by_name: dict[str, Any]) -> Any:
@@ -194,7 +194,7 @@ def _only(values_by_name: dict[str, Any]) -> Any:
     return value
 
 
-def setups_from_flags(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
+def setups_from_flags(stored: Setup | None = None, suggestions: Iterable[str] = ("all",)) -> dict[str, Setup]:
     """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
 
     Where the flags leave something open, it comes from the setup in which a policy was trained, or tracks were stored:
@@ -203,14 +203,14 @@ def setups_from_flags(stored: Setup | None = None, near: Iterable[str] = ("all",
 
     Args:
         stored: the setup of tracks; None for the setup of --policy.
-        near: see `bodies_from_flags`.
+        suggestions: see `bodies_from_flags`.
 
     Raises:
         ValueError: as `bodies_from_flags`, `task_from_flags` and `policies.setup_of`.
         OSError: as `bodies_from_flags` and `policies.setup_of`.
     """
     # First: these import the modules that flags name.
-    bodies = bodies_from_flags(near)
+    bodies = bodies_from_flags(suggestions)
     task, settings = task_from_flags()
     trained = policy_setup() if stored is None else None
     origin = trained if stored is None else stored  # of what the flags leave open
@@ -282,7 +282,7 @@ def only_setup() -> Setup:
         ValueError: as `setups_from_flags`, or several bodies.
         OSError: as `setups_from_flags`.
     """
-    return _only(setups_from_flags(near=()))
+    return _only(setups_from_flags(suggestions=()))
 
 
 def task_from_flags() -> tuple[str, dict[str, Any]]:

@@ -107,7 +107,7 @@ def write_views(
     with contextlib.ExitStack() as stack:
         footages = []
         for name, walker_policy in policies.items():
-            act = alone(walker_policy, FLAGS.seed)
+            act = alone(walker_policy, FLAGS.seed)  # a function of a `TimeStep`
             footage = films.Footage(name, environments[name], act, camera, size, quality)
             stack.callback(footage.close)
             footages.append(footage)

@@ -124,7 +124,7 @@ def draw_pictures(elites: Iterable[Elite], cells: Map, trial: Trial) -> dict[Cel
     pictures = {}
     for elite in elites:
         environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
-        act = policies.alone(policy, trial.first.seeds[0])
+        act = policies.alone(policy, trial.first.seeds[0])  # a function of a `TimeStep`
         size = (_PICTURE_WIDTH, _PICTURE_HEIGHT)
         footage = films.Footage(elite.label, environment, act, "portrait", size)
         for _ in range(_PICTURE_STEP):
@@ -140,7 +140,7 @@ def write_picture(path: Path, pictures: Mapping[Cell, np.ndarray]) -> None:
     empty_picture = np.zeros((_PICTURE_HEIGHT, _PICTURE_WIDTH, 3), np.uint8)
     all_pictures = [pictures.get(cell, empty_picture) for cell in layout.cells]
     with files.writing(path) as temporary:
-        films.write_png(temporary, [films.grid(all_pictures, layout.columns)], 0.0)
+        films.write_png(temporary, [films.grid(all_pictures, layout.columns)], seconds=0.0)
 
 
 def write_walks(folder: Path, elites: Iterable[Elite], cells: Map, trial: Trial) -> None:

@@ -92,8 +92,12 @@ def add_task(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
         "task": gui.add_dropdown("Task", tasks, initial_value=sketch.task),
         "ground": gui.add_dropdown("Ground", grounds, initial_value=sketch.ground),
         "gait": gui.add_dropdown("Gait", gait_names, initial_value=sketch.gait),
-        "speed": gui.add_slider("Speed", 0.2, 2.0, 0.05, sketch.speed, hint="Multiple of the body's own"),
-        "kicks": gui.add_slider("Kicks", 0.0, max_kicks, 0.1, sketch.kicks, hint="At most, sqrt(g h)"),
+        "speed": gui.add_slider(
+            "Speed", min=0.2, max=2.0, step=0.05, initial_value=sketch.speed, hint="Multiple of the body's own"
+        ),
+        "kicks": gui.add_slider(
+            "Kicks", min=0.0, max=max_kicks, step=0.1, initial_value=sketch.kicks, hint="At most, sqrt(g h)"
+        ),
         "settings": gui.add_text("Settings", sketch.settings, hint="Of the task, as a JSON object"),
         "policy": gui.add_dropdown("Policy", policies, initial_value=sketch.policy),
         "preset": gui.add_dropdown("Preset", presets, initial_value=sketch.preset),
@@ -105,7 +109,7 @@ def add_velocity(gui: viser.GuiApi, state: PageState) -> dict[str, Any]:
     widgets: dict[str, Any] = {}
     widgets["by_hand"] = gui.add_checkbox("By hand", state.command.by_hand, hint="Else the task's own command")
     for name in VELOCITY:
-        widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.05, state.value(name))
+        widgets[name] = gui.add_slider(_label(name), min=-1.0, max=1.0, step=0.05, initial_value=state.value(name))
     return widgets
 
 
@@ -115,11 +119,21 @@ def add_pose(gui: viser.GuiApi) -> dict[str, Any]:
     gait_names = [player_controls.OWN_GAIT]  # the page adds those that suit the body
     widgets: dict[str, Any] = {
         "gait_now": gui.add_dropdown("Gait now", gait_names, initial_value=player_controls.OWN_GAIT),
-        "tempo": gui.add_slider("Frequency", min_tempo, max_tempo, 0.05, 1.0, hint="Multiple of the gait's own"),
+        "tempo": gui.add_slider(
+            "Frequency", min=min_tempo, max=max_tempo, step=0.05, initial_value=1.0, hint="Multiple of the gait's own"
+        ),
     }
     for name in POSE:
-        widgets[name] = gui.add_slider(_label(name), -1.0, 1.0, 0.01, 0.0, hint="Standing heights or rad")
+        widgets[name] = gui.add_slider(
+            _label(name), min=-1.0, max=1.0, step=0.01, initial_value=0.0, hint="Standing heights or rad"
+        )
     return widgets
+
+
+def add_length_factor(gui: viser.GuiApi) -> viser.GuiSliderHandle:
+    """Add a slider of the factor of a length, without a label and hidden."""
+    lowest, highest = LENGTH_FACTORS
+    return gui.add_slider("", min=lowest, max=highest, step=LENGTH_FACTOR_STEP, initial_value=1.0, visible=False)
 
 
 def list_with(choice: str, names: Iterable[str]) -> list[str]:

@@ -46,10 +46,7 @@ class LinkWidgets:
             self._leg = gui.add_dropdown("Legs to change", [_ALL_LEGS], initial_value=_ALL_LEGS)
             self._symmetric = gui.add_checkbox("Symmetric", True, hint="The leg across changes, too")
             self._dragging = gui.add_checkbox("Drag joints", False, hint="Time stands still; drag the balls")
-            self._sliders = [
-                gui.add_slider("", *layout.LENGTH_FACTORS, layout.LENGTH_FACTOR_STEP, 1.0, visible=False)
-                for _ in range(layout.MAX_LINK_SLIDERS)
-            ]
+            self._sliders = [layout.add_length_factor(gui) for _ in range(layout.MAX_LINK_SLIDERS)]
         self._leg.on_update(lambda event: self._show_state())
         self._dragging.on_update(lambda event: self._switch_dragging())
         for index, slider in enumerate(self._sliders):

@@ -82,6 +82,7 @@ def make_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
     environment = load_environment(creature.setup)
     with contextlib.closing(environment):
         act = _policy_under_commands(environment, creature.sketch, commands)
+        # Tracks are recorded of policies for vectors of environments; this vector has one.
         policy = Individuals(lambda: act, num_envs=1, joints=len(body.joint_names))
         track = style.record(environment, policy, seed=0, max_steps=_PAGE_STEPS)
     return pages.page({body.name: track}).encode()

@@ -97,7 +97,8 @@ def _source_body(source: str, legs: int, links: int, layout: str | None, seed: i
         return families.sound_body(seed)
     if source == FILE:
         return body_from_json(file)
-    return registry.body_of(checks.name(source, sources(), "source", suggestions=(FILE,)))
+    name = checks.name(source, sources(), "source", suggestions=(FILE,))  # raises a ValueError for other names
+    return registry.body_of(name)
 
 
 def make_body(sketch: Sketch) -> Body:
@@ -171,7 +172,7 @@ def chosen_preset(sketch: Sketch) -> str | None:
     """
     if sketch.preset == DEFAULT_CHOICE:
         return None
-    return registry.refuse_import("law", sketch.preset)
+    return registry.refuse_import("law", sketch.preset)  # a law of another package has a preset of its name
 
 
 def spec_file_name(body: Body) -> str:
