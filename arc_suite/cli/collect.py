@@ -40,7 +40,9 @@ FLAGS = flags.FLAGS
 define_body(more=", or all in turn")
 define_task()
 define_policy()
-flags.DEFINE_integer("checkpoint", None, "Environment step of the checkpoint of the run that --policy names.", 0)
+flags.DEFINE_integer(
+    "checkpoint", None, "Environment step of the checkpoint of the run that --policy names.", lower_bound=0
+)
 flags.DEFINE_enum(
     "quality",
     None,
@@ -54,7 +56,9 @@ flags.DEFINE_list(
     f"{policies.PRESET_HELP} Several with commas take turns. [default: the one that suits the task and the body]",
 )
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
-flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", 1, MAX_COUNT)
+flags.DEFINE_integer(
+    "episodes", 1000, "How many episodes the dataset is to have.", lower_bound=1, upper_bound=MAX_COUNT
+)
 flags.DEFINE_integer(
     "steps", STEPS, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=STEPS
 )
@@ -62,8 +66,8 @@ flags.DEFINE_integer(
     "seed",
     seed_ranges.COLLECTING.start,
     "Seed of the first episode; the others count on from it. Evaluation has those below.",
-    seed_ranges.COLLECTING.start,
-    seed_ranges.COLLECTING[-1],
+    lower_bound=seed_ranges.COLLECTING.start,
+    upper_bound=seed_ranges.COLLECTING[-1],
 )
 flags.DEFINE_string("id", None, "Id of the dataset. [default: arc_suite/ROBOT/TASK/POLICY-PRESET-v0, or like it]")
 flags.DEFINE_boolean("overwrite", False, "Replace a dataset of that id, once the new one is complete.")
@@ -71,7 +75,9 @@ flags.DEFINE_string("author", None, "Who has made the dataset, for its metadata.
 flags.DEFINE_string("code_permalink", None, "Where the code lies that made the dataset, for its metadata.")
 flags.DEFINE_string("verify", None, "Replay the dataset of this id instead.")
 flags.DEFINE_integer("num_envs", 64, "Episodes at a time; the data do not depend on it.", lower_bound=1)
-flags.DEFINE_integer("threads", None, "Threads to simulate on; the data do not depend on it. [default: all]", 1)
+flags.DEFINE_integer(
+    "threads", None, "Threads to simulate on; the data do not depend on it. [default: all]", lower_bound=1
+)
 
 
 def main() -> None:

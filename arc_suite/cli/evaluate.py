@@ -24,7 +24,9 @@ from arc_suite.evaluation import provenance, reports
 
 FLAGS = flags.FLAGS
 define_walk("all", ", or all")
-flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", 1, MAX_COUNT)
+flags.DEFINE_integer(
+    "episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1, upper_bound=MAX_COUNT
+)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
 

@@ -33,7 +33,7 @@ flags.DEFINE_list(
     f"Which, with commas between them: {', '.join(catalog.CLIPS)}; module:name of one that another package has; or "
     f"{catalog.ALL}.",
 )
-flags.DEFINE_float("fps", catalog.FPS, "Frames a second.", 1.0, 1000.0)
+flags.DEFINE_float("fps", catalog.FPS, "Frames a second.", lower_bound=1.0, upper_bound=1000.0)
 flags.DEFINE_string("rig", "skin", f"{' or '.join(catalog.RIGS)}: bones and one mesh, or rigid parts.")
 flags.DEFINE_string(
     "root_motion", "both", "moving: the root goes as the body walks; in_place: it stays; both: each clip twice."

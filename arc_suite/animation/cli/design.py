@@ -52,7 +52,11 @@ flags.DEFINE_string("task", None, "Task in which bodies are evaluated. [default:
 flags.DEFINE_multi_string("set", [], "Setting of the task, name=value.")
 flags.DEFINE_string("around", None, f"A creature whose variants are searched: {ROBOT_HELP}, or a spec file.")
 flags.DEFINE_float(
-    "amount", 0.1, "Standard deviation of the variants' lengths (logarithm) and headings (rad).", 0.001, 0.5
+    "amount",
+    0.1,
+    "Standard deviation of the variants' lengths (logarithm) and headings (rad).",
+    lower_bound=0.001,
+    upper_bound=0.5,
 )
 flags.DEFINE_float("mass", None, f"Mass of every body, kg. [default: {DEFAULT_MASS:g}, or that of --around]")
 flags.DEFINE_float(
@@ -67,18 +71,24 @@ flags.DEFINE_integer(
     "bodies",
     260,
     f"Bodies to evaluate, rounded up to batches of {BATCH_SIZE}; more make a finished search go on.",
-    1,
-    MAX_COUNT,
+    lower_bound=1,
+    upper_bound=MAX_COUNT,
 )
 flags.DEFINE_integer(
     "random",
     RANDOM_BODIES,
     "Bodies of random genes, with which it begins; as many as --bodies for a control.",
-    1,
-    MAX_COUNT,
+    lower_bound=1,
+    upper_bound=MAX_COUNT,
 )
-flags.DEFINE_integer("steps", 200, "Control steps of the first evaluation; the second takes twice as many.", 10, 500)
-flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 2**32 - 1)
+flags.DEFINE_integer(
+    "steps",
+    200,
+    "Control steps of the first evaluation; the second takes twice as many.",
+    lower_bound=10,
+    upper_bound=500,
+)
+flags.DEFINE_integer("seed", 0, "Seed of the search.", lower_bound=0, upper_bound=2**32 - 1)
 flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)
 flags.DEFINE_bool("pages", True, "Write pages on which the best walk.")
 flags.DEFINE_string("output", None, "Folder to write to, made if need be. Required.", short_name="o")

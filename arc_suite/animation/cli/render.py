@@ -40,11 +40,23 @@ _SETTLING_STEPS = 60  # control steps, after which the gait does not depend on t
 
 FLAGS = flags.FLAGS
 define_walk(more=", or all of them side by side")
-flags.DEFINE_integer("seed", 0, "Seed of the start of the episode and of the random policy.", 0, 2**32 - 1)
-flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
-flags.DEFINE_integer("width", None, "Of a view, in pixels. [default: 640, in a GIF 240, in a WebP 480]", 16, MAX_WIDTH)
 flags.DEFINE_integer(
-    "height", None, "Of a view, in pixels. [default: 480, in a GIF 180, in a WebP 360]", 16, MAX_HEIGHT
+    "seed", 0, "Seed of the start of the episode and of the random policy.", lower_bound=0, upper_bound=2**32 - 1
+)
+flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
+flags.DEFINE_integer(
+    "width",
+    None,
+    "Of a view, in pixels. [default: 640, in a GIF 240, in a WebP 480]",
+    lower_bound=16,
+    upper_bound=MAX_WIDTH,
+)
+flags.DEFINE_integer(
+    "height",
+    None,
+    "Of a view, in pixels. [default: 480, in a GIF 180, in a WebP 360]",
+    lower_bound=16,
+    upper_bound=MAX_HEIGHT,
 )
 flags.DEFINE_integer(
     "steps",
@@ -53,7 +65,13 @@ flags.DEFINE_integer(
     "[default: 200, in a GIF or WebP 80, on a page 400, before a picture 60]",
     lower_bound=0,
 )
-flags.DEFINE_float("fps", None, "Frames a second of a film. [default: one a control step, of 50 a second]", 1.0, 1000.0)
+flags.DEFINE_float(
+    "fps",
+    None,
+    "Frames a second of a film. [default: one a control step, of 50 a second]",
+    lower_bound=1.0,
+    upper_bound=1000.0,
+)
 flags.DEFINE_bool("loop", False, "Of films: the walk has settled, and holds the whole gait cycles nearest to --steps.")
 flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif, .webp or .html. Required.", short_name="o")
 

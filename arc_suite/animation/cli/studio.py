@@ -25,7 +25,9 @@ from arc_suite.cpg.selection import check_preset_name
 FLAGS = flags.FLAGS
 define_walk()
 flags.DEFINE_string("host", "127.0.0.1", "Address to listen on; 0.0.0.0 lets in everyone who can reach this machine.")
-flags.DEFINE_integer("port", 8080, "Port to listen on; the next free one if it is taken.", 1, 65535)
+flags.DEFINE_integer(
+    "port", 8080, "Port to listen on; the next free one if it is taken.", lower_bound=1, upper_bound=65535
+)
 
 
 def main() -> None:

@@ -38,7 +38,13 @@ FLAGS = flags.FLAGS
 define_walk(more=", or all; without it, the one of stored tracks", policy=sources.HELP)
 flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
 flags.DEFINE_string("compare_preset", None, "Preset of --compare, if that is cpg. [default: as of --preset]")
-flags.DEFINE_integer("episodes", evaluation.CURVE_EPISODES, "How many episodes; of stored ones, at most.", 1, MAX_COUNT)
+flags.DEFINE_integer(
+    "episodes",
+    evaluation.CURVE_EPISODES,
+    "How many episodes; of stored ones, at most.",
+    lower_bound=1,
+    upper_bound=MAX_COUNT,
+)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON.")
 flags.DEFINE_string("output", None, "Folder of pictures; of several robots, a folder in it for each.", short_name="o")
