@@ -74,8 +74,8 @@ def to_arrays(state: State) -> dict[str, np.ndarray]:
     for index, stream in enumerate(state.streams):
         for leaf_index, leaf in enumerate(trees.leaves(stream)):
             arrays[f"stream/{index}/{leaf_index}"] = np.asarray(leaf)
-    random_parts = zip(*(random[1:] for random in state.randoms), strict=True)  # without the generator's name
-    for (name, random_array), values in zip(_RANDOM_ARRAYS.items(), random_parts, strict=True):
+    for part_index, (name, random_array) in enumerate(_RANDOM_ARRAYS.items(), start=1):  # part 0 is a name
+        values = [random_state[part_index] for random_state in state.randoms]
         arrays[name] = np.array(values, random_array.dtype)
     present_texts, next_texts = state.settings
     if any(text != "{}" for text in [*present_texts, *next_texts]):
@@ -95,7 +95,7 @@ def from_arrays(
     """Return the state of a snapshot, and the tasks of its episodes and of the next ones.
 
     Args:
-        like: the present state of the environments that will continue from the snapshot.
+        like: the present state of the environments that will continue from the snapshot; shapes must be equal.
         task: of all these environments together.
         check_simulations: raises ValueError for arrays of the simulations that do not fit.
         arrays: the snapshot.

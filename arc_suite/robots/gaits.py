@@ -77,7 +77,7 @@ def _wave(body: Body) -> Gait:
 
 def _alternating(body: Body, duty_factor: float) -> Gait:
     """Return the gait in which every leg is half a cycle from its neighbors in front, behind and across."""
-    return _in_two_groups(body, duty_factor, lambda rank, is_right: (rank + is_right) % 2 == 1)
+    return _in_two_groups(body, duty_factor, lambda rank, is_right: (rank % 2 == 1) != is_right)
 
 
 def _in_two_groups(body: Body, duty_factor: float, is_late: Callable[[int, bool], bool]) -> Gait:

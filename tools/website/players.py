@@ -35,7 +35,7 @@ def write(folder: Path) -> None:
     for robot, name in film_pages().items():
         environment = arc_suite.load(robot, "walk", {"random": 0})
         policy = policies.policy("ppo", robot, task=environment.task.definition)
-        track = style.record(environment, policy, 0, FILM_START + FILM_STEPS)
+        track = style.record(environment, policy, seed=0, max_steps=FILM_START + FILM_STEPS)
         film = _cut_start(track, FILM_START)
         (folder / name).write_text(pages.page({robot: film}), encoding="utf-8")
 
