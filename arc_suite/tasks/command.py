@@ -23,20 +23,26 @@ from arc_suite.tasks.parts import Planar, Scalar
 from arc_suite.tasks.readings import component
 from arc_suite.tasks.sensors import FAR
 
-BAND = 0.75  # error at which tracking is 0, as a share of the command, or of half a unit for smaller commands
+BAND = 0.75  # error at which tracking is 0, as a share of the command
+MIN_JUDGED_COMMAND = 0.5  # units of the command; smaller commands are judged as strictly as one of this size
 DIRECTIONS = ("forward", "left", "turning")
 RANGES = ((-0.5, 1.0), (-0.5, 0.5), (-1.0, 1.0))  # of drawn commands, by direction
 MAX_COMMAND = 10.0  # bound of the ranges that a caller may set
-COMMANDS = 17  # of a schedule
-SHORTEST = 60  # control steps for which a command holds
-LONGEST = 161  # one more than the most control steps for which a command holds
+COMMANDS = 17  # number of commands in a schedule
+SHORTEST = 60  # control steps; a command holds for at least so many
+LONGEST = 161  # control steps; a command holds for fewer
+_SIDEWAYS_PROBABILITY = 0.5
+_TURNING_PROBABILITY = 0.7
+_GOING_PROBABILITY = 0.95  # other commands are stops
+_MIN_COMMAND_SIZE = 0.2  # as a share of the largest; smaller commands become stops
 
-GOALS = 16  # of a chain; after the last one the way leads back
-NEAR = 0.7  # distance of the torso at which a goal is reached, R
+GOALS = 16  # number of goals in a chain; after the last one, the way leads back along the chain
+GOAL_RADIUS = 0.7  # distance of the torso at which a goal is reached, R
+_MIN_GOAL_DISTANCE = 1e-9  # R; directions are divided by distances
 _DISK_THICKNESS = 0.02  # of the disk that shows a goal, R
 _DISK_COLOR = (0.2, 0.9, 0.4, 1.0)
 
-# Steps to the eight corners around one.
+# Steps from a corner of a grid to the eight corners around it.
 _MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
 
 
@@ -201,23 +207,31 @@ def draw_command(random: np.random.RandomState, ranges=RANGES) -> np.ndarray:
     """
     low, high = np.transpose(ranges)
     command = random.uniform(low, high)
-    goes_sideways, turns, goes = random.uniform(size=3) < (0.5, 0.7, 0.95)
+    goes_sideways, turns, goes = random.uniform(size=3) < (
+        _SIDEWAYS_PROBABILITY,
+        _TURNING_PROBABILITY,
+        _GOING_PROBABILITY,
+    )
     command = command * (1.0, goes_sideways, turns)
     max_speed = max(1.0, *np.abs(ranges[:2]).flat)
     max_turning = max(1.0, *np.abs(ranges[2]))
     size = np.hypot(command[0], command[1]) / max_speed + abs(command[2]) / max_turning
-    is_going = goes and size >= 0.2
-    return command / max(size, 1.0) * is_going
+    is_going = goes and size >= _MIN_COMMAND_SIZE
+    return command / max(size, 1.0) * is_going  # 0 for a stop
 
 
 def tracking(desired, motion):
-    """Return how well a motion (..., 3) follows a velocity (..., 3), 0 to 1: in its direction times in its turning."""
+    """Return how well (...) a motion (..., 3) follows a velocity (..., 3), from 0 to 1.
+
+    It is the product of two kernels: of the planar velocity, and of turning.
+    """
     xp = motion.__array_namespace__()
     error = desired - motion
     desired_speed = xp.hypot(desired[..., 0], desired[..., 1])
     planar_error = xp.hypot(error[..., 0], error[..., 1])
-    planar_tracking = terms.triangle(planar_error, BAND * xp.maximum(desired_speed, 0.5))
-    turning_tracking = terms.triangle(error[..., 2], BAND * xp.maximum(abs(desired[..., 2]), 0.5))
+    planar_tracking = terms.triangle(planar_error, BAND * xp.maximum(desired_speed, MIN_JUDGED_COMMAND))
+    desired_turning = abs(desired[..., 2])
+    turning_tracking = terms.triangle(error[..., 2], BAND * xp.maximum(desired_turning, MIN_JUDGED_COMMAND))
     return planar_tracking * turning_tracking
 
 
@@ -301,19 +315,24 @@ def scheduled_value(ends, values, steps):
         values: (..., n, size), in order.
         steps: (...) control steps since the start.
     """
+    xp = ends.__array_namespace__()
     step = steps % ends[..., -1]
-    current = (step[..., None] >= ends).sum(axis=-1)[..., None, None]
-    return ends.__array_namespace__().take_along_axis(values, current, axis=-2)[..., 0, :]
+    ended_values = (step[..., None] >= ends).sum(axis=-1)
+    index = ended_values[..., None, None]
+    return xp.take_along_axis(values, index, axis=-2)[..., 0, :]
 
 
 def begins_next(ends, live, steps):
     """Return whether (...) the next value of a schedule holds since step `steps` (...); see `scheduled_value`.
 
-    It does not where a live value (..., size) has no NaN, as that one holds.
+    It is False where a live value (..., size) without NaN holds in place of the schedule.
     """
+    xp = ends.__array_namespace__()
     step = steps % ends[..., -1]
-    changes = (step[..., None] == ends).any(axis=-1) | ((step == 0) & (steps > 0))
-    return changes & ends.__array_namespace__().isnan(live).any(axis=-1)
+    repeats = (step == 0) & (steps > 0)
+    begins = (step[..., None] == ends).any(axis=-1) | repeats
+    schedule_holds = xp.isnan(live).any(axis=-1)
+    return begins & schedule_holds
 
 
 @dataclasses.dataclass(frozen=True)
@@ -398,7 +417,7 @@ def chain(numbers) -> np.ndarray:
     return np.array(corners[2:], float)
 
 
-def at_goal(bearing):
+def command_to_goal(bearing):
     """Return the command (..., 3) to a goal at a bearing (...), rad: a turn, and forward as it faces the goal."""
     xp = bearing.__array_namespace__()
     forward = xp.cos(bearing).clip(0.0)
@@ -407,7 +426,7 @@ def at_goal(bearing):
 
 @dataclasses.dataclass(frozen=True)
 class ToGoal(Command):
-    """Straight to a goal, through pillars if need be, and when it is reached to the next one of a chain.
+    """A velocity straight to a goal, whether or not pillars are in the way, then to the next goal of a chain.
 
     Lengths are multiples of the arena's unit R.
     """
@@ -434,7 +453,7 @@ class ToGoal(Command):
         """Return the command: straight to the goal as far as the body faces it, and a turn to face it."""
         goal = memory.to_goal
         xp = memory.goals.__array_namespace__()
-        return at_goal(xp.arctan2(goal[..., 1], goal[..., 0]))
+        return command_to_goal(xp.arctan2(goal[..., 1], goal[..., 0]))
 
     def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step: progress to the goal, and the next goal where it is reached."""
@@ -442,7 +461,7 @@ class ToGoal(Command):
         distance_before = xp.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])  # m
         to_goal = _to_goal(memory.goals, memory.reached, place)
         distance = xp.hypot(to_goal[..., 0], to_goal[..., 1])
-        arrived = distance <= NEAR * context.arena.unit
+        arrived = distance <= GOAL_RADIUS * context.arena.unit
         reached = memory.reached + arrived
         memory = Chain(
             goals=memory.goals,
@@ -467,10 +486,11 @@ class ToGoal(Command):
         goal = memory.to_goal
         unit = context.arena.unit  # R, m
         xp = goal.__array_namespace__()
-        distance = xp.hypot(goal[..., 0], goal[..., 1])
-        distance = xp.maximum(distance, 1e-9 * unit)[..., None]  # above 0, as the direction is divided by it
-        direction = goal / distance
-        return {"goal": xp.concatenate([direction, (distance / (FAR * unit)).clip(0.0, 1.0)], axis=-1)}
+        distance = xp.hypot(goal[..., 0], goal[..., 1])  # m
+        positive_distance = xp.maximum(distance, _MIN_GOAL_DISTANCE * unit)[..., None]
+        direction = goal / positive_distance  # cosine and sine
+        distance_share = (positive_distance / (FAR * unit)).clip(0.0, 1.0)
+        return {"goal": xp.concatenate([direction, distance_share], axis=-1)}
 
     def progress(self, context: Context, memory: Chain, judged_steps) -> dict:
         """Return how many goals were reached."""
@@ -481,7 +501,7 @@ class ToGoal(Command):
         unit = context.arena.unit  # R, m
         center = np.array((*_present_goal(memory.goals, memory.reached), 0.0))
         top = center + (0.0, 0.0, _DISK_THICKNESS * unit)
-        return [Marker("cylinder", center, top, NEAR * unit, _DISK_COLOR)]
+        return [Marker("cylinder", center, top, GOAL_RADIUS * unit, _DISK_COLOR)]
 
 
 def velocity_bonuses(speed_share, step_tracking, upright, feet_in_schedule) -> dict:

@@ -4,7 +4,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite.arenas import Arena
 from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.fitting import velocity_units
@@ -14,7 +13,7 @@ class Context(NamedTuple):
     """Lengths and speeds to which the command, the ground and the health of a task are fitted.
 
     Attributes:
-        arena: where the task takes place.
+        arena: where the task takes place: an `arenas.Arena`, of the class that the command and the ground need.
         height: h, the standing height, m.
         reach: R, the mean distance of the feet from their center, m.
         units: (3,) of commands: the target velocity, twice, m/s, and the turning velocity, rad/s, at which feet on a
@@ -30,7 +29,7 @@ class Context(NamedTuple):
         reference: what gait and pose by command measure the body by; None without them.
     """
 
-    arena: Arena
+    arena: Any
     height: float
     reach: float
     units: np.ndarray

@@ -32,7 +32,9 @@ START_SPREAD = 6.0  # largest distance of the start from the middle of the lane,
 OFF_LANE = 10.0  # distance from the middle of the lane at which an episode is truncated, h
 LANE_END = 1.0  # distance from either end of the lane at which an episode is truncated, h
 MAX_LANE_LENGTH = 300.0  # ahead of the start, h
-SUNK_DEPTH = 0.05  # of a foot's center under the ground, h; feet in regular contact do not reach it
+SUNK_DEPTH = 0.05  # of a foot's center under the ground, h; the center of a foot in contact is never so deep
+_LANE_MARGIN_FACTOR = 1.15  # of the length of a lane, over the distance at the target velocity
+_LANE_MARGIN = 6.0  # added to the length of a lane, h
 SUNK_STEPS = 5  # consecutive control steps at this depth after which a foot is stuck
 
 
@@ -317,17 +319,21 @@ class Lanes(Ground):
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the lanes with checked settings."""
         values = {name: overrides.get(name, getattr(self, name)) for name in self.settings}
-        sizes = [name for name in terrain.sizes(self.kinds) if values[name] is not None]
+        size_names = [name for name in terrain.sizes(self.kinds) if values[name] is not None]
         for name in ("difficulty", *CURRICULUM):
-            if sizes and name in overrides:
-                raise ValueError(f"{name}: expected none with {sizes[0]}={values[sizes[0]]}, got {overrides[name]}")
+            if size_names and name in overrides:
+                size_name = size_names[0]
+                raise ValueError(f"{name}: expected none with {size_name}={values[size_name]}, got {overrides[name]}")
+        sizes: dict[str, Any] = {}
+        for name in size_names:
+            sizes[name] = checks.number(name, values[name], *terrain.SIZES[name])
         return dataclasses.replace(
             self,
             difficulty=checks.number("difficulty", values["difficulty"], 0.0, 1.0),
             curriculum=checks.boolean("curriculum", values["curriculum"]),
             level=checks.integer("level", values["level"], 0, LEVELS - 1),
             terrain_seed=checks.integer("terrain_seed", values["terrain_seed"], 0, 2**32 - 1),
-            **{name: checks.number(name, values[name], *terrain.SIZES[name]) for name in sizes},
+            **sizes,
         )
 
     @property
@@ -336,13 +342,17 @@ class Lanes(Ground):
         return self.curriculum
 
     def arena(self, body: Body, parameters: Parameters) -> Arena:
-        """Return the lanes, which are 15 % longer than the way at the target velocity, and 6 h."""
-        distance = abs(parameters.target_velocity) * STEPS * control_timestep(body)
-        length = min(6.0 + np.ceil(1.15 * distance / body.torso.standing_height), MAX_LANE_LENGTH)  # h
-        levels = np.arange(LEVELS) / (LEVELS - 1.0) if self.curriculum else [self.difficulty]
+        """Return the lanes, which are longer than the distance that a body walks at the target velocity."""
+        distance = abs(parameters.target_velocity) * STEPS * control_timestep(body)  # m
+        distance_with_margin = np.ceil(_LANE_MARGIN_FACTOR * distance / body.torso.standing_height)  # h
+        length = min(_LANE_MARGIN + distance_with_margin, MAX_LANE_LENGTH)
+        if self.curriculum:
+            difficulties = tuple(float(difficulty) for difficulty in np.arange(LEVELS) / (LEVELS - 1.0))
+        else:
+            difficulties = (float(self.difficulty),)
         copies = dict.fromkeys(self.kinds, self._copies)
         sizes = {name: getattr(self, name) for name in terrain.SIZES if getattr(self, name) is not None}
-        return terrain.made(body, copies, float(length), tuple(map(float, levels)), self.terrain_seed, sizes)
+        return terrain.made(body, copies, float(length), difficulties, self.terrain_seed, sizes)
 
     def first(self) -> Stream:
         """Return the level at which a stream begins; without an outcome, the first episode has it."""
@@ -384,18 +394,18 @@ class Lanes(Ground):
 
     def after(self, context: Context, memory: Lane, place, readings: Readings, arrived) -> Lane:
         """Return the memory with the steps of a foot under ground, and whether the torso has left the lane."""
-        unit = context.arena.unit  # h, m
+        unit = context.arena.unit  # m, the standing height h
         length = context.arena.length  # h
         is_under_ground = (readings.foot_heights < -SUNK_DEPTH * unit).any(axis=-1)
         steps_under_ground = (memory.steps_under_ground + 1) * is_under_ground
         x = place[..., 0]
         y = place[..., 1]
         is_at_end = (x > (length - LANE_END) * unit) | (x < (LANE_END - terrain.BACK) * unit)
-        is_beside_lane = abs(y - memory.middle) > OFF_LANE * unit
+        is_off_lane = abs(y - memory.middle) > OFF_LANE * unit
         return memory._replace(
             steps_under_ground=steps_under_ground,
             is_stuck=steps_under_ground >= SUNK_STEPS,
-            has_left=is_at_end | is_beside_lane,
+            has_left=is_at_end | is_off_lane,
         )
 
     def ended(self, memory: Lane, fell) -> tuple:

@@ -68,4 +68,4 @@ for _name, _member in vars(Task).items():
     if inspect.isfunction(_member) and _takes_memory(_member) and _name not in _RETURN_MEMORY:
         setattr(Wrapper, _name, _make_forwarding_method(_name))
 
-Task.register(Wrapper)
+Task.register(Wrapper)  # type: ignore[type-abstract]
