@@ -91,7 +91,7 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
     else:
         half_length, half_width = _SPACING * _HEIGHT * legs / 4.0, 0.4 * _HEIGHT
     proportions = Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, PROFILES[links], (_REACH,) * legs)
-    return build_body(f"walker_{legs}x{links}", legs, layout, proportions)
+    return assemble_body(f"walker_{legs}x{links}", legs, layout, proportions)
 
 
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
@@ -162,7 +162,7 @@ def draw_body(
         ],
         reaches=tuple(map(float, reaches)),
     )
-    return build_body("random", legs, layout, proportions)
+    return assemble_body("random", legs, layout, proportions)
 
 
 def scaled(body: Body, factor: float) -> Body:
@@ -289,7 +289,7 @@ def _check_layout(layout: str | None, legs: int) -> str:
     return checks.name(layout, LAYOUTS, "layout")
 
 
-def build_body(name: str, legs: int, layout: str, proportions: Proportions) -> Body:
+def assemble_body(name: str, legs: int, layout: str, proportions: Proportions) -> Body:
     """Return a body of given proportions; checked legs and layout are as in `generate`."""
     p = proportions
     if layout == "radial":

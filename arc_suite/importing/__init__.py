@@ -21,14 +21,17 @@ from arc_suite.robots import ROBOTS, sources
 from arc_suite.robots.spec import MAX_NAME, Body, Held, Simulation, SpecError
 
 _CONTROL_STEP = 0.02  # s
-_LARGEST_TIMESTEP = 0.004  # s
-_GRAVITIES = (0.1, 1000.0)  # m/s^2, downwards
-_MASSES = (1e-6, 1e9)  # kg
-_UNNAMED = "MuJoCo Model"  # of MJCF without a name
+_MAX_TIMESTEP = 0.004  # s
+_MIN_SUBSTEPS = 2  # in a control step
+_MIN_CONTACT_TIME = 0.02  # s
+_GRAVITY_RANGE = (0.1, 1000.0)  # m/s^2, downwards
+_MASS_RANGE = (1e-6, 1e9)  # kg
+_DEFAULT_NAME = "MuJoCo Model"  # which MuJoCo gives MJCF without a name
+_IMPORTED = "_imported"  # ends the name of a body that would have a robot's name
 
 
 class ImportedRobot(NamedTuple):
-    """A robot of others.
+    """A robot from a file of others.
 
     Attributes:
         body: with a source.
@@ -37,6 +40,14 @@ class ImportedRobot(NamedTuple):
 
     body: Body
     notes: tuple[str, ...]
+
+
+class _StandingRobot(NamedTuple):
+    """A file, its robot, and how it stands."""
+
+    file: RobotFile
+    robot: Robot
+    stance: Stance
 
 
 def import_robot(path: str | os.PathLike, home: str | None = None, feet: Sequence[str] = ()) -> ImportedRobot:
@@ -54,105 +65,125 @@ def import_robot(path: str | os.PathLike, home: str | None = None, feet: Sequenc
     path = Path(path)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of MuJoCo, about attributes of the file that it will drop
-            return _imported(path, home, feet)
+            warnings.simplefilter("ignore")  # MuJoCo warns about attributes that are dropped here
+            return _import_file(path, home, feet)
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
 
 
 def body_of(path: str | os.PathLike) -> Body:
-    """Return the body of `imported`; the same one as long as the file stays as it is.
+    """Return the body of `import_robot`; the same one as long as the file stays as it is.
 
     Raises:
-        SpecError: as `imported`.
-        OSError: as `imported`.
+        SpecError: as `import_robot`.
+        OSError: as `import_robot`.
     """
-    return _body(os.path.realpath(path), hashlib.sha256(opening.content(Path(path))).digest())
+    digest = hashlib.sha256(opening.content(Path(path))).digest()
+    return _cached_body(os.path.realpath(path), digest)
 
 
 @functools.lru_cache(maxsize=64)
-def _body(path: str, _content: bytes) -> Body:
+def _cached_body(path: str, _digest: bytes) -> Body:
     return import_robot(path).body
 
 
-def _imported(path: Path, home: str | None, feet: Sequence[str]) -> ImportedRobot:
-    file, robot, stance = _standing(path, home, feet)
+def _import_file(path: Path, home: str | None, feet: Sequence[str]) -> ImportedRobot:
+    file, robot, stance = _find_standing_robot(path, home, feet)
     _check_world(robot)
     _check_hinges(robot, stance)
     names = choose_names(robot, stance.legs)
-    driven = motors.find_motors(robot, stance)
-    order = _order(robot, stance, file.order)
+    servos, motor_notes = motors.find_motors(robot, stance)
+    order = _order_joints(robot, stance, file.order)
     body = Body(
-        name=_name(robot, path),
+        name=_choose_body_name(robot, path),
         torso=sketch.sketch_torso(robot, stance),
-        legs=sketch.sketch_legs(robot, stance, names, driven.servos),
+        legs=sketch.sketch_legs(robot, stance, names, servos),
         camera=sketch.sketch_camera(stance),
-        simulation=_simulation(float(robot.model.opt.timestep)),
+        simulation=_choose_simulation(float(robot.model.opt.timestep)),
         source=writing.write_source(robot, stance, names, file.meshes),
-        held=tuple(Held(name=names.joints[joint], servo=driven.servos[joint]) for joint in names.held),
-        file_joints=tuple(robot.name(joint) for joint in order),
+        held=tuple(Held(name=names.joints[joint], servo=servos[joint]) for joint in names.held),
+        file_joints=tuple(robot.joint_name(joint) for joint in order),
     )
-    told = notes.import_notes(robot, stance, names, order)
-    return ImportedRobot(
-        sources.check(body), (*told, *driven.notes, *file.notes, *notes.omission_notes(file, robot, stance, names))
-    )
+    import_notes = notes.import_notes(robot, stance, names, order)
+    omission_notes = notes.omission_notes(file, robot, stance, names)
+    return ImportedRobot(sources.check(body), (*import_notes, *motor_notes, *file.notes, *omission_notes))
 
 
-def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[RobotFile, Robot, Stance]:
-    """Return the robot of a file as it stands; a URDF in which it does not may have another axis that points up."""
-
-    def tried(turn: str) -> tuple[RobotFile, Robot, Stance]:
-        file = opening.open_robot(path, turn)
-        robot = tree.robot_of(file.model, file.root, file.notes)
-        return file, robot, poses.find_stance(robot, home, feet)
-
+def _find_standing_robot(path: Path, home: str | None, feet: Sequence[str]) -> _StandingRobot:
+    """Return the robot of a file as it stands; the y axis of a URDF may point up."""
     try:
-        return tried(urdf.LEVEL)
+        return _open_standing_robot(path, home, feet, urdf.LEVEL)
     except poses.NoStance as error:
-        for turn in urdf.TURNS if path.suffix.lower() == ".urdf" else ():
+        reason = str(error)
+    if path.suffix.lower() == ".urdf":
+        for turn in urdf.TURNS:
             with contextlib.suppress(SpecError):
-                file, robot, stance = tried(turn)
-                if np.ptp([leg.center for leg in stance.legs], axis=0).argmax() == 0:
+                file, robot, stance = _open_standing_robot(path, home, feet, turn)
+                extents = np.ptp([leg.center for leg in stance.legs], axis=0)  # (3,) of the feet, m
+                if extents.argmax() == 0:  # longest forward, as robots are
                     note = "turned: the file's y axis points up, the torso's frame has z there"
-                    return file._replace(notes=(*file.notes, note)), robot, stance
-        raise SpecError(str(error)) from None
+                    return _StandingRobot(file._replace(notes=(*file.notes, note)), robot, stance)
+    raise SpecError(reason)
+
+
+def _open_standing_robot(path: Path, home: str | None, feet: Sequence[str], turn: str) -> _StandingRobot:
+    """Return the robot of a file as it stands, with the base of a URDF turned."""
+    file = opening.open_robot(path, turn)
+    robot = tree.robot_of(file.model, file.root, file.notes)
+    return _StandingRobot(file, robot, poses.find_stance(robot, home, feet))
 
 
 def _check_world(robot: Robot) -> None:
     """Refuse gravity that does not pull down, and a robot of an impossible weight."""
-    gravity, mass = robot.model.opt.gravity, float(robot.model.body_subtreemass[robot.root])
-    if not (_GRAVITIES[0] <= -gravity[2] <= _GRAVITIES[1] and abs(gravity[:2]).max() < 1e-6):
-        given = " ".join(f"{each:g}" for each in gravity)
-        raise SpecError(f"option: gravity: expected 0 0 -9.81 or the like, got {given}")
-    if not _MASSES[0] <= mass <= _MASSES[1]:
-        raise SpecError(f"expected a robot of {_MASSES[0]:g} to {_MASSES[1]:g} kg, got {mass:g}")
+    gravity = robot.model.opt.gravity
+    min_gravity, max_gravity = _GRAVITY_RANGE
+    is_vertical = abs(gravity[:2]).max() < 1e-6
+    if not (min_gravity <= -gravity[2] <= max_gravity and is_vertical):
+        gravity_text = " ".join(f"{component:g}" for component in gravity)
+        raise SpecError(f"option: gravity: expected 0 0 -9.81 or the like, got {gravity_text}")
+    mass = float(robot.model.body_subtreemass[robot.root])
+    min_mass, max_mass = _MASS_RANGE
+    if not min_mass <= mass <= max_mass:
+        raise SpecError(f"expected a robot of {min_mass:g} to {max_mass:g} kg, got {mass:g}")
 
 
 def _check_hinges(robot: Robot, stance: Stance) -> None:
     for joint in stance.joints:
         if robot.model.jnt_type[joint] != tree.HINGE:
-            raise SpecError(f"joint {robot.name(joint)!r} of a leg is a slide joint; expected hinges")
+            raise SpecError(f"joint {robot.joint_name(joint)!r} of a leg is a slide joint; expected hinges")
 
 
-def _name(robot: Robot, path: Path) -> str:
-    """Return the model's name, or that of the file, cleaned; a robot's own would give the body its numbers."""
-    given = robot.model.names[: robot.model.names.index(b"\0")].decode("utf-8", "replace")
-    name = clean_name("" if given == _UNNAMED else given) or clean_name(path.stem) or "robot"
-    return f"{name[: MAX_NAME - 9]}_imported" if name in ROBOTS else name
+def _choose_body_name(robot: Robot, path: Path) -> str:
+    """Return the model's name, or that of the file, cleaned.
+
+    A robot of the suite keeps its name for itself: parameters are found by it.
+    """
+    model_name = robot.model.names[: robot.model.names.index(b"\0")].decode("utf-8", "replace")
+    if model_name == _DEFAULT_NAME:
+        model_name = ""
+    name = clean_name(model_name) or clean_name(path.stem) or "robot"
+    if name in ROBOTS:
+        return name[: MAX_NAME - len(_IMPORTED)] + _IMPORTED
+    return name
 
 
-def _simulation(timestep: float) -> Simulation:
-    """Return the constants: the file's timestep, or the next smaller one that divides a control step."""
+def _choose_simulation(timestep: float) -> Simulation:
+    """Return the constants: the file's timestep, s, or the next smaller one that divides a control step."""
     if timestep <= 0.0:
         raise SpecError(f"option: timestep: expected a number above 0, got {timestep:g}")
-    substeps = max(2, math.ceil(_CONTROL_STEP / min(timestep, _LARGEST_TIMESTEP) - 1e-6))
-    step = _CONTROL_STEP / substeps
-    return Simulation(timestep=step, contact_time=max(0.02, 2.0 * step), contact_margin=0.0, substeps=substeps)
+    substeps = math.ceil(_CONTROL_STEP / min(timestep, _MAX_TIMESTEP) - 1e-6)
+    substeps = max(_MIN_SUBSTEPS, substeps)
+    suite_timestep = _CONTROL_STEP / substeps
+    contact_time = max(_MIN_CONTACT_TIME, 2.0 * suite_timestep)
+    return Simulation(timestep=suite_timestep, contact_time=contact_time, contact_margin=0.0, substeps=substeps)
 
 
-def _order(robot: Robot, stance: Stance, given: tuple[str, ...]) -> list[int]:
-    """Return the joints of the legs in the order of the file: of its actuators, or of its joints."""
-    legs = stance.joints
-    named = {robot.name(joint): joint for joint in robot.joints}
-    orders = (motors.actuated_joints(robot), [named[name] for name in given if name in named], robot.joints)
-    return next([joint for joint in order if joint in legs] for order in orders if set(legs) <= set(order))
+def _order_joints(robot: Robot, stance: Stance, urdf_order: tuple[str, ...]) -> list[int]:
+    """Return the joints of the legs in the order of the file: of its actuators, of a URDF, or of the model."""
+    joints_of_legs = set(stance.joints)
+    joint_by_name = {robot.joint_name(joint): joint for joint in robot.joints}
+    joints_in_urdf = [joint_by_name[name] for name in urdf_order if name in joint_by_name]
+    for order in (motors.actuated_joints(robot), joints_in_urdf):
+        if joints_of_legs <= set(order):
+            return [joint for joint in order if joint in joints_of_legs]
+    return [joint for joint in robot.joints if joint in joints_of_legs]

@@ -1,10 +1,10 @@
 """The meshes of colliders, as points and triangles in the text of the source.
 
 The compiler turns a mesh into the frame of its inertia and moves its geom in return. So that it does the same again,
-it gets the points of the file, and the geom's place in the file.
+it gets the points of the file, and the geom's pose in the file.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,9 +14,10 @@ import numpy as np
 from arc_suite.importing.tree import colliding_geoms, vertices
 from arc_suite.robots.spec import MAX_SOURCE
 
-_MESH = mujoco.mjtGeom.mjGEOM_MESH
+# Characters of all meshes of a body; beyond, the largest meshes are reduced to their hulls.
+MAX_TEXT = MAX_SOURCE - (1 << 17)
 
-MAX_TEXT = MAX_SOURCE - (1 << 17)  # characters of all meshes of a body; beyond, the largest are reduced to their hulls
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
 
 _INERTIAS = {
     mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX: "convex",
@@ -24,6 +25,9 @@ _INERTIAS = {
     mujoco.mjtMeshInertia.mjMESH_INERTIA_LEGACY: "legacy",
     mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL: "shell",
 }
+
+# Attributes of a mesh, with the values that MuJoCo takes if they are left out.
+_DEFAULTS = {"scale": (1.0, 1.0, 1.0), "refpos": (0.0, 0.0, 0.0), "refquat": (1.0, 0.0, 0.0, 0.0)}
 
 
 class Mesh(NamedTuple):
@@ -34,7 +38,7 @@ class Mesh(NamedTuple):
         whole: whether it has all points of the file, and not only the corners of its hull.
         attributes: of the asset, as in MJCF.
         position: (3,) of the geom, before the compiler moves it.
-        orientation: (4,) of it, a quaternion.
+        orientation: (4,) of the geom, a quaternion.
     """
 
     name: str
@@ -48,23 +52,25 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
     """Return the meshes of geoms that collide, by geom.
 
     Args:
-        spec: of the file; nothing of it is changed.
+        spec: of the file; it is not changed.
         model: compiled from it.
     """
     geoms = [geom for geom in colliding_geoms(model) if model.geom_type[geom] == _MESH]
     if not geoms:
         return {}
-    names = {geom: model.mesh(int(model.geom_dataid[geom])).name for geom in geoms}
-    wholes = {name: _asset(spec, spec.mesh(name)) for name in dict.fromkeys(names.values())}
-    hulls = {name: _hull(model, geom) for geom, name in names.items()}
-    whole = _that_fit(wholes, hulls)
-    places = _places(spec)
-    return {
-        geom: Mesh(name, True, wholes[name], places.geom_pos[geom], places.geom_quat[geom])
-        if name in whole
-        else Mesh(name, False, hulls[name], model.geom_pos[geom], model.geom_quat[geom])
-        for geom, name in names.items()
-    }
+    name_of_geom = {geom: model.mesh(int(model.geom_dataid[geom])).name for geom in geoms}
+    whole_meshes = {name: _whole_mesh(spec, spec.mesh(name)) for name in dict.fromkeys(name_of_geom.values())}
+    hulls = {name: _hull(model, geom) for geom, name in name_of_geom.items()}
+    whole_names = _choose_whole_meshes(whole_meshes, hulls)
+    model_without_meshes = _compile_without_meshes(spec)
+    meshes = {}
+    for geom, name in name_of_geom.items():
+        is_whole = name in whole_names
+        # The compiler moves the geoms of whole meshes again, but not those of hulls.
+        poses = model_without_meshes if is_whole else model
+        attributes = whole_meshes[name] if is_whole else hulls[name]
+        meshes[geom] = Mesh(name, is_whole, attributes, poses.geom_pos[geom], poses.geom_quat[geom])
+    return meshes
 
 
 def file_of(spec: mujoco.MjSpec, mesh) -> Path:
@@ -72,56 +78,71 @@ def file_of(spec: mujoco.MjSpec, mesh) -> Path:
     return Path(spec.modelfiledir) / spec.meshdir / mesh.file
 
 
-def _text(numbers: Iterable) -> str:
-    """Return numbers that are read back as the same bits; those of float32 have fewer digits."""
-    return " ".join(map(str, numbers))
-
-
-def _asset(spec: mujoco.MjSpec, mesh) -> dict[str, str]:
+def _whole_mesh(spec: mujoco.MjSpec, mesh) -> dict[str, str]:
     """Return the attributes of a mesh with its points in place of its file."""
-    read = mujoco.MjSpec.from_file(str(file_of(spec, mesh))).meshes[0] if mesh.file else mesh
+    mesh_with_points = mesh
+    if mesh.file:
+        mesh_with_points = mujoco.MjSpec.from_file(str(file_of(spec, mesh))).meshes[0]
     attributes = {
         "inertia": _INERTIAS[mesh.inertia],
-        "vertex": _text(np.array(read.uservert, np.float32)),
-        "face": _text(read.userface),
+        "vertex": _format(np.array(mesh_with_points.uservert, np.float32)),
+        "face": _format(mesh_with_points.userface),
     }
-    plain = {"scale": (1.0, 1.0, 1.0), "refpos": (0.0, 0.0, 0.0), "refquat": (1.0, 0.0, 0.0, 0.0)}
-    attributes |= {
-        name: _text(getattr(mesh, name).tolist()) for name in plain if any(getattr(mesh, name) != plain[name])
-    }
+    for name, default in _DEFAULTS.items():
+        value = getattr(mesh, name)
+        if any(value != default):
+            attributes[name] = _format(value.tolist())
     if mesh.maxhullvert > 0:
         attributes["maxhullvert"] = str(mesh.maxhullvert)
     return {name: text for name, text in attributes.items() if text}
 
 
-def _that_fit(wholes: dict[str, dict[str, str]], hulls: dict[str, dict[str, str]]) -> set[str]:
-    """Return the names of meshes that stay whole, so that the text is short enough: all but the largest."""
-    whole, reduced = ({name: sum(map(len, mesh.values())) for name, mesh in kind.items()} for kind in (wholes, hulls))
-    total = sum(whole.values())
-    for name in sorted(whole, key=lambda name: -whole[name]):
+def _hull(model: mujoco.MjModel, geom: int) -> dict[str, str]:
+    """Return the attributes of a mesh of the corners of a compiled mesh's convex hull."""
+    mesh = int(model.geom_dataid[geom])
+    points = vertices(model, mesh)
+    graph = int(model.mesh_graphadr[mesh])
+    if graph >= 0:
+        # The graph has the number of corners, that of triangles, an edge address and a vertex for each corner.
+        count = int(model.mesh_graph[graph])
+        first = graph + 2 + count
+        corners = np.sort(model.mesh_graph[first : first + count])
+        points = points[corners]
+    return {"inertia": "convex", "vertex": _format(points.ravel())}
+
+
+def _format(numbers: Iterable) -> str:
+    """Return numbers as text that is read back as the same bits; float32 has fewer digits."""
+    return " ".join(map(str, numbers))
+
+
+def _choose_whole_meshes(
+    whole_meshes: Mapping[str, Mapping[str, str]], hulls: Mapping[str, Mapping[str, str]]
+) -> set[str]:
+    """Return the names of meshes that stay whole: all except the largest, if the text would be too long."""
+    whole_lengths = {name: _text_length(attributes) for name, attributes in whole_meshes.items()}
+    hull_lengths = {name: _text_length(attributes) for name, attributes in hulls.items()}
+    whole_names = set(whole_lengths)
+    total = sum(whole_lengths.values())
+    for name in sorted(whole_lengths, key=lambda name: -whole_lengths[name]):
         if total <= MAX_TEXT:
             break
-        total += reduced[name] - whole.pop(name)
-    return set(whole)
+        total += hull_lengths[name] - whole_lengths[name]
+        whole_names.remove(name)
+    return whole_names
 
 
-def _hull(model: mujoco.MjModel, geom: int) -> dict[str, str]:
-    """Return a mesh of the corners of a compiled mesh's convex hull."""
-    mesh = int(model.geom_dataid[geom])
-    graph = int(model.mesh_graphadr[mesh])
-    corners = slice(None)
-    if graph >= 0:  # number of corners, of triangles, then of each corner its edges, then its vertex
-        count = int(model.mesh_graph[graph])
-        corners = np.sort(model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count])
-    return {"inertia": "convex", "vertex": _text(vertices(model, mesh)[corners].ravel())}
+def _text_length(attributes: Mapping[str, str]) -> int:
+    return sum(len(text) for text in attributes.values())
 
 
-def _places(spec: mujoco.MjSpec) -> mujoco.MjModel:
+def _compile_without_meshes(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Return the model with balls in place of meshes: they lie where the file puts the meshes."""
     spec = spec.copy()
     for geom in spec.geoms:
         if geom.type == _MESH:
-            geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_SPHERE, ""
+            geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
+            geom.meshname = ""
             geom.size[0] = 1.0
     for mesh in list(spec.meshes):
         spec.delete(mesh)

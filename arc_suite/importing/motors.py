@@ -1,7 +1,7 @@
 """The servos of an imported robot: gains and torque limits of the file where it has them, else by rule."""
 
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -12,21 +12,26 @@ from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import foot_loads
 from arc_suite.robots.spec import Servo
 
-# The rule for gains: this error calls for so many times the torque that holds the standing pose.
-_ERROR = 0.1  # rad
-_TIMES = 10.0
-_LEAST_SHARE = 0.5  # of the leg's strongest load, by which a joint with a smaller one counts
-_LEAST_FREQUENCY = 17.0  # rad/s, of a joint with what it moves
+# The rule for stiffness: an error of so many radians makes a servo give this multiple of the load. The load of a joint
+# is the torque that holds it in the standing pose.
+_RULE_ERROR = 0.1  # rad
+_RULE_LOADS = 10.0
+_MIN_LOAD_SHARE = 0.5  # of the largest load in the leg: a joint with a smaller load counts with this one
+_MIN_FREQUENCY = 17.0  # rad/s, natural frequency of a joint with the inertia that it moves
+_MAX_FREQUENCY = 40.0  # rad/s, the same: a leg on the floor moves the torso, and not its links alone
 _DAMPING_RATIO = 0.7
-_CARRYING = 40.0  # rad/s, of a joint at most: a leg on the floor moves the torso, and not its links alone
 
-_STRENGTH = 30.0  # times the load, of a motor whose limit the file does not have
-_UNKNOWN = 1000.0  # N m; files have it, and larger ones, where nobody knew the motor
-_IMPLAUSIBLE = 200.0  # times the leg's strongest load
+_LOADS_PER_LIMIT = 30.0  # torque limit of a motor in loads, where the file has no limit
 
-_SIZED, _PLACEHOLDER = "sized", "placeholder"  # where a limit comes from, in place of an attribute
+# Limits that are placeholders, as some files have them for motors that nobody knew.
+_PLACEHOLDER_TORQUE = 1000.0  # N m, and more
+_MAX_LOADS_PER_LIMIT = 200.0  # in loads of the joint in the leg that bears most
 
-_OF_JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+# Origins of a limit. Other origins are names of attributes in the file.
+_BY_RULE = "sized"
+_PLACEHOLDER = "placeholder"
+
+_JOINT_TRANSMISSIONS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
 class Motors(NamedTuple):
@@ -41,124 +46,216 @@ class Motors(NamedTuple):
     notes: tuple[str, ...]
 
 
+class _Gains(NamedTuple):
+    """Gains of a servo.
+
+    Attributes:
+        stiffness: N m/rad.
+        damping: N m s/rad, in addition to that of the joint.
+    """
+
+    stiffness: float
+    damping: float
+
+
+class _Limit(NamedTuple):
+    """A torque limit.
+
+    Attributes:
+        torque: N m.
+        origin: the attribute of the file that sets it, `_BY_RULE` or `_PLACEHOLDER`.
+    """
+
+    torque: float
+    origin: str
+
+
+class _Drive(NamedTuple):
+    """An actuator that drives a joint.
+
+    Attributes:
+        actuator: MuJoCo's index.
+        joint: MuJoCo's index.
+        gear: torque per force of the actuator.
+    """
+
+    actuator: int
+    joint: int
+    gear: float
+
+
 def find_motors(robot: Robot, stance: Stance) -> Motors:
     """Return the servos of a robot's joints."""
     inertias, loads = _mechanics(robot, stance)
-    given, limits = dict(_gains(robot)), _limits(robot)
+    gains_of_file = _find_gains(robot)
+    limits_of_file = _find_limits(robot)
+    servos = {}
+    origins = {}
+    for joints in _group_joints(robot, stance):
+        largest_load = max(loads[joint] for joint in joints)
+        for joint in joints:
+            load = max(loads[joint], _MIN_LOAD_SHARE * largest_load)
+            limit = limits_of_file.get(joint)
+            if limit is None:
+                limit = _Limit(_torque_by_rule(load, inertias[joint]), _BY_RULE)
+            exceeds_load = largest_load > 0.0 and limit.torque > _MAX_LOADS_PER_LIMIT * largest_load
+            if limit.torque >= _PLACEHOLDER_TORQUE or exceeds_load:
+                limit = limit._replace(origin=_PLACEHOLDER)
+            gains = gains_of_file.get(joint)
+            if gains is None:
+                joint_damping = float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
+                gains = _gains_by_rule(load, inertias[joint], limit.torque, joint_damping)
+            servos[joint] = Servo(stiffness=gains.stiffness, damping=gains.damping, limit=limit.torque)
+            origins[joint] = limit.origin
+    limit_notes = _limit_notes(stance.joints, servos, origins)
+    return Motors(servos, (*limit_notes, _gain_note(stance.joints, gains_of_file)))
+
+
+def _group_joints(robot: Robot, stance: Stance) -> list[tuple[int, ...]]:
+    """Return the joints of each leg, then each joint that belongs to no leg."""
     groups = [leg.joints for leg in stance.legs]
-    groups += [(joint,) for joint in robot.joints if not any(joint in group for group in groups)]
-    servos, origins = {}, {}
-    for group in groups:
-        strongest = max(loads[joint] for joint in group)
-        for joint in group:
-            load, inertia = max(loads[joint], _LEAST_SHARE * strongest), inertias[joint]
-            limit, origins[joint] = limits.get(joint) or (_sized(load, inertia), _SIZED)
-            if limit >= _UNKNOWN or (strongest and limit > _IMPLAUSIBLE * strongest):
-                origins[joint] = _PLACEHOLDER
-            damping = float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
-            stiffness, resistance = given.get(joint) or _rule(load, inertia, limit, damping)
-            servos[joint] = Servo(stiffness=stiffness, damping=resistance, limit=limit)
-    return Motors(servos, tuple(_notes(stance.joints, servos, origins, given)))
+    joints_of_legs = set(stance.joints)
+    groups += [(joint,) for joint in robot.joints if joint not in joints_of_legs]
+    return groups
 
 
-def _sized(load: float, inertia: float) -> float:
-    """Return the limit of a motor that the file tells nothing of; one that bears nothing moves its link."""
-    return _STRENGTH * max(load, inertia * _LEAST_FREQUENCY**2 * _ERROR / _TIMES)
+def _torque_by_rule(load: float, inertia: float) -> float:
+    """Return the torque limit, N m, of a motor without one in the file; without a load it still moves its link."""
+    least_load = inertia * _MIN_FREQUENCY**2 * _RULE_ERROR / _RULE_LOADS
+    return _LOADS_PER_LIMIT * max(load, least_load)
 
 
-def _rule(load: float, inertia: float, limit: float, damping: float) -> tuple[float, float]:
-    """Return stiffness and damping of a servo."""
-    wanted = max(_TIMES * load / _ERROR, inertia * _LEAST_FREQUENCY**2)
-    stiffness = min(wanted, limit / _ERROR)
-    moved = max(inertia, stiffness / _CARRYING**2)
-    return stiffness, max(2.0 * _DAMPING_RATIO * np.sqrt(stiffness * moved) - damping, 0.0)
+def _gains_by_rule(load: float, inertia: float, torque_limit: float, joint_damping: float) -> _Gains:
+    """Return the gains of a servo without gains in the file; the joint's own damping counts towards its damping."""
+    desired_stiffness = max(_RULE_LOADS * load / _RULE_ERROR, inertia * _MIN_FREQUENCY**2)
+    stiffness = min(desired_stiffness, torque_limit / _RULE_ERROR)
+    effective_inertia = max(inertia, stiffness / _MAX_FREQUENCY**2)
+    desired_damping = 2.0 * _DAMPING_RATIO * np.sqrt(stiffness * effective_inertia)
+    return _Gains(stiffness, max(desired_damping - joint_damping, 0.0))
 
 
 def _mechanics(robot: Robot, stance: Stance) -> tuple[dict[int, float], dict[int, float]]:
-    """Return the inertia with armature that each joint moves, and the torque that it holds with all feet carrying."""
+    """Return, by joint, the inertia with armature that it moves, and its load while all feet carry."""
     model = robot.model
-    data = robot.placed(stance.qpos)
+    data = robot.forward_kinematics(stance.qpos)
     mujoco.mj_forward(model, data)
-    matrix = np.empty((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, matrix)
+    mass_matrix = np.empty((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass_matrix)
+
     mass = float(model.body_subtreemass[robot.root])
-    center = data.subtree_com[robot.root]
-    soles = np.array([leg.sole for leg in stance.legs])
     weight = mass * float(np.linalg.norm(model.opt.gravity))
-    bias = data.qfrc_bias.copy()
-    for leg, force in zip(stance.legs, foot_loads(weight, soles[:, :2] - center[:2]), strict=True):
-        bias -= force * _lever(model, data, leg)
+    center_of_mass = data.subtree_com[robot.root]
+    soles = np.array([leg.sole for leg in stance.legs])
+    forces = foot_loads(weight, soles[:, :2] - center_of_mass[:2])
+    torques = data.qfrc_bias.copy()
+    for leg, force in zip(stance.legs, forces, strict=True):
+        torques -= force * _vertical_jacobian(model, data, leg)
+
     dofs = {joint: int(model.jnt_dofadr[joint]) for joint in robot.joints}
-    inertias = {joint: float(matrix[dof, dof]) for joint, dof in dofs.items()}
-    return inertias, {joint: float(abs(bias[dof])) for joint, dof in dofs.items()}
+    inertias = {joint: float(mass_matrix[dof, dof]) for joint, dof in dofs.items()}
+    loads = {joint: float(abs(torques[dof])) for joint, dof in dofs.items()}
+    return inertias, loads
 
 
-def _lever(model: mujoco.MjModel, data: mujoco.MjData, leg: Leg) -> np.ndarray:
+def _vertical_jacobian(model: mujoco.MjModel, data: mujoco.MjData, leg: Leg) -> np.ndarray:
     """Return the vertical velocity of a sole per velocity of each degree of freedom (nv,)."""
     jacobian = np.zeros((3, model.nv))
     mujoco.mj_jac(model, data, jacobian, None, leg.sole, leg.body)
     return jacobian[2]
 
 
-def _driven(robot: Robot) -> Iterator[tuple[int, int, float]]:
-    """Yield the actuators of joints: actuator, joint and gear."""
-    model = robot.model
-    for actuator in range(model.nu):
-        joint = int(model.actuator_trnid[actuator, 0])
-        muscle = model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE
-        if model.actuator_trntype[actuator] in _OF_JOINTS and joint in robot.joints and not muscle:
-            yield actuator, joint, abs(float(model.actuator_gear[actuator, 0]))
-
-
 def actuated_joints(robot: Robot) -> list[int]:
-    """Return the joints that actuators drive, in their order."""
-    return list(dict.fromkeys(joint for _, joint, _ in _driven(robot)))
+    """Return the joints that actuators drive, each once, in the order of the actuators."""
+    joints = [drive.joint for drive in _find_drives(robot)]
+    return list(dict.fromkeys(joints))
 
 
 def count_joint_actuators(robot: Robot) -> int:
     """Return how many actuators drive a joint of the robot."""
-    return sum(1 for _ in _driven(robot))
+    return len(list(_find_drives(robot)))
 
 
-def _gains(robot: Robot) -> Iterator[tuple[int, tuple[float, float]]]:
-    """Yield stiffness and damping of joints that a position actuator drives."""
+def _find_drives(robot: Robot) -> Iterator[_Drive]:
+    """Yield the actuators that drive a joint of the robot; muscles are none of them."""
     model = robot.model
-    for actuator, joint, gear in _driven(robot):
-        gain, (_, position, velocity) = float(model.actuator_gainprm[actuator, 0]), model.actuator_biasprm[actuator, :3]
-        affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
-        if affine and gain > 0.0 and gain == -position and gear > 0.0:
-            yield joint, (gain * gear**2, max(float(-velocity), 0.0) * gear**2)
+    for actuator in range(model.nu):
+        joint = int(model.actuator_trnid[actuator, 0])
+        is_muscle = model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE
+        drives_joint = model.actuator_trntype[actuator] in _JOINT_TRANSMISSIONS and joint in robot.joints
+        if drives_joint and not is_muscle:
+            yield _Drive(actuator, joint, abs(float(model.actuator_gear[actuator, 0])))
 
 
-def _limits(robot: Robot) -> dict[int, tuple[float, str]]:
-    """Return the least torque limit of each joint that has one, and the attribute that says so."""
-    model, found = robot.model, {}
-    for actuator, joint, gear in _driven(robot):
-        force = abs(model.actuator_forcerange[actuator]).max()
-        control = abs(model.actuator_ctrlrange[actuator]).max()
-        motor = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
-        if model.actuator_forcelimited[actuator]:
-            found.setdefault(joint, []).append((gear * float(force), "forcerange"))
-        if motor and model.actuator_ctrllimited[actuator]:
-            gain = abs(float(model.actuator_gainprm[actuator, 0]))
-            found.setdefault(joint, []).append((gear * gain * float(control), "ctrlrange"))
+def _find_gains(robot: Robot) -> dict[int, _Gains]:
+    """Return the gains of joints that a position actuator drives, by joint; the last actuator of a joint counts."""
+    model = robot.model
+    gains = {}
+    for drive in _find_drives(robot):
+        gain = float(model.actuator_gainprm[drive.actuator, 0])
+        _, position_bias, velocity_bias = model.actuator_biasprm[drive.actuator, :3]
+        is_affine = model.actuator_biastype[drive.actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+        is_position_actuator = is_affine and gain > 0.0 and gain == -position_bias
+        if is_position_actuator and drive.gear > 0.0:
+            damping = max(float(-velocity_bias), 0.0)
+            gains[drive.joint] = _Gains(gain * drive.gear**2, damping * drive.gear**2)
+    return gains
+
+
+def _find_limits(robot: Robot) -> dict[int, _Limit]:
+    """Return the least torque limit of each joint that has one above 0."""
+    model = robot.model
+    limits_of_joint = defaultdict(list)
+    for drive in _find_drives(robot):
+        if model.actuator_forcelimited[drive.actuator]:
+            force = abs(model.actuator_forcerange[drive.actuator]).max()
+            limits_of_joint[drive.joint].append(_Limit(drive.gear * float(force), "forcerange"))
+        is_motor = model.actuator_biastype[drive.actuator] == mujoco.mjtBias.mjBIAS_NONE
+        if is_motor and model.actuator_ctrllimited[drive.actuator]:
+            control = abs(model.actuator_ctrlrange[drive.actuator]).max()
+            gain = abs(float(model.actuator_gainprm[drive.actuator, 0]))
+            limits_of_joint[drive.joint].append(_Limit(drive.gear * gain * float(control), "ctrlrange"))
     for joint in robot.joints:
         if model.jnt_actfrclimited[joint]:
             effort = float(abs(model.jnt_actfrcrange[joint]).max())
-            found.setdefault(joint, []).append((effort, "actuatorfrcrange or effort"))
-    positive = {joint: [limit for limit in limits if limit[0] > 0.0] for joint, limits in found.items()}
-    return {joint: min(limits) for joint, limits in positive.items() if limits}
+            limits_of_joint[joint].append(_Limit(effort, "actuatorfrcrange or effort"))
+
+    least_limits = {}
+    for joint, limits in limits_of_joint.items():
+        positive_limits = [limit for limit in limits if limit.torque > 0.0]
+        if positive_limits:
+            # Of equal torques, the origin that comes first in the alphabet.
+            least_limits[joint] = min(positive_limits, key=lambda limit: (limit.torque, limit.origin))
+    return least_limits
 
 
-def _notes(legs: list[int], servos: dict, origins: dict, given: dict) -> Iterator[str]:
-    """Yield a line for each origin of limits of the legs' motors, and one for the gains."""
-    for origin, count in Counter(origins[joint] for joint in legs).items():
-        torques = [servos[joint].limit for joint in legs if origins[joint] == origin]
-        span = " to ".join(dict.fromkeys(f"{torque:.4g}" for torque in (min(torques), max(torques))))
-        said = {
-            _SIZED: f"none in the file for {count} motors, sized to {span} N m, {_STRENGTH:g} times their load",
-            _PLACEHOLDER: f"{span} N m of {count} motors is a placeholder, far above their load",
-        }
-        yield f"limits: {said.get(origin, f'{span} N m of {count} motors, from {origin}')}"
-    own = sum(joint in given for joint in legs)
-    yield f"gains: {own} of {len(legs)} servos have those of the file's position actuators, the others are sized"
+def _limit_notes(joints_of_legs: Sequence[int], servos: dict[int, Servo], origins: dict[int, str]) -> Iterator[str]:
+    """Yield a line for each origin of the limits of the legs' motors."""
+    counts = Counter(origins[joint] for joint in joints_of_legs)
+    for origin, count in counts.items():
+        torques = [servos[joint].limit for joint in joints_of_legs if origins[joint] == origin]
+        span = _format_span(min(torques), max(torques))
+        if origin == _BY_RULE:
+            text = f"none in the file for {count} motors, sized to {span} N m, {_LOADS_PER_LIMIT:g} times their load"
+        elif origin == _PLACEHOLDER:
+            text = f"{span} N m of {count} motors is a placeholder, far above their load"
+        else:
+            text = f"{span} N m of {count} motors, from {origin}"
+        yield f"limits: {text}"
+
+
+def _format_span(low: float, high: float) -> str:
+    """Return "low to high", or one number if both read the same."""
+    low_text = f"{low:.4g}"
+    high_text = f"{high:.4g}"
+    if low_text == high_text:
+        return low_text
+    return f"{low_text} to {high_text}"
+
+
+def _gain_note(joints_of_legs: Sequence[int], gains_of_file: dict[int, _Gains]) -> str:
+    """Return a line on where the gains of the legs' servos come from."""
+    count = sum(joint in gains_of_file for joint in joints_of_legs)
+    return (
+        f"gains: {count} of {len(joints_of_legs)} servos have those of the file's position actuators, "
+        "the others are sized"
+    )

@@ -1,13 +1,16 @@
 """Names of an imported body's parts: legs from front to rear by side, everything else after the file, cleaned."""
 
 import re
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from arc_suite.importing.poses import Leg
 from arc_suite.importing.tree import Robot
 from arc_suite.robots.spec import MAX_NAME
 
-_MIDLINE = 1e-4  # m; a foot that is nearer to it than that stands on the left
+_MIDLINE = 1e-4  # m, to the right; a foot that is nearer to the midline stands on the left
+_RESERVED = ("torso", "root", "floor", "world")  # names of the suite's own parts
+_MAX_SUFFIX = 5  # characters of the number behind a name that occurs twice
 
 
 class Names(NamedTuple):
@@ -15,7 +18,7 @@ class Names(NamedTuple):
 
     Attributes:
         legs: of each leg, in the order of the legs.
-        joints: of all joints but the free one.
+        joints: of all joints except the free one.
         bodies: of all bodies of the robot.
         held: joints outside of the legs.
     """
@@ -28,50 +31,60 @@ class Names(NamedTuple):
 
 def choose_names(robot: Robot, legs: tuple[Leg, ...]) -> Names:
     """Return the names of a robot's parts; a body with several joints of a leg has the name of its last link."""
-    labels, joints, bodies = _leg_names(legs), {}, {robot.root: "torso"}
+    labels = _leg_labels(legs)
+    joints = {}
+    bodies = {robot.root: "torso"}
+    used_names = set(_RESERVED)
     for label, leg in zip(labels, legs, strict=True):
-        for place, joint in enumerate(leg.joints, start=1):
-            joints[joint] = f"{label}_joint{place}"
-            bodies[int(robot.model.jnt_bodyid[joint])] = f"{label}_link{place}"
-    parts = {f"{label}_{part}" for label, leg in zip(labels, legs, strict=True) for part in _parts(leg)}
+        for number, joint in enumerate(leg.joints, start=1):
+            joints[joint] = f"{label}_joint{number}"
+            bodies[int(robot.model.jnt_bodyid[joint])] = f"{label}_link{number}"
+        used_names.update(_part_names(label, leg))
+    used_names.update(joints.values())
+    used_names.update(bodies.values())
+
     held = tuple(joint for joint in robot.joints if joint not in joints)
-    taken = {"torso", "root", "floor", "world", *joints.values(), *bodies.values(), *parts}
     for joint in held:
-        joints[joint] = _unique(robot.name(joint), "joint", taken)
+        joints[joint] = _add_unique_name(robot.joint_name(joint), "joint", used_names)
     for body in robot.bodies:
         if body not in bodies:
-            bodies[body] = _unique(robot.model.body(body).name, "body", taken)
+            bodies[body] = _add_unique_name(robot.model.body(body).name, "body", used_names)
     return Names(labels, joints, bodies, held)
 
 
-def _parts(leg: Leg) -> list[str]:
-    return [*(f"link{place}" for place in range(1, len(leg.joints) + 1)), "foot"]
+def _part_names(label: str, leg: Leg) -> Iterator[str]:
+    """Yield the names of a leg's links and foot."""
+    for number in range(1, len(leg.joints) + 1):
+        yield f"{label}_link{number}"
+    yield f"{label}_foot"
 
 
-def _leg_names(legs: tuple[Leg, ...]) -> tuple[str, ...]:
-    """Return l1, l2 and so on of left legs, r1, r2 and so on of right ones, from front to rear."""
+def _leg_labels(legs: tuple[Leg, ...]) -> tuple[str, ...]:
+    """Return l1, l2 and so on for left legs, r1, r2 and so on for right ones, from front to rear."""
     sides = ["r" if leg.center[1] < -_MIDLINE else "l" for leg in legs]
-    ranks = [
-        sum(other == side and ahead.center[0] > leg.center[0] for other, ahead in zip(sides, legs, strict=True))
-        for side, leg in zip(sides, legs, strict=True)
-    ]
-    found = [f"{side}{rank + 1}" for side, rank in zip(sides, ranks, strict=True)]
-    if len(set(found)) == len(found):
-        return tuple(found)
-    return tuple(f"leg{place}" for place in range(1, len(legs) + 1))  # two feet are equally far in front
+    labels = []
+    for side, leg in zip(sides, legs, strict=True):
+        legs_of_side = [neighbor for neighbor_side, neighbor in zip(sides, legs, strict=True) if neighbor_side == side]
+        legs_ahead = [neighbor for neighbor in legs_of_side if neighbor.center[0] > leg.center[0]]
+        labels.append(f"{side}{len(legs_ahead) + 1}")
+    if len(set(labels)) < len(labels):  # two feet are equally far in front
+        return tuple(f"leg{number}" for number in range(1, len(legs) + 1))
+    return tuple(labels)
 
 
 def clean_name(text: str) -> str:
-    """Return a name out of [a-z0-9_], at most as long as names are; "" where nothing of it is left."""
-    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")[:MAX_NAME].strip("_")
+    """Return a text as a name of [a-z0-9_], at most as long as names are; "" if no such character is in it."""
+    name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+    return name[:MAX_NAME].strip("_")
 
 
-def _unique(text: str, kind: str, taken: set[str]) -> str:
-    """Return a clean name that is not taken, and take it."""
+def _add_unique_name(text: str, kind: str, used_names: set[str]) -> str:
+    """Return a clean name that is not used yet, and add it to the used ones."""
     base = clean_name(text) or kind
-    name, count = base, 1
-    while name in taken:
+    name = base
+    count = 1
+    while name in used_names:
         count += 1
-        name = f"{base[: MAX_NAME - 5]}_{count}"
-    taken.add(name)
+        name = f"{base[: MAX_NAME - _MAX_SUFFIX]}_{count}"
+    used_names.add(name)
     return name

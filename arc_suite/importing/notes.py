@@ -1,4 +1,4 @@
-"""What a user is told of an import, a line each."""
+"""Notes for the user of an import, a line each."""
 
 from collections.abc import Iterator, Sequence
 
@@ -11,54 +11,80 @@ from arc_suite.importing.poses import Stance
 from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import GRAVITY
 
+_MAX_GRAVITY_DIFFERENCE = 0.05  # of the suite's gravity, without a note
+_MAX_NAMES = 4  # of joints in one note
+
 
 def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int]) -> Iterator[str]:
-    """Yield the legs, the map of the joints, and the standing pose.
+    """Yield notes on the legs, the map of the joints, and the standing pose.
 
     Args:
-        robot: the file's.
+        robot: of the file.
         stance: in which it stands.
         names: of its parts.
         order: joints of the legs in the order of the file.
     """
-    kinds = sorted({len(leg.joints) for leg in stance.legs})
-    yield f"legs: {len(stance.legs)} ({', '.join(names.legs)}), {' or '.join(map(str, kinds))} joints each"
-    pairs = ", ".join(f"{robot.name(joint)} {names.joints[joint]}" for joint in order)
+    joint_counts = sorted({len(leg.joints) for leg in stance.legs})
+    counts_text = " or ".join(map(str, joint_counts))
+    yield f"legs: {len(stance.legs)} ({', '.join(names.legs)}), {counts_text} joints each"
+    pairs = ", ".join(f"{robot.joint_name(joint)} {names.joints[joint]}" for joint in order)
     yield f"joints in the file's order, each with its name in the suite: {pairs}"
-    places = [stance.joints.index(joint) for joint in order]
-    same = places == sorted(places)
-    yield f"joint map: {'the file has the order of actions' if same else f'places of the file in an action: {places}'}"
+    action_indices = [stance.joints.index(joint) for joint in order]
+    if action_indices == sorted(action_indices):
+        yield "joint map: the file has the order of actions"
+    else:
+        yield f"joint map: places of the file in an action: {action_indices}"
     yield f"standing pose: {stance.origin}, torso {stance.height:.3g} m above the floor"
 
 
 def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) -> Iterator[str]:
-    """Yield what does not come in, or not as it is in the file."""
+    """Yield notes on what is left out, or is not as in the file."""
     model = file.model
-    others = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody)) - 1
-    hulls = sorted(
-        {file.meshes[geom].name for geom in robot.colliders if geom in file.meshes and not file.meshes[geom].whole}
-    )
+    hulls = _reduced_meshes(file, robot)
     if hulls:
         yield f"reduced: {len(hulls)} large meshes to their hulls, such as {hulls[0]}; contacts differ by some digits"
-    swims = bool(model.opt.density or model.opt.viscosity)
-    counts = {
+    for kind, count in _omission_counts(file, robot).items():
+        if count:
+            yield f"left out: {count} {kind}"
+    yield "left out: contacts of the robot with itself; looks, as pictures show the colliders"
+    wheels = _find_wheels(robot, stance)
+    if wheels:
+        yield f"left out: {len(wheels)} wheels, which are held, such as {robot.joint_name(wheels[0])}"
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    if abs(gravity - GRAVITY) > _MAX_GRAVITY_DIFFERENCE * GRAVITY:
+        yield f"units: the file's gravity is {gravity:g}; speeds and times of the tasks count on {GRAVITY:g} m/s^2"
+    if names.held:
+        held_names = ", ".join(robot.joint_name(joint) for joint in names.held[:_MAX_NAMES])
+        yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({held_names})"
+
+
+def _reduced_meshes(file: RobotFile, robot: Robot) -> list[str]:
+    """Return the names of colliders' meshes that are reduced to their hulls, sorted."""
+    names = set()
+    for geom in robot.colliders:
+        mesh = file.meshes.get(geom)
+        if mesh is not None and not mesh.whole:
+            names.add(mesh.name)
+    return sorted(names)
+
+
+def _omission_counts(file: RobotFile, robot: Robot) -> dict[str, int]:
+    """Return how many things of each kind are left out."""
+    model = file.model
+    has_fluid = bool(model.opt.density or model.opt.viscosity)
+    shapes_in_fluid = int((model.geom_fluid[:, 0] > 0.0).sum()) if has_fluid else 0
+    bodies_in_world = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody))
+    return {
         "tendons": model.ntendon,
         "equality constraints": model.neq,
         "actuators that are no motors of single joints": model.nu - motors.count_joint_actuators(robot),
-        "shapes in a fluid": int(swims * (model.geom_fluid[:, 0] > 0.0).sum()),
+        "shapes in a fluid": shapes_in_fluid,
         "sensors": model.nsensor,
-        "other bodies in the world": others,
+        "other bodies in the world": bodies_in_world - 1,
     }
-    for what, count in counts.items():
-        if count:
-            yield f"left out: {count} {what}"
-    yield "left out: contacts of the robot with itself; looks, as pictures show the colliders"
-    wheels = [robot.chains[leg.body][-1] for leg in stance.legs if robot.chains[leg.body][-1] != leg.joints[-1]]
-    if wheels:
-        yield f"left out: {len(wheels)} wheels, which are held, such as {robot.name(wheels[0])}"
-    gravity = float(np.linalg.norm(model.opt.gravity))
-    if abs(gravity - GRAVITY) > 0.05 * GRAVITY:
-        yield f"units: the file's gravity is {gravity:g}; speeds and times of the tasks count on {GRAVITY:g} m/s^2"
-    if names.held:
-        shown = ", ".join(robot.name(joint) for joint in names.held[:4])
-        yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({shown})"
+
+
+def _find_wheels(robot: Robot, stance: Stance) -> list[int]:
+    """Return the joints of wheels: the last joint before a foot that is no joint of the leg."""
+    last_joints = [(leg, robot.chains[leg.body][-1]) for leg in stance.legs]
+    return [joint for leg, joint in last_joints if joint != leg.joints[-1]]

@@ -2,23 +2,26 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import mujoco
 
 from arc_suite import checks, files
 from arc_suite.importing import urdf
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of
+from arc_suite.importing.tree import FREE
 from arc_suite.robots import sources
 from arc_suite.robots.spec import SpecError
 
 MAX_BYTES = 1 << 24  # of a file; the largest of 45 has 200 kB
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
-_LINE = re.compile(r",? line \d+")
-_DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
+_LINE_NUMBER = re.compile(r",? line \d+")  # in MuJoCo's errors
+_XML_DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
+
+_Result = TypeVar("_Result")
 
 
 class RobotFile(NamedTuple):
@@ -27,8 +30,8 @@ class RobotFile(NamedTuple):
     Attributes:
         model: compiled, with a free joint at the torso.
         root: body of the torso.
-        meshes: of geoms that are one, by geom.
-        order: names of joints in the order of the file; none where the model has that order.
+        meshes: of geoms whose shape is a mesh, by geom.
+        order: names of joints in the order of the file; empty if the model has that order.
         notes: one line for each thing that is left out or repaired.
     """
 
@@ -39,36 +42,50 @@ class RobotFile(NamedTuple):
     notes: tuple[str, ...]
 
 
+class _Spec(NamedTuple):
+    """A file as a spec that is not compiled yet.
+
+    Attributes:
+        spec: of MuJoCo.
+        order: as in `RobotFile`.
+        notes: as in `RobotFile`.
+    """
+
+    spec: mujoco.MjSpec
+    order: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
 def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
     """Return the robot of an MJCF or a URDF file.
 
     Args:
         path: of the file.
-        turn: roll, pitch and yaw of a URDF's base in the torso's frame.
+        turn: roll, pitch and yaw, rad, of a URDF's base in the torso's frame.
 
     Raises:
-        SpecError: it is neither, or MuJoCo cannot compile it.
-        OSError: it cannot be read.
+        SpecError: the file is neither, or MuJoCo cannot compile it.
+        OSError: the file cannot be read.
     """
-    element = _parsed(content(path))
-    spec, order, notes = _read(path, element, turn)
-    model, left_out = _compiled(spec)
-    model, root, freed = _freed(spec, model)
-    return RobotFile(model, root, meshes_of(spec, model), order, (*notes, *left_out, *freed))
+    root_element = _parse(content(path))
+    spec, order, notes = _read_spec(path, root_element, turn)
+    model, mesh_notes = _compile(spec)
+    model, torso, torso_notes = _free_torso(spec, model)
+    return RobotFile(model, torso, meshes_of(spec, model), order, (*notes, *mesh_notes, *torso_notes))
 
 
 def content(path: Path) -> bytes:
     """Return the bytes of a file, at most one more than it may have.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
     with files.reading(path), path.open("rb") as file:
         return file.read(MAX_BYTES + 1)
 
 
-def _parsed(data: bytes) -> ElementTree.Element:
-    """Return the top element of XML that names no entities."""
+def _parse(data: bytes) -> ElementTree.Element:
+    """Return the root element of XML without entities."""
     if len(data) > MAX_BYTES:
         raise SpecError(f"expected at most {MAX_BYTES} bytes")
     try:
@@ -79,7 +96,7 @@ def _parsed(data: bytes) -> ElementTree.Element:
         raise SpecError("expected XML without a document type and entities")
     try:
         # Some exporters write an empty line before the declaration, which XML forbids.
-        element = ElementTree.fromstring(_DECLARATION.sub("", text))
+        element = ElementTree.fromstring(_XML_DECLARATION.sub("", text))
     except ElementTree.ParseError as error:
         raise SpecError(f"expected XML: {error}") from None
     if element.tag not in ("mujoco", "robot"):
@@ -87,106 +104,128 @@ def _parsed(data: bytes) -> ElementTree.Element:
     return element
 
 
-def _read(
-    path: Path, element: ElementTree.Element, turn: str
-) -> tuple[mujoco.MjSpec, tuple[str, ...], tuple[str, ...]]:
-    """Return the file as a spec that is not compiled, its joints in its order, and notes."""
-    if element.tag == "robot":
-        cured, order, notes = urdf.repair_urdf(element, path.parent, turn)
-        return _said(lambda: mujoco.MjSpec.from_string(cured), lines=False), order, notes
-    spec = _said(lambda: mujoco.MjSpec.from_file(str(path)))
-    _drop_looks(spec)
-    return spec, (), ()
+def _read_spec(path: Path, root_element: ElementTree.Element, turn: str) -> _Spec:
+    """Return the spec of a file."""
+    if root_element.tag == "robot":
+        text, order, notes = urdf.repair_urdf(root_element, path.parent, turn)
+        # The text is not the file: numbers of its lines would mislead.
+        spec = _with_short_errors(lambda: mujoco.MjSpec.from_string(text), shows_line_numbers=False)
+        return _Spec(spec, order, notes)
+    spec = _with_short_errors(lambda: mujoco.MjSpec.from_file(str(path)))
+    _delete_visuals(spec)
+    return _Spec(spec, order=(), notes=())
 
 
-def _said(work, lines: bool = True):
-    """Return what `work` returns; MuJoCo's errors become a line.
+def _with_short_errors(function: Callable[[], _Result], shows_line_numbers: bool = True) -> _Result:
+    """Return what a function of MuJoCo returns; its errors become a SpecError of one line.
 
     Args:
-        work: takes nothing.
-        lines: whether the numbers of lines in MuJoCo's errors are those of the file.
+        function: takes no arguments.
+        shows_line_numbers: whether the numbers of lines in MuJoCo's errors are shown.
     """
     try:
-        return work()
+        return function()
     except ValueError as error:
         reason = checks.quote(error)
-        raise SpecError(f"MuJoCo cannot read it: {reason if lines else _LINE.sub('', reason)}") from None
+        if not shows_line_numbers:
+            reason = _LINE_NUMBER.sub("", reason)
+        raise SpecError(f"MuJoCo cannot read it: {reason}") from None
 
 
-def _drop_looks(spec: mujoco.MjSpec) -> None:
-    """Delete what is only seen, so that no file is read for it: pictures, and meshes that weigh and touch nothing."""
+def _delete_visuals(spec: mujoco.MjSpec) -> None:
+    """Delete textures, materials, skins and visual meshes, so that no file is read for them."""
     for element in (*spec.geoms, *spec.sites, *spec.skins):
         element.material = ""
     for element in (*spec.materials, *spec.textures, *spec.skins):
         spec.delete(element)
     if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         for geom in list(spec.geoms):
-            seen = geom.type == _MESH and not (geom.contype or geom.conaffinity) and geom.parent.explicitinertial
-            if seen and geom.name not in _paired(spec):
+            if _is_visual_mesh(geom) and geom.name not in _names_in_contact_pairs(spec):
                 spec.delete(geom)
-    used = {geom.meshname for geom in spec.geoms}
+    mesh_names = {geom.meshname for geom in spec.geoms}
     for mesh in list(spec.meshes):
-        if mesh.name not in used:
+        if mesh.name not in mesh_names:
             spec.delete(mesh)
 
 
-def _paired(spec: mujoco.MjSpec) -> set[str]:
-    return {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
+def _is_visual_mesh(geom) -> bool:
+    """Return whether a geom is a mesh that neither touches anything nor adds to the inertia of its body."""
+    can_touch = geom.contype or geom.conaffinity
+    return bool(geom.type == _MESH and not can_touch and geom.parent.explicitinertial)
 
 
-def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
-    """Return the compiled model, without the meshes that cannot be read, and a note of these."""
+def _names_in_contact_pairs(spec: mujoco.MjSpec) -> set[str]:
+    names = set()
+    for pair in spec.pairs:
+        names.update((pair.geomname1, pair.geomname2))
+    return names
+
+
+def _compile(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """Return the compiled model, and notes; meshes that cannot be read are deleted from the spec."""
     try:
         return spec.compile(), ()
     except ValueError as error:
-        unread = sorted(_unread(spec))
-        if not unread:
+        unreadable_meshes = sorted(mesh.name for mesh in spec.meshes if not _compiles_alone(spec, mesh))
+        if not unreadable_meshes:
             raise SpecError(f"MuJoCo cannot compile it: {checks.quote(error)}") from None
     for geom in list(spec.geoms):
-        if geom.meshname in unread:
+        if geom.meshname in unreadable_meshes:
             spec.delete(geom)
     for mesh in list(spec.meshes):
-        if mesh.name in unread:
+        if mesh.name in unreadable_meshes:
             spec.delete(mesh)
+    count = len(unreadable_meshes)
+    note = f"left out: {count} meshes that cannot be read, such as {unreadable_meshes[0]}"
     try:
-        note = f"left out: {len(unread)} meshes that cannot be read, such as {unread[0]}"
         return spec.compile(), (note,)
     except ValueError as error:
         raise SpecError(
-            f"MuJoCo cannot compile it without {len(unread)} meshes that cannot be read ({unread[0]}): "
+            f"MuJoCo cannot compile it without {count} meshes that cannot be read ({unreadable_meshes[0]}): "
             f"{checks.quote(error)}"
         ) from None
 
 
-def _unread(spec: mujoco.MjSpec) -> Iterator[str]:
-    """Yield the names of meshes that do not compile alone."""
-    for mesh in spec.meshes:
-        try:
-            alone = mujoco.MjSpec.from_file(str(file_of(spec, mesh)))
-            alone.meshes[0].name, alone.meshes[0].inertia = mesh.name, mesh.inertia
-            alone.worldbody.add_geom(type=_MESH, meshname=mesh.name)
-            alone.compile()
-        except (ValueError, IndexError):
-            yield mesh.name
+def _compiles_alone(spec: mujoco.MjSpec, mesh) -> bool:
+    """Return whether a model of one mesh compiles."""
+    try:
+        spec_of_mesh = mujoco.MjSpec.from_file(str(file_of(spec, mesh)))
+        spec_of_mesh.meshes[0].name = mesh.name
+        spec_of_mesh.meshes[0].inertia = mesh.inertia
+        spec_of_mesh.worldbody.add_geom(type=_MESH, meshname=mesh.name)
+        spec_of_mesh.compile()
+    except (ValueError, IndexError):
+        return False
+    return True
 
 
-def _freed(spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[mujoco.MjModel, int, tuple[str, ...]]:
-    """Return the model with a free torso, its body, and a note if the file has none that is free.
+def _free_torso(spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[mujoco.MjModel, int, tuple[str, ...]]:
+    """Return the model with a free torso, the torso, and a note if it is not free in the file.
 
-    The torso is the first free body with joints, else the heaviest body in the world.
+    The torso is the first free body with joints, else the heaviest body in the world that has joints.
     """
-    tops = [body for body in range(1, model.nbody) if model.body_parentid[body] == 0]
-    moving = [body for body in tops if (model.body_rootid[model.jnt_bodyid] == body).sum() > 1]
-    free = [body for body in moving if model.body_jntnum[body] and model.jnt_type[model.body_jntadr[body]] == 0]
-    if free:
-        return model, free[0], ()
-    if not moving:
+    bodies_in_world = [body for body in range(1, model.nbody) if model.body_parentid[body] == 0]
+    robots = [body for body in bodies_in_world if _count_joints_below(model, body) > 1]
+    free_robots = [body for body in robots if _has_free_joint(model, body)]
+    if free_robots:
+        return model, free_robots[0], ()
+    if not robots:
         raise SpecError("no body in the world has two joints; expected a robot with legs")
-    root = max(moving, key=lambda body: model.body_subtreemass[body])
-    name = model.body(root).name
-    if model.body_jntnum[root]:
-        joint = model.joint(model.body_jntadr[root])
+    torso = max(robots, key=lambda body: model.body_subtreemass[body])
+    name = model.body(torso).name
+    if model.body_jntnum[torso]:
+        joint = model.joint(model.body_jntadr[torso])
         raise SpecError(f"the torso {name!r} moves by the joint {joint.name!r} alone; expected a free or a fixed torso")
-    body = spec.body(name) if name else spec.bodies[root]
-    body.add_freejoint()
-    return _said(spec.compile), root, (f"the torso {name} is fixed to the world in the file: it has a free joint now",)
+    body_of_spec = spec.body(name) if name else spec.bodies[torso]
+    body_of_spec.add_freejoint()
+    note = f"the torso {name} is fixed to the world in the file: it has a free joint now"
+    return _with_short_errors(spec.compile), torso, (note,)
+
+
+def _count_joints_below(model: mujoco.MjModel, body: int) -> int:
+    """Return how many joints move a body of the world and the bodies that it carries."""
+    return int((model.body_rootid[model.jnt_bodyid] == body).sum())
+
+
+def _has_free_joint(model: mujoco.MjModel, body: int) -> bool:
+    return bool(model.body_jntnum[body] and model.jnt_type[model.body_jntadr[body]] == FREE)

@@ -1,6 +1,6 @@
 """Which chains of a robot are legs, and the pose in which it stands on them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -13,39 +13,50 @@ from arc_suite.models.kinematics import least_changes
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots.spec import SpecError
 
-# Shares of the standing height.
-_AGREE = 0.15  # by which feet on the floor may differ
-_HANG = 0.5  # of the deepest foot: a chain that reaches lower is a leg that hangs
-_LEAST_MARGIN = 0.02  # of the center of mass inside the feet
-_OFF = 0.15  # of the center of mass from the line between two feet, which may be long
+# Joints between the torso and a part, outwards.
+Chain = tuple[int, ...]
 
-_STRAIGHT = 0.96  # of a leg's length: one that is longer has no knee to bend
-_LEAST_THIGH = 0.2  # of the standing height; a shorter one does not make a leg straight
-_SOLE = 0.05  # of the standing height, that a foot is high whose shape tells nothing
+# Checks of a pose, in standing heights.
+_MAX_FOOT_DIFFERENCE = 0.15  # in height, between feet on the floor
+_MAX_CHAIN_DEPTH = 0.5  # of the end of a chain that is no leg; a lower one is a leg that hangs
+_MIN_MARGIN = 0.02  # of the center of mass inside of three or more feet
+_MAX_OVERHANG = 0.15  # of the center of mass from the line between two feet, which may be long
+_MIN_THIGH = 0.2  # a leg with a shorter thigh does not count as straight
+_MAX_STRAIGHTNESS = 0.96  # distance from hip to sole, as a share of thigh and shank
+_LIMIT_TOLERANCE = 1e-6  # rad or m, by which a joint may be out of its range
 
-# The search for a pose with bent knees.
-_REACH = 0.65  # of the leg's length, from the joint before the last down to the foot
-_ASIDE = 0.1  # of the leg's length, of the foot outwards from where a straight leg has it: a wide stance is steady
-_BEND = 0.65  # rad, of the thigh at first; the knee bends back twice as much
-_STEPS = 80
-_LARGEST_STEP = 0.2  # rad
-_DAMPING = 0.05  # of the leg's length
-_MISS = 0.05  # of the leg's length
+# Shapes of feet.
+_MAX_FOOT_RADIUS = 0.05  # standing heights, of a foot that is neither sphere nor capsule
+_CONTACT_HEIGHT = 0.01  # standing heights: shapes of a foot that are at most so much higher touch the floor, too
+_SOLE_TILT = 0.05  # rad, of the directions in which the sole of a flat foot is measured
+_SOLE_DIRECTIONS = 16
 
-_TILT = 0.05  # of the directions from which the sole of a flat foot is felt
-_LEVEL = 0.01  # of the standing height, by which shapes of one foot that touch the floor differ
-_HUB = 0.1  # of a wheel's radius, by which the joint may miss its middle
-_RANGE = 6.0  # rad; a joint that turns farther has no middle
+# Wheels.
+_MIN_WHEEL_RANGE = 6.0  # rad; a joint that turns farther may turn a wheel, and has no middle position
+_MAX_HUB_OFFSET = 0.1  # of the wheel's radius, between its joint and its middle
+_MAX_WHEEL_AXIS_RISE = 0.5  # vertical part of a wheel's axis, a unit vector
 
-# numpy's integers are equal to MuJoCo's enumerations, but not in a tuple of them.
-_BALLS = (int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE))
+# The search for a pose with bent knees. Lengths are shares of the leg's length, from the joint before the last down to
+# the foot.
+_LEG_HEIGHT = 0.65
+_FOOT_OFFSET = 0.1  # outwards from the foot of a straight leg: a wide stance is steady
+_START_BEND = 0.65  # rad, of the thigh; the knee bends back twice as much
+_ITERATIONS = 80
+_MAX_STEP = 0.2  # rad
+_DAMPING = 0.05
+_MAX_MISS = 0.05
+_MIN_FOOT_DEPTH = 0.4  # of the deepest foot; chains that end higher are arms and heads
+
+# Integers, since numpy's integers are not found in a tuple of MuJoCo's enumerations.
+_SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+_ROUND_SHAPES = (_SPHERE, int(mujoco.mjtGeom.mjGEOM_CAPSULE))
 
 
 class Leg(NamedTuple):
     """A leg of a robot in its standing pose, in the torso's frame.
 
     Attributes:
-        joints: its own, from the torso outwards.
+        joints: of the leg alone, from the torso outwards.
         body: the last link.
         geom: the foot's collider.
         sole: (3,) the lowest point.
@@ -67,7 +78,7 @@ class Stance(NamedTuple):
     Attributes:
         qpos: (nq,) of the file's model, with the torso's frame as the world's.
         legs: in the order of the file.
-        height: of the torso's origin above the lowest sole.
+        height: of the torso's origin above the lowest sole, m.
         origin: where the pose comes from, in words.
     """
 
@@ -90,6 +101,18 @@ class _Unfit(Exception):
     """A pose in which the robot does not stand; the message says why."""
 
 
+class _ChainEnd(NamedTuple):
+    """The lowest point at the end of a chain, in the torso's frame.
+
+    Attributes:
+        point: (3,) m.
+        geom: the collider that has it.
+    """
+
+    point: np.ndarray
+    geom: int
+
+
 def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
     """Return the pose in which a robot stands.
 
@@ -97,257 +120,321 @@ def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
     reach the floor, with the center of mass inside them and no straight legs.
 
     Args:
-        robot: the file's.
-        home: name of a keyframe, which is then taken whatever it looks like.
+        robot: of the file.
+        home: name of a keyframe, which is then taken without checks; None to find a pose.
         feet: names of bodies or geoms at the ends of the legs; none to find them.
 
     Raises:
         NoStance: no pose stands.
-        SpecError: a name is not in the file, or its pose has no legs.
+        SpecError: a name is not in the file, or the pose of the keyframe has no legs.
     """
-    ends = _named_feet(robot, feet) if feet else None
+    named_feet = _find_named_feet(robot, feet) if feet else None
     if home is not None:
-        names = [robot.model.key(key).name for key in range(robot.model.nkey)]
-        key = names.index(_known(home, names, "keyframe"))
+        return _stance_of_keyframe(robot, home, named_feet)
+    # Straight legs are better than none: a second round admits them.
+    reasons = []
+    candidates = []
+    for origin, qpos in _candidate_poses(robot, named_feet):
         try:
-            return _standing(robot, robot.model.key_qpos[key], f"keyframe {home}", ends, strict=False)
+            return _stance_of_pose(robot, qpos, origin, named_feet)
         except _Unfit as reason:
-            raise SpecError(f"keyframe {home}: {reason}") from None
-    reasons, tried = [], []
-    for bent, poses in ((True, _poses(robot, ends)), (False, tried)):  # better straight legs than none
-        for origin, qpos in poses:
-            try:
-                return _standing(robot, qpos, origin, ends, bent)
-            except _Unfit as reason:
-                reasons.append(f"{origin}: {reason}")
-            if bent:
-                tried.append((origin, qpos))
+            reasons.append(f"{origin}: {reason}")
+        candidates.append((origin, qpos))
+    for origin, qpos in candidates:
+        try:
+            return _stance_of_pose(robot, qpos, origin, named_feet, admits_straight_legs=True)
+        except _Unfit as reason:
+            reasons.append(f"{origin}: {reason}")
     cure = "name a keyframe that stands with --home, or the feet with --feet"
     raise NoStance(f"no standing pose ({'; '.join(dict.fromkeys(reasons))}); {cure}")
 
 
-def _known(name: str, valid: Sequence[str], kind: str) -> str:
+def _stance_of_keyframe(robot: Robot, home: str, named_feet: dict[Chain, list[int]] | None) -> Stance:
+    """Return the stance of a keyframe, without checks except that it has legs."""
+    keyframes = [robot.model.key(key).name for key in range(robot.model.nkey)]
+    key = keyframes.index(_check_name(home, keyframes, "keyframe"))
     try:
-        return checks.name(name, [each for each in valid if each], kind)
+        return _stance_of_pose(robot, robot.model.key_qpos[key], f"keyframe {home}", named_feet, is_checked=False)
+    except _Unfit as reason:
+        raise SpecError(f"keyframe {home}: {reason}") from None
+
+
+def _check_name(name: str, valid_names: Sequence[str], kind: str) -> str:
+    """Return a name that is one of the valid ones; parts without a name do not count."""
+    try:
+        return checks.name(name, [valid_name for valid_name in valid_names if valid_name], kind)
     except ValueError as error:
         raise SpecError(str(error)) from None
 
 
-def _named_feet(robot: Robot, feet: Sequence[str]) -> dict[tuple[int, ...], list[int]]:
+def _find_named_feet(robot: Robot, feet: Sequence[str]) -> dict[Chain, list[int]]:
     """Return the colliders of feet that are named by body or geom, by the chain that leads to them."""
-    ends, model = {}, robot.model
-    names = {model.geom(geom).name: [geom] for geom in robot.colliders}
+    model = robot.model
+    geoms_by_name = {model.geom(geom).name: [geom] for geom in robot.colliders}
     for body in robot.bodies[1:]:
-        own = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body]
-        if own:
-            names[model.body(body).name] = own
+        body_colliders = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body]
+        if body_colliders:
+            geoms_by_name[model.body(body).name] = body_colliders
+    foot_colliders = {}
     for foot in feet:
-        geoms = names[_known(foot, list(names), "foot")]
-        chain = robot.chains[int(model.geom_bodyid[geoms[0]])]
+        geoms = geoms_by_name[_check_name(foot, list(geoms_by_name), "foot")]
+        chain = robot.chain_of_geom(geoms[0])
         if not chain:
             raise SpecError(f"foot {foot!r}: no joint lies between it and the torso")
-        ends[chain] = geoms
-    return ends
+        foot_colliders[chain] = geoms
+    return foot_colliders
 
 
-def _ends(robot: Robot) -> dict[tuple[int, ...], list[int]]:
-    """Return the colliders at the end of every chain of joints that no other chain goes on from."""
-    ends = {}
+def _find_end_colliders(robot: Robot) -> dict[Chain, list[int]]:
+    """Return the colliders at the end of every chain of joints that is not the beginning of another chain."""
+    colliders = {}
     for geom in robot.colliders:
-        ends.setdefault(robot.chains[int(robot.model.geom_bodyid[geom])], []).append(geom)
-    inner = {chain[:size] for chain in ends for size in range(len(chain))}
-    return {chain: geoms for chain, geoms in ends.items() if chain not in inner}
+        colliders.setdefault(robot.chain_of_geom(geom), []).append(geom)
+    beginnings = {chain[:size] for chain in colliders for size in range(len(chain))}
+    return {chain: geoms for chain, geoms in colliders.items() if chain not in beginnings}
 
 
-def _poses(robot: Robot, ends: dict | None) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the poses (nq,) to try, each with where it comes from."""
+def _candidate_poses(robot: Robot, named_feet: dict[Chain, list[int]] | None) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the poses (nq,) to try, each with where it comes from: keyframes first, `home` before others."""
     model = robot.model
     for key in sorted(range(model.nkey), key=lambda key: model.key(key).name != "home"):
         yield f"keyframe {model.key(key).name or key}", model.key_qpos[key]
     yield "zero angles", model.qpos0
-    for front, rear in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
-        found = _searched(robot, ends or _ends(robot), front, rear)
-        if found is not None:
-            yield "search for bent knees", found
-    yield "middle of the ranges", _middle(robot)
-    yield "zero angles within the ranges", robot.clipped(model.qpos0)
+    foot_colliders = _find_end_colliders(robot) if named_feet is None else named_feet
+    for front_sign, rear_sign in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
+        qpos = _search_bent_knees(robot, foot_colliders, front_sign, rear_sign)
+        if qpos is not None:
+            yield "search for bent knees", qpos
+    yield "middle of the ranges", _middle_pose(robot)
+    yield "zero angles within the ranges", robot.clip_to_limits(model.qpos0)
 
 
-def _middle(robot: Robot) -> np.ndarray:
-    """Return the pose in the middle of all ranges that have one."""
+def _middle_pose(robot: Robot) -> np.ndarray:
+    """Return the pose (nq,) with joints in the middle of their ranges; joints that turn without end stay at zero."""
     qpos = robot.model.qpos0.copy()
     for joint in robot.joints:
-        low, high = robot.range(joint)
-        if high - low < _RANGE:
-            qpos[robot.place(joint)] = 0.5 * (low + high)
-    return robot.clipped(qpos)
+        low, high = robot.limits(joint)
+        if high - low < _MIN_WHEEL_RANGE:
+            qpos[robot.qpos_index(joint)] = 0.5 * (low + high)
+    return robot.clip_to_limits(qpos)
 
 
-def _standing(
-    robot: Robot, qpos: np.ndarray, origin: str, ends: dict | None, bent: bool = True, strict: bool = True
+def _stance_of_pose(
+    robot: Robot,
+    qpos: np.ndarray,
+    origin: str,
+    named_feet: dict[Chain, list[int]] | None,
+    admits_straight_legs: bool = False,
+    is_checked: bool = True,
 ) -> Stance:
     """Return the stance of a pose.
 
     Args:
-        robot: the file's.
+        robot: of the file.
         qpos: (nq,) the pose.
         origin: where it comes from.
-        ends: colliders of feet that are named, by chain; None to find them.
-        bent: whether straight legs are refused.
-        strict: whether anything is refused.
+        named_feet: colliders of feet that the user names, by chain; None to find them.
+        admits_straight_legs: whether legs may be straight.
+        is_checked: whether the robot must stand; otherwise it needs legs alone.
 
     Raises:
-        _Unfit: the robot does not stand in it; if not strict, only if it has no legs.
+        _Unfit: the robot does not stand in it, or has no legs.
     """
-    outside = [joint for joint in robot.joints if not _within(robot, joint, qpos)]
-    if outside and strict:
-        raise _Unfit(f"joint {robot.name(outside[0])} is out of its range")
-    data = robot.placed(qpos)
-    named, ends = bool(ends), ends or _ends(robot)
-    found = {chain: tree.lowest_point(robot, data, geoms) for chain, geoms in ends.items() if chain}
-    if not found:
+    if is_checked:
+        _check_limits(robot, qpos)
+    data = robot.forward_kinematics(qpos)
+    foot_colliders = _find_end_colliders(robot) if named_feet is None else named_feet
+    ends = {}
+    for chain, geoms in foot_colliders.items():
+        if chain:
+            ends[chain] = _ChainEnd(*tree.lowest_point(robot, data, geoms))
+    if not ends:
         raise _Unfit("no chain of joints ends in a collider")
-    height = -min(point[2] for point, _ in found.values())
+    height = -min(end.point[2] for end in ends.values())
     if height <= 0.0:
         raise _Unfit("no foot is below the torso")
-    low = {chain: end for chain, end in found.items() if named or end[0][2] < -(1.0 - _AGREE) * height}
-    legs = _legs(robot, data, ends, low, height)
-    if strict:
-        _check_feet(robot, found, legs, height)
+    if named_feet is None:
+        highest_foot = -(1.0 - _MAX_FOOT_DIFFERENCE) * height
+        low_ends = {chain: end for chain, end in ends.items() if end.point[2] < highest_foot}
+    else:
+        low_ends = ends
+    legs = _find_legs(robot, data, foot_colliders, low_ends, height)
+    if is_checked:
+        _check_feet(robot, ends, legs, height)
         _check_torso(robot, data, legs, height)
-    if strict and bent:
-        _check_knees(data, legs, height)
+        if not admits_straight_legs:
+            _check_knees(data, legs, height)
     return Stance(data.qpos.copy(), legs, float(height), origin)
 
 
-def _within(robot: Robot, joint: int, qpos: np.ndarray) -> bool:
-    low, high = robot.range(joint)
-    return low - 1e-6 <= qpos[robot.place(joint)] <= high + 1e-6
-
-
-def _legs(robot: Robot, data: mujoco.MjData, ends: dict, low: dict, height: float) -> tuple[Leg, ...]:
-    """Return the legs of chains that end low; joints that several of them share, and wheels, belong to none."""
+def _find_legs(
+    robot: Robot,
+    data: mujoco.MjData,
+    foot_colliders: Mapping[Chain, list[int]],
+    low_ends: Mapping[Chain, _ChainEnd],
+    height: float,
+) -> tuple[Leg, ...]:
+    """Return the legs of chains that end low; joints of several chains, and of wheels, belong to none."""
     legs = []
-    for chain, (point, geom) in sorted(low.items()):
-        others = {joint for other in low if other != chain for joint in other}
-        own = tuple(joint for joint in chain if joint not in others)
-        if own and _is_wheel(robot, data, own[-1], point, geom):
-            own = own[:-1]
-        if not own:
-            raise _Unfit(f"joint {robot.name(chain[-1])} turns a wheel or several feet")
-        body = int(robot.model.geom_bodyid[geom])
-        sole, radius = _sole(robot, data, ends[chain], height)
-        legs.append(Leg(own, body, geom, sole, sole + (0.0, 0.0, radius), radius))
+    for chain, end in sorted(low_ends.items(), key=lambda item: item[0]):
+        joints_of_other_chains = {joint for other_chain in low_ends if other_chain != chain for joint in other_chain}
+        joints = tuple(joint for joint in chain if joint not in joints_of_other_chains)
+        if joints and _is_wheel(robot, data, joints[-1], end):
+            joints = joints[:-1]
+        if not joints:
+            raise _Unfit(f"joint {robot.joint_name(chain[-1])} turns a wheel or several feet")
+        body = int(robot.model.geom_bodyid[end.geom])
+        sole, radius = _measure_sole(robot, data, foot_colliders[chain], height)
+        legs.append(Leg(joints, body, end.geom, sole, center=sole + (0.0, 0.0, radius), radius=radius))
     if len(legs) < 2:
         raise _Unfit(f"{len(legs)} foot on the floor")
     return tuple(legs)
 
 
-def _is_wheel(robot: Robot, data: mujoco.MjData, joint: int, point: np.ndarray, geom: int) -> bool:
+def _is_wheel(robot: Robot, data: mujoco.MjData, joint: int, end: _ChainEnd) -> bool:
     """Return whether a joint turns a foot without end about the foot's own middle."""
-    low, high = robot.range(joint)
+    low, high = robot.limits(joint)
     axis = data.xaxis[joint]
-    middle, sole = (np.linalg.norm(np.cross(axis, end - data.xanchor[joint])) for end in (data.geom_xpos[geom], point))
-    return bool(high - low > _RANGE and abs(axis[2]) < 0.5 and middle < _HUB * sole)
+    anchor = data.xanchor[joint]
+    hub_offset = np.linalg.norm(np.cross(axis, data.geom_xpos[end.geom] - anchor))
+    wheel_radius = np.linalg.norm(np.cross(axis, end.point - anchor))
+    turns_without_end = high - low > _MIN_WHEEL_RANGE
+    is_axis_level = abs(axis[2]) < _MAX_WHEEL_AXIS_RISE
+    return bool(turns_without_end and is_axis_level and hub_offset < _MAX_HUB_OFFSET * wheel_radius)
 
 
-def _sole(robot: Robot, data: mujoco.MjData, geoms: Sequence[int], height: float) -> tuple[np.ndarray, float]:
-    """Return the middle of what touches the floor (3,), and the radius of a ball in its place."""
+def _measure_sole(robot: Robot, data: mujoco.MjData, geoms: Sequence[int], height: float) -> tuple[np.ndarray, float]:
+    """Return the middle (3,) of what touches the floor, and the radius of a ball in its place, m."""
     model = robot.model
-    point, geom = tree.lowest_point(robot, data, geoms)
-    touching = [each for each in geoms if tree.lowest_point(robot, data, [each])[0][2] < point[2] + _LEVEL * height]
-    kind, radius = model.geom_type[geom], float(model.geom_size[geom][0])
-    if kind == _BALLS[0] and len(touching) == 1:
-        return point, radius
-    around = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
-    tilts = np.stack((_TILT * np.cos(around), _TILT * np.sin(around), np.full(16, -1.0)), axis=1)
-    tilts /= np.linalg.norm(tilts, axis=1, keepdims=True)
-    felt = np.array([tree.support_point(model, data, each, tilt) for tilt in tilts for each in touching])
-    middle = np.array((*(0.5 * (felt[:, :2].max(axis=0) + felt[:, :2].min(axis=0))), point[2]))
-    if kind in _BALLS:
-        return middle, radius
-    half = 0.5 * (tree.support_point(model, data, geom, -tree.DOWN)[2] - point[2])
-    return middle, float(min(half, _SOLE * height))
+    lowest_point, lowest_geom = tree.lowest_point(robot, data, geoms)
+    contact_height = lowest_point[2] + _CONTACT_HEIGHT * height
+    touching_geoms = [geom for geom in geoms if tree.lowest_point(robot, data, [geom])[0][2] < contact_height]
+    shape = model.geom_type[lowest_geom]
+    radius = float(model.geom_size[lowest_geom][0])
+    if shape == _SPHERE and len(touching_geoms) == 1:
+        return lowest_point, radius
+
+    azimuths = np.linspace(0.0, 2.0 * np.pi, _SOLE_DIRECTIONS, endpoint=False)
+    downwards = np.full(_SOLE_DIRECTIONS, -1.0)
+    directions = np.stack((_SOLE_TILT * np.cos(azimuths), _SOLE_TILT * np.sin(azimuths), downwards), axis=1)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    points = [tree.support_point(model, data, geom, direction) for direction in directions for geom in touching_geoms]
+    floor_points = np.array(points)[:, :2]
+    middle = 0.5 * (floor_points.max(axis=0) + floor_points.min(axis=0))
+    sole = np.array((*middle, lowest_point[2]))
+    if shape in _ROUND_SHAPES:
+        return sole, radius
+    half_height = 0.5 * (tree.support_point(model, data, lowest_geom, -tree.DOWN)[2] - lowest_point[2])
+    return sole, float(min(half_height, _MAX_FOOT_RADIUS * height))
 
 
-def _check_feet(robot: Robot, found: dict, legs: tuple[Leg, ...], height: float) -> None:
-    low = {leg.geom for leg in legs}
-    for chain, (point, geom) in found.items():
-        if geom not in low and point[2] < -_HANG * height:
-            raise _Unfit(f"the chain of {robot.name(chain[-1])} ends {height + point[2]:.3g} m above the floor")
-    uneven = max(leg.sole[2] for leg in legs) + height
-    if uneven > _AGREE * height:
-        raise _Unfit(f"a foot hangs {uneven:.3g} m above the floor")
+def _check_limits(robot: Robot, qpos: np.ndarray) -> None:
+    """Refuse joints out of their ranges."""
+    for joint in robot.joints:
+        low, high = robot.limits(joint)
+        if not low - _LIMIT_TOLERANCE <= qpos[robot.qpos_index(joint)] <= high + _LIMIT_TOLERANCE:
+            raise _Unfit(f"joint {robot.joint_name(joint)} is out of its range")
+
+
+def _check_feet(robot: Robot, ends: Mapping[Chain, _ChainEnd], legs: tuple[Leg, ...], height: float) -> None:
+    """Refuse feet that hang above the floor."""
+    foot_geoms = {leg.geom for leg in legs}
+    for chain, end in ends.items():
+        if end.geom not in foot_geoms and end.point[2] < -_MAX_CHAIN_DEPTH * height:
+            name = robot.joint_name(chain[-1])
+            raise _Unfit(f"the chain of {name} ends {height + end.point[2]:.3g} m above the floor")
+    highest_foot = max(leg.sole[2] for leg in legs) + height  # m above the floor
+    if highest_foot > _MAX_FOOT_DIFFERENCE * height:
+        raise _Unfit(f"a foot hangs {highest_foot:.3g} m above the floor")
 
 
 def _check_torso(robot: Robot, data: mujoco.MjData, legs: tuple[Leg, ...], height: float) -> None:
-    """Refuse a torso or an arm below the feet, and a center of mass outside of three or more feet."""
-    own = {joint for leg in legs for joint in leg.joints}
-    chains = {geom: robot.chains[int(robot.model.geom_bodyid[geom])] for geom in robot.colliders}
-    rest = [geom for geom, chain in chains.items() if not own.intersection(chain)]
-    if rest and tree.lowest_point(robot, data, rest)[0][2] < -height:
-        raise _Unfit("the torso is lower than the feet")
+    """Refuse a torso or an arm below the feet, and a center of mass outside of the feet."""
+    leg_joints = {joint for leg in legs for joint in leg.joints}
+    other_geoms = [geom for geom in robot.colliders if not leg_joints.intersection(robot.chain_of_geom(geom))]
+    if other_geoms:
+        lowest_point, _ = tree.lowest_point(robot, data, other_geoms)
+        if lowest_point[2] < -height:
+            raise _Unfit("the torso is lower than the feet")
     margin = stability_margin(data.subtree_com[robot.root], [leg.sole for leg in legs])
-    if margin < (_LEAST_MARGIN if len(legs) > 2 else -_OFF) * height:
+    min_margin = _MIN_MARGIN if len(legs) > 2 else -_MAX_OVERHANG
+    if margin < min_margin * height:
         raise _Unfit(f"the center of mass is {margin:.3g} m inside of the feet")
 
 
 def _check_knees(data: mujoco.MjData, legs: tuple[Leg, ...], height: float) -> None:
+    """Refuse straight legs."""
     for leg in legs:
         if len(leg.joints) < 2:
             continue
         hip, knee = (data.xanchor[joint] for joint in leg.joints[-2:])
-        thigh, shank = np.linalg.norm(knee - hip), np.linalg.norm(leg.sole - knee)
-        if thigh > _LEAST_THIGH * height and np.linalg.norm(leg.sole - hip) > _STRAIGHT * (thigh + shank):
+        thigh = np.linalg.norm(knee - hip)
+        shank = np.linalg.norm(leg.sole - knee)
+        is_straight = np.linalg.norm(leg.sole - hip) > _MAX_STRAIGHTNESS * (thigh + shank)
+        if thigh > _MIN_THIGH * height and is_straight:
             raise _Unfit("the legs are straight")
 
 
-def _searched(robot: Robot, ends: dict, front: int, rear: int) -> np.ndarray | None:
-    """Return a pose (nq,) with each foot below the joint before the last, knees bent to a side; None if there is none.
+def _search_bent_knees(
+    robot: Robot, foot_colliders: Mapping[Chain, list[int]], front_sign: int, rear_sign: int
+) -> np.ndarray | None:
+    """Return a pose (nq,) with bent knees and each foot below the joint before the last; None if there is none.
 
     Args:
-        robot: the file's.
-        ends: colliders by chain.
-        front: sign of the bend of legs in front of the torso's origin.
-        rear: of the others.
+        robot: of the file.
+        foot_colliders: by chain.
+        front_sign: of the bend of legs in front of the torso's origin, 1 or -1.
+        rear_sign: of the bend of the other legs.
     """
-    zero = robot.clipped(robot.model.qpos0 * 0.0)
-    data = robot.placed(zero)
-    lows = {chain: tree.lowest_point(robot, data, geoms) for chain, geoms in ends.items() if len(chain) > 1}
-    deepest = min((point[2] for point, _ in lows.values()), default=0.0)
-    qpos = _middle(robot)
-    for chain, (point, geom) in lows.items():
-        if point[2] < 0.4 * deepest:  # arms and heads stay
-            sign = front if data.xanchor[chain[-2]][0] > 0.0 else rear
-            bent = _bent(robot, zero, chain, (point, geom), sign)
-            if bent is None:
-                return None
-            for joint in chain:
-                qpos[robot.place(joint)] = bent[robot.place(joint)]
+    zero_qpos = robot.clip_to_limits(robot.model.qpos0 * 0.0)
+    data = robot.forward_kinematics(zero_qpos)
+    ends = {}
+    for chain, geoms in foot_colliders.items():
+        if len(chain) > 1:
+            ends[chain] = _ChainEnd(*tree.lowest_point(robot, data, geoms))
+    deepest = min((end.point[2] for end in ends.values()), default=0.0)
+    qpos = _middle_pose(robot)
+    for chain, end in ends.items():
+        if end.point[2] >= _MIN_FOOT_DEPTH * deepest:
+            continue
+        is_in_front = data.xanchor[chain[-2]][0] > 0.0
+        sign = front_sign if is_in_front else rear_sign
+        leg_qpos = _bend_leg(robot, zero_qpos, chain, end, sign)
+        if leg_qpos is None:
+            return None
+        for joint in chain:
+            qpos[robot.qpos_index(joint)] = leg_qpos[robot.qpos_index(joint)]
     return qpos
 
 
-def _bent(robot: Robot, zero: np.ndarray, chain: tuple[int, ...], end: tuple, sign: int) -> np.ndarray | None:
+def _bend_leg(robot: Robot, zero_qpos: np.ndarray, chain: Chain, end: _ChainEnd, sign: int) -> np.ndarray | None:
     """Return a pose (nq,) in which one leg stands with a bent knee, by damped least squares; None if it cannot."""
-    model, (point, geom) = robot.model, end
-    body = int(model.geom_bodyid[geom])
-    data = robot.placed(zero)
-    foot = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
-    hip, knee = data.xanchor[chain[-2]].copy(), data.xanchor[chain[-1]].copy()
-    length = np.linalg.norm(knee - hip) + np.linalg.norm(point - knee)
-    aside = point[1] + np.sign(point[1]) * _ASIDE * length if len(chain) > 2 else hip[1]
-    goal = np.array((hip[0], aside, hip[2] - _REACH * length))
-    places, dofs = [robot.place(joint) for joint in chain], [int(model.jnt_dofadr[joint]) for joint in chain]
-    qpos = zero.copy()
-    qpos[places[-2:]] = _BEND * sign, -2.0 * _BEND * sign
-    for _ in range(_STEPS):
-        qpos = robot.clipped(qpos)
-        robot.placed(qpos, data)
-        reached = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot
+    model = robot.model
+    body = int(model.geom_bodyid[end.geom])
+    data = robot.forward_kinematics(zero_qpos)
+    foot_in_body = data.xmat[body].reshape(3, 3).T @ (end.point - data.xpos[body])
+    hip = data.xanchor[chain[-2]].copy()
+    knee = data.xanchor[chain[-1]].copy()
+    leg_length = np.linalg.norm(knee - hip) + np.linalg.norm(end.point - knee)
+    moved_outwards = end.point[1] + np.sign(end.point[1]) * _FOOT_OFFSET * leg_length
+    goal_y = moved_outwards if len(chain) > 2 else hip[1]
+    goal = np.array((hip[0], goal_y, hip[2] - _LEG_HEIGHT * leg_length))
+
+    qpos_indices = [robot.qpos_index(joint) for joint in chain]
+    dofs = [int(model.jnt_dofadr[joint]) for joint in chain]
+    qpos = zero_qpos.copy()
+    qpos[qpos_indices[-2]] = _START_BEND * sign
+    qpos[qpos_indices[-1]] = -2.0 * _START_BEND * sign
+    for _ in range(_ITERATIONS):
+        qpos = robot.clip_to_limits(qpos)
+        robot.forward_kinematics(qpos, data)
+        foot = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot_in_body
         jacobian = np.zeros((3, model.nv))
-        mujoco.mj_jac(model, data, jacobian, None, reached, body)
-        moved = jacobian[:, dofs]
-        step = least_changes(moved, (goal - reached)[:, None], _DAMPING * float(length))
-        qpos[places] += step.clip(-_LARGEST_STEP, _LARGEST_STEP)
-    missed = np.linalg.norm((goal - reached)[[0, 2]]) > _MISS * length
-    return None if missed else robot.clipped(qpos)
+        mujoco.mj_jac(model, data, jacobian, None, foot, body)
+        leg_jacobian = jacobian[:, dofs]
+        change = least_changes(leg_jacobian, (goal - foot)[:, None], _DAMPING * float(leg_length))
+        qpos[qpos_indices] += change.clip(-_MAX_STEP, _MAX_STEP)
+    miss = np.linalg.norm((goal - foot)[[0, 2]])  # m, forward and up
+    if miss > _MAX_MISS * leg_length:
+        return None
+    return robot.clip_to_limits(qpos)

@@ -1,6 +1,7 @@
 """The kinematic sketch of an imported body: its legs in the torso's frame, as it stands."""
 
 import math
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -12,82 +13,121 @@ from arc_suite.importing.tree import Robot
 from arc_suite.robots import spec
 from arc_suite.robots.spec import MAX_ALIAS, Foot, Joint, Link, Servo, Solid, Torso, TrackingCamera
 
-_APART = 1e-4  # of the standing height, at least between two joints of a leg: a link has a length
-_SHARE = 0.25  # of the foot's radius, of a link that has no collider
-_CAMERA = np.array((0.0, -4.0, 1.6))  # by the larger of height and span; that of `sizing`
-_ROUND = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
+_MIN_LINK_LENGTH = 1e-4  # standing heights
+_MIN_HALF_EXTENT = 0.05  # standing heights, of the torso's box
+_MIN_RANGE = 1e-3  # degrees
+_RADIUS_SHARE = 0.25  # radius of a link without a collider, in radii of the foot
+_CAMERA_OFFSET = np.array((0.0, -4.0, 1.6))  # in the larger of height and span; the same as in `models.sizing`
+_ROUND_SHAPES = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 
 
-def sketch_legs(robot: Robot, stance: Stance, names: Names, servos: dict[int, Servo]) -> tuple[spec.Leg, ...]:
-    """Return the legs of the spec, in the order of the file."""
-    data = robot.placed(stance.qpos)
+def sketch_legs(robot: Robot, stance: Stance, names: Names, servos: Mapping[int, Servo]) -> tuple[spec.Leg, ...]:
+    """Return the legs of the spec, in the order of the file.
+
+    Args:
+        robot: of the file.
+        stance: in which it stands.
+        names: of its parts.
+        servos: by joint.
+    """
+    data = robot.forward_kinematics(stance.qpos)
     return tuple(
-        _leg(robot, stance, data, leg, label, servos) for label, leg in zip(names.legs, stance.legs, strict=True)
+        _sketch_leg(robot, stance, data, leg, label, servos) for label, leg in zip(names.legs, stance.legs, strict=True)
     )
 
 
-def _leg(robot: Robot, stance: Stance, data: mujoco.MjData, leg: Leg, label: str, servos: dict) -> spec.Leg:
-    points = _points(data, leg, _APART * stance.height)
+def _sketch_leg(
+    robot: Robot, stance: Stance, data: mujoco.MjData, leg: Leg, label: str, servos: Mapping[int, Servo]
+) -> spec.Leg:
+    points = _leg_points(data, leg, _MIN_LINK_LENGTH * stance.height)
     links = []
-    for place, joint in enumerate(leg.joints):
-        given = _joint(robot, stance, data, joint, f"joint{place + 1}", servos[joint])
-        end = _floats(points[place + 1] - points[place])
-        links.append(Link(name=f"link{place + 1}", end=end, radius=_radius(robot, leg, joint), joint=given))
-    return spec.Leg(name=label, mount=_floats(points[0]), links=tuple(links), foot=Foot(radius=leg.radius))
+    for index, joint in enumerate(leg.joints):
+        link = Link(
+            name=f"link{index + 1}",
+            end=_to_vector(points[index + 1] - points[index]),
+            radius=_link_radius(robot, leg, joint),
+            joint=_sketch_joint(robot, stance, data, joint, f"joint{index + 1}", servos[joint]),
+        )
+        links.append(link)
+    return spec.Leg(name=label, mount=_to_vector(points[0]), links=tuple(links), foot=Foot(radius=leg.radius))
 
 
-def _floats(numbers) -> spec.Vector:
+def _to_vector(numbers) -> spec.Vector:
     x, y, z = map(float, numbers)
     return x, y, z
 
 
-def _points(data: mujoco.MjData, leg: Leg, apart: float) -> list[np.ndarray]:
-    """Return the anchors of a leg's joints and the foot's center, no two in one place; the foot stays where it is."""
-    points = [data.xanchor[joint].copy() for joint in leg.joints] + [leg.center]
-    for place in range(len(points) - 2, -1, -1):
-        if np.linalg.norm(points[place + 1] - points[place]) < apart:
-            points[place] = points[place + 1] + (0.0, 0.0, apart)
+def _leg_points(data: mujoco.MjData, leg: Leg, min_length: float) -> list[np.ndarray]:
+    """Return the anchors of a leg's joints and the foot's center (3,), m.
+
+    Where two of them are nearer than a minimum length, m, the one nearer to the torso is moved up. The foot stays.
+    """
+    points = [data.xanchor[joint].copy() for joint in leg.joints]
+    points.append(leg.center)
+    for index in reversed(range(len(leg.joints))):
+        next_point = points[index + 1]
+        if np.linalg.norm(next_point - points[index]) < min_length:
+            points[index] = next_point + (0.0, 0.0, min_length)
     return points
 
 
-def _joint(robot: Robot, stance: Stance, data: mujoco.MjData, joint: int, name: str, servo: Servo) -> Joint:
-    model, dof = robot.model, robot.model.jnt_dofadr[joint]
-    home = stance.qpos[robot.place(joint)]
-    low, high = (math.degrees(limit - home) for limit in robot.range(joint))
-    low, high = max(min(low, 0.0), -180.0), min(max(high, 0.0), 180.0)
+def _sketch_joint(robot: Robot, stance: Stance, data: mujoco.MjData, joint: int, name: str, servo: Servo) -> Joint:
+    """Return a joint of the spec, whose angle is 0 in the standing pose."""
+    model = robot.model
+    dof = model.jnt_dofadr[joint]
+    standing_angle = stance.qpos[robot.qpos_index(joint)]  # rad
+    low_limit, high_limit = robot.limits(joint)
+    low = max(min(math.degrees(low_limit - standing_angle), 0.0), -180.0)
+    high = min(max(math.degrees(high_limit - standing_angle), 0.0), 180.0)
+    if high <= low:
+        high = low + _MIN_RANGE
     return Joint(
         name=name,
-        axis=_floats(data.xaxis[joint]),
-        range_deg=(low, high if high > low else low + 1e-3),
+        axis=_to_vector(data.xaxis[joint]),
+        range_deg=(low, high),
         armature=float(model.dof_armature[dof]),
         damping=float(model.dof_damping[dof]),
         servo=servo,
-        alias=robot.name(joint)[:MAX_ALIAS],
+        alias=robot.joint_name(joint)[:MAX_ALIAS],
     )
 
 
-def _radius(robot: Robot, leg: Leg, joint: int) -> float:
+def _link_radius(robot: Robot, leg: Leg, joint: int) -> float:
     """Return the radius of a link for pictures: the thinnest of its round colliders, or a share of the foot's."""
-    model, body = robot.model, robot.model.jnt_bodyid[joint]
-    own = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body and model.geom_type[geom] in _ROUND]
-    return min((float(model.geom_size[geom][0]) for geom in own), default=_SHARE * leg.radius)
+    model = robot.model
+    body = model.jnt_bodyid[joint]
+    colliders_of_link = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body]
+    radii = [float(model.geom_size[geom][0]) for geom in colliders_of_link if model.geom_type[geom] in _ROUND_SHAPES]
+    return min(radii, default=_RADIUS_SHARE * leg.radius)
 
 
 def sketch_torso(robot: Robot, stance: Stance) -> Torso:
     """Return the torso: one box around its colliders, or around the mounts of its legs if it has none."""
-    data = robot.placed(stance.qpos)
-    own = [geom for geom in robot.colliders if not robot.chains[int(robot.model.geom_bodyid[geom])]]
-    axes = np.eye(3)
-    far = [np.diag([tree.support_point(robot.model, data, geom, axis) @ axes for axis in axes]) for geom in own]
-    near = [np.diag([tree.support_point(robot.model, data, geom, -axis) @ axes for axis in axes]) for geom in own]
-    mounts = [data.xanchor[leg.joints[0]] for leg in stance.legs]
-    high, low = np.max(far or mounts, axis=0), np.min(near or mounts, axis=0)
-    half = np.maximum(0.5 * (high - low), 0.05 * stance.height)
-    trunk = Solid(name="trunk", shape="box", size=_floats(half), position=_floats(0.5 * (high + low)))
+    data = robot.forward_kinematics(stance.qpos)
+    torso_colliders = [geom for geom in robot.colliders if not robot.chain_of_geom(geom)]
+    if torso_colliders:
+        high_points = [_geom_bounds(robot, data, geom, side=1.0) for geom in torso_colliders]
+        low_points = [_geom_bounds(robot, data, geom, side=-1.0) for geom in torso_colliders]
+    else:
+        high_points = [data.xanchor[leg.joints[0]] for leg in stance.legs]
+        low_points = high_points
+    high = np.max(high_points, axis=0)
+    low = np.min(low_points, axis=0)
+    half_extents = np.maximum(0.5 * (high - low), _MIN_HALF_EXTENT * stance.height)
+    center = 0.5 * (high + low)
+    trunk = Solid(name="trunk", shape="box", size=_to_vector(half_extents), position=_to_vector(center))
     return Torso(standing_height=stance.height, solids=(trunk,))
+
+
+def _geom_bounds(robot: Robot, data: mujoco.MjData, geom: int, side: float) -> np.ndarray:
+    """Return the highest coordinates (3,) of a geom, m, or with a side of -1 the lowest ones."""
+    axes = np.eye(3)
+    support_points = [tree.support_point(robot.model, data, geom, side * axis) @ axes for axis in axes]
+    return np.diag(support_points)
 
 
 def sketch_camera(stance: Stance) -> TrackingCamera:
     """Return a camera from which all feet are seen."""
-    size = max(*(abs(leg.center[:2]).max() for leg in stance.legs), stance.height)
-    return TrackingCamera(position=_floats(size * _CAMERA))
+    span = max(abs(leg.center[:2]).max() for leg in stance.legs)
+    size = max(span, stance.height)
+    return TrackingCamera(position=_to_vector(size * _CAMERA_OFFSET))

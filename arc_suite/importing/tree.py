@@ -8,11 +8,15 @@ import numpy as np
 
 from arc_suite.robots.spec import SpecError
 
-_KIND = mujoco.mjtJoint
-FREE, BALL, SLIDE, HINGE = map(int, (_KIND.mjJNT_FREE, _KIND.mjJNT_BALL, _KIND.mjJNT_SLIDE, _KIND.mjJNT_HINGE))
+FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+BALL = int(mujoco.mjtJoint.mjJNT_BALL)
+SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+DOWN = np.array((0.0, 0.0, -1.0))
 
 _GEOM = mujoco.mjtGeom
-DOWN = np.array((0.0, 0.0, -1.0))
+_IDENTITY_POSE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position and quaternion
 
 
 class Robot(NamedTuple):
@@ -22,7 +26,7 @@ class Robot(NamedTuple):
         model: the file, whose torso has a free joint.
         root: body of the torso.
         bodies: of the robot, parents first.
-        joints: all but the free one, in the order of the file.
+        joints: all except the free one, in the order of the file.
         colliders: geoms that collide with anything.
         chains: by body, the joints between the torso and it, outwards.
     """
@@ -34,32 +38,41 @@ class Robot(NamedTuple):
     colliders: tuple[int, ...]
     chains: dict[int, tuple[int, ...]]
 
-    def name(self, joint: int) -> str:
+    def joint_name(self, joint: int) -> str:
         """Return the name of a joint in the file, or its number."""
         return self.model.joint(joint).name or f"joint {joint}"
 
-    def range(self, joint: int) -> tuple[float, float]:
-        """Return the limits of a joint, rad or m; infinite ones where it has none."""
-        low, high = self.model.jnt_range[joint] if self.model.jnt_limited[joint] else (-np.inf, np.inf)
+    def limits(self, joint: int) -> tuple[float, float]:
+        """Return the lower and upper limit of a joint, rad or m; infinite if it has none."""
+        if not self.model.jnt_limited[joint]:
+            return -np.inf, np.inf
+        low, high = self.model.jnt_range[joint]
         return float(low), float(high)
 
-    def place(self, joint: int) -> int:
-        """Return where a joint's angle stands in qpos."""
+    def qpos_index(self, joint: int) -> int:
+        """Return the index of a joint's angle in qpos."""
         return int(self.model.jnt_qposadr[joint])
 
-    def clipped(self, qpos: np.ndarray) -> np.ndarray:
-        """Return a pose (nq,) with all joints within their limits."""
-        qpos = qpos.copy()
-        for joint in self.joints:
-            qpos[self.place(joint)] = np.clip(qpos[self.place(joint)], *self.range(joint))
-        return qpos
+    def chain_of_geom(self, geom: int) -> tuple[int, ...]:
+        """Return the joints between the torso and a geom, outwards."""
+        return self.chains[int(self.model.geom_bodyid[geom])]
 
-    def placed(self, qpos: np.ndarray, data: mujoco.MjData | None = None) -> mujoco.MjData:
+    def clip_to_limits(self, qpos: np.ndarray) -> np.ndarray:
+        """Return a pose (nq,) with all joints within their limits."""
+        clipped_qpos = qpos.copy()
+        for joint in self.joints:
+            index = self.qpos_index(joint)
+            low, high = self.limits(joint)
+            clipped_qpos[index] = np.clip(qpos[index], low, high)
+        return clipped_qpos
+
+    def forward_kinematics(self, qpos: np.ndarray, data: mujoco.MjData | None = None) -> mujoco.MjData:
         """Return the state of a pose (nq,), with the torso's frame as the world's: a new one, or `data`."""
-        data = mujoco.MjData(self.model) if data is None else data
-        start = self.model.jnt_qposadr[self.model.body_jntadr[self.root]]
+        if data is None:
+            data = mujoco.MjData(self.model)
+        start = self.model.jnt_qposadr[self.model.body_jntadr[self.root]]  # of the torso's pose in qpos
         data.qpos[:] = qpos
-        data.qpos[start : start + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        data.qpos[start : start + 7] = _IDENTITY_POSE
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_comPos(self.model, data)
         return data
@@ -74,20 +87,22 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
         notes: what was left out of the file, for an error.
 
     Raises:
-        SpecError: it has ball joints, or nothing that collides.
+        SpecError: the robot has ball joints, or nothing that collides.
     """
     chains: dict[int, tuple[int, ...]] = {root: ()}
     for body in range(root + 1, model.nbody):
         parent = int(model.body_parentid[body])
         if parent in chains:
-            first = int(model.body_jntadr[body])
-            chains[body] = (*chains[parent], *range(first, first + int(model.body_jntnum[body])))
+            first_joint = int(model.body_jntadr[body])
+            last_joint = first_joint + int(model.body_jntnum[body])
+            chains[body] = (*chains[parent], *range(first_joint, last_joint))
     joints = tuple(sorted({joint for chain in chains.values() for joint in chain}))
     colliders = tuple(geom for geom in colliding_geoms(model) if int(model.geom_bodyid[geom]) in chains)
     robot = Robot(model, root, tuple(chains), joints, colliders, chains)
-    balls = [robot.name(joint) for joint in joints if model.jnt_type[joint] == BALL]
-    if balls:
-        raise SpecError(f"joint {balls[0]!r} is a ball joint; expected hinges")
+
+    ball_joints = [robot.joint_name(joint) for joint in joints if model.jnt_type[joint] == BALL]
+    if ball_joints:
+        raise SpecError(f"joint {ball_joints[0]!r} is a ball joint; expected hinges")
     if not robot.colliders:
         raise SpecError("; ".join(("no shape collides with anything: a leg needs one at its end", *notes)))
     return robot
@@ -95,37 +110,38 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
 
 def colliding_geoms(model: mujoco.MjModel) -> list[int]:
     """Return the geoms that can touch others: by their masks, or as one of a contact pair."""
-    touches = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    touches[[*model.pair_geom1, *model.pair_geom2]] = True
-    return np.flatnonzero(touches).tolist()
+    can_touch = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    can_touch[[*model.pair_geom1, *model.pair_geom2]] = True
+    return np.flatnonzero(can_touch).tolist()
 
 
 def support_point(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> np.ndarray:
-    """Return the farthest point (3,) of a geom along a direction (3,), in the world."""
-    turn, size = data.geom_xmat[geom].reshape(3, 3), model.geom_size[geom]
-    along = turn.T @ direction
-    return data.geom_xpos[geom] + turn @ _farthest(model, geom, size, along)
+    """Return the farthest point (3,) of a geom along a unit vector (3,), in the world."""
+    rotation = data.geom_xmat[geom].reshape(3, 3)
+    local_direction = rotation.T @ direction
+    return data.geom_xpos[geom] + rotation @ _local_support_point(model, geom, local_direction)
 
 
-def _farthest(model: mujoco.MjModel, geom: int, size: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Return the farthest point (3,) along a unit vector (3,), in the geom's frame."""
-    across = np.array((along[0], along[1], 0.0))
-    rim = size[0] * across / max(np.hypot(*along[:2]), 1e-9)
-    end = np.array((0.0, 0.0, np.sign(along[2]) * size[1]))
+def _local_support_point(model: mujoco.MjModel, geom: int, direction: np.ndarray) -> np.ndarray:
+    """Return the farthest point (3,) of a geom along a unit vector (3,), in the geom's frame."""
+    size = model.geom_size[geom]
+    horizontal = np.array((direction[0], direction[1], 0.0))
+    rim_point = size[0] * horizontal / max(np.hypot(*direction[:2]), 1e-9)  # of a circle about the z axis
+    axis_end = np.array((0.0, 0.0, np.sign(direction[2]) * size[1]))  # of a capsule or cylinder
     match model.geom_type[geom]:
         case _GEOM.mjGEOM_SPHERE:
-            return size[0] * along
+            return size[0] * direction
         case _GEOM.mjGEOM_CAPSULE:
-            return size[0] * along + end
+            return size[0] * direction + axis_end
         case _GEOM.mjGEOM_CYLINDER:
-            return rim + end
+            return rim_point + axis_end
         case _GEOM.mjGEOM_ELLIPSOID:
-            return size**2 * along / np.linalg.norm(size * along)
+            return size**2 * direction / np.linalg.norm(size * direction)
         case _GEOM.mjGEOM_BOX:
-            return np.sign(along) * size
+            return np.sign(direction) * size
         case _GEOM.mjGEOM_MESH:
             points = vertices(model, int(model.geom_dataid[geom]))
-            return points[(points @ along).argmax()].astype(float)
+            return points[(points @ direction).argmax()].astype(float)
     return np.zeros(3)
 
 
@@ -136,6 +152,7 @@ def vertices(model: mujoco.MjModel, mesh: int) -> np.ndarray:
 
 
 def lowest_point(robot: Robot, data: mujoco.MjData, geoms: Sequence[int]) -> tuple[np.ndarray, int]:
-    """Return the lowest point (3,) of geoms, and the one that has it."""
-    points = [(support_point(robot.model, data, geom, DOWN), geom) for geom in geoms]
-    return min(points, key=lambda point: point[0][2])
+    """Return the lowest point (3,) of geoms, and the geom that has it."""
+    points = [support_point(robot.model, data, geom, DOWN) for geom in geoms]
+    lowest = int(np.argmin([point[2] for point in points]))
+    return points[lowest], geoms[lowest]

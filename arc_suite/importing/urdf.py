@@ -1,33 +1,39 @@
-"""Cures of URDF: what MuJoCo refuses, and what gets lost on the way into it."""
+"""Repairs of URDF: what MuJoCo refuses, and what gets lost when MuJoCo reads it."""
 
 import collections
-import itertools
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from arc_suite.robots.spec import SpecError
 
+# Roll, pitch and yaw, rad, of a robot's base in the torso's frame.
 LEVEL = "0 0 0"
-TURNS = (f"{math.pi / 2} 0 {math.pi / 2}", f"{math.pi / 2} 0 0")  # y points up, and z or x ahead
+TURNS = (f"{math.pi / 2} 0 {math.pi / 2}", f"{math.pi / 2} 0 0")  # the base's y axis up; ahead is its z axis, or x
 
-_OWN = "arc_suite_"  # begins the names of links that are added
-_READABLE = (".stl", ".obj", ".msh")
-_KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating")
-_LEAST = 1e-6  # of the inertia of a ball of the link's mass; a smaller one is none
-_LIGHT = 1e-4  # of the robot's mass, of a link that moves and has none
-_DENSITY = 1000.0  # kg/m^3, of the ball that a link without inertia is taken for
-_JOINT_NUMBERS = {
+_ADDED_PREFIX = "arc_suite_"  # begins the names of links that are added
+_IGNORED_ELEMENTS = ("gazebo", "transmission", "mujoco")
+_MESH_EXTENSIONS = (".stl", ".obj", ".msh")
+_MESH_SCHEMES = ("package://", "file://", "model://")
+_JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating")
+
+# Attributes of a joint's elements, with how many numbers each has.
+_JOINT_ATTRIBUTES = {
     "axis": {"xyz": 3},
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
     "dynamics": dict.fromkeys(("damping", "friction"), 1),
 }
-_SCHEMES = ("package://", "file://", "model://")
-_DIAGONAL, _PRODUCTS = ("ixx", "iyy", "izz"), ("ixy", "ixz", "iyz")
-_ROUNDING = 1e-9  # of inertias in files, as a share of the largest
+
+_MOMENTS = ("ixx", "iyy", "izz")  # of inertia, the diagonal of the matrix
+_PRODUCTS = ("ixy", "ixz", "iyz")
+_INERTIA_ROWS = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
+_BALL_DENSITY = 1000.0  # kg/m^3, of the ball that stands for a link without inertia
+_MIN_MOMENT = 1e-6  # of the moment of that ball; a smaller one counts as none
+_ROUNDING = 1e-9  # of inertias in files, as a share of the largest moment
+_LIGHT_LINK = 1e-4  # of the robot's mass, of a link that moves and has no mass
 
 _COMPILER = {
     "strippath": "false",
@@ -38,6 +44,9 @@ _COMPILER = {
     "boundinertia": "0",
 }
 
+# Elements by name, in the order of the file.
+Elements = dict[str, ElementTree.Element]
+
 
 def repair_urdf(
     robot: ElementTree.Element, folder: Path, turn: str = LEVEL
@@ -45,200 +54,264 @@ def repair_urdf(
     """Return a URDF that MuJoCo reads, its moving joints in the order of the file, and notes.
 
     Args:
-        robot: the top element, which is changed.
+        robot: the root element, which is changed.
         folder: of the file; meshes are searched there and upwards.
-        turn: roll, pitch and yaw of the base in the torso's frame, for files whose z axis does not point up.
+        turn: roll, pitch and yaw, rad, of the base in the torso's frame, for files whose z axis does not point up.
 
     Raises:
         SpecError: it is no URDF; the message names the link or joint.
     """
     if any("xacro" in str(element.tag) for element in robot.iter()):
         raise SpecError("has xacro macros; write the URDF with xacro first")
-    for tag in ("gazebo", "transmission", "mujoco"):
+    for tag in _IGNORED_ELEMENTS:
         for element in robot.findall(tag):
             robot.remove(element)
-    links, joints = _named(robot, "link"), _named(robot, "joint")
+    links = _elements_by_name(robot, "link")
+    joints = _elements_by_name(robot, "joint")
     for name, joint in joints.items():
         _check_joint(name, joint, links)
-    notes = [*_cure_shapes(links, folder), *_cure_inertias(links), *_cure_masses(links, joints), *_mimics(joints)]
-    _add_root(robot, links, joints, turn)
+    notes = (
+        *_repair_shapes(links, folder),
+        *_repair_inertias(links),
+        *_add_missing_masses(links, joints),
+        *_mimic_notes(joints),
+    )
+    _add_floating_root(robot, links, joints, turn)
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _COMPILER)
     order = tuple(name for name, joint in joints.items() if joint.get("type") not in ("fixed", "floating"))
-    return ElementTree.tostring(robot, encoding="unicode"), order, tuple(notes)
+    return ElementTree.tostring(robot, encoding="unicode"), order, notes
 
 
-def _named(robot: ElementTree.Element, tag: str) -> dict[str, ElementTree.Element]:
-    """Return the links or joints by name, in the order of the file."""
-    found = {}
+def _elements_by_name(robot: ElementTree.Element, tag: str) -> Elements:
+    """Return the links or joints by name, with the numbers of their poses checked."""
+    elements = {}
     for element in robot.findall(tag):
         name = element.get("name")
-        if not name or name in found:
-            raise SpecError(f"{tag} {name!r}: the name occurs twice" if name else f"a {tag} has no name")
-        found[name] = element
-        for child in element.iter("origin"):
+        if not name:
+            raise SpecError(f"a {tag} has no name")
+        if name in elements:
+            raise SpecError(f"{tag} {name!r}: the name occurs twice")
+        elements[name] = element
+        for origin in element.iter("origin"):
             for key in ("xyz", "rpy"):
-                _numbers(f"{tag} {name!r}: origin {key}", child.get(key, "0 0 0"), 3)
-    if not found:
+                _parse_numbers(f"{tag} {name!r}: origin {key}", origin.get(key, "0 0 0"), 3)
+    if not elements:
         raise SpecError(f"expected a URDF, got one without a {tag}")
-    return found
+    return elements
 
 
-def _numbers(what: str, text: str, size: int) -> list[float]:
+def _parse_numbers(label: str, text: str, count: int) -> list[float]:
+    """Return so many finite numbers of a text; the label begins the error."""
     try:
         numbers = [float(word) for word in text.split()]
     except ValueError:
         numbers = []
-    if len(numbers) != size or not all(map(math.isfinite, numbers)):
-        raise SpecError(f"{what}: expected {size} number{'s' * (size > 1)}, got {text[:60]!r}")
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        plural = "s" if count > 1 else ""
+        raise SpecError(f"{label}: expected {count} number{plural}, got {text[:60]!r}")
     return numbers
 
 
-def _cure_shapes(links: dict[str, ElementTree.Element], folder: Path) -> Iterator[str]:
-    """Drop visual shapes, and colliders that cannot be read; yield a note of these."""
-    dropped = []
-    for name, link in links.items():
-        for visual in link.findall("visual"):
-            link.remove(visual)
-        for collision in link.findall("collision"):
-            mesh, sphere = collision.find("geometry/mesh"), collision.find("geometry/sphere")
-            if mesh is not None:
-                file = _resolved(mesh.get("filename", ""), folder)
-                mesh.set("filename", str(file))
-            if (mesh is not None and file is None) or (sphere is not None and not _positive(sphere.get("radius"))):
-                link.remove(collision)
-                dropped.append(name)
-    if dropped:
-        yield f"left out: {len(dropped)} colliders that cannot be read, such as of {dropped[0]}"
-
-
-def _positive(text: str | None) -> bool:
-    try:
-        return float(text or "0") > 0.0
-    except ValueError:
-        return False
-
-
-def _resolved(name: str, folder: Path) -> Path | None:
-    """Return the file of a mesh: below the folder of the URDF or one above it; None if MuJoCo cannot read it."""
-    for scheme in _SCHEMES:
-        name = name.removeprefix(scheme)
-    if not name.lower().endswith(_READABLE):
-        return None
-    _, _, inner = name.partition("/")  # a package's name need not be its folder's
-    bases = [folder.absolute(), *folder.absolute().parents]
-    return next((base / part for base in bases for part in (name, inner) if part and (base / part).is_file()), None)
-
-
-def _cure_inertias(links: dict[str, ElementTree.Element]) -> Iterator[str]:
-    """Drop the products of inertias that no solid has, and inertias without a mass; yield a note of these."""
-    repaired = []
-    for name, link in links.items():
-        inertial = link.find("inertial")
-        if inertial is None:
-            continue
-        mass, inertia = inertial.find("mass"), inertial.find("inertia")
-        if mass is None or inertia is None:
-            raise SpecError(f"link {name!r}: inertial: expected a mass and an inertia")
-        values = {key: inertia.get(key, "0") for key in _DIAGONAL + _PRODUCTS}
-        numbers = {key: _numbers(f"link {name!r}: inertia {key}", text, 1)[0] for key, text in values.items()}
-        (weight,) = _numbers(f"link {name!r}: mass value", mass.get("value", ""), 1)
-        if weight <= 0.0:
-            link.remove(inertial)
-            continue
-        least, middle, most = np.linalg.eigvalsh(_matrix(numbers))
-        if least + middle < (1.0 - _ROUNDING) * most:  # the compiler then balances them
-            repaired.append(name)
-        ball = _ball(weight)
-        if least <= max(_ROUNDING * most, _LEAST * ball):
-            repaired.append(name)
-            values = dict.fromkeys(_PRODUCTS, "0")
-            values |= {key: repr(numbers[key] if numbers[key] > _LEAST * ball else ball) for key in _DIAGONAL}
-        for key, text in values.items():
-            inertia.set(key, text)
-    if repaired:
-        yield f"repaired: inertias of {len(set(repaired))} links that no solid has, such as of {repaired[0]}"
-
-
-def _ball(mass: float) -> float:
-    """Return the moment of inertia of a ball, kg m^2."""
-    return 0.4 * mass * (0.75 * mass / (math.pi * _DENSITY)) ** (2.0 / 3.0)
-
-
-def _matrix(numbers: dict[str, float]) -> np.ndarray:
-    rows = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
-    return np.array([[numbers[key] for key in row] for row in rows])
-
-
-def _mimics(joints: dict[str, ElementTree.Element]) -> Iterator[str]:
-    found = [name for name, joint in joints.items() if joint.find("mimic") is not None]
-    if found:
-        yield f"left out: {len(found)} mimic joints move on their own, such as {found[0]}"
-
-
-def _cure_masses(links: dict[str, ElementTree.Element], joints: dict[str, ElementTree.Element]) -> Iterator[str]:
-    """Give links that move and weigh nothing, fixed ones included, a small mass; yield a note of these."""
-    masses = {name: float(link.find("inertial/mass").get("value")) for name, link in _weighed(links)}
-    fixed, moving = collections.defaultdict(list), []
-    for joint in joints.values():
-        parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
-        fixed[parent] += [child] if joint.get("type") == "fixed" else []
-        moving += [child] if joint.get("type") != "fixed" else []
-    light = [name for name in moving if not any(masses.get(link) for link in _cluster(name, fixed))]
-    for name in light:
-        mass = _LIGHT * sum(masses.values())
-        inertial = ElementTree.SubElement(links[name], "inertial")
-        ElementTree.SubElement(inertial, "mass", value=repr(mass))
-        numbers = dict.fromkeys(_DIAGONAL, repr(_ball(mass))) | dict.fromkeys(_PRODUCTS, "0")
-        ElementTree.SubElement(inertial, "inertia", numbers)
-    if light:
-        yield f"repaired: {len(light)} links that move and weigh nothing get {mass:.2g} kg, such as {light[0]}"
-
-
-def _weighed(links: dict[str, ElementTree.Element]) -> Iterator[tuple[str, ElementTree.Element]]:
-    return ((name, link) for name, link in links.items() if link.find("inertial") is not None)
-
-
-def _cluster(name: str, fixed: dict[str, list[str]]) -> list[str]:
-    """Return a link and all that are fixed to it."""
-    found = [name]
-    for link in found:
-        found += [child for child in fixed[link] if child not in found]
-    return found
-
-
-def _check_joint(name: str, joint: ElementTree.Element, links: dict[str, ElementTree.Element]) -> None:
-    if joint.get("type") not in _KINDS:
-        raise SpecError(f"joint {name!r}: expected a type out of {', '.join(_KINDS)}, got {joint.get('type')!r}")
+def _check_joint(name: str, joint: ElementTree.Element, links: Elements) -> None:
+    """Refuse an unknown type, a missing link, an element that occurs twice, and wrong numbers."""
+    if joint.get("type") not in _JOINT_TYPES:
+        raise SpecError(f"joint {name!r}: expected a type out of {', '.join(_JOINT_TYPES)}, got {joint.get('type')!r}")
     for end in ("parent", "child"):
         element = joint.find(end)
         link = None if element is None else element.get("link")
         if link not in links:
             raise SpecError(f"joint {name!r}: its {end} is no link of the file: {link!r}")
     tags = [element.tag for element in joint]
-    twice = next((tag for tag in tags if tags.count(tag) > 1), None)
-    if twice is not None:
-        raise SpecError(f"joint {name!r}: expected one element {twice!r}, got {tags.count(twice)}")
-    for tag, keys in _JOINT_NUMBERS.items():
+    for tag in tags:
+        if tags.count(tag) > 1:
+            raise SpecError(f"joint {name!r}: expected one element {tag!r}, got {tags.count(tag)}")
+    for tag, number_counts in _JOINT_ATTRIBUTES.items():
         element = joint.find(tag)
-        for key in [] if element is None else keys:
-            _numbers(f"joint {name!r}: {tag} {key}", element.get(key, "0" if tag != "axis" else "1 0 0"), keys[key])
+        if element is None:
+            continue
+        default = "1 0 0" if tag == "axis" else "0"
+        for key, count in number_counts.items():
+            _parse_numbers(f"joint {name!r}: {tag} {key}", element.get(key, default), count)
 
 
-def _add_root(robot: ElementTree.Element, links: dict, joints: dict, turn: str) -> None:
-    """Have the base float on an empty link, unless it floats: MuJoCo welds the base of a URDF to the world."""
+def _repair_shapes(links: Elements, folder: Path) -> Iterator[str]:
+    """Remove visual shapes, and colliders that cannot be read; yield a note on these colliders."""
+    links_with_losses = []
+    for name, link in links.items():
+        for visual in link.findall("visual"):
+            link.remove(visual)
+        for collision in link.findall("collision"):
+            mesh = collision.find("geometry/mesh")
+            sphere = collision.find("geometry/sphere")
+            is_readable = True
+            if mesh is not None:
+                file = _find_mesh_file(mesh.get("filename", ""), folder)
+                mesh.set("filename", str(file))
+                is_readable = file is not None
+            if sphere is not None and not _is_positive(sphere.get("radius")):
+                is_readable = False
+            if not is_readable:
+                link.remove(collision)
+                links_with_losses.append(name)
+    if links_with_losses:
+        yield f"left out: {len(links_with_losses)} colliders that cannot be read, such as of {links_with_losses[0]}"
+
+
+def _is_positive(text: str | None) -> bool:
+    try:
+        return float(text or "0") > 0.0
+    except ValueError:
+        return False
+
+
+def _find_mesh_file(name: str, folder: Path) -> Path | None:
+    """Return the file of a mesh: below the folder of the URDF or one above it; None if MuJoCo cannot read it."""
+    path = name
+    for scheme in _MESH_SCHEMES:
+        path = path.removeprefix(scheme)
+    if not path.lower().endswith(_MESH_EXTENSIONS):
+        return None
+    _, _, path_in_package = path.partition("/")  # the name of a package need not be that of its folder
+    for base in (folder.absolute(), *folder.absolute().parents):
+        for relative_path in (path, path_in_package):
+            if relative_path and (base / relative_path).is_file():
+                return base / relative_path
+    return None
+
+
+def _repair_inertias(links: Elements) -> Iterator[str]:
+    """Repair inertias that no solid has, and remove those without a mass; yield a note on the repaired ones."""
+    repaired_links = []
+    for name, link in links.items():
+        inertial = link.find("inertial")
+        if inertial is None:
+            continue
+        mass_element = inertial.find("mass")
+        inertia_element = inertial.find("inertia")
+        if mass_element is None or inertia_element is None:
+            raise SpecError(f"link {name!r}: inertial: expected a mass and an inertia")
+        texts = {key: inertia_element.get(key, "0") for key in _MOMENTS + _PRODUCTS}
+        inertia = {key: _parse_numbers(f"link {name!r}: inertia {key}", text, 1)[0] for key, text in texts.items()}
+        (mass,) = _parse_numbers(f"link {name!r}: mass value", mass_element.get("value", ""), 1)
+        if mass <= 0.0:
+            link.remove(inertial)
+            continue
+        if _breaks_triangle_rule(inertia):  # MuJoCo's compiler balances the moments
+            repaired_links.append(name)
+        if _has_vanishing_moment(inertia, mass):
+            repaired_links.append(name)
+            texts = _replace_vanishing_moments(inertia, mass)
+        for key, text in texts.items():
+            inertia_element.set(key, text)
+    if repaired_links:
+        count = len(set(repaired_links))
+        yield f"repaired: inertias of {count} links that no solid has, such as of {repaired_links[0]}"
+
+
+def _breaks_triangle_rule(inertia: Mapping[str, float]) -> bool:
+    """Return whether one principal moment is larger than the sum of the other two."""
+    smallest, middle, largest = _principal_moments(inertia)
+    return smallest + middle < (1.0 - _ROUNDING) * largest
+
+
+def _has_vanishing_moment(inertia: Mapping[str, float], mass: float) -> bool:
+    """Return whether the smallest principal moment is nothing for a link of this mass, kg."""
+    smallest, _, largest = _principal_moments(inertia)
+    return smallest <= max(_ROUNDING * largest, _MIN_MOMENT * _ball_moment(mass))
+
+
+def _replace_vanishing_moments(inertia: Mapping[str, float], mass: float) -> dict[str, str]:
+    """Return the texts of an inertia without products, and with the moment of a ball where a moment is nothing."""
+    ball_moment = _ball_moment(mass)
+    texts = dict.fromkeys(_PRODUCTS, "0")
+    for key in _MOMENTS:
+        is_enough = inertia[key] > _MIN_MOMENT * ball_moment
+        texts[key] = repr(inertia[key] if is_enough else ball_moment)
+    return texts
+
+
+def _principal_moments(inertia: Mapping[str, float]) -> np.ndarray:
+    """Return the principal moments (3,) of an inertia, kg m^2, the smallest first."""
+    matrix = np.array([[inertia[key] for key in row] for row in _INERTIA_ROWS])
+    return np.linalg.eigvalsh(matrix)
+
+
+def _ball_moment(mass: float) -> float:
+    """Return the moment of inertia of a ball of a mass, kg m^2."""
+    radius_squared = (0.75 * mass / (math.pi * _BALL_DENSITY)) ** (2.0 / 3.0)
+    return 0.4 * mass * radius_squared
+
+
+def _add_missing_masses(links: Elements, joints: Elements) -> Iterator[str]:
+    """Give links that move without mass, also in links fixed to them, a small mass; yield a note on these."""
+    masses = {}
+    for name, link in links.items():
+        if link.find("inertial") is not None:
+            masses[name] = float(link.find("inertial/mass").get("value"))
+    fixed_children = collections.defaultdict(list)
+    moving_links = []
+    for joint in joints.values():
+        child = joint.find("child").get("link")
+        if joint.get("type") == "fixed":
+            fixed_children[joint.find("parent").get("link")].append(child)
+        else:
+            moving_links.append(child)
+
+    light_links = []
+    for name in moving_links:
+        rigid_part = _links_fixed_to(name, fixed_children)
+        if not any(masses.get(link) for link in rigid_part):
+            light_links.append(name)
+    if not light_links:
+        return
+    mass = _LIGHT_LINK * sum(masses.values())
+    for name in light_links:
+        inertial = ElementTree.SubElement(links[name], "inertial")
+        ElementTree.SubElement(inertial, "mass", value=repr(mass))
+        texts = dict.fromkeys(_MOMENTS, repr(_ball_moment(mass))) | dict.fromkeys(_PRODUCTS, "0")
+        ElementTree.SubElement(inertial, "inertia", texts)
+    yield f"repaired: {len(light_links)} links that move and weigh nothing get {mass:.2g} kg, such as {light_links[0]}"
+
+
+def _links_fixed_to(name: str, fixed_children: Mapping[str, list[str]]) -> list[str]:
+    """Return a link and all links that are fixed to it, directly or by others."""
+    links = [name]
+    for link in links:  # which grows on the way
+        links += [child for child in fixed_children[link] if child not in links]
+    return links
+
+
+def _mimic_notes(joints: Elements) -> Iterator[str]:
+    """Yield a note on mimic joints, if there are any."""
+    mimics = [name for name, joint in joints.items() if joint.find("mimic") is not None]
+    if mimics:
+        yield f"left out: {len(mimics)} mimic joints move on their own, such as {mimics[0]}"
+
+
+def _add_floating_root(robot: ElementTree.Element, links: Elements, joints: Elements, turn: str) -> None:
+    """Let the base float on an empty link, unless it floats: MuJoCo welds the base of a URDF to the world."""
     if any(joint.get("type") == "floating" for joint in joints.values()):
         return
     children = {joint.find("child").get("link") for joint in joints.values()}
     bases = [name for name in links if name not in children]
     if len(bases) != 1:
         raise SpecError(f"expected one link without a parent, got {len(bases)}: {', '.join(bases[:4]) or 'a loop'}")
-    chain = [f"{_OWN}world", bases[0]] if turn == LEVEL else [f"{_OWN}world", f"{_OWN}torso", bases[0]]
-    for link in chain[:-1]:
-        ElementTree.SubElement(robot, "link", name=link)
-    for parent, child in itertools.pairwise(chain):
-        kind = "floating" if parent == chain[0] else "fixed"
-        joint = ElementTree.SubElement(robot, "joint", name=f"{parent}_joint", type=kind)
-        ElementTree.SubElement(joint, "parent", link=parent)
-        ElementTree.SubElement(joint, "child", link=child)
-        if kind == "fixed":
-            ElementTree.SubElement(joint, "origin", rpy=turn)
+    (base,) = bases
+    world = f"{_ADDED_PREFIX}world"
+    torso = f"{_ADDED_PREFIX}torso"
+    ElementTree.SubElement(robot, "link", name=world)
+    if turn == LEVEL:
+        _add_joint(robot, world, base, "floating")
+    else:
+        ElementTree.SubElement(robot, "link", name=torso)
+        _add_joint(robot, world, torso, "floating")
+        joint = _add_joint(robot, torso, base, "fixed")
+        ElementTree.SubElement(joint, "origin", rpy=turn)
+
+
+def _add_joint(robot: ElementTree.Element, parent: str, child: str, kind: str) -> ElementTree.Element:
+    """Add a joint between two links, and return it."""
+    joint = ElementTree.SubElement(robot, "joint", name=f"{parent}_joint", type=kind)
+    ElementTree.SubElement(joint, "parent", link=parent)
+    ElementTree.SubElement(joint, "child", link=child)
+    return joint

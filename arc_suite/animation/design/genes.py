@@ -88,7 +88,7 @@ class ProportionGenes:
             profile=profile,
             reaches=(numbers["reach"] * reach_factors).tolist(),
         )
-        return generator.build_body("design", legs, layout, proportions)
+        return generator.assemble_body("design", legs, layout, proportions)
 
     def size_share(self, genes: np.ndarray) -> float:
         """Return the size of the body as a share of the largest size within a budget."""
