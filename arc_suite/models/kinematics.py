@@ -1,4 +1,4 @@
-"""Kinematics of legs: where soles are at given angles of joints, and which angles bring them to places."""
+"""Kinematics of legs: where soles are at given angles of joints, and which angles bring soles to goals."""
 
 from typing import NamedTuple, Self
 
@@ -6,12 +6,14 @@ import numpy as np
 
 from arc_suite.robots.spec import Body
 
-_USED = 0.95  # share of a joint's range, about its middle, that targets may use
-_SETTLING = 50  # steps of the search for a pose at ease
+_JOINT_RANGE_SHARE = 0.95  # of a joint's range, about its middle, that targets may use
+_RELAXING_ITERATIONS = 50
+_MIN_PATH_LENGTH = 1e-9  # of the path of a foot that moves
 # Cross products with the unit vectors, as matrices.
 _CROSS = np.array(
     [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]]
 )
+_VERTICAL = (0.0, 0.0, 1.0)
 
 
 class Legs(NamedTuple):
@@ -25,8 +27,8 @@ class Legs(NamedTuple):
         radii: (legs,) of the feet, m.
         joints: (legs, links) indices; 0 where a link is fixed.
         moves: (legs, links) whether a link has a joint.
-        low: (legs, links) bounds of targets, rad.
-        high: the same.
+        low: (legs, links) lower bounds of targets, rad.
+        high: (legs, links) upper bounds of targets, rad.
     """
 
     mounts: np.ndarray
@@ -40,7 +42,7 @@ class Legs(NamedTuple):
     high: np.ndarray
 
     @classmethod
-    def of(cls, body: Body, used: float = _USED) -> Self:
+    def of(cls, body: Body, used: float = _JOINT_RANGE_SHARE) -> Self:
         """Return the legs of a body.
 
         Args:
@@ -48,92 +50,112 @@ class Legs(NamedTuple):
             used: share of a joint's range, about its middle, that targets may use.
         """
         shape = (len(body.legs), max(len(leg.links) for leg in body.legs))
-        axes, ends, joints = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape, int)
-        moves, low, high, count = np.zeros(shape, bool), np.zeros(shape), np.zeros(shape), 0
-        for i, leg in enumerate(body.legs):
-            for j, link in enumerate(leg.links):
-                ends[i, j] = link.end
-                if link.joint:
-                    axes[i, j] = np.array(link.joint.axis) / np.linalg.norm(link.joint.axis)
-                    joints[i, j], moves[i, j] = count, True
-                    first, last = np.radians(link.joint.range_deg)
-                    spare = 0.5 * (1.0 - used) * (last - first)
-                    low[i, j], high[i, j] = first + spare, last - spare
-                    count += 1
-        mounts, radii = np.array([leg.mount for leg in body.legs]), np.array([leg.foot.radius for leg in body.legs])
-        turns = _rotations(np.tile((0.0, 0.0, 1.0), (len(mounts), 1)), np.radians([leg.yaw_deg for leg in body.legs]))
+        axes = np.zeros((*shape, 3))
+        ends = np.zeros((*shape, 3))
+        joints = np.zeros(shape, int)
+        moves = np.zeros(shape, bool)
+        low = np.zeros(shape)
+        high = np.zeros(shape)
+        joint_count = 0
+        for leg_index, leg in enumerate(body.legs):
+            for link_index, link in enumerate(leg.links):
+                index = (leg_index, link_index)
+                ends[index] = link.end
+                if not link.joint:
+                    continue
+                axes[index] = np.array(link.joint.axis) / np.linalg.norm(link.joint.axis)
+                joints[index] = joint_count
+                moves[index] = True
+                low_limit, high_limit = np.radians(link.joint.range_deg)
+                unused_range = 0.5 * (1.0 - used) * (high_limit - low_limit)  # at either limit
+                low[index] = low_limit + unused_range
+                high[index] = high_limit - unused_range
+                joint_count += 1
+        mounts = np.array([leg.mount for leg in body.legs])
+        radii = np.array([leg.foot.radius for leg in body.legs])
+        yaws = np.radians([leg.yaw_deg for leg in body.legs])
+        turns = _rotations(np.tile(_VERTICAL, (len(mounts), 1)), yaws)
         return cls(mounts, turns, axes, ends, radii, joints, moves, low, high)
 
     def by_leg(self, values) -> np.ndarray:
         """Return values (..., joints) as (..., legs, links), 0 where a link is fixed."""
-        return values.__array_namespace__().where(self.moves, values[..., self.joints], 0.0)
+        xp = values.__array_namespace__()
+        return xp.where(self.moves, values[..., self.joints], 0.0)
 
     def by_joint(self, values) -> np.ndarray:
         """Return values (..., legs, links) as (..., joints)."""
         return values[..., self.moves]
 
     def soles(self, angles) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places (..., legs, 3) of the soles, m, and their Jacobians (..., legs, 3, links).
+        """Return the positions (..., legs, 3) of the soles, m, and their Jacobians (..., legs, 3, links).
 
         Args:
             angles: (..., legs, links) rad.
         """
-        numpy, frame, place, joints = angles.__array_namespace__(), self.turns, self.mounts, []
+        xp = angles.__array_namespace__()
+        orientation = self.turns
+        position = self.mounts
+        axes_and_anchors = []
         for link in range(angles.shape[-1]):
-            joints.append(((frame @ self.axes[:, link, :, None])[..., 0], place))
-            frame = frame @ _rotations(self.axes[:, link], angles[..., link])
-            place = place + (frame @ self.ends[:, link, :, None])[..., 0]
-        sole = place - self.radii[:, None] * (0.0, 0.0, 1.0)
-        return sole, numpy.stack([numpy.cross(axis, sole - anchor) for axis, anchor in joints], axis=-1)
+            axis = (orientation @ self.axes[:, link, :, None])[..., 0]
+            axes_and_anchors.append((axis, position))
+            orientation = orientation @ _rotations(self.axes[:, link], angles[..., link])
+            position = position + (orientation @ self.ends[:, link, :, None])[..., 0]
+        sole = position - self.radii[:, None] * _VERTICAL
+        jacobian = xp.stack([xp.cross(axis, sole - anchor) for axis, anchor in axes_and_anchors], axis=-1)
+        return sole, jacobian
 
     def solve_joint_angles(self, angles, goals, weights, damping: float, steps: int) -> np.ndarray:
-        """Return the angles (..., legs, links), by damped least squares from given ones, that bring soles near goals.
+        """Return the angles (..., legs, links) that bring soles near goals, by damped least squares.
 
         Args:
             angles: (..., legs, links) to begin with, rad.
-            goals: (..., legs, 3) places of the soles, m.
-            weights: (..., legs, 3, 3) by which what is missing is turned and weighed.
+            goals: (..., legs, 3) of the soles, m.
+            weights: (..., legs, 3, 3) matrices that multiply the errors of the soles.
             damping: m.
             steps: of the search.
         """
-        numpy = goals.__array_namespace__()
+        xp = goals.__array_namespace__()
         for _ in range(steps):
-            place, jacobian = self.soles(angles)
-            missing, weighed = weights @ (goals - place)[..., None], weights @ jacobian
-            change = least_changes(weighed, missing, damping)
-            # Joints at their bounds must not hold the others up.
-            bound = (angles <= self.low) & (change < 0.0) | (angles >= self.high) & (change > 0.0)
-            change = least_changes(numpy.where(bound[..., None, :], 0.0, weighed), missing, damping)
+            soles, jacobian = self.soles(angles)
+            error = weights @ (goals - soles)[..., None]
+            weighted_jacobian = weights @ jacobian
+            change = least_changes(weighted_jacobian, error, damping)
+            # Joints at their bounds must not keep the other joints from moving.
+            is_stuck = (angles <= self.low) & (change < 0.0) | (angles >= self.high) & (change > 0.0)
+            free_jacobian = xp.where(is_stuck[..., None, :], 0.0, weighted_jacobian)
+            change = least_changes(free_jacobian, error, damping)
             angles = (angles + change).clip(self.low, self.high)
         return angles
 
-    def relaxed_joint_angles(self, places, weights, damping: float) -> np.ndarray:
-        """Return the angles (legs, links), rad, near the middle of the joints' ranges, that bring soles near places.
+    def relaxed_joint_angles(self, goals, weights, damping: float) -> np.ndarray:
+        """Return the angles (legs, links), rad, near the middle of the joints' ranges, that bring soles near goals.
 
         Args:
-            places: (legs, 3) m.
-            weights: (3, 3) as for `solve_joint_angles`, of all legs.
+            goals: (legs, 3) of the soles, m.
+            weights: (3, 3) as for `solve_joint_angles`, the same for all legs.
             damping: m.
         """
-        weights = np.tile(weights, (len(places), 1, 1))
-        return self.solve_joint_angles(0.5 * (self.low + self.high), places, weights, damping, _SETTLING)
+        middle = 0.5 * (self.low + self.high)
+        weights_of_legs = np.tile(weights, (len(goals), 1, 1))
+        return self.solve_joint_angles(middle, goals, weights_of_legs, damping, _RELAXING_ITERATIONS)
 
 
 def least_changes(jacobian, missing, damping: float) -> np.ndarray:
     """Return the changes of joints, by damped least squares, that move a point: J^T (J J^T + d^2 I)^-1 e.
 
     Args:
-        jacobian: (..., 3, n) of the point, m/rad.
-        missing: (..., 3, 1) displacement of the point, m.
-        damping: m.
+        jacobian: J, (..., 3, n) of the point, m/rad.
+        missing: e, (..., 3, 1) displacement of the point, m.
+        damping: d, m.
 
     Returns:
         (..., n) rad.
     """
     xp = jacobian.__array_namespace__()
     transposed = jacobian.swapaxes(-1, -2)
-    square = jacobian @ transposed + damping**2 * np.eye(3)
-    return (transposed @ xp.linalg.solve(square, missing))[..., 0]
+    damped_square = jacobian @ transposed + damping**2 * np.eye(3)
+    return (transposed @ xp.linalg.solve(damped_square, missing))[..., 0]
 
 
 def damped_changes(jacobian, pull, damping):
@@ -142,7 +164,7 @@ def damped_changes(jacobian, pull, damping):
     With the same damping of all joints they are those of `least_changes`, up to rounding.
 
     Args:
-        jacobian: (..., m, n) m/rad.
+        jacobian: J, (..., m, n) m/rad.
         pull: J^T e, (..., n, 1); of one point (n,) alone.
         damping: D, (n, n) m^2, a diagonal matrix.
 
@@ -154,47 +176,56 @@ def damped_changes(jacobian, pull, damping):
 
 
 def _rotations(axes, angles) -> np.ndarray:
-    """Rotations (..., 3, 3) by angles (...) about unit axes (..., 3), after Rodrigues; none about an axis of 0."""
+    """Return rotations (..., 3, 3) by angles (...) about unit axes (..., 3), after Rodrigues.
+
+    An axis of 0 gives no rotation.
+    """
+    xp = angles.__array_namespace__()
     cross = sum(axes[..., i, None, None] * _CROSS[i] for i in range(3))
-    numpy = angles.__array_namespace__()
-    sine, cosine = numpy.sin(angles)[..., None, None], numpy.cos(angles)[..., None, None]
+    sine = xp.sin(angles)[..., None, None]
+    cosine = xp.cos(angles)[..., None, None]
     return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
 
 
-def point_velocities(motion, places):
-    """Return velocities (environments, places, 2) of places (..., places, 2 or 3) of a body in motion.
+def point_velocities(motion, points):
+    """Return velocities (environments, points, 2) of points (..., points, 2 or 3) of a body in motion.
 
     Args:
         motion: (environments, 3) forward, left and turning, m/s and rad/s.
-        places: m from the center of turning.
+        points: m from the center of turning.
     """
+    xp = motion.__array_namespace__()
     forward, left, turning = (motion[:, i : i + 1] for i in range(3))
-    stack = motion.__array_namespace__().stack
-    return stack([forward - turning * places[..., 1], left + turning * places[..., 0]], axis=-1)
+    return xp.stack([forward - turning * points[..., 1], left + turning * points[..., 0]], axis=-1)
 
 
-def tilt_heights(vertical, places):
-    """Return by how much the torso's tilt raises places of it, (environments, places), m.
+def tilt_heights(vertical, points):
+    """Return by how much the torso's tilt raises points of it, (environments, points), m.
 
     Args:
         vertical: (environments, 3) the world's, in the torso's frame.
-        places: (places, 2 or 3) m from the center.
+        points: (points, 2 or 3) m from the center.
     """
-    return vertical[:, :1] * places[:, 0] + vertical[:, 1:2] * places[:, 1]
+    return vertical[:, :1] * points[:, 0] + vertical[:, 1:2] * points[:, 1]
 
 
 def path_weights(paths, across: float, level: float = 1.0):
-    """Return weights (..., 3, 3) of an error along paths (..., 2), across them, and in height.
+    """Return matrices (..., 3, 3) that weigh an error along paths (..., 2), across them, and in height.
 
     Args:
         paths: of feet, of any length.
         across: weight of the error across the path, against that along it.
         level: weight of the error in height.
     """
-    numpy = paths.__array_namespace__()
-    length = numpy.hypot(paths[..., 0], paths[..., 1])[..., None]
-    along = numpy.where(length > 1e-9, paths / numpy.maximum(length, 1e-9), np.array((1.0, 0.0)))
-    x, y = along[..., 0], along[..., 1]
-    zero, height = numpy.zeros_like(x), numpy.full_like(x, level)
-    rows = (x, y, zero), (-across * y, across * x, zero), (zero, zero, height)
-    return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)
+    xp = paths.__array_namespace__()
+    length = xp.hypot(paths[..., 0], paths[..., 1])[..., None]
+    forward = np.array((1.0, 0.0))  # for a foot that does not move
+    direction = xp.where(length > _MIN_PATH_LENGTH, paths / xp.maximum(length, _MIN_PATH_LENGTH), forward)
+    x = direction[..., 0]
+    y = direction[..., 1]
+    zero = xp.zeros_like(x)
+    along_row = (x, y, zero)
+    across_row = (-across * y, across * x, zero)
+    height_row = (zero, zero, xp.full_like(x, level))
+    rows = [xp.stack(row, axis=-1) for row in (along_row, across_row, height_row)]
+    return xp.stack(rows, axis=-2)
