@@ -1,7 +1,6 @@
 """Environments of different bodies as one Gymnasium vector environment."""
 
-import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -17,6 +16,7 @@ from arc_suite.bodies.tokens import Description, Tokens
 from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepare_task
+from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import CURRICULUM
 
 
@@ -35,7 +35,7 @@ class BodiesTask(NamedTuple):
 
     @property
     def definition(self) -> "BodiesTask":
-        """Itself, where the task of one body has a value of the contract."""
+        """This task itself: learners read `definition` of any task."""
         return self
 
     @property
@@ -113,16 +113,19 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         Raises:
             ValueError: an unknown name, a body with more than 12 legs or 4 joints a leg, or a value that does not fit.
         """
-        self._lock, self._places, self._begun = Lock(), [], False
-        given = bodies if isinstance(bodies, list | tuple) else [bodies]
-        found = list(itertools.chain.from_iterable(map(registry.bodies_of, given)))
+        self._lock = Lock()
+        self._places: list[Place] = []
+        self._begun = False
+        different_bodies = _find_bodies(bodies)
         num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
-        if not found:
+        if not different_bodies:
             raise ValueError(f"bodies: expected at least one, got {checks.preview(bodies)}")
-        if len(found) > num_envs:
-            raise ValueError(f"num_envs: expected at least one for each of {len(found)} bodies, got {num_envs}")
-        for body in found:
-            tokens.joint_slots(body)
+        if len(different_bodies) > num_envs:
+            raise ValueError(
+                f"num_envs: expected at least one for each of {len(different_bodies)} bodies, got {num_envs}"
+            )
+        for body in different_bodies:
+            tokens.joint_slots(body)  # refuses too many legs or joints
         settings = {"actions": "position", **checks.mapping("task_kwargs", task_kwargs)}
         checks.name(settings["actions"], ["position"], "actions of different bodies")
         seed = settings.pop("random", None)
@@ -137,21 +140,29 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             "camera_id": camera_id,
             "privileged": privileged,
         }
-        made = {body: Member(*prepare_task(body, task_name, _of_tasks(settings))) for body in dict.fromkeys(found)}
-        which_body = [index % len(found) for index in range(num_envs)]
-        members = [made[body] for body in found]
-        self.num_envs, self.bodies = num_envs, tuple(found[which] for which in which_body)
-        self.tasks = tuple(members[which].task for which in which_body)
+        member_of_body = {}
+        for body in dict.fromkeys(different_bodies):
+            task, model = prepare_task(body, task_name, _task_settings(settings))
+            member_of_body[body] = Member(task, model)
+
+        body_of_env = [different_bodies[index % len(different_bodies)] for index in range(num_envs)]
+        members = [member_of_body[body] for body in body_of_env]
+        self.num_envs = num_envs
+        self.bodies = tuple(body_of_env)
+        self.tasks = tuple(member.task for member in members)
         self.task = BodiesTask(self.tasks[0].name, self.tasks[0].step_limit)
-        self._tokens, self._flat = Tokens.of(self.tasks), flat
-        for indices in group_by_batch([members[which] for which in which_body]):
-            group = Group([members[which_body[index]] for index in indices], task_name, **options)
+        self._tokens = Tokens.of(self.tasks)
+        self._flat = flat
+        for indices in group_by_batch(members):
+            group = Group([members[index] for index in indices], task_name, **options)
             self._places.append(Place(group, np.array(indices), self._tokens.select(indices)))
-        first = self._places[0].group
         self.step_limit = float(max(np.max(place.group.step_limit) for place in self._places))
-        self.autoreset_mode, self.metadata, self.render_mode = first.autoreset_mode, first.metadata, render_mode
-        described = [tokens.body_description(member.task) for member in members]
-        columns = zip(*(described[which] for which in which_body), strict=True)
+        first_group = self._places[0].group
+        self.autoreset_mode = first_group.autoreset_mode
+        self.metadata = first_group.metadata
+        self.render_mode = render_mode
+        description_of_body = {body: tokens.body_description(member.task) for body, member in member_of_body.items()}
+        columns = zip(*(description_of_body[body] for body in body_of_env), strict=True)
         self.description = Description(*map(np.stack, columns))
         self.single_observation_space, self.single_action_space = _spaces(flat)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -169,14 +180,15 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         mask = self._checked_reset_mask(options)
         if not (self._begun or mask.all()):
             raise ResetNeeded("cannot reset some environments: reset all of them first")
-        seeds, info = [None] * self.num_envs if seed is None else self._checked_seeds(seed), {}
+        seeds = [None] * self.num_envs if seed is None else self._checked_seeds(seed)
+        info = {}
         for group, indices, _ in self._places:
             if mask[indices].any():
-                options = {"reset_mask": mask[indices]}
-                _, own = group.reset(seed=[seeds[index] for index in indices], options=options)
-                scatter(info, own, indices, self.num_envs)
+                group_seeds = [seeds[index] for index in indices]
+                _, group_info = group.reset(seed=group_seeds, options={"reset_mask": mask[indices]})
+                scatter(info, group_info, indices, self.num_envs)
         self._begun = True
-        return self._observed(), info
+        return self._observation(), info
 
     @one_thread_at_a_time
     def step(self, actions):
@@ -186,24 +198,29 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             actions: (num_envs, 12, 4), or (num_envs, 48) of flat environments, clipped to [-1, 1].
 
         Raises:
-            ValueError: actions of another shape, or NaN in one; nothing has moved then.
+            ValueError: actions of another shape, or NaN in one; no environment has advanced then.
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("step")
         if not self._begun:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
-        actions, info = checked_action(actions, self.action_space.shape), {}
-        reward, (terminated, truncated) = np.zeros(self.num_envs), np.zeros((2, self.num_envs), bool)
+        checked_actions = checked_action(actions, self.action_space.shape)
+        reward = np.zeros(self.num_envs)
+        terminated = np.zeros(self.num_envs, bool)
+        truncated = np.zeros(self.num_envs, bool)
+        info = {}
         for place in self._places:
-            group, indices, _ = place
-            _, reward[indices], terminated[indices], truncated[indices], own = group.step(
-                place.tokens.body_actions(actions[indices])
-            )
-            if "final_obs" in own:
-                own["final_obs"] = self._last(place, own["final_obs"])
-            scatter(info, own, indices, self.num_envs)
-        return self._observed(), reward, terminated, truncated, info
+            indices = place.indices
+            body_actions = place.tokens.body_actions(checked_actions[indices])
+            _, group_reward, group_terminated, group_truncated, group_info = place.group.step(body_actions)
+            reward[indices] = group_reward
+            terminated[indices] = group_terminated
+            truncated[indices] = group_truncated
+            if "final_obs" in group_info:
+                group_info["final_obs"] = self._final_observations(place, group_info["final_obs"])
+            scatter(info, group_info, indices, self.num_envs)
+        return self._observation(), reward, terminated, truncated, info
 
     def own_observations(self) -> tuple[np.ndarray, ...]:
         """Return the latest observation (size,) float32 of each environment as its own task has it.
@@ -213,7 +230,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         return self._of_each(lambda group: group._observation.copy())
 
     def places(self) -> np.ndarray:
-        """Return the places (num_envs, 3) of the torsos in the world: x and y, m, and yaw, rad."""
+        """Return x and y, m, and yaw, rad, of the torsos in the world (num_envs, 3)."""
         poses = np.array(self._of_each(lambda group: group.batch.data.qpos[:, :7]))
         return np.column_stack([poses[:, :2], rotations.yaw(poses[:, 3:7])])
 
@@ -228,12 +245,13 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def command(self, name: str, value, mask=None) -> None:
         """Set a command of the task in some environments; see `VectorEnv.command`."""
         self._check_open("command")
-        mask, value = self._checked_mask(mask, "mask"), checked_command(self.tasks[0], name, value, (self.num_envs,))
+        mask = self._checked_mask(mask, "mask")
+        values = checked_command(self.tasks[0], name, value, (self.num_envs,))
         if not self._begun:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
         for group, indices, _ in self._places:
             if mask[indices].any():
-                group.command(name, value[indices], mask[indices])
+                group.command(name, values[indices], mask[indices])
 
     @one_thread_at_a_time
     def change_model(self, fields: Mapping[str, Any], mask=None) -> None:
@@ -242,23 +260,26 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         Values broadcast to the fields of each body.
         """
         self._check_open("change the model")
-        chosen, mask = [], self._checked_mask(mask, "mask")
+        mask = self._checked_mask(mask, "mask")
+        checked_changes = []  # all of them, before the first model changes
         for group, indices, _ in self._places:
             if mask[indices].any():
-                chosen.append((group, group._checked_fields(fields), mask[indices]))
-        for group, values, own in chosen:
-            group.batch.change_model(values, own)
+                checked_changes.append((group, group._checked_fields(fields), mask[indices]))
+        for group, values, group_mask in checked_changes:
+            group.batch.change_model(values, group_mask)
 
     @one_thread_at_a_time
     def change_settings(self, settings: Mapping[str, Any], mask=None) -> None:
         """Set settings of some environments from their next reset on; see `VectorEnv.change_settings`."""
         self._check_open("change settings")
-        chosen, mask = [], self._checked_mask(mask, "mask")
+        mask = self._checked_mask(mask, "mask")
+        _, curriculum_setting = CURRICULUM
+        checked_changes = []  # all of them, before the first setting changes
         for group, indices, _ in self._places:
             if mask[indices].any():
-                chosen.append((group, mask[indices], group._checked_changes(settings)))
-        for group, own, changes in chosen:
-            group._put_changes(own, changes, CURRICULUM[1] in settings)
+                checked_changes.append((group, group._checked_changes(settings), mask[indices]))
+        for group, changes, group_mask in checked_changes:
+            group._put_changes(group_mask, changes, restart=curriculum_setting in settings)
 
     @one_thread_at_a_time
     def rest(self, mask) -> None:
@@ -272,17 +293,20 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return the state of all environments as arrays by name, from which `restore` goes on.
 
-        Among them are flat `observation` (num_envs, 664), and `steps` (num_envs,), control steps of the episodes.
+        They include flat `observation` (num_envs, 664), and `steps` (num_envs,), control steps of the episodes.
 
         Raises:
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("take a snapshot")
-        taken = enumerate(place.group.snapshot() for place in self._places)
-        arrays = {f"{number}/{name}": array for number, arrays in taken for name, array in arrays.items()}
-        steps = np.array(self._of_each(lambda group: group._steps))
-        return arrays | {"observation": self._vectors(self._gathered_tokens()), "steps": steps}
+        arrays = {}
+        for number, place in enumerate(self._places):
+            for name, array in place.group.snapshot().items():
+                arrays[f"{number}/{name}"] = array
+        arrays["observation"] = self._flatten(self._make_tokens())
+        arrays["steps"] = np.array(self._of_each(lambda group: group._steps))
+        return arrays
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -295,13 +319,17 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
-        checked, steps = [], np.asarray(arrays.get("steps", ()))
+        steps = np.asarray(arrays.get("steps", ()))
+        has_steps = steps.shape == (self.num_envs,)
+        checked_snapshots = []  # all of them, before the first group is restored
         for number, place in enumerate(self._places):
             prefix = f"{number}/"
-            own = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
-            own["steps"] = steps[place.indices] if steps.shape == (self.num_envs,) else steps
-            checked.append(place.group._checked_snapshot(own))
-        for place, snapshot in zip(self._places, checked, strict=True):
+            group_arrays = {
+                name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)
+            }
+            group_arrays["steps"] = steps[place.indices] if has_steps else steps  # the group refuses other shapes
+            checked_snapshots.append(place.group._checked_snapshot(group_arrays))
+        for place, snapshot in zip(self._places, checked_snapshots, strict=True):
             place.group._restore_state(*snapshot)
         self._begun = True
 
@@ -311,13 +339,17 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self._check_open("render")
         if self.render_mode is None:
             return None
-        places = self._of_each(lambda group: [(group, place) for place in range(group.num_envs)])
-        chosen = [places[index] for index in self._checked_indices(indices)]
-        return tuple(group.render([place])[0] for group, place in chosen)
+        group_and_index = self._of_each(lambda group: [(group, index) for index in range(group.num_envs)])
+        pictures = []
+        for env_index in self._checked_indices(indices):
+            group, index_in_group = group_and_index[env_index]
+            (picture,) = group.render([index_in_group])
+            pictures.append(picture)
+        return tuple(pictures)
 
     @one_thread_at_a_time
     def close(self, **kwargs) -> None:
-        """Free the simulations; once more does nothing."""
+        """Free the simulations; a second call does nothing."""
         super().close(**kwargs)
 
     def close_extras(self, **kwargs) -> None:
@@ -335,52 +367,77 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """The seed of each environment's stream of random numbers; -1 where none was given."""
         return self._of_each(lambda group: group.np_random_seed)
 
-    def _of_each(self, values) -> tuple:
-        """For each environment, what a function returns of its group for it."""
-        found = [None] * self.num_envs
+    def _of_each(self, values_of_group: Callable[[Group], Iterable]) -> tuple:
+        """Return a value for each environment, given a function that returns those of a group."""
+        values: list[Any] = [None] * self.num_envs
         for group, indices, _ in self._places:
-            for index, value in zip(indices.tolist(), values(group), strict=True):
-                found[index] = value
-        return tuple(found)
+            for index, value in zip(indices.tolist(), values_of_group(group), strict=True):
+                values[index] = value
+        return tuple(values)
 
-    def _observed(self) -> dict[str, np.ndarray] | np.ndarray:
-        found = self._gathered_tokens()
-        return self._vectors(found) if self._flat else found
+    def _observation(self) -> dict[str, np.ndarray] | np.ndarray:
+        """Return the latest observation of all environments."""
+        token_blocks = self._make_tokens()
+        return self._flatten(token_blocks) if self._flat else token_blocks
 
-    def _gathered_tokens(self) -> dict[str, np.ndarray]:
-        gathered = np.empty(self._tokens.places.shape, np.float32)
-        for group, indices, own in self._places:
-            gathered[indices] = own.gather_inputs(group._observation)
-        return self._tokens.make_tokens(gathered)
+    def _make_tokens(self) -> dict[str, np.ndarray]:
+        """Return the tokens of all environments."""
+        inputs = np.empty(self._tokens.places.shape, np.float32)
+        for group, indices, group_tokens in self._places:
+            inputs[indices] = group_tokens.gather_inputs(group._observation)
+        return self._tokens.make_tokens(inputs)
 
-    def _vectors(self, found: Mapping[str, np.ndarray], indices=slice(None)) -> np.ndarray:
-        """Flat observations of the tokens of some environments."""
-        return tokens.flatten_tokens(found, self.description.legs[indices], self.description.torso[indices])
+    def _flatten(self, token_blocks: Mapping[str, np.ndarray], indices=slice(None)) -> np.ndarray:
+        """Return flat observations of the tokens of some environments."""
+        legs = self.description.legs[indices]
+        torso = self.description.torso[indices]
+        return tokens.flatten_tokens(token_blocks, legs, torso)
 
-    def _last(self, place: Place, vectors: np.ndarray) -> np.ndarray:
-        """The last observations of a group's episodes, objects (environments,), None where none ended."""
-        found = np.full(len(vectors), None, object)
-        for index in [i for i, vector in enumerate(vectors) if vector is not None]:
-            own = place.tokens.select([index])
-            seen = own.make_tokens(own.gather_inputs(vectors[index][None]))
-            last = self._vectors(seen, place.indices[[index]])[0]
-            found[index] = last if self._flat else {name: array[0] for name, array in seen.items()}
-        return found
+    def _final_observations(self, place: Place, vectors: np.ndarray) -> np.ndarray:
+        """Return the final observations of a group's episodes.
+
+        Args:
+            place: of the group.
+            vectors: (environments of the group,) objects: observations of the bodies' own tasks, None for episodes
+                that go on.
+
+        Returns:
+            (environments of the group,) objects, None for episodes that go on.
+        """
+        observations = np.full(len(vectors), None, object)
+        for index, vector in enumerate(vectors):
+            if vector is None:
+                continue
+            env_tokens = place.tokens.select([index])
+            token_blocks = env_tokens.make_tokens(env_tokens.gather_inputs(vector[None]))
+            if self._flat:
+                observations[index] = self._flatten(token_blocks, place.indices[[index]])[0]
+            else:
+                observations[index] = {name: array[0] for name, array in token_blocks.items()}
+        return observations
+
+
+def _find_bodies(bodies: Any) -> list[Body]:
+    """Return the bodies of one or several names, specs or ranges; see `registry.bodies_of`."""
+    names = bodies if isinstance(bodies, list | tuple) else [bodies]
+    return [body for name in names for body in registry.bodies_of(name)]
 
 
 def _spaces(flat: bool) -> tuple[gymnasium.Space, gymnasium.Space]:
-    """The spaces of observations and of actions."""
-    joints = (tokens.LEGS * tokens.JOINTS,) if flat else (tokens.LEGS, tokens.JOINTS)
-    actions = gymnasium.spaces.Box(-1.0, 1.0, joints, np.float32)
+    """Return the spaces of observations and of actions of one environment."""
     if flat:
-        return gymnasium.spaces.Box(-np.inf, np.inf, (sum(tokens.FLAT.values()),), np.float32), actions
-    sizes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
+        size = sum(tokens.FLAT.values())
+        observations = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS * tokens.JOINTS,), np.float32)
+        return observations, actions
+    shapes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
     boxes: dict[str, gymnasium.Space] = {
-        name: gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32) for name, size in sizes.items()
+        name: gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32) for name, shape in shapes.items()
     }
+    actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS, tokens.JOINTS), np.float32)
     return gymnasium.spaces.Dict(boxes), actions
 
 
-def _of_tasks(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of a task, without that of its driver."""
+def _task_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a task, without that of the vector environment."""
     return {name: value for name, value in settings.items() if name != "on_divergence"}

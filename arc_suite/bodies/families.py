@@ -10,7 +10,7 @@ from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body, SpecError
 
-MAX_DRAWS = 100  # draws of one seed
+MAX_DRAWS = 100  # for one seed
 
 
 def sound_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
@@ -30,10 +30,15 @@ def sound_body(seed: int, legs: int | None = None, links: int | None = None, lay
     Raises:
         ValueError: a value out of range.
     """
-    first = generator.random_body(seed, legs, links, layout)
-    legs, links = len(first.legs), len(first.legs[0].links)
-    # The generator of (seed, 0) is that of the seed.
-    return sound(lambda random: generator.draw_body(random, legs, links, layout), "random", seed, overlaps)
+    first_body = generator.random_body(seed, legs, links, layout)
+    leg_count = len(first_body.legs)
+    link_count = len(first_body.legs[0].links)
+
+    def draw(random: np.random.Generator) -> Body:
+        return generator.draw_body(random, leg_count, link_count, layout)
+
+    # The first draw is `first_body` again: NumPy's generator of (seed, 0) is that of the seed.
+    return sound(draw, "random", seed, overlaps)
 
 
 def varied_body(seed: int) -> Body:
@@ -66,16 +71,17 @@ def sound(
         draw: returns a body, or raises a SpecError.
         family: its name.
         seed: 0 or more.
-        faults: returns what is wrong with a body, nothing of a sound one.
+        faults: returns what is wrong with a body; a sound one has none.
 
     Raises:
         ValueError: not a seed, or a family without sound bodies.
     """
     checks.seed(seed)
     for attempt in range(MAX_DRAWS):
+        random = np.random.default_rng((seed, attempt))
         try:
-            body = draw(np.random.default_rng((seed, attempt))).replace(name=f"{family}_{seed}")
-        except SpecError:
+            body = draw(random).replace(name=f"{family}_{seed}")
+        except SpecError:  # a length is out of range
             continue
         if not any(faults(body)):
             return body
@@ -84,9 +90,11 @@ def sound(
 
 def few_legs(seed: int) -> Body:
     """Return a random body of 4 to 8 legs, for policies that are tested with more; see `sound_body`."""
-    return sound_body(seed, legs=4 + checks.seed(seed) % 5).replace(name=f"few_legs_{seed}")
+    legs = 4 + checks.seed(seed) % 5
+    return sound_body(seed, legs=legs).replace(name=f"few_legs_{seed}")
 
 
 def few_links(seed: int) -> Body:
     """Return a random body of 2 or 3 links a leg, for policies that are tested with 4; see `sound_body`."""
-    return sound_body(seed, links=2 + checks.seed(seed) % 2).replace(name=f"few_links_{seed}")
+    links = 2 + checks.seed(seed) % 2
+    return sound_body(seed, links=links).replace(name=f"few_links_{seed}")

@@ -1,4 +1,4 @@
-"""Batches of environments of different bodies: which share one, and what they return of their environments."""
+"""Batches of environments of different bodies: which environments share one, and how infos of batches are joined."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -30,15 +30,17 @@ class Group(VectorEnv):
     def __init__(self, members: Sequence[Member], task_name: str, **options):
         """Allocate an environment for each member; for the options see `VectorEnv`."""
         self._members = members
-        self._padding = tokens.privileged_padding(members[0].task)  # the same for all, whose layout is one
+        self._padding = tokens.privileged_padding(members[0].task)  # the same for all members, as their layouts are
         super().__init__(None, task_name, len(members), **options)
 
     def _privileged_vectors(self) -> np.ndarray:
         return tokens.spread(self._padding, super()._privileged_vectors())
 
     def _prepare_tasks(self):
-        tasks, models = zip(*self._members, strict=True)
-        return list(tasks), models[0] if all(task is tasks[0] for task in tasks) else list(models)
+        tasks = [member.task for member in self._members]
+        models = [member.model for member in self._members]
+        have_one_body = all(task is tasks[0] for task in tasks)
+        return tasks, models[0] if have_one_body else models
 
 
 class Place(NamedTuple):
@@ -50,24 +52,34 @@ class Place(NamedTuple):
 
 
 def group_by_batch(members: Sequence[Member]) -> list[list[int]]:
-    """Indices of environments that share a batch."""
+    """Return the indices of environments that share a batch, for each batch."""
     groups: dict[Any, list[int]] = {}
-    keys: dict[int, Any] = {}
+    keys: dict[int, Any] = {}  # of batches, by id of the task
     for index, (task, model) in enumerate(members):
         if id(task) not in keys:
             kind = stacked.kind(task)
+            # A task that cannot be stacked shares a batch with nothing except itself.
             keys[id(task)] = id(task) if kind is None else (kind, layout(model))
         groups.setdefault(keys[id(task)], []).append(index)
     return list(groups.values())
 
 
-def scatter(info: dict, own: Mapping[str, Any], indices: np.ndarray, count: int) -> None:
-    """Put the info of some environments into that of all."""
-    for name, value in own.items():
+def scatter(info: dict, group_info: Mapping[str, Any], indices: np.ndarray, count: int) -> None:
+    """Put the info of a group of environments into that of all.
+
+    Args:
+        info: of all environments, which is changed.
+        group_info: of the group.
+        indices: of the group's environments among all.
+        count: number of all environments.
+    """
+    for name, value in group_info.items():
         if isinstance(value, dict):
             scatter(info.setdefault(name, {}), value, indices, count)
             continue
         if name not in info:
-            shape = (count, *value.shape[1:])
-            info[name] = np.full(count, None, object) if value.dtype == object else np.zeros(shape, value.dtype)
+            if value.dtype == object:
+                info[name] = np.full(count, None, object)
+            else:
+                info[name] = np.zeros((count, *value.shape[1:]), value.dtype)
         info[name][indices] = value

@@ -8,8 +8,11 @@ from arc_suite import checks
 from arc_suite.bodies import generator
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Leg, Solid, Vector
 
-FACTOR = (0.1, 10.0)  # of a length
-FAN = (-90.0, 90.0)  # degrees
+FACTOR = (0.1, 10.0)  # bounds of a factor of lengths
+FAN = (-90.0, 90.0)  # degrees, bounds
+
+_SUFFIX = "_shaped"  # of names
+_MIDLINE = 1e-9  # m, half of its width
 
 
 class Shape(NamedTuple):
@@ -57,71 +60,110 @@ def shaped(body: Body, **changes) -> Body:
         ValueError: a value or a length out of range, a link that the body does not have, or an imported body.
     """
     shape = Shape(**changes)
-    factors = {
+    link_factors = {
         checks.name(name, link_names(body), "link"): checks.number(f"links[{name!r}]", factor, *FACTOR)
         for name, factor in shape.links.items()
     }
-    own = link_ends(body)
-    ends = {checks.name(name, own, "part"): end for name, end in shape.ends.items()}
-    length, width, thickness = (
-        checks.number(name, getattr(shape, name), *FACTOR) for name in ("length", "width", "thickness")
-    )
-    torso = length, width, thickness
+    body_ends = link_ends(body)
+    ends = {checks.name(name, body_ends, "part"): end for name, end in shape.ends.items()}
+    length = checks.number("length", shape.length, *FACTOR)
+    width = checks.number("width", shape.width, *FACTOR)
+    thickness = checks.number("thickness", shape.thickness, *FACTOR)
+    torso_factors = (length, width, thickness)
     fan = checks.number("fan", shape.fan, *FAN)
-    same_links = set(factors.values()) <= {1.0} and all(tuple(end) == own[name] for name, end in ends.items())
-    if shape._replace(links={}, ends={}) == Shape() and same_links:
+
+    keeps_links = all(factor == 1.0 for factor in link_factors.values())
+    keeps_ends = all(tuple(end) == body_ends[name] for name, end in ends.items())
+    keeps_torso = shape._replace(links={}, ends={}) == Shape()
+    if keeps_torso and keeps_links and keeps_ends:
         return body
     if body.source:
         raise ValueError(f"shape: {body.name} was imported, and keeps the shape of its file")
-    furthest = max(abs(leg.mount[0]) for leg in body.legs) or 1.0
-    legs = tuple(_leg(leg, factors, ends, torso, fan * leg.mount[0] / furthest) for leg in body.legs)
-    solids = tuple(_stretched(solid, torso) for solid in body.torso.solids)
-    ballast = tuple(_stretched(each, torso) for each in body.ballast)
-    reshaped = body.replace(torso=body.torso.replace(standing_height=None, solids=solids), ballast=ballast, legs=legs)
-    stem = body.name[: MAX_NAME - len("_shaped")]
-    return generator.scaled(reshaped, shape.scale).replace(name=f"{stem.removesuffix('_shaped')}_shaped")
+
+    farthest_mount = max(abs(leg.mount[0]) for leg in body.legs) or 1.0  # m, forward or backward
+    legs = []
+    for leg in body.legs:
+        turn = fan * leg.mount[0] / farthest_mount  # degrees, forward
+        legs.append(_shape_leg(leg, link_factors, ends, torso_factors, turn))
+    solids = tuple(_stretch(solid, torso_factors) for solid in body.torso.solids)
+    ballast = tuple(_stretch(solid, torso_factors) for solid in body.ballast)
+    torso = body.torso.replace(standing_height=None, solids=solids)
+    reshaped_body = body.replace(torso=torso, ballast=ballast, legs=tuple(legs))
+    scaled_body = generator.scaled(reshaped_body, shape.scale)
+    stem = body.name[: MAX_NAME - len(_SUFFIX)].removesuffix(_SUFFIX)
+    return scaled_body.replace(name=stem + _SUFFIX)
 
 
-def _leg(
-    leg: Leg, factors: Mapping[str, float], ends: Mapping[str, Sequence[float]], torso: Vector, turn: float
+def _shape_leg(
+    leg: Leg,
+    link_factors: Mapping[str, float],
+    ends: Mapping[str, Sequence[float]],
+    torso_factors: Vector,
+    turn: float,
 ) -> Leg:
-    (x, y, z), (length, width, _) = leg.mount, torso
-    side = math.copysign(1.0, y) if abs(y) > 1e-9 else 0.0  # a leg on the midline keeps its heading
-    links = [link.replace(end=tuple(ends.get(leg.full_name(link), link.end))) for link in leg.links]
-    links = [link.replace(end=tuple(factors.get(link.name, 1.0) * part for part in link.end)) for link in links]
+    """Return a leg of other proportions.
+
+    Args:
+        leg: to change.
+        link_factors: of lengths, by name of the link.
+        ends: of links, m, by name of the part.
+        torso_factors: by which the mount moves along x and y.
+        turn: of the leg forward, degrees; a leg on the midline keeps its heading.
+    """
+    x, y, z = leg.mount
+    length, width, _ = torso_factors
+    links = []
+    for link in leg.links:
+        end = ends.get(leg.full_name(link), link.end)
+        factor = link_factors.get(link.name, 1.0)
+        links.append(link.replace(end=tuple(factor * component for component in end)))
+    side = math.copysign(1.0, y) if abs(y) > _MIDLINE else 0.0
     return leg.replace(mount=(length * x, width * y, z), links=tuple(links), yaw_deg=leg.yaw_deg - side * turn)
 
 
-def _stretched(solid: Solid, factors: Vector) -> Solid:
-    """Return a solid with its position and size times factors along the torso's axes; a turned one keeps its angles."""
-    position = tuple(factor * part for factor, part in zip(factors, solid.position, strict=True))
+def _stretch(solid: Solid, factors: Vector) -> Solid:
+    """Return a solid with its position and size times factors along the torso's axes; its angles stay."""
+    position = tuple(factor * component for factor, component in zip(factors, solid.position, strict=True))
     # A local axis e becomes longer by |factors * e|, e in the torso's frame.
-    axes = [math.hypot(*(f * part for f, part in zip(factors, axis, strict=True))) for axis in _axes(solid.euler_deg)]
+    stretches = []
+    for axis in _axes(solid.euler_deg):
+        stretched_axis = [factor * component for factor, component in zip(factors, axis, strict=True)]
+        stretches.append(math.hypot(*stretched_axis))
+    x_stretch, y_stretch, z_stretch = stretches
+
+    shape = solid.shape
     size: tuple[float, ...]
-    if solid.shape == "sphere" and len(set(axes)) > 1:
-        return _changed(
-            solid, factors, shape="ellipsoid", size=tuple(solid.size[0] * a for a in axes), position=position
-        )
-    if solid.shape in ("box", "ellipsoid"):
-        size = tuple(half * axis for half, axis in zip(solid.size, axes, strict=True))
+    if shape == "sphere" and len(set(stretches)) > 1:
+        shape = "ellipsoid"
+        radius = solid.size[0]
+        size = tuple(radius * stretch for stretch in stretches)
+    elif shape in ("box", "ellipsoid"):
+        size = tuple(half_extent * stretch for half_extent, stretch in zip(solid.size, stretches, strict=True))
     else:  # round about the local z axis
-        size = (solid.size[0] * math.sqrt(axes[0] * axes[1]), *(half * axes[2] for half in solid.size[1:]))
-    return _changed(solid, factors, size=size, position=position)
-
-
-def _changed(solid: Solid, factors: Vector, **fields) -> Solid:
-    """Return a solid with other fields; ballast gains weight as the torso gains volume."""
-    mass = {"mass": solid.mass * math.prod(factors)} if isinstance(solid, Ballast) else {}
-    return solid.replace(**fields, **mass)
+        radius, *half_lengths = solid.size
+        radius_stretch = math.sqrt(x_stretch * y_stretch)
+        size = (radius * radius_stretch, *(half_length * z_stretch for half_length in half_lengths))
+    stretched_solid = solid.replace(shape=shape, size=size, position=position)
+    if isinstance(stretched_solid, Ballast):  # gains weight as the torso gains volume
+        return stretched_solid.replace(mass=stretched_solid.mass * math.prod(factors))
+    return stretched_solid
 
 
 def _axes(euler_deg: Vector) -> list[Vector]:
-    """Return the axes of a frame that is turned about the x, y and z axes of the turning frame, in that order."""
-    (ca, sa), (cb, sb), (cc, sc) = (
-        (math.cos(math.radians(angle)), math.sin(math.radians(angle))) for angle in euler_deg
-    )
+    """Return the axes of a frame that is turned about the x, y and z axes of the turning frame, in that order.
+
+    Args:
+        euler_deg: the three angles, degrees.
+    """
+    x_angle, y_angle, z_angle = (math.radians(angle) for angle in euler_deg)
+    cos_x = math.cos(x_angle)
+    sin_x = math.sin(x_angle)
+    cos_y = math.cos(y_angle)
+    sin_y = math.sin(y_angle)
+    cos_z = math.cos(z_angle)
+    sin_z = math.sin(z_angle)
     return [
-        (cb * cc, ca * sc + sa * sb * cc, sa * sc - ca * sb * cc),
-        (-cb * sc, ca * cc - sa * sb * sc, sa * cc + ca * sb * sc),
-        (sb, -sa * cb, ca * cb),
+        (cos_y * cos_z, cos_x * sin_z + sin_x * sin_y * cos_z, sin_x * sin_z - cos_x * sin_y * cos_z),
+        (-cos_y * sin_z, cos_x * cos_z - sin_x * sin_y * sin_z, sin_x * cos_z + cos_x * sin_y * sin_z),
+        (sin_y, -sin_x * cos_y, cos_x * cos_y),
     ]

@@ -1,7 +1,7 @@
-"""What one policy for all bodies observes and does: legs, torso and command, without dimension and padded.
+"""Observations and actions of one policy for all bodies: legs, torso and command, without dimension and padded.
 
-Legs are tokens: a vector for each, the same for every body. They are computed from the blocks that the body's own
-policy observes. Everything is a product, a sum or a root of numbers, which round alike in batches of any size.
+Each leg is a token: a vector with the same layout for every body. Tokens are computed from the blocks that the body's
+own policy observes. Everything is a product, a sum or a root of numbers, which round alike in batches of any size.
 """
 
 import functools
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from arc_suite.models.sizing import position_gains, size_body
-from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.standing import GRAVITY, PoseMechanics, measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks
 from arc_suite.tasks.blocks import Block
@@ -30,7 +30,8 @@ from arc_suite.tasks.parts import (
     joint_places,
 )
 
-LEGS, JOINTS = 12, 4  # at most, of a body, and of a leg
+LEGS = 12  # at most, of a body
+JOINTS = 4  # at most, of a leg
 
 # The blocks that tokens are made from, and the parts that each has to have.
 BLOCKS = {
@@ -39,13 +40,18 @@ BLOCKS = {
     "contact_forces": (RigidParts,),
     "gait_clock": (Phase,),
 }
-_UPWARD = 5  # place of the upward force among the torque and force on a rigid part
+_UPWARD_FORCE = 5  # its index among the torque and force on a rigid part
 
-# Sizes: of a leg, of the torso and of the command in every step, and of a leg and the torso in the description.
-LEG, TORSO, COMMAND = 2 * JOINTS + 4, 12, 6
-LEG_DESCRIPTION, TORSO_DESCRIPTION = 9 + 8 * JOINTS, 10
+# Sizes of what changes in every step: of a leg, of the torso and of the command.
+LEG = 2 * JOINTS + 4
+TORSO = 12
+COMMAND = 6
 
-# Sizes of the blocks of one vector that holds all of it.
+# Sizes of the description, which stays the same: of a leg and of the torso.
+LEG_DESCRIPTION = 9 + 8 * JOINTS
+TORSO_DESCRIPTION = 10
+
+# Sizes of the blocks of one vector that holds everything.
 FLAT = {
     "legs": LEGS * LEG,
     "torso": TORSO,
@@ -54,16 +60,22 @@ FLAT = {
     "torso_description": TORSO_DESCRIPTION,
 }
 
-# What a network of legs sees of one leg: its token and description, and those of the torso, and the command.
+# Inputs of a network for one leg: token and description of the leg, token and description of the torso, and command.
 LEG_INPUTS = LEG + LEG_DESCRIPTION + TORSO + COMMAND + TORSO_DESCRIPTION
-_COUNTS = slice(8, 12)  # of a leg's description: the number of joints, as one of four
+_JOINT_COUNTS = slice(8, 12)  # of a leg's description: the number of joints, as one of four
 
-_CARRIES = 0.05  # share of the weight from which on a foot counts as loaded
-_LARGEST_FORCE = 0.5  # that is asked for, as observed forces are clipped to 1
+_MIN_CARRIED_SHARE = 0.05  # of the weight, on a foot that counts as loaded
+_MAX_THRESHOLD = 0.5  # of the force on a loaded foot, as observed forces are clipped to 1
+_MIN_LENGTH = 1e-9  # m, of vectors in divisions
+_MIN_HEADING = np.float32(1e-6)  # length of the forward axis seen from above, in divisions
+
+# Sizes of the parts of what `Tokens.gather_inputs` returns, before the command: posture, velocities, joint angles,
+# joint velocities, forces, clock.
+_INPUT_SIZES = (5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2)
 
 
 class Description(NamedTuple):
-    """Bodies as a policy knows them: lengths in h, rates in sqrt(g / h), torques in those of the motors.
+    """Properties of bodies that stay the same: lengths in h, rates in sqrt(g / h), torques in those of the motors.
 
     Attributes:
         legs: (..., 12, 41) foot and mount from the torso's origin (6), direction of the foot (2), number of joints as
@@ -71,7 +83,7 @@ class Description(NamedTuple):
             damping of position control (4 + 4), duty factor.
         torso: (..., 10) number of legs by 12, half-extents of the first solid (3), center of mass (3), static
             stability margin, R, duty factor.
-        mask: (..., 12, 4) booleans, which joints there are.
+        mask: (..., 12, 4) whether a leg has a joint.
         reach: (..., 12, 4) angles that an action of 1 asks for, rad.
     """
 
@@ -83,9 +95,9 @@ class Description(NamedTuple):
 
 def pad_joints(body: Body, values: np.ndarray) -> np.ndarray:
     """Return values (joints, ...) of a body's joints as (12, 4, ...), 0 where there is none."""
-    array = np.zeros((LEGS * JOINTS, *np.shape(values)[1:]))
-    array[joint_slots(body)] = values
-    return array.reshape(LEGS, JOINTS, *array.shape[1:])
+    padded_values = np.zeros((LEGS * JOINTS, *np.shape(values)[1:]))
+    padded_values[joint_slots(body)] = values
+    return padded_values.reshape(LEGS, JOINTS, *padded_values.shape[1:])
 
 
 def privileged_sizes(task: Task) -> dict[str, int]:
@@ -99,34 +111,34 @@ def pad_privileged(task: Task, vectors: np.ndarray) -> np.ndarray:
 
 
 def privileged_padding(task: Task) -> Padding:
-    """Return the places of a task's privileged observation in that of bodies of 12 legs of 4 joints."""
+    """Return the indices of a task's privileged observation in that of a body of 12 legs of 4 joints."""
     return join_padding([_padding(block) for block in task.privileged_blocks.values()])
 
 
 def spread(padding: Padding, vectors: np.ndarray) -> np.ndarray:
-    """Return vectors (environments, numbers of the body) at their places in padded ones, 0 elsewhere."""
+    """Return vectors (environments, size) of a body as padded ones (environments, padded size), 0 where padded."""
     padded_vectors = np.zeros((len(vectors), padding.size), vectors.dtype)
     padded_vectors[:, padding.places] = vectors
     return padded_vectors
 
 
 def _padding(block: Block) -> Padding:
-    """Return the places of a block's numbers in that of a body of 12 legs of 4 joints."""
+    """Return the indices of a block's numbers in the block of a body of 12 legs of 4 joints."""
     return join_padding([part.padding(LEGS, JOINTS) for part in block.parts])
 
 
-@functools.lru_cache(maxsize=256)
-def _slots(body: Body) -> tuple[int, ...]:
-    return joint_places(body, LEGS, JOINTS)
-
-
 def joint_slots(body: Body) -> np.ndarray:
-    """Return the places (joints,) of a body's joints among the 12 x 4 of all legs.
+    """Return the indices (joints,) of a body's joints among the 12 x 4 joints of padded legs.
 
     Raises:
         ValueError: the body has more than 12 legs, or a leg more than 4 joints.
     """
-    return np.array(_slots(body))
+    return np.array(_cached_slots(body))
+
+
+@functools.lru_cache(maxsize=256)
+def _cached_slots(body: Body) -> tuple[int, ...]:
+    return joint_places(body, LEGS, JOINTS)
 
 
 def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) -> np.ndarray:
@@ -137,7 +149,7 @@ def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np
         legs: (environments, 12, 41) of the description.
         torso: (environments, 10) of the description.
     """
-    parts = *(tokens[name] for name in ("legs", "torso", "command")), legs, torso
+    parts = [tokens["legs"], tokens["torso"], tokens["command"], legs, torso]
     return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=-1)
 
 
@@ -147,31 +159,40 @@ def split_flat(vectors) -> dict[str, Any]:
 
 
 def leg_inputs(vectors):
-    """Return the inputs (..., 12, 81) of a network of legs, and which joints there are (..., 12, 4).
+    """Return the inputs (..., 12, 81) of a network of legs, and whether a leg has a joint (..., 12, 4).
 
     Args:
-        vectors: (..., 664) of `flat`, of NumPy or JAX; normalized ones keep the number of joints as it is.
+        vectors: (..., 664) of `flatten_tokens`, of NumPy or JAX; normalized ones keep the number of joints as it is.
     """
-    numpy = vectors.__array_namespace__()
+    xp = vectors.__array_namespace__()
     legs, torso, command, leg_descriptions, torso_description = split_flat(vectors).values()
-    leading = vectors.shape[:-1]
-    descriptions = leg_descriptions.reshape(*leading, LEGS, LEG_DESCRIPTION)
-    shared = numpy.concatenate([torso, command, torso_description], axis=-1)[..., None, :]
-    shared = numpy.broadcast_to(shared, (*leading, LEGS, shared.shape[-1]))
-    inputs = numpy.concatenate([legs.reshape(*leading, LEGS, LEG), descriptions, shared], axis=-1)
-    counts = descriptions[..., _COUNTS]
-    # A leg of k joints has the first k.
-    mask = numpy.stack([counts[..., joint:].sum(axis=-1) for joint in range(JOINTS)], axis=-1) > 0.5
+    batch_shape = vectors.shape[:-1]
+    leg_tokens = legs.reshape(*batch_shape, LEGS, LEG)
+    descriptions = leg_descriptions.reshape(*batch_shape, LEGS, LEG_DESCRIPTION)
+    shared = xp.concatenate([torso, command, torso_description], axis=-1)[..., None, :]
+    shared_by_legs = xp.broadcast_to(shared, (*batch_shape, LEGS, shared.shape[-1]))
+    inputs = xp.concatenate([leg_tokens, descriptions, shared_by_legs], axis=-1)
+    # A leg of k joints has the joints 0 to k - 1. Entry k - 1 of its counts is 1.
+    counts = descriptions[..., _JOINT_COUNTS]
+    has_joint = [counts[..., joint:].sum(axis=-1) for joint in range(JOINTS)]
+    mask = xp.stack(has_joint, axis=-1) > 0.5
     return inputs, mask
 
 
 def repeat_for_legs(values: np.ndarray, counts: float) -> np.ndarray:
-    """Return numbers (81,) of the inputs of one leg as those (664,) of the vector; `counts` for numbers of joints."""
-    leg, description, torso, command, about = np.split(values, np.cumsum((LEG, LEG_DESCRIPTION, TORSO, COMMAND)))
-    description = description.copy()
-    description[_COUNTS] = counts
-    parts = np.tile(leg, LEGS), torso, command, np.tile(description, LEGS), about
-    return np.concatenate(parts).astype(np.float32)
+    """Return numbers (81,) for the inputs of one leg as numbers (664,) for the vector of `flatten_tokens`.
+
+    Args:
+        values: (81,) in the order of `leg_inputs`.
+        counts: in place of the numbers of joints.
+    """
+    ends = np.cumsum((LEG, LEG_DESCRIPTION, TORSO, COMMAND))
+    leg, leg_description, torso, command, torso_description = np.split(values, ends)
+    leg_description = leg_description.copy()
+    leg_description[_JOINT_COUNTS] = counts
+    legs = np.tile(leg, LEGS)
+    leg_descriptions = np.tile(leg_description, LEGS)
+    return np.concatenate([legs, torso, command, leg_descriptions, torso_description]).astype(np.float32)
 
 
 def body_description(task: Task) -> Description:
@@ -182,38 +203,68 @@ def body_description(task: Task) -> Description:
     """
     if task.parameters is None:
         raise ValueError(f"task {task.name}: expected one that prescribes a gait")
-    body, pose, duty = task.scene.body, measure_standing(task.scene.body), task.parameters.duty_factor
-    height, first = pose.height, body.torso.solids[0]
-    count, rate = len(body.legs), math.sqrt(GRAVITY / pose.height)
-    stiffness, damping = position_gains(size_body(body), pose.inertias)
+    body = task.scene.body
+    duty_factor = task.parameters.duty_factor
+    pose = measure_standing(body)
+    height = pose.height  # m, of the torso
+    leg_count = len(body.legs)
     ranges = np.radians([joint.range_deg for joint in body.joints])
-    feet, mounts = np.array([leg.foot_position for leg in body.legs]), np.array([leg.mount for leg in body.legs])
-    away = feet[:, :2] / np.maximum(np.hypot(feet[:, 0], feet[:, 1]), 1e-9)[:, None]
-    counts = np.eye(JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]
-    jacobians = pad_joints(body, np.concatenate([jacobian.T for jacobian in pose.jacobians]))[:count]
-    by_leg = (pad_joints(body, values)[:count] for values in (ranges, stiffness, damping * rate))
-    parts = [feet / height, mounts / height, away, counts, jacobians.swapaxes(1, 2) / height, *by_leg]
+
     legs = np.zeros((LEGS, LEG_DESCRIPTION))
-    legs[:count] = np.concatenate([part.reshape(count, -1) for part in parts] + [np.full((count, 1), duty)], axis=-1)
-    half = np.array((*first.size, *(first.size[-1],) * (3 - len(first.size))))
-    lengths = np.array((*half, *pose.center, pose.margin, reach(body))) / height
+    legs[:leg_count] = _describe_legs(body, pose, ranges, duty_factor)
+    first_solid = body.torso.solids[0]
+    missing_extents = 3 - len(first_solid.size)  # of solids that are round about an axis
+    half_extents = np.array((*first_solid.size, *(first_solid.size[-1],) * missing_extents))
+    lengths = np.array((*half_extents, *pose.center, pose.margin, reach(body))) / height
     return Description(
         legs=legs.astype(np.float32),
-        torso=np.array((count / LEGS, *lengths, duty), np.float32),
+        torso=np.array((leg_count / LEGS, *lengths, duty_factor), np.float32),
         mask=pad_joints(body, np.ones(len(ranges))).astype(bool),
         reach=pad_joints(body, abs(ranges).max(axis=-1)).astype(np.float32),
     )
 
 
+def _describe_legs(body: Body, pose: PoseMechanics, ranges: np.ndarray, duty_factor: float) -> np.ndarray:
+    """Return the descriptions (legs, 41) of a body's legs; see `Description`.
+
+    Args:
+        body: any body.
+        pose: the standing one.
+        ranges: (joints, 2) of the joints, rad.
+        duty_factor: of the gait.
+    """
+    leg_count = len(body.legs)
+    rate = math.sqrt(GRAVITY / pose.height)  # rad/s
+    feet = np.array([leg.foot_position for leg in body.legs])  # (legs, 3) m
+    mounts = np.array([leg.mount for leg in body.legs])  # (legs, 3) m
+    foot_distances = np.maximum(np.hypot(feet[:, 0], feet[:, 1]), _MIN_LENGTH)  # from the torso, seen from above
+    foot_directions = feet[:, :2] / foot_distances[:, None]
+    joint_counts = np.eye(JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]
+    jacobians = pad_joints(body, np.concatenate([jacobian.T for jacobian in pose.jacobians]))[:leg_count]
+    stiffness, damping = position_gains(size_body(body), pose.inertias)
+    parts = [
+        feet / pose.height,
+        mounts / pose.height,
+        foot_directions,
+        joint_counts,
+        jacobians.swapaxes(1, 2) / pose.height,
+        pad_joints(body, ranges)[:leg_count],
+        pad_joints(body, stiffness)[:leg_count],
+        pad_joints(body, damping * rate)[:leg_count],
+        np.full((leg_count, 1), duty_factor),
+    ]
+    return np.concatenate([part.reshape(leg_count, -1) for part in parts], axis=-1)
+
+
 class Tokens(NamedTuple):
-    """How observations of environments become tokens, in float32; all arrays have a leading axis for environments.
+    """Constants that turn observations of environments into tokens, in float32; the leading axis is for environments.
 
     Attributes:
-        places: (environments, n) where in the body's own observation vector the torso's posture and velocity (5 + 6),
-            joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command (6, or 0) lie; any
-            place for what is not there.
-        mask: (environments, 12, 4) 1 where there is a joint.
-        legs: (environments, 12) 1 where there is a leg.
+        places: (environments, n) indices in the body's own observation vector of the torso's posture and velocity
+            (5 + 6), joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command (6, or
+            0); any index for legs and joints that the body does not have.
+        mask: (environments, 12, 4) 1 for a joint of the body.
+        legs: (environments, 12) 1 for a leg of the body.
         height: (environments,) h, m.
         speed: (environments,) sqrt(g h), m/s.
         rate: (environments,) sqrt(g / h), rad/s.
@@ -245,53 +296,71 @@ class Tokens(NamedTuple):
         Raises:
             ValueError: see `described`, or a task that does not observe the blocks `BLOCKS`.
         """
-        made = {id(task): cls._of_one(task) for task in {id(task): task for task in tasks}.values()}
-        return cls(*(np.stack(values) for values in zip(*(made[id(task)] for task in tasks), strict=True)))
+        task_by_id = {id(task): task for task in tasks}
+        values_by_id = {key: cls._of_task(task) for key, task in task_by_id.items()}
+        columns = zip(*(values_by_id[id(task)] for task in tasks), strict=True)
+        return cls(*(np.stack(column) for column in columns))
 
     @classmethod
-    def _of_one(cls, task: Task) -> tuple:
+    def _of_task(cls, task: Task) -> Self:
+        """Return the tokens of one task, without the leading axis for environments."""
         if "history" in task.blocks:
             raise ValueError("history: expected 0 for different bodies, as tokens of legs hold the present alone")
         if any(name not in task.blocks or task.blocks[name].kinds != kinds for name, kinds in BLOCKS.items()):
             raise ValueError(f"task {task.name}: expected the blocks {', '.join(BLOCKS)}, got {', '.join(task.blocks)}")
-        body, parameters, pose = task.scene.body, task.parameters, measure_standing(task.scene.body)
-        # Forces are in N, or in weights where a task has a command.
+        body = task.scene.body
+        parameters = task.parameters
+        pose = measure_standing(body)
+        # Forces are in weights where a task has a command, else in N.
         weight = 1.0 if "command" in task.blocks else pose.mass * GRAVITY
-        phases = np.zeros(LEGS)
+        phases = np.zeros(LEGS)  # rad
         phases[: len(body.legs)] = parameters.phase_offsets
-        middle = math.pi * parameters.duty_factor
+        mid_stance = math.pi * parameters.duty_factor  # phase, rad
         mask = pad_joints(body, np.ones(len(body.joint_names)))
         units = velocity_units(body, parameters.target_velocity)
-        numbers = (
-            mask,
-            mask.any(axis=-1),
-            pose.height,
-            math.sqrt(GRAVITY * pose.height),
-            math.sqrt(GRAVITY / pose.height),
-            units,
-            units[0] / units[2] / pose.height,
-            math.copysign(1.0, parameters.target_velocity),
-            min(_CARRIES * weight, _LARGEST_FORCE),
-            np.stack([np.sin(phases), np.cos(phases)], axis=-1),
-            np.array((math.sin(middle), math.cos(middle))),
+        tokens = cls(
+            places=cls._input_indices(task),
+            mask=mask,
+            legs=mask.any(axis=-1),
+            height=pose.height,
+            speed=math.sqrt(GRAVITY * pose.height),
+            rate=math.sqrt(GRAVITY / pose.height),
+            units=units,
+            turn=units[0] / units[2] / pose.height,
+            forward=math.copysign(1.0, parameters.target_velocity),
+            loaded=min(_MIN_CARRIED_SHARE * weight, _MAX_THRESHOLD),
+            offset=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
+            middle=np.array((math.sin(mid_stance), math.cos(mid_stance))),
         )
-        return cls._places(task), *(np.asarray(number, np.float32) for number in numbers)
+        indices, *numbers = tokens
+        return cls(indices, *(np.asarray(number, np.float32) for number in numbers))
 
     @staticmethod
-    def _places(task: Task) -> np.ndarray:
+    def _input_indices(task: Task) -> np.ndarray:
+        """Return the indices (n,) in the task's observation of the numbers that tokens are made from."""
         body = task.scene.body
-        numbers = {name: np.arange(part.start, part.stop) for name, part in blocks.slices(task.sizes).items()}
-        parts = {name: [numbers[name][part] for part in task.blocks[name].slices] for name in BLOCKS}
+        block_slices = blocks.places(task.sizes)
+        block_indices = {name: np.arange(part.start, part.stop) for name, part in block_slices.items()}
+        parts = {name: [block_indices[name][part] for part in task.blocks[name].places] for name in BLOCKS}
         height, orientation, angles = parts["posture"]
-        linear, angular, speeds = parts["velocities"]
+        linear_velocity, angular_velocity, joint_velocities = parts["velocities"]
         (forces,) = parts["contact_forces"]
-        upward = np.zeros(LEGS, int)
         rigid_parts = task.blocks["contact_forces"].parts[0]
-        upward[: len(body.legs)] = [forces[rigid_parts.places(name)[_UPWARD]] for name in body.foot_names]
-        joints = [pad_joints(body, places).ravel() for places in (angles, speeds)]
-        command = numbers.get("command", [])
-        places = [height, orientation, linear, angular, *joints, upward, numbers["gait_clock"], command]
-        return np.concatenate(places).astype(int)
+        upward_forces = np.zeros(LEGS, int)
+        for leg, name in enumerate(body.foot_names):
+            upward_forces[leg] = forces[rigid_parts.places(name)[_UPWARD_FORCE]]
+        indices = [
+            height,
+            orientation,
+            linear_velocity,
+            angular_velocity,
+            pad_joints(body, angles).ravel(),
+            pad_joints(body, joint_velocities).ravel(),
+            upward_forces,
+            block_indices["gait_clock"],
+            block_indices.get("command", []),
+        ]
+        return np.concatenate(indices).astype(int)
 
     def gather_inputs(self, vectors: np.ndarray) -> np.ndarray:
         """Return the numbers (environments, n) of observation vectors (environments, size) that tokens are made from.
@@ -301,45 +370,78 @@ class Tokens(NamedTuple):
         return np.take_along_axis(vectors, self.places, axis=-1)
 
     @staticmethod
-    def split_inputs(gathered: np.ndarray) -> list[np.ndarray]:
-        """Return gathered numbers (..., n), or their places, in the parts that `places` names."""
-        return np.split(gathered, np.cumsum((5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2)), axis=-1)
+    def split_inputs(inputs: np.ndarray) -> list[np.ndarray]:
+        """Return gathered numbers (..., n), or their indices, in the parts that `places` names."""
+        return np.split(inputs, np.cumsum(_INPUT_SIZES), axis=-1)
 
-    def make_tokens(self, gathered: np.ndarray) -> dict[str, np.ndarray]:
+    def make_tokens(self, inputs: np.ndarray) -> dict[str, np.ndarray]:
         """Return the tokens of gathered numbers (environments, n).
 
         Returns:
             legs (environments, 12, 12): joint angles, rad, and velocities (4 + 4), sine and cosine of the leg's phase,
-            whether it is to stand, whether it is loaded; 0 for legs and joints that are not there.
+            whether it is to stand, whether it is loaded; 0 for legs and joints that a body does not have.
             torso (environments, 12): height, up axis (3), forward axis (2), velocity (3), angular velocity (3).
-            command (environments, 6): the desired velocity and the present one, as the torso heads, in units of
-            the command.
+            command (environments, 6): the desired velocity and the present one, along the torso's heading, in units
+            of the command.
         """
-        pose, velocities, angles, speeds, forces, clock, command = self.split_inputs(gathered.astype(np.float32))
-        angles, speeds = (array.reshape(self.mask.shape) * self.mask for array in (angles, speeds))
-        sine = clock[:, :1] * self.offset[..., 1] + clock[:, 1:] * self.offset[..., 0]
-        cosine = clock[:, 1:] * self.offset[..., 1] - clock[:, :1] * self.offset[..., 0]
-        still = clock == 0.0
-        stands = sine * self.middle[:, :1] + cosine * self.middle[:, 1:] >= self.middle[:, 1:]
-        stands = stands | (still[:, :1] & still[:, 1:])
-        phase = np.stack([sine, cosine, stands, forces >= self.loaded[:, None]], axis=-1) * self.legs[..., None]
-        legs = np.concatenate([angles, speeds / self.rate[:, None, None], phase], axis=-1)
+        pose, velocities, angles, joint_velocities, forces, clock, command = self.split_inputs(
+            inputs.astype(np.float32)
+        )
+        legs = self._leg_tokens(angles, joint_velocities, forces, clock)
 
         height, w, x, y, z = pose.T
-        up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))  # the world's, in the torso
-        ahead, aside = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
-        level = np.maximum(np.sqrt(ahead * ahead + aside * aside), np.float32(1e-6))
-        cos, sin = ahead / level, aside / level
-        vx, vy, vz, *angular = velocities.T
-        linear = [cos * vx + sin * vy, cos * vy - sin * vx, vz]
-        rates = [speed / self.speed for speed in linear] + [speed / self.rate for speed in angular]
-        torso = np.stack([height / self.height, *up, ahead, aside, *rates], axis=-1)
-        if not command.shape[-1]:  # along world x, and back into that direction
-            turn = (-sin * self.turn).clip(-1.0, 1.0)
-            desired = [self.forward * cos, -self.forward * sin, turn]
-            motion = [speed / unit for speed, unit in zip((*linear[:2], angular[2]), self.units.T, strict=True)]
+        # The world's vertical in the torso's frame.
+        up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+        # The torso's forward axis in the world, seen from above.
+        forward_x = 1.0 - 2.0 * (y * y + z * z)
+        forward_y = 2.0 * (x * y + w * z)
+        length = np.maximum(np.sqrt(forward_x * forward_x + forward_y * forward_y), _MIN_HEADING)
+        cos_heading = forward_x / length
+        sin_heading = forward_y / length
+        vx, vy, vz, *angular_velocity = velocities.T  # in the world
+        forward_velocity = cos_heading * vx + sin_heading * vy
+        left_velocity = cos_heading * vy - sin_heading * vx
+        linear_rates = [velocity / self.speed for velocity in (forward_velocity, left_velocity, vz)]
+        angular_rates = [velocity / self.rate for velocity in angular_velocity]
+        torso = np.stack([height / self.height, *up, forward_x, forward_y, *linear_rates, *angular_rates], axis=-1)
+
+        if not command.shape[-1]:  # without a command, along world x, and back into that direction
+            turn = (-sin_heading * self.turn).clip(-1.0, 1.0)
+            desired = [self.forward * cos_heading, -self.forward * sin_heading, turn]
+            forward_unit, left_unit, turn_unit = self.units.T
+            motion = [
+                forward_velocity / forward_unit,
+                left_velocity / left_unit,
+                angular_velocity[2] / turn_unit,
+            ]
             command = np.stack([*desired, *motion], axis=-1)
         return {"legs": legs, "torso": torso, "command": command}
+
+    def _leg_tokens(self, angles, joint_velocities, forces, clock) -> np.ndarray:
+        """Return the tokens of legs (environments, 12, 12).
+
+        Args:
+            angles: (environments, 48) rad.
+            joint_velocities: (environments, 48) rad/s.
+            forces: (environments, 12) upward on feet.
+            clock: (environments, 2) sine and cosine of the gait's phase; both are 0 while a body is to stand.
+        """
+        masked_angles = angles.reshape(self.mask.shape) * self.mask
+        masked_velocities = joint_velocities.reshape(self.mask.shape) * self.mask
+        offset_sine = self.offset[..., 0]
+        offset_cosine = self.offset[..., 1]
+        # Sine and cosine of each leg's phase: that of the clock plus the leg's offset.
+        sine = clock[:, :1] * offset_cosine + clock[:, 1:] * offset_sine
+        cosine = clock[:, 1:] * offset_cosine - clock[:, :1] * offset_sine
+        has_stopped = clock == 0.0  # in both numbers, for a body that is to stand
+        # A leg stands while its phase is nearer to mid-stance than phase 0 is, the touchdown.
+        middle_sine = self.middle[:, :1]
+        middle_cosine = self.middle[:, 1:]
+        is_in_stance = sine * middle_sine + cosine * middle_cosine >= middle_cosine
+        is_to_stand = is_in_stance | (has_stopped[:, :1] & has_stopped[:, 1:])
+        is_loaded = forces >= self.loaded[:, None]
+        phase = np.stack([sine, cosine, is_to_stand, is_loaded], axis=-1) * self.legs[..., None]
+        return np.concatenate([masked_angles, masked_velocities / self.rate[:, None, None], phase], axis=-1)
 
     def select(self, indices) -> Self:
         """Return the tokens of some environments."""
@@ -347,5 +449,6 @@ class Tokens(NamedTuple):
 
     def body_actions(self, actions: np.ndarray) -> np.ndarray:
         """Return the bodies' own actions (environments, joints) of padded ones (environments, 12, 4)."""
-        flat = actions.reshape(len(actions), -1)
-        return flat[self.mask.reshape(flat.shape) > 0.0].reshape(len(actions), -1)
+        flat_actions = actions.reshape(len(actions), -1)
+        has_joint = self.mask.reshape(flat_actions.shape) > 0.0
+        return flat_actions[has_joint].reshape(len(actions), -1)

@@ -18,7 +18,7 @@ from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.tracing import repeated, traced
 from arc_suite.tasks import Task
 
-NAME = "universal"  # of the policies that come with the package
+NAME = "universal"  # of the policies in the package
 
 
 def load(name: str | os.PathLike, task: Task | None = None) -> Network:
@@ -32,12 +32,15 @@ def load(name: str | os.PathLike, task: Task | None = None) -> Network:
         ValueError: a damaged file, or a policy of one body.
         OSError: the file cannot be read.
     """
-    trained_in = "steer" if task is not None and "command" in task.blocks else "walk"
-    packaged = PACKAGED / f"{NAME}-{trained_in}{network.EXTENSION}"
-    made = network.load(packaged if name == NAME else name)
-    if not made.setup.several:
-        raise ValueError(f"policy {name}: expected one of many bodies, got one of {made.setup.body.name}")
-    return made
+    if name == NAME:
+        follows_command = task is not None and "command" in task.blocks
+        training_task = "steer" if follows_command else "walk"
+        policy = network.load(PACKAGED / f"{NAME}-{training_task}{network.EXTENSION}")
+    else:
+        policy = network.load(name)
+    if not policy.setup.several:
+        raise ValueError(f"policy {name}: expected one of many bodies, got one of {policy.setup.body.name}")
+    return policy
 
 
 class Universal:
@@ -61,18 +64,22 @@ class Universal:
             ValueError: a body with more than 12 legs or 4 joints a leg, or a task that prescribes no gait or lacks
                 a block that the network needs.
         """
-        self.network, self.task = trained, task
-        described, body = tokens.body_description(task), task.scene.body
-        self.descriptions = described.legs[None], described.torso[None]
-        self.reach = described.reach[described.mask]
+        body = task.scene.body
+        description = tokens.body_description(task)
+        self.network = trained
+        self.task = task
+        self.descriptions = (description.legs[None], description.torso[None])
+        self.reach = description.reach[description.mask]
         self.tokens = Tokens.of([task])
         self.gains = position_gains(size_body(body), measure_standing(body).inertias)
-        self._positions = traced(self._traced, task.size)
+        self._positions = traced(self._trace_positions, task.size)
 
     @property
     def graph(self) -> Graph:
-        """What gives the actions (num_envs, joints) for observations (num_envs, size) of the task."""
-        return self._positions if self.task.actions == "position" else traced(self._traced_torques, self.task.size)
+        """The graph of actions (num_envs, joints) for observations (num_envs, size) of the task."""
+        if self.task.actions == "position":
+            return self._positions
+        return traced(self._trace_torques, self.task.size)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
@@ -83,25 +90,32 @@ class Universal:
         Raises:
             ValueError: an observation of another body, or without a block of the task.
         """
-        blocks = read_blocks(observation, self.task.sizes, len(self.reach), len(self.task.scene.body.part_names))
+        joint_count = len(self.reach)
+        part_count = len(self.task.scene.body.part_names)
+        blocks = read_blocks(observation, self.task.sizes, joint_count, part_count)
         vectors = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
         positions = self._positions(vectors).astype(float)
         if self.task.actions == "position":
             return positions
-        _, angles, speeds = proprioception(read_blocks(observation, Clocked.reads, len(self.reach)))
-        return torques(self.reach * positions, angles, speeds, *self.gains)
+        _, angles, velocities = proprioception(read_blocks(observation, Clocked.reads, joint_count))
+        stiffness, damping = self.gains
+        return torques(self.reach * positions, angles, velocities, stiffness, damping)
 
-    def _traced(self, vectors: Any) -> Any:
+    def _trace_positions(self, vectors: Any) -> Any:
         """Write the nodes of positions (1, joints) for a traced observation (1, size)."""
-        seen = self.tokens.make_tokens(self.tokens.gather_inputs(vectors))
-        flat: Any = tokens.flatten_tokens(seen, *self.descriptions)
+        leg_descriptions, torso_description = self.descriptions
+        blocks = self.tokens.make_tokens(self.tokens.gather_inputs(vectors))
+        flat: Any = tokens.flatten_tokens(blocks, leg_descriptions, torso_description)
         return self.tokens.body_actions(repeated(self.network.graph, flat))  # type: ignore[arg-type]
 
-    def _traced_torques(self, vectors: Any) -> Any:
+    def _trace_torques(self, vectors: Any) -> Any:
         """Write the nodes of torques (1, joints) for a traced observation (1, size)."""
-        _, _, *proprioceived, _, _, _ = self.tokens.split_inputs(self.tokens.gather_inputs(vectors))
-        angles, speeds = map(self.tokens.body_actions, proprioceived)
-        return torques(self.reach * self._traced(vectors), angles, speeds, *self.gains)
+        inputs = self.tokens.split_inputs(self.tokens.gather_inputs(vectors))
+        _, _, padded_angles, padded_velocities, _, _, _ = inputs
+        angles = self.tokens.body_actions(padded_angles)
+        velocities = self.tokens.body_actions(padded_velocities)
+        stiffness, damping = self.gains
+        return torques(self.reach * self._trace_positions(vectors), angles, velocities, stiffness, damping)
 
 
 def for_body(trained: Network, setup: Setup) -> Network:
@@ -110,5 +124,5 @@ def for_body(trained: Network, setup: Setup) -> Network:
     Raises:
         ValueError: as `Universal`.
     """
-    made = Universal(trained, setup.definition)
-    return Network(made.graph, setup, dict(made.task.sizes))
+    policy = Universal(trained, setup.definition)
+    return Network(policy.graph, setup, dict(policy.task.sizes))

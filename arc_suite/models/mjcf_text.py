@@ -14,22 +14,26 @@ def to_mjcf(root: mjcf.RootElement) -> str:
         root: the model. Without a free joint the text has no keyframe, since PyMJCF's `attach` would shift its numbers.
 
     Returns:
-        The text. It compiles to the same model as `root`, except the keyframe.
+        The text. It compiles to the same model as `root`, except for the keyframe.
     """
-    text = root.to_xml()
-    for whole in text.findall("default"):
-        (own,) = whole
-        text.replace(whole, own) if len(own) else text.remove(whole)
-    for element in text.iterfind(".//*[@class='/']"):
+    tree = root.to_xml()
+    for defaults in tree.findall("default"):
+        (global_defaults,) = defaults  # the class "/"
+        if len(global_defaults):
+            tree.replace(defaults, global_defaults)
+        else:
+            tree.remove(defaults)
+    for element in tree.iterfind(".//*[@class='/']"):
         del element.attrib["class"]
     if root.find("joint", "root") and not root.find("key", "home"):
-        angles = [0.0 for joint in root.find_all("joint") if joint.tag == "joint"]
-        qpos = (*root.find("body", "torso").pos, 1.0, 0.0, 0.0, 0.0, *angles)
-        home = etree.SubElement(etree.SubElement(text, "keyframe"), "key", name="home")
-        home.set("qpos", exact(qpos))
-    return etree.tostring(text, encoding="unicode", pretty_print=True)
+        hinges = [joint for joint in root.find_all("joint") if joint.tag == "joint"]
+        torso_pose = (*root.find("body", "torso").pos, 1.0, 0.0, 0.0, 0.0)  # position and quaternion
+        keyframe = etree.SubElement(tree, "keyframe")
+        home = etree.SubElement(keyframe, "key", name="home")
+        home.set("qpos", exact((*torso_pose, *(0.0 for _ in hinges))))
+    return etree.tostring(tree, encoding="unicode", pretty_print=True)
 
 
 def exact(values) -> str:
     """Return numbers as text that is read back as the same bits."""
-    return " ".join(str(number) if isinstance(number, int) else repr(number) for number in np.ravel(values).tolist())
+    return " ".join(repr(number) for number in np.ravel(values).tolist())

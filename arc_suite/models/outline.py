@@ -8,24 +8,30 @@ import numpy as np
 
 from arc_suite.robots.spec import Body, Leg, Solid
 
+# Corners (8, 3) of a box with half-extents of 1.
 CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
 def solid_corners(solid: Solid) -> np.ndarray:
     """Return the corners of a box around a solid, turned with it, in the torso's frame: (8, 3)."""
-    rotation, quaternion = np.empty(9), np.empty(4)
+    quaternion = np.empty(4)
     mujoco.mju_euler2Quat(quaternion, np.radians(solid.euler_deg), "xyz")
+    rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, quaternion)
     return solid.position + (CORNERS * _half_extents(solid)) @ rotation.reshape(3, 3).T
 
 
 def _half_extents(solid: Solid) -> tuple[float, ...]:
-    radius, length = solid.size[0], solid.size[-1]
-    return {
-        "sphere": (radius, radius, radius),
-        "capsule": (radius, radius, length + radius),
-        "cylinder": (radius, radius, length),
-    }.get(solid.shape, solid.size)
+    """Return the half-extents (3,) of the box around a solid, in the solid's frame, m."""
+    radius = solid.size[0]
+    half_length = solid.size[-1]  # without the ends of a capsule
+    if solid.shape == "sphere":
+        return radius, radius, radius
+    if solid.shape == "capsule":
+        return radius, radius, half_length + radius
+    if solid.shape == "cylinder":
+        return radius, radius, half_length
+    return solid.size
 
 
 def leg_points(leg: Leg) -> Iterator[tuple[np.ndarray, float]]:

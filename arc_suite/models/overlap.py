@@ -12,11 +12,15 @@ from arc_suite.models.stride import fitted_gait, half_stroke, strokes
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 
-_ALLOWED = 0.01  # depth of an overlap, of the standing height
+_MAX_DEPTH = 0.01  # standing heights, of an overlap that does not count
 
 # Demonstrators lengthen strides to keep their course. Of 49 random bodies that overlapped as they walked, 47 are found
 # with this factor and 41 without, and none that did not.
-_LENGTHENED = 1.25
+_STRIDE_FACTOR = 1.25
+
+# Owners of geoms that are no legs.
+_TORSO = -1
+_BALLAST = -2
 
 
 class Overlap(NamedTuple):
@@ -25,7 +29,7 @@ class Overlap(NamedTuple):
     Attributes:
         names: of a solid of the torso and a part of a leg, or of parts of two legs.
         depth: m.
-        pose: in which they do, "the standing pose" or "a stride".
+        pose: in which they overlap, "the standing pose" or "a stride".
     """
 
     names: tuple[str, str]
@@ -42,54 +46,68 @@ def overlaps(body: Body, spread: float = 1.0) -> Iterator[Overlap]:
         body: the spec.
         spread: factor of the distances of the legs' mounts from the torso's middle, seen from above.
     """
-    if body.source:  # whose parts are a sketch of colliders of any shape
+    if body.source:  # the legs of an imported body are only a sketch of its colliders
         return
-    names, pairs = _names(body), _pairs(body)
+    names = _geom_names(body)
+    pairs = _separate_pairs(body)
     model = copy.copy(compile_body(body))
-    model.body_pos[[model.body(leg.part_names[0]).id for leg in body.legs], :2] *= spread
+    first_links = [model.body(leg.part_names[0]).id for leg in body.legs]
+    model.body_pos[first_links, :2] *= spread
     data = mujoco.MjData(model)
-    nearest = model.geom_rbound[pairs].sum(axis=1)
+    max_distances = model.geom_rbound[pairs].sum(axis=1)  # between centers of geoms that can overlap, m
     for pose, angles in _poses(body):
         data.qpos[7:] = angles
         mujoco.mj_kinematics(model, data)
-        distances = np.linalg.norm(np.subtract(*data.geom_xpos[pairs.T]), axis=1)
-        for one, other in pairs[distances < nearest]:
-            depth = -mujoco.mj_geomDistance(model, data, one, other, 0.0, None)
-            if depth > _ALLOWED * body.torso.standing_height:
-                yield Overlap((names[one], names[other]), depth, pose)
+        first_centers = data.geom_xpos[pairs[:, 0]]
+        second_centers = data.geom_xpos[pairs[:, 1]]
+        distances = np.linalg.norm(first_centers - second_centers, axis=1)
+        for first, second in pairs[distances < max_distances]:
+            depth = -mujoco.mj_geomDistance(model, data, first, second, 0.0, None)
+            if depth > _MAX_DEPTH * body.torso.standing_height:
+                yield Overlap((names[first], names[second]), depth, pose)
 
 
 def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
     """Yield poses by name, (joints,) rad: the standing one, and those of a stride at which legs are nearest."""
     yield "the standing pose", np.zeros(len(body.joint_names))
-    if body.name in ROBOTS:  # which has a gait of its own
+    if body.name in ROBOTS:  # has a gait of its own
         return
     gait = fitted_gait(body)
-    moves = strokes(body, _LENGTHENED * half_stroke(body, gait))
-    offsets = np.array(gait.offsets)
+    strokes_of_legs = strokes(body, _STRIDE_FACTOR * half_stroke(body, gait))
+    offsets = np.array(gait.offsets)  # (legs,) cycles
     # Neighbors reach the ends of their strides at different times. All legs sweep at constant speed between the
     # moments at which one of them touches down or takes off, so that two are nearest at such a moment.
-    for time in np.unique(np.concatenate([-offsets, gait.duty_factor - offsets]).round(9) % 1.0):
-        ways = np.interp((time + offsets) % 1.0, (0.0, gait.duty_factor, 1.0), (1.0, -1.0, 1.0))
-        yield "a stride", np.concatenate([way * sweep for way, (sweep, _) in zip(ways, moves, strict=True)])
+    event_times = np.concatenate([-offsets, gait.duty_factor - offsets]).round(9) % 1.0
+    for time in np.unique(event_times):
+        phases = (time + offsets) % 1.0
+        # From the front end of the stride, 1, to its rear end in stance, and back in swing.
+        sweep_shares = np.interp(phases, (0.0, gait.duty_factor, 1.0), (1.0, -1.0, 1.0))
+        angles = [share * sweep for share, (sweep, _) in zip(sweep_shares, strokes_of_legs, strict=True)]
+        yield "a stride", np.concatenate(angles)
 
 
-def _pairs(body: Body) -> np.ndarray:
-    """Return the pairs of geoms that are to be apart, (pairs, 2)."""
-    weights = len(body.ballast)
-    inner = [True] * len(body.torso.solids) + [False] * weights
-    owner = [-1] * len(body.torso.solids) + [-2] * weights
-    for index, leg in enumerate(body.legs):
-        hip = next(number for number, link in enumerate(leg.links) if link.joint)
-        inner += [number <= hip for number in range(len(leg.parts))]
-        owner += [index] * len(leg.parts)
-    inner, owner = np.array(inner), np.array(owner)
-    one, other = np.triu_indices(len(owner), 1)
-    apart = (owner[one] != owner[other]) & ~(inner[one] & inner[other])
-    return np.stack([one, other], axis=1)[apart & (owner[one] != -2) & (owner[other] != -2)]
+def _separate_pairs(body: Body) -> np.ndarray:
+    """Return the pairs of geoms that are to be apart, (pairs, 2).
+
+    They belong to two legs, or to the torso and a leg, and are not both close to the torso.
+    """
+    owners = [_TORSO] * len(body.torso.solids) + [_BALLAST] * len(body.ballast)
+    is_close = [True] * len(body.torso.solids) + [False] * len(body.ballast)  # to the torso
+    for leg_index, leg in enumerate(body.legs):
+        links_with_joint = [link_index for link_index, link in enumerate(leg.links) if link.joint]
+        hip = links_with_joint[0]
+        owners += [leg_index] * len(leg.parts)
+        is_close += [part_index <= hip for part_index in range(len(leg.parts))]
+    owners = np.array(owners)
+    is_close = np.array(is_close)
+    first, second = np.triu_indices(len(owners), 1)
+    is_ballast = (owners[first] == _BALLAST) | (owners[second] == _BALLAST)
+    is_separate = (owners[first] != owners[second]) & ~(is_close[first] & is_close[second]) & ~is_ballast
+    return np.stack([first, second], axis=1)[is_separate]
 
 
-def _names(body: Body) -> list[str]:
-    """Return the names of the parts of geoms."""
+def _geom_names(body: Body) -> list[str]:
+    """Return the names of the parts of geoms, in the order of the model."""
     solids = [solid.name for solid in (*body.torso.solids, *body.ballast)]
-    return solids + [name for leg in body.legs for name in leg.part_names]
+    parts_of_legs = [name for leg in body.legs for name in leg.part_names]
+    return solids + parts_of_legs

@@ -1,7 +1,7 @@
 """Flaws that keep a body from standing or walking, found in poses without simulation."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,25 +10,27 @@ from arc_suite.models import sizing, stride
 from arc_suite.models.outline import torso_box
 from arc_suite.models.overlap import overlaps
 from arc_suite.models.standing import PoseMechanics, by_leg, measure_standing
-from arc_suite.robots.spec import Body, Leg, Link
+from arc_suite.robots.spec import Body, Leg
 
-# Shares of the standing height.
-_GAP = 0.12  # of feet from the floor; feet of published robots hang by up to 0.25 and sink by up to 0.07
+# Lengths in standing heights.
+_MAX_GAP = 0.12  # of feet from the floor; feet of published robots hang by up to 0.25 and sink by up to 0.07
 _HOPELESS_GAP = 0.6  # beyond which the torso settles outside of the healthy range of a walk
-_LEAST_STRIDE = 0.03  # that the most able foot sweeps or is lifted, within a demonstrator's bounds
+_MIN_STROKE = 0.03  # that the most able foot sweeps or is lifted, within a demonstrator's bounds
 _HOPELESS_OVERHANG = 0.05  # of the center of mass beyond the feet
 
-_LEAST_TILT = 0.15  # margin of stability as a share of the height of the center of mass; generated bodies have 0.7 to 2
-_LARGEST_TURN = 0.5  # rad, of a joint
+_MIN_MARGIN = 0.15  # of stability, in heights of the center of mass; generated bodies have 0.7 to 2
+_MARGIN_SPARE = 1.05  # factor on the displacement of feet that a flaw names
+_MAX_TURN = 0.5  # rad, of a joint in a stroke
+_MIN_WALKING_LEGS = 3
+_MIN_DISPLACEMENT = 1e-6  # m, that a text names
 
 # A body walks about as fast, of the target speed, as its motors give of this many times the loads of a stride: medians
 # of 16 `varied` bodies with 1, 2, 3, 4, 6 and 10 times the loads are 0.14, 0.25, 0.46, 0.61, 0.82 and 1.09. Over 161
 # bodies with random motors the mean error is 0.21; 118 are called weak, and 76 % of these stay below 0.7 as they walk.
-_BRISK = 7.0
+_LOADS_OF_BRISK_STRIDE = 7.0
 
-_LEAST_LEGS = 3
-
-_SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # of the legs' mounts, tried against overlaps
+_SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # factors of the legs' mounts, tried against overlaps
+_MAX_NAMES = 4  # of legs in one text
 
 
 class Flaw(NamedTuple):
@@ -37,7 +39,7 @@ class Flaw(NamedTuple):
     Attributes:
         text: what is wrong, and a value that fits.
         hopeless: whether no body can walk with it.
-        cure: the body with the value that fits; None where the text names none.
+        cure: the body with the value that fits; None if the text names none.
     """
 
     text: str
@@ -48,184 +50,247 @@ class Flaw(NamedTuple):
 def flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body, none for one that should walk."""
     pose = measure_standing(body)
-    return [flaw for check in (_height, _legs, _support, _motors, _joints, _parts) for flaw in check(body, pose)]
+    body_flaws = []
+    for check in (_check_height, _check_legs, _check_support, _check_motors, _check_joints, _check_parts):
+        body_flaws.extend(check(body, pose))
+    return body_flaws
 
 
 def hopeless_flaws(body: Body) -> list[Flaw]:
-    """Return the flaws of a body with which none can walk; quicker than `flaws`, as neither motors nor overlaps are."""
+    """Return the flaws of a body with which none can walk.
+
+    It is quicker than `flaws`, as motors and overlaps are not checked: their flaws are never hopeless.
+    """
     pose = measure_standing(body)
-    found = [flaw for check in (_height, _support, _joints) for flaw in check(body, pose)]
-    return [flaw for flaw in found if flaw.hopeless]
+    body_flaws = []
+    for check in (_check_height, _check_support, _check_joints):
+        body_flaws.extend(flaw for flaw in check(body, pose) if flaw.hopeless)
+    return body_flaws
 
 
-def _height(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+def _check_height(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find feet above or below the floor, and parts of the torso below the feet."""
-    height, soles = pose.height, pose.soles[:, 2]
-    gap = float(height + soles.min())
-    fitting = float(f"{-soles.min():.3g}")
-    fits = f"standing_height {fitting:.3g} fits"
-    if abs(gap) > _GAP * height:
-        where = "hang {:.3g} m above the floor" if gap > 0.0 else "stand {:.3g} m in the floor"
-        cure = body.replace(torso=body.torso.replace(standing_height=fitting)) if fitting > 0.0 else None
-        yield Flaw(f"feet {where.format(abs(gap))}: {fits}", abs(gap) > _HOPELESS_GAP * height, cure)
-    short = [leg.name for leg, sole in zip(body.legs, soles, strict=True) if sole - soles.min() > _GAP * height]
-    if short:
-        missing = max(soles) - min(soles)
-        names = ", ".join(short[:4]) + ", ..." * (len(short) > 4)
-        text = f"feet of {names} end up to {missing:.3g} m above the lowest foot: legs longer by that fit"
-        yield Flaw(text, False, _lengthened(body, soles - soles.min()))
-    deeper = float(soles.min() - torso_box(body)[0][2])
-    if deeper > 0.0:
-        text = f"the torso reaches {deeper:.3g} m lower than the feet: legs longer by more than that fit"
-        yield Flaw(text, deeper > _GAP * height)
+    soles = pose.soles[:, 2]  # heights in the torso's frame, m
+    lowest_sole = soles.min()
+    max_gap = _MAX_GAP * pose.height
+    gap = float(pose.height + lowest_sole)
+    if abs(gap) > max_gap:
+        fitting_height = float(f"{-lowest_sole:.3g}")
+        cure = None
+        if fitting_height > 0.0:
+            cure = body.replace(torso=body.torso.replace(standing_height=fitting_height))
+        error = f"hang {gap:.3g} m above the floor" if gap > 0.0 else f"stand {-gap:.3g} m in the floor"
+        text = f"feet {error}: standing_height {fitting_height:.3g} fits"
+        yield Flaw(text, abs(gap) > _HOPELESS_GAP * pose.height, cure)
+
+    heights_above_lowest = soles - lowest_sole
+    short_legs = [leg.name for leg, height in zip(body.legs, heights_above_lowest, strict=True) if height > max_gap]
+    if short_legs:
+        names = ", ".join(short_legs[:_MAX_NAMES])
+        if len(short_legs) > _MAX_NAMES:
+            names += ", ..."
+        largest = max(soles) - min(soles)
+        text = f"feet of {names} end up to {largest:.3g} m above the lowest foot: legs longer by that fit"
+        yield Flaw(text, False, _lengthen_legs(body, heights_above_lowest))
+
+    lowest_corner, _ = torso_box(body)
+    depth = float(lowest_sole - lowest_corner[2])
+    if depth > 0.0:
+        text = f"the torso reaches {depth:.3g} m lower than the feet: legs longer by more than that fit"
+        yield Flaw(text, depth > max_gap)
 
 
-def _support(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+def _check_legs(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+    """Find too few legs for any demonstrator."""
+    if len(body.legs) < _MIN_WALKING_LEGS:
+        yield Flaw(f"no demonstrator keeps its balance on {len(body.legs)} legs: 3 and more walk", False)
+
+
+def _check_support(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find a center of mass outside the polygon of the feet, or too near its edge."""
     if len(body.legs) < 3:
         yield Flaw(f"{len(body.legs)} feet span no area to stand on: 3 or more legs fit", False)
         return
-    above = pose.center[2] - pose.soles[:, 2].min()
+    center_height = pose.center[2] - pose.soles[:, 2].min()  # of mass, m above the feet
     if pose.margin < 0.0:
-        outside = f"the center of mass lies {-pose.margin:.3g} m outside of the feet"
-        sides = {leg.side for leg in body.legs}
-        if len(sides) == 1:
-            other, cure = "right" if sides == {"left"} else "left", None
-            text = f"{outside}, all on the {sides.pop()}: legs mirrored to the {other} fit"
-        else:
-            middle = (pose.soles.min(axis=0) + pose.soles.max(axis=0)) / 2.0
-            # Legs take the center of mass along with them.
-            x, y, _ = (pose.center - middle) / (1.0 - _mass_of_legs(body) / pose.mass)
-            text, cure = f"{outside}: legs {_displacement(x, y)} fit", _moved(body, [(x, y)] * len(body.legs))
-        yield Flaw(text, pose.margin < -_HOPELESS_OVERHANG * pose.height, cure)
-    elif pose.margin < _LEAST_TILT * above:
-        tilt, missing = np.degrees(np.arctan2(pose.margin, above)), 1.05 * (_LEAST_TILT * above - pose.margin)
-        tower = f"a tower that tips over when tilted by {tilt:.2g} degrees"
-        outwards = missing * np.sign(pose.soles - pose.center)[:, :2]
-        yield Flaw(f"{tower}: feet {missing:.2g} m further out all around fit", False, _moved(body, outwards))
+        yield _overhang_flaw(body, pose)
+    elif pose.margin < _MIN_MARGIN * center_height:
+        tilt = np.degrees(np.arctan2(pose.margin, center_height))
+        distance = _MARGIN_SPARE * (_MIN_MARGIN * center_height - pose.margin)
+        outwards = distance * np.sign(pose.soles - pose.center)[:, :2]
+        text = (
+            f"a tower that tips over when tilted by {tilt:.2g} degrees: "
+            f"feet {distance:.2g} m further out all around fit"
+        )
+        yield Flaw(text, False, _move_legs(body, outwards))
+
+
+def _overhang_flaw(body: Body, pose: PoseMechanics) -> Flaw:
+    """Return the flaw of a center of mass outside of the feet."""
+    error = f"the center of mass lies {-pose.margin:.3g} m outside of the feet"
+    is_hopeless = pose.margin < -_HOPELESS_OVERHANG * pose.height
+    sides = {leg.side for leg in body.legs}
+    if len(sides) == 1:
+        (side,) = sides
+        missing_side = "right" if side == "left" else "left"
+        return Flaw(f"{error}, all on the {side}: legs mirrored to the {missing_side} fit", is_hopeless)
+    middle = (pose.soles.min(axis=0) + pose.soles.max(axis=0)) / 2.0
+    # Legs that move take their share of the center of mass along.
+    share_of_rest = 1.0 - _mass_of_legs(body) / pose.mass
+    x, y, _ = (pose.center - middle) / share_of_rest
+    cure = _move_legs(body, [(x, y)] * len(body.legs))
+    return Flaw(f"{error}: legs {_describe_displacement(x, y)} fit", is_hopeless, cure)
 
 
 def _mass_of_legs(body: Body) -> float:
     """Return the mass of all legs, kg: capsules and spheres."""
     volume = 0.0
     for leg in body.legs:
-        balls = sum(part.radius**3 for part in leg.parts)
+        cubed_radii = sum(part.radius**3 for part in leg.parts)
         rods = sum(link.radius**2 * math.hypot(*link.end) for link in leg.links)
-        volume += math.pi * (4.0 / 3.0 * balls + rods)
+        volume += math.pi * (4.0 / 3.0 * cubed_radii + rods)
     return body.density * volume
 
 
-def _displacement(x: float, y: float) -> str:
-    """Return in words a displacement on the floor, m."""
-    parts = ((x, "forward", "backward"), (y, "to the left", "to the right"))
-    return " and ".join(f"{abs(way):.2g} m {high if way > 0.0 else low}" for way, high, low in parts if abs(way) > 1e-6)
+def _describe_displacement(x: float, y: float) -> str:
+    """Return a displacement on the floor, m, in words."""
+    parts = []
+    if abs(x) > _MIN_DISPLACEMENT:
+        parts.append(f"{abs(x):.2g} m {'forward' if x > 0.0 else 'backward'}")
+    if abs(y) > _MIN_DISPLACEMENT:
+        parts.append(f"{abs(y):.2g} m {'to the left' if y > 0.0 else 'to the right'}")
+    return " and ".join(parts)
 
 
-def _motors(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+def _check_motors(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find motors too weak to hold the standing pose where no joint limit holds it, or too weak for a stride."""
     joints = body.joints
-    given = np.array([joint.torque or np.inf for joint in joints])
-    if np.isinf(given).all():
+    torques = np.array([joint.torque or np.inf for joint in joints])  # inf for motors that are to be sized
+    if np.isinf(torques).all():
         return
     low, high = np.transpose([joint.range_deg for joint in joints])
-    held = np.where(np.where(pose.loads > 0.0, low, high) == 0.0, 0.0, abs(pose.loads))
-    if (given < held).any():
-        yield _short(body, given, held, "hold the body up")
+    limit_under_load = np.where(pose.loads > 0.0, low, high)
+    is_held_by_limit = limit_under_load == 0.0
+    standing_loads = np.where(is_held_by_limit, 0.0, abs(pose.loads))
+    if (torques < standing_loads).any():
+        yield _weak_motor_flaw(body, torques, standing_loads, "hold the body up")
         return
-    if body.source:  # whose servos walk with less: the share below was measured on torques
+    if body.source:  # the number of loads was measured on motors; servos walk with less
         return
-    loads = _BRISK * sizing.sizing_loads(body)
-    if (reached := _reached(body, (given / loads).clip(max=1.0))) < stride.MIN_SPEED_SHARE:
-        slow = f"weak: reaches about {reached:.1f} of the target speed, as "
-        yield _short(body, given, loads, "a brisk stride takes", slow)
+    stride_loads = _LOADS_OF_BRISK_STRIDE * sizing.sizing_loads(body)
+    speed_share = _estimate_speed_share(body, (torques / stride_loads).clip(max=1.0))
+    if speed_share < stride.MIN_SPEED_SHARE:
+        effect = f"weak: reaches about {speed_share:.1f} of the target speed, as "
+        yield _weak_motor_flaw(body, torques, stride_loads, "a brisk stride takes", effect)
 
 
-def _legs(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
-    """Find too few legs for any demonstrator."""
-    if len(body.legs) < _LEAST_LEGS:
-        yield Flaw(f"no demonstrator keeps its balance on {len(body.legs)} legs: 3 and more walk", False)
+def _weak_motor_flaw(body: Body, torques: np.ndarray, loads: np.ndarray, purpose: str, effect: str = "") -> Flaw:
+    """Return the flaw of motors that give less than their loads.
 
-
-def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str, effect: str = "") -> Flaw:
-    """Return the flaw of motors that give less than what is needed, (joints,) N m."""
-    weak, worst = int((given < needed).sum()), int((needed / given).argmax())
-    lacks = f"{needed[worst] - given[worst]:.3g} of the {needed[worst]:.3g} N m that {purpose}"
-    others = f", as do those of {weak - 1} more joints" * (weak > 1)
+    Args:
+        body: of the motors.
+        torques: (joints,) that motors give, N m.
+        loads: (joints,) that they should give, N m.
+        purpose: of the loads, which ends the text.
+        effect: begins the text.
+    """
+    is_weak = torques < loads
+    weak_count = int(is_weak.sum())
+    worst = int((loads / torques).argmax())
+    shortage = f"{loads[worst] - torques[worst]:.3g} of the {loads[worst]:.3g} N m that {purpose}"
+    more_joints = f", as do those of {weak_count - 1} more joints" if weak_count > 1 else ""
+    name = body.joint_names[worst]
     if body.source:
-        return Flaw(f"{effect}the servo of {body.joint_names[worst]} lacks {lacks}{others}", False)
-    cure = _unpowered(body, given < needed)
-    fits = sizing.size_body(cure).joints[worst].motor.gear
-    return Flaw(
-        f"{effect}the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure
-    )
+        return Flaw(f"{effect}the servo of {name} lacks {shortage}{more_joints}", False)
+    cure = _remove_motors(body, is_weak)
+    gear = sizing.size_body(cure).joints[worst].motor.gear
+    return Flaw(f"{effect}the motor of {name} lacks {shortage}{more_joints}: gear {gear:.3g} fits", False, cure)
 
 
-def _reached(body: Body, shares: np.ndarray) -> float:
-    """Return about which share of the target speed a body reaches whose motors give shares (joints,) of what it takes.
+def _estimate_speed_share(body: Body, torque_shares: np.ndarray) -> float:
+    """Return about which share of the target speed a body reaches.
 
     In each leg the joint that bears most and the one that sweeps most decide; the others hardly matter.
+
+    Args:
+        body: any body.
+        torque_shares: (joints,) that motors give of the torque for the target speed.
     """
-    moves = stride.strokes(body, stride.half_stroke(body, stride.fitted_gait(body)))
-    legs = zip(by_leg(body, shares), by_leg(body, stride.stride_loads(body)), moves, strict=True)
-    return float(np.mean([own[[borne.argmax(), abs(sweep).argmax()]].min() for own, borne, (sweep, _) in legs]))
+    strokes_of_legs = stride.strokes(body, stride.half_stroke(body, stride.fitted_gait(body)))
+    shares_of_legs = by_leg(body, torque_shares)
+    loads_of_legs = by_leg(body, stride.stride_loads(body))
+    least_shares = []
+    for shares, loads, (sweep, _) in zip(shares_of_legs, loads_of_legs, strokes_of_legs, strict=True):
+        decisive_joints = [loads.argmax(), abs(sweep).argmax()]
+        least_shares.append(shares[decisive_joints].min())
+    return float(np.mean(least_shares))
 
 
-def _unpowered(body: Body, joints: np.ndarray) -> Body:
-    """Return the body with the motors of some of its joints, (joints,) booleans, left to be sized."""
-    chosen = iter(joints)
-
-    def unpowered(link: Link) -> Link:
-        return link.replace(joint=link.joint.replace(motor=None)) if link.joint and next(chosen) else link
-
-    return body.replace(legs=tuple(leg.replace(links=tuple(map(unpowered, leg.links))) for leg in body.legs))
-
-
-def _moved(body: Body, displacements: Iterable) -> Body:
-    """Return the body with its legs moved on the torso by displacements (legs, 2), m."""
-    legs = (
-        leg.replace(mount=(leg.mount[0] + float(x), leg.mount[1] + float(y), leg.mount[2]))
-        for leg, (x, y) in zip(body.legs, displacements, strict=True)
-    )
-    return body.replace(legs=tuple(legs))
-
-
-def _lengthened(body: Body, missing: np.ndarray) -> Body:
-    """Return the body with the feet lower by (legs,) m: the last link of each leg reaches further down."""
+def _remove_motors(body: Body, is_removed: Sequence[bool]) -> Body:
+    """Return the body with the motors of some of its joints (joints,) left to be sized."""
+    removals = iter(is_removed)
     legs = []
-    for leg, length in zip(body.legs, missing, strict=True):
-        *others, last = leg.links
-        x, y, z = last.end
-        legs.append(leg.replace(links=(*others, last.replace(end=(x, y, z - float(length))))))
+    for leg in body.legs:
+        links = []
+        for link in leg.links:
+            if link.joint and next(removals):
+                link = link.replace(joint=link.joint.replace(motor=None))
+            links.append(link)
+        legs.append(leg.replace(links=tuple(links)))
     return body.replace(legs=tuple(legs))
 
 
-def _joints(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+def _move_legs(body: Body, displacements: Iterable) -> Body:
+    """Return the body with its legs moved on the torso by displacements (legs, 2), m."""
+    legs = []
+    for leg, (x, y) in zip(body.legs, displacements, strict=True):
+        mount_x, mount_y, mount_z = leg.mount
+        legs.append(leg.replace(mount=(mount_x + float(x), mount_y + float(y), mount_z)))
+    return body.replace(legs=tuple(legs))
+
+
+def _lengthen_legs(body: Body, lengths: np.ndarray) -> Body:
+    """Return the body with the feet lower by lengths (legs,), m: the last link of each leg reaches further down."""
+    legs = []
+    for leg, length in zip(body.legs, lengths, strict=True):
+        *first_links, last_link = leg.links
+        x, y, z = last_link.end
+        longer_link = last_link.replace(end=(x, y, z - float(length)))
+        legs.append(leg.replace(links=(*first_links, longer_link)))
+    return body.replace(legs=tuple(legs))
+
+
+def _check_joints(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find legs that cannot take a step."""
-    reaches = np.array([_reach(leg, jacobian) for leg, jacobian in zip(body.legs, pose.jacobians, strict=True)])
-    forward, up = reaches.max(axis=0) / pose.height
-    if forward < _LEAST_STRIDE:
+    strokes = np.array(
+        [_largest_strokes(leg, jacobian) for leg, jacobian in zip(body.legs, pose.jacobians, strict=True)]
+    )
+    forward, up = strokes.max(axis=0) / pose.height
+    if forward < _MIN_STROKE:
         text = "no leg has a joint that sweeps its foot forward and back: a hip about axis [0, 0, 1], both ways, fits"
         yield Flaw(text, True)
-    if up < _LEAST_STRIDE:
+    if up < _MIN_STROKE:
         yield Flaw("no joint lifts a foot: a second joint in each leg, about axis [-1, 0, 0], fits", False)
 
 
-def _reach(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
+def _largest_strokes(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
     """Return the largest stroke of a foot by one joint: forward and back, and up, m."""
-    low, high = np.radians([joint.range_deg for joint in leg.joints]).clip(-_LARGEST_TURN, _LARGEST_TURN).T
-    sweep = abs(jacobian[0]) * np.minimum(-low, high)
-    return sweep.max(), np.maximum(jacobian[2] * low, jacobian[2] * high).max()
+    ranges = np.radians([joint.range_deg for joint in leg.joints]).clip(-_MAX_TURN, _MAX_TURN)
+    low, high = ranges.T
+    sweeps = abs(jacobian[0]) * np.minimum(-low, high)
+    lifts = np.maximum(jacobian[2] * low, jacobian[2] * high)
+    return sweeps.max(), lifts.max()
 
 
-def _parts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+def _check_parts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find legs that overlap, with each other or with the torso."""
-    found = max(overlaps(body), key=lambda each: each.depth, default=None)
-    if found is None:
+    deepest = max(overlaps(body), key=lambda overlap: overlap.depth, default=None)
+    if deepest is None:
         return
-    text = f"{' and '.join(found.names)} overlap by {found.depth:.3g} m in {found.pose}"
+    text = f"{' and '.join(deepest.names)} overlap by {deepest.depth:.3g} m in {deepest.pose}"
     for spread in _SPREADS:
         if not any(overlaps(body, spread)):
             outwards = [(spread - 1.0) * np.array(leg.mount[:2]) for leg in body.legs]
-            yield Flaw(f"{text}: legs mounted {spread:g} times as far out fit", False, _moved(body, outwards))
+            yield Flaw(f"{text}: legs mounted {spread:g} times as far out fit", False, _move_legs(body, outwards))
             return
     yield Flaw(f"{text}: shorter or thinner links fit", False)

@@ -1,7 +1,7 @@
-"""Models of imported bodies: their source with what it lacks, never rebuilt.
+"""Models of imported bodies: their source, with servos, cameras, a sensor and the ground added.
 
 A source is MJCF of one free body `torso` alone, whose parts and joints have the names of the body's legs. It stays
-the record of the physics. Servos, cameras and a sensor are added, and the ground.
+the record of the physics.
 """
 
 import functools
@@ -21,8 +21,10 @@ from arc_suite.robots.spec import Body, Servo, SpecError
 
 HOME = "home"  # keyframe of the standing pose
 
-_OF_SCENES = ("option", "keyframe")  # sections that a scene has itself
-_INERT = {"mass": "0", "group": "2", "contype": "0", "conaffinity": "0"}
+_SECTIONS_OF_SCENES = ("option", "keyframe")  # a scene that takes the body has its own
+_TORSO = 1  # its index in the model
+_DECORATION = {"mass": "0", "group": "2", "contype": "0", "conaffinity": "0"}
+_FOOT_COVER = 1.04  # radius of the sphere around a foot, in radii of the foot
 
 
 def mjcf_tree(body: Body, arena: Arena | None, decorated: bool = False, releases: bool = False) -> ElementTree.Element:
@@ -31,41 +33,43 @@ def mjcf_tree(body: Body, arena: Arena | None, decorated: bool = False, releases
     Args:
         body: with a source.
         arena: where it moves; None leaves free joint, options and ground to the scene that takes the body.
-        decorated: whether it has looks; colliders are what is seen.
+        decorated: whether the colliders get materials.
         releases: whether legs can weaken or hang; see `_add_servos`.
 
     Raises:
         SpecError: a source that MuJoCo cannot read, or that lacks a part of the body.
     """
-    compile_source(body)  # finds out at once whether MuJoCo reads it
+    compile_source(body)  # raises the error
     root = ElementTree.fromstring(body.source)
     root.set("model", body.name)
-    bodies = {part.get("name"): part for part in root.iter("body")}
+    parts = {part.get("name"): part for part in root.iter("body")}
+    torso = parts["torso"]
     _add_servos(root, body, releases)
-    views = {name: ("trackcom", camera) for name, camera in _cameras(body).items()}
-    for name, (mode, camera) in (views | {builder.EYE: ("fixed", builder.eye(body))}).items():
-        attributes = {key: exact(value) for key, value in camera.items()}
-        SubElement(bodies["torso"], "camera", name=name, mode=mode, **attributes)
-    SubElement(SubElement(root, "sensor"), "accelerometer", name="torso_acceleration", site="torso")
+    _add_cameras(torso, body)
+    sensors = SubElement(root, "sensor")
+    SubElement(sensors, "accelerometer", name="torso_acceleration", site="torso")
     if decorated:
-        _show_colliders(bodies, body)
+        _show_colliders(parts, body)
     if arena is None:
-        bodies["torso"].remove(bodies["torso"].find("joint"))
-        for section in [each for each in root if each.tag in _OF_SCENES]:
-            root.remove(section)
+        torso.remove(torso.find("joint"))
+        for section in list(root):
+            if section.tag in _SECTIONS_OF_SCENES:
+                root.remove(section)
     else:
         _set_options(root, body)
-    _add_ground(root, bodies["torso"], _ground(body, arena, decorated))
+    _add_ground(root, torso, _ground(body, arena, decorated))
     return root
 
 
 def model_spec(body: Body, arena: Arena, decorated: bool = False) -> mujoco.MjSpec:
-    """Return the spec of an imported body's model; without looks, its servos have releases. See `tree`."""
+    """Return the spec of an imported body's model; without decorations, its servos have releases. See `mjcf_tree`."""
     root = mjcf_tree(body, arena, decorated, releases=not decorated)
-    heights = [np.array(field.attrib.pop("elevation").split(), float) for field in root.iter("hfield")]
+    # Heights of the ground go in as numbers: see `assembly.model_spec`.
+    elevations = [np.array(field.attrib.pop("elevation").split(), float) for field in root.iter("hfield")]
     spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-    for field, values in zip(spec.hfields, heights, strict=True):  # as numbers: see `assembly.model_spec`
-        field.userdata = values.reshape(field.nrow, field.ncol)[::-1].ravel()
+    for field, elevation in zip(spec.hfields, elevations, strict=True):
+        # MJCF lists rows from the far side in y.
+        field.userdata = elevation.reshape(field.nrow, field.ncol)[::-1].ravel()
     return spec
 
 
@@ -78,6 +82,7 @@ def compile_source(body: Body) -> mujoco.MjModel:
     """
     try:
         model = mujoco.MjModel.from_xml_string(body.source)
+        # MuJoCo raises a KeyError for each name that the source lacks.
         model.key(HOME)
         for name in body.part_names:
             model.body(name)
@@ -91,81 +96,132 @@ def compile_source(body: Body) -> mujoco.MjModel:
 def angles_at_home(body: Body) -> dict[str, float]:
     """Return the positions of a source's joints in the standing pose by name: rad, or m of a slide."""
     model = compile_source(body)
-    hinges = (joint for joint in range(model.njnt) if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE)
-    return {model.joint(joint).name: float(model.key(HOME).qpos[model.jnt_qposadr[joint]]) for joint in hinges}
+    qpos = model.key(HOME).qpos
+    angles = {}
+    for joint in range(model.njnt):
+        if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
+            angles[model.joint(joint).name] = float(qpos[model.jnt_qposadr[joint]])
+    return angles
 
 
 def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
-    """Add the servos of all joints, those of held joints last.
+    """Add the servos of all joints: those of legs, their releases in the same order, those of held joints.
 
     A servo holds its joint in the standing pose for a control of 0, and a reach away from it for 1. Its torque is
     k (reach u + home - q) - d v for a control u. That of its release is -r (k (home - q) - d v) for a control r. With
-    controls s u and 1 - s a joint has the share s of its torque. Releases follow the servos of legs, in their order.
+    controls s u and 1 - s a joint has the share s of its torque.
     """
-    joints, home = {joint.get("name"): joint for joint in root.iter("joint")}, angles_at_home(body)
-    legs = [
-        (leg.full_name(joint), joint.servo, np.radians(np.abs(joint.range_deg)).max())
-        for leg in body.legs
-        for joint in leg.joints
-    ]
-    actuator = SubElement(root, "actuator")
-
-    def add(name: str, joint: str, low: float, **attributes: str) -> None:
-        SubElement(
-            actuator, "general", name=name, joint=joint, ctrllimited="true", ctrlrange=exact((low, 1.0)), **attributes
-        )
-
-    def hold(name: str, servo: Servo, reach: float) -> None:
-        bias = exact((servo.stiffness * home[name], -servo.stiffness, -servo.damping))
-        add(name, name, -1.0, biastype="affine", gainprm=exact(servo.stiffness * reach), biasprm=bias)
-        limit = exact((-servo.limit, servo.limit))  # of the sum of what acts on the joint
-        joints[name].attrib |= {"actuatorfrclimited": "true", "actuatorfrcrange": limit}
-
-    for each in legs:
-        hold(*each)
-    for name, servo, _ in legs if releases else ():
-        gain = exact((-servo.stiffness * home[name], servo.stiffness, servo.damping))
-        add(f"{name}-release", name, 0.0, gaintype="affine", gainprm=gain)
-    for joint in body.held:
-        hold(joint.name, joint.servo, 0.0)
+    actuators = SubElement(root, "actuator")
+    joints = {joint.get("name"): joint for joint in root.iter("joint")}
+    home = angles_at_home(body)  # rad
+    leg_joints = [(leg.full_name(joint), joint) for leg in body.legs for joint in leg.joints]
+    for name, joint in leg_joints:
+        reach = np.radians(np.abs(joint.range_deg)).max()
+        _add_servo(actuators, joints[name], joint.servo, home[name], reach)
+    if releases:
+        for name, joint in leg_joints:
+            _add_release(actuators, name, joint.servo, home[name])
+    for held_joint in body.held:
+        name = held_joint.name
+        _add_servo(actuators, joints[name], held_joint.servo, home[name], reach=0.0)
 
 
-def _cameras(body: Body) -> dict[str, dict]:
-    """Return the cameras by name, which frame the standing body with its colliders.
+def _add_servo(
+    actuators: ElementTree.Element, joint: ElementTree.Element, servo: Servo, home: float, reach: float
+) -> None:
+    """Add a servo, and limit the torque on its joint.
 
-    MuJoCo keeps a camera where it is seen from the center of mass in the pose of all joints at zero.
+    Args:
+        actuators: the section.
+        joint: element of the joint.
+        servo: of the joint.
+        home: angle in the standing pose, rad.
+        reach: angle from there for a control of 1, rad.
+    """
+    name = joint.get("name")
+    gain = exact(servo.stiffness * reach)
+    bias = exact((servo.stiffness * home, -servo.stiffness, -servo.damping))
+    _add_actuator(actuators, name, name, (-1.0, 1.0), biastype="affine", gainprm=gain, biasprm=bias)
+    torque_range = exact((-servo.limit, servo.limit))  # of all actuators of the joint together
+    joint.attrib |= {"actuatorfrclimited": "true", "actuatorfrcrange": torque_range}
+
+
+def _add_release(actuators: ElementTree.Element, joint: str, servo: Servo, home: float) -> None:
+    """Add the release of the servo of a joint, given by name; `home` is its angle in the standing pose, rad."""
+    gain = exact((-servo.stiffness * home, servo.stiffness, servo.damping))
+    _add_actuator(actuators, f"{joint}-release", joint, (0.0, 1.0), gaintype="affine", gainprm=gain)
+
+
+def _add_actuator(
+    actuators: ElementTree.Element, name: str, joint: str, control_range: tuple[float, float], **attributes: str
+) -> None:
+    control = {"ctrllimited": "true", "ctrlrange": exact(control_range)}
+    SubElement(actuators, "general", name=name, joint=joint, **control, **attributes)
+
+
+def _add_cameras(torso: ElementTree.Element, body: Body) -> None:
+    """Add the cameras that ride along, and the eye."""
+    for name, camera in _riding_cameras(body).items():
+        _add_camera(torso, name, "trackcom", camera)
+    _add_camera(torso, builder.EYE, "fixed", builder.eye(body))
+
+
+def _add_camera(torso: ElementTree.Element, name: str, mode: str, camera: dict) -> None:
+    attributes = {key: exact(value) for key, value in camera.items()}
+    SubElement(torso, "camera", name=name, mode=mode, **attributes)
+
+
+def _riding_cameras(body: Body) -> dict[str, dict]:
+    """Return the cameras that ride along by name; they frame the standing body with its colliders.
+
+    MuJoCo keeps a camera where it is seen from the center of mass in the pose of all joints at zero. So cameras of
+    the standing pose are moved by the difference of the centers of mass.
     """
     model = compile_source(body)
-    data, centers = mujoco.MjData(model), []
-    for qpos in (model.qpos0, model.key(HOME).qpos):
-        data.qpos[:] = qpos
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        centers.append(data.subtree_com[1] - data.xpos[1])
-    middles, halves = model.geom_aabb[:, None, :3], model.geom_aabb[:, None, 3:]
-    turns = data.geom_xmat.reshape(-1, 3, 3).swapaxes(-1, -2)
-    boxes = (middles + CORNERS * halves) @ turns + data.geom_xpos[:, None] - data.xpos[1]
-    points = np.concatenate([outline(body), boxes.reshape(-1, 3)])
-    moved = centers[0] - centers[1]
-    return {name: camera | {"pos": camera["pos"] + moved} for name, camera in builder.cameras(body, points).items()}
+    data = mujoco.MjData(model)
+    center_at_zero = _center_of_mass(model, data, model.qpos0)
+    center_at_home = _center_of_mass(model, data, model.key(HOME).qpos)
+    shift = center_at_zero - center_at_home
+
+    # Corners (geoms, 8, 3) of the boxes around geoms, from the torso.
+    box_centers = model.geom_aabb[:, None, :3]
+    box_half_extents = model.geom_aabb[:, None, 3:]
+    transposed_rotations = data.geom_xmat.reshape(-1, 3, 3).swapaxes(-1, -2)
+    corners = (box_centers + CORNERS * box_half_extents) @ transposed_rotations
+    corners = corners + data.geom_xpos[:, None] - data.xpos[_TORSO]
+    points = np.concatenate([outline(body), corners.reshape(-1, 3)])
+    cameras = builder.cameras(body, points)
+    return {name: camera | {"pos": camera["pos"] + shift} for name, camera in cameras.items()}
 
 
-def _show_colliders(bodies: dict[str, ElementTree.Element], body: Body) -> None:
+def _center_of_mass(model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> np.ndarray:
+    """Put the data into a pose (nq,), and return the center of mass (3,) from the torso."""
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return data.subtree_com[_TORSO] - data.xpos[_TORSO]
+
+
+def _show_colliders(parts: dict[str, ElementTree.Element], body: Body) -> None:
     """Give the colliders materials, and the feet spheres that can show a reward."""
-    for name, part in bodies.items():
+    for name, part in parts.items():
         for geom in part.findall("geom"):
             geom.set("material", "shell" if name == "torso" else "limb")
     for leg, name in zip(body.legs, body.foot_names, strict=True):
-        size = exact(1.04 * leg.foot.radius)
-        SubElement(bodies[name], "geom", name=f"visual-{name}", type="sphere", size=size, material="glow", **_INERT)
+        cover = {"name": f"visual-{name}", "type": "sphere", "size": exact(_FOOT_COVER * leg.foot.radius)}
+        SubElement(parts[name], "geom", **cover, material="glow", **_DECORATION)
 
 
 def _set_options(root: ElementTree.Element, body: Body) -> None:
-    option = root.find("option")
-    option = SubElement(root, "option") if option is None else option
+    """Set the timestep and the integrator, and skip the search for islands, as for other bodies."""
+    option = _find_or_add(root, "option")
     option.attrib |= {"timestep": exact(body.simulation.timestep), "integrator": "implicitfast"}
-    flag = option.find("flag")
-    (SubElement(option, "flag") if flag is None else flag).set("island", "disable")
+    _find_or_add(option, "flag").set("island", "disable")
+
+
+def _find_or_add(parent: ElementTree.Element, tag: str) -> ElementTree.Element:
+    element = parent.find(tag)
+    return SubElement(parent, tag) if element is None else element
 
 
 def _ground(body: Body, arena: Arena | None, decorated: bool) -> ElementTree.Element:
@@ -182,6 +238,7 @@ def _ground(body: Body, arena: Arena | None, decorated: bool) -> ElementTree.Ele
 
 
 def _add_ground(root: ElementTree.Element, torso: ElementTree.Element, ground: ElementTree.Element) -> None:
+    """Add what `_ground` returns to the MJCF of a body: lights to its torso, the rest to the world."""
     root.extend([section for section in ground if section.tag in ("asset", "visual", "statistic")])
     for element in ground.find("worldbody"):
         if element.get("name") == "torso":

@@ -12,9 +12,12 @@ from arc_suite.robots.spec import Body
 
 GRAVITY = 9.81  # m/s^2
 
+_MIN_FORCE_SHARE = 0.25  # of its equal share of the weight, that every foot carries
+_MIN_LINE_LENGTH = 1e-12  # m, between two soles that are not the same
+
 
 class PoseMechanics(NamedTuple):
-    """Mechanics of the standing pose, in the torso's frame and SI units; joints are the actuated ones.
+    """Mechanics of a pose, such as the standing one, in the torso's frame and SI units; joints are the actuated ones.
 
     Attributes:
         height: of the torso's origin above the floor.
@@ -23,7 +26,7 @@ class PoseMechanics(NamedTuple):
         soles: (legs, 3) the lowest points of the feet.
         jacobians: for each leg (3, joints of the leg): velocity of the sole per joint velocity.
         inertias: (joints,) diagonal of the mass matrix without armature.
-        loads: (joints,) torques of the joints that hold the pose while the feet that carry do so.
+        loads: (joints,) torques that hold the pose while feet carry the weight.
     """
 
     height: float
@@ -36,8 +39,10 @@ class PoseMechanics(NamedTuple):
 
     @property
     def margin(self) -> float:
-        """Static stability: distance of the center of mass, on the floor, from the nearest edge of the polygon of the
-        soles, m; negative outside."""
+        """Static stability: distance of the center of mass from the edge of the polygon of the soles, m.
+
+        Both are seen from above. It is negative outside of the polygon.
+        """
         return stability_margin(self.center, self.soles)
 
 
@@ -58,75 +63,81 @@ def pose_mechanics(body: Body, angles: np.ndarray | None = None, feet: np.ndarra
         angles: (joints,) rad, in place of zero for all of them; the torso stays where it is.
         feet: (legs,) whether each foot carries; None for all of them.
     """
-    (pose,) = mechanics_of_poses(body, [(angles, feet)])
-    return pose
+    (mechanics,) = mechanics_of_poses(body, [(angles, feet)])
+    return mechanics
 
 
 def mechanics_of_poses(
     body: Body, poses: Iterable[tuple[np.ndarray | None, np.ndarray | None]]
 ) -> Iterator[PoseMechanics]:
-    """Yield the mechanics of poses, for which MuJoCo's data are made once: that takes longer than a pose.
+    """Yield the mechanics of several poses; MuJoCo's data, which take longer than a pose, are made once.
 
     Args:
         body: the spec.
-        poses: angles and feet of each; see `posed`.
+        poses: pairs of angles and feet; see `pose_mechanics`.
     """
     model = compile_body(body)
-    places = _places(body)
+    indices = _find_indices(body)
     data = mujoco.MjData(model)
     for angles, feet in poses:
         data.qpos[:] = standing_qpos(model)
         if angles is not None:
-            data.qpos[places.angles] += angles
+            data.qpos[indices.angles] += angles
         mujoco.mj_forward(model, data)
-        yield _measure(body, model, data, places, feet)
+        yield _measure(body, model, data, indices, feet)
 
 
 def _measure(
-    body: Body, model: mujoco.MjModel, data: mujoco.MjData, places: "_Places", feet: np.ndarray | None
+    body: Body, model: mujoco.MjModel, data: mujoco.MjData, indices: "_Indices", feet: np.ndarray | None
 ) -> PoseMechanics:
-    """Return the mechanics of the pose in which the data are."""
-    origin = data.xpos[1]
-    soles, jacobians = [], []
-    for leg, foot, dofs in zip(body.legs, places.feet, places.dofs_by_leg, strict=True):
+    """Return the mechanics of the pose of the data."""
+    torso = 1  # its index
+    origin = data.xpos[torso]
+    soles = []
+    jacobians = []
+    for leg, foot, dofs in zip(body.legs, indices.feet, indices.dofs_by_leg, strict=True):
         sole = data.xpos[foot] - (0.0, 0.0, leg.foot.radius)
         jacobian = np.empty((3, model.nv))
         mujoco.mj_jac(model, data, jacobian, None, sole, foot)
         soles.append(sole - origin)
         jacobians.append(jacobian[:, dofs])
-    soles = np.array(soles)
-    center = data.subtree_com[1] - origin
+    soles = np.array(soles)  # (legs, 3)
+    center_of_mass = data.subtree_com[torso] - origin
     mass = float(model.body_mass.sum())
-    matrix = np.empty((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, matrix)
-    loads = np.zeros(len(soles))
-    carrying = np.ones(len(soles), bool) if feet is None else feet
-    if carrying.any():
-        loads[carrying] = foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - center[:2])
-    torques_of_feet = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
+    mass_matrix = np.empty((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass_matrix)
+    carries = np.ones(len(soles), bool) if feet is None else feet
+    forces = np.zeros(len(soles))  # N, vertical
+    if carries.any():
+        weight = mass * -model.opt.gravity[2]
+        forces[carries] = foot_loads(weight, soles[carries, :2] - center_of_mass[:2])
+    torques_of_feet = [force * jacobian[2] for force, jacobian in zip(forces, jacobians, strict=True)]
+    torques_of_weight = (data.qfrc_bias - data.qfrc_passive)[indices.dofs]
     return PoseMechanics(
         height=body.torso.standing_height,
         mass=mass,
-        center=center,
+        center=center_of_mass,
         soles=soles,
         jacobians=tuple(jacobians),
-        inertias=np.diag(matrix)[places.dofs],
-        loads=(data.qfrc_bias - data.qfrc_passive)[places.dofs] - torques_of_feet,
+        inertias=np.diag(mass_matrix)[indices.dofs],
+        loads=torques_of_weight - np.concatenate(torques_of_feet),
     )
 
 
 def standing_qpos(model: mujoco.MjModel) -> np.ndarray:
-    """Return the positions (nq,) in which a body stands: of an imported one the keyframe of its source."""
-    return model.key_qpos[0].copy() if model.nkey else model.qpos0.copy()
+    """Return qpos (nq,) of a standing body: the keyframe of an imported one, which its source has."""
+    if model.nkey:
+        return model.key_qpos[0].copy()
+    return model.qpos0.copy()
 
 
-class _Places(NamedTuple):
-    """Where the joints and feet of a body are in its compiled model.
+class _Indices(NamedTuple):
+    """Indices of the joints and feet of a body in its compiled model.
 
     Attributes:
         angles: (joints,) indices into qpos.
         dofs: (joints,) indices into qvel.
-        dofs_by_leg: the same of each leg; a slice where they are adjacent, as matrix products round by how an array
+        dofs_by_leg: the same of each leg. Adjacent ones are a slice, since matrix products round by how an array
             lies in memory.
         feet: (legs,) indices of rigid parts.
     """
@@ -138,29 +149,36 @@ class _Places(NamedTuple):
 
 
 @functools.lru_cache(maxsize=256)
-def _places(body: Body) -> _Places:
+def _find_indices(body: Body) -> _Indices:
     model = compile_body(body)
     joints = [model.joint(name) for name in body.joint_names]
     dofs = np.array([joint.dofadr[0] for joint in joints])
     dofs_by_leg = []
-    for indices in by_leg(body, dofs):
-        adjacent = slice(int(indices[0]), int(indices[-1]) + 1)
-        dofs_by_leg.append(adjacent if adjacent.stop - adjacent.start == len(indices) else indices)
-    feet = tuple([model.body(name).id for name in body.foot_names])
-    return _Places(np.array([joint.qposadr[0] for joint in joints]), dofs, tuple(dofs_by_leg), feet)
+    for dofs_of_leg in by_leg(body, dofs):
+        first = int(dofs_of_leg[0])
+        stop = int(dofs_of_leg[-1]) + 1
+        is_adjacent = stop - first == len(dofs_of_leg)
+        dofs_by_leg.append(slice(first, stop) if is_adjacent else dofs_of_leg)
+    return _Indices(
+        angles=np.array([joint.qposadr[0] for joint in joints]),
+        dofs=dofs,
+        dofs_by_leg=tuple(dofs_by_leg),
+        feet=tuple([model.body(name).id for name in body.foot_names]),
+    )
 
 
 def by_leg(body: Body, values: np.ndarray) -> list[np.ndarray]:
     """Return values of joints (joints,) as those of each leg (joints of the leg,)."""
-    return np.split(values, np.cumsum([len(leg.joints) for leg in body.legs])[:-1])
+    joint_counts = [len(leg.joints) for leg in body.legs]
+    return np.split(values, np.cumsum(joint_counts)[:-1])
 
 
 @functools.lru_cache(maxsize=256)
 def compile_body(body: Body) -> mujoco.MjModel:
     """Return the body of `builder.build` without motors, contacts and constants; geoms are ordered as in the spec.
 
-    MuJoCo's own `MjSpec` is fast here; PyMJCF would double the time of building the model. An imported body's is that
-    of its source.
+    MuJoCo's own `MjSpec` is fast here; PyMJCF would double the time of building the model. The model of an imported
+    body is that of its source.
     """
     if body.source:
         return source.compile_source(body)
@@ -170,33 +188,38 @@ def compile_body(body: Body) -> mujoco.MjModel:
 def foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
     """Return vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the center of mass.
 
-    The least-norm solution of the balance of force and moments. Every foot carries at least a quarter
-    of its equal share, since in walking every foot carries in turn.
+    They are the least-norm solution of the balance of force and moments. Every foot carries a least share, since in
+    walking every foot carries in turn.
     """
-    balance = np.stack([np.ones(len(soles)), *soles.T])
-    forces = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
-    return forces.clip(min=0.25 * weight / len(soles))
+    x, y = soles.T
+    balance = np.stack([np.ones(len(soles)), x, y])  # rows: force, moments about y and x
+    total = np.array([weight, 0.0, 0.0])
+    forces = np.linalg.lstsq(balance, total, rcond=None)[0]
+    return forces.clip(min=_MIN_FORCE_SHARE * weight / len(soles))
 
 
 def stability_margin(center, soles) -> float:
-    """Return the distance of a point to the edge of the convex hull of others, seen from above; negative outside.
+    """Return the distance of a center to the edge of the convex hull of soles, seen from above; negative outside.
 
     Args:
-        center: (2,) or more, the point.
-        soles: (n, 2) or more.
+        center: (2,) or more, the point, m.
+        soles: (n, 2) or more, m.
 
     Returns:
-        Inside, the distance to the nearest edge; outside, minus one no larger than that to the hull;
-        -inf if there are no others.
+        Inside, the distance to the nearest edge, m. Outside, the negative of a distance that is no larger than the
+        distance to the hull. -inf if there are no soles.
     """
     points = np.asarray(soles)[:, :2] - np.asarray(center)[:2]
-    # It is the least, over all directions, of how far the hull reaches beyond the point. That
-    # direction is normal to an edge, and so to a line through two points.
+    if not len(points):
+        return -np.inf
+    # The margin is the least, over all directions, of how far the hull reaches from the center. That direction is
+    # normal to an edge, and so to a line through two points.
     first, second = np.triu_indices(len(points), k=1)
-    along = points[second] - points[first]
-    length = np.hypot(*along.T)
-    along = along[length > 1e-12] / length[length > 1e-12, None]
-    normals = np.concatenate([along @ [[0.0, 1.0], [-1.0, 0.0]], along @ [[0.0, -1.0], [1.0, 0.0]]])
-    if not len(normals):
-        return -float(np.hypot(*points.T).min(initial=np.inf)) if len(points) else -np.inf
+    lines = points[second] - points[first]
+    lengths = np.hypot(*lines.T)
+    is_line = lengths > _MIN_LINE_LENGTH
+    directions = lines[is_line] / lengths[is_line, None]
+    normals = np.concatenate([directions @ [[0.0, 1.0], [-1.0, 0.0]], directions @ [[0.0, -1.0], [1.0, 0.0]]])
+    if not len(normals):  # all soles lie in one point
+        return -float(np.hypot(*points.T).min())
     return float((points @ normals.T).max(axis=0).min())
