@@ -1,4 +1,4 @@
-"""Bodies made to order: a number of legs and links with sensible defaults, or random ones of all proportions.
+"""Bodies with a number of legs and links: with default proportions, or with random ones.
 
 They hold geometry alone; `sizing` derives motors and constants from it. With all joints at zero
 they stand with every foot on the floor.
@@ -15,8 +15,8 @@ from arc_suite import checks
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
 LEGS = (4, 12)  # fewest and most
-LINKS = (1, 4)
-SCALE = (0.01, 100.0)
+LINKS = (1, 4)  # fewest and most, of a leg
+SCALE = (0.01, 100.0)  # smallest and largest factor
 LAYOUTS = ("pairs", "radial")
 
 # A leg in its vertical plane, by number of links: of each, its share of the leg's length and its
@@ -38,11 +38,19 @@ JOINT_NAMES = ("hip", "knee", "ankle", "toe")
 _HIP = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-45.0, 45.0))
 _BEND = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
 
-_CHANGED = re.compile("_(scaled|mutated)$")
+_SUFFIX = re.compile("_(scaled|mutated)$")  # of names
 
+# Default proportions.
 _HEIGHT = 0.4  # m
 _SPACING = 0.5  # of the height, between neighboring legs of a side
 _REACH = 0.9  # of the height, from mount to foot
+_HALF_WIDTH = 0.4  # of the height, of a long torso
+_HALF_THICKNESS = 0.25  # of the height
+_FAN = 35.0  # degrees
+
+_FOOT_RADIUS = 0.06  # of the height
+_LINK_THICKNESS = 0.8  # in foot radii, of the last link: thinner than the foot, so that the foot touches the ground
+_LINK_THICKENING = 0.35  # share of it, for each link nearer to the torso
 
 
 class Proportions(NamedTuple):
@@ -84,13 +92,24 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
     Raises:
         ValueError: a value out of range.
     """
-    legs, links = checks.integer("legs", legs, *LEGS), checks.integer("links", links, *LINKS)
+    legs = checks.integer("legs", legs, *LEGS)
+    links = checks.integer("links", links, *LINKS)
     layout = _check_layout(layout, legs)
     if layout == "radial":
-        half_length = half_width = _SPACING * _HEIGHT * legs / (2.0 * math.pi)
+        half_length = _SPACING * _HEIGHT * legs / (2.0 * math.pi)  # radius of a circle of legs
+        half_width = half_length
     else:
-        half_length, half_width = _SPACING * _HEIGHT * legs / 4.0, 0.4 * _HEIGHT
-    proportions = Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, PROFILES[links], (_REACH,) * legs)
+        half_length = _SPACING * _HEIGHT * legs / 4.0
+        half_width = _HALF_WIDTH * _HEIGHT
+    proportions = Proportions(
+        height=_HEIGHT,
+        half_length=half_length,
+        half_width=half_width,
+        thickness=_HALF_THICKNESS,
+        fan=_FAN,
+        profile=PROFILES[links],
+        reaches=(_REACH,) * legs,
+    )
     return assemble_body(f"walker_{legs}x{links}", legs, layout, proportions)
 
 
@@ -118,8 +137,8 @@ def draw_body(
 ) -> Body:
     """Draw a body, `random`.
 
-    Draws, where not given, 4 to 12 legs, 2 to 4 links and, for an even number of legs, the layout,
-    radial for three in ten. Always draws:
+    Legs, links and layout are drawn unless they are arguments: 4 to 12 legs, 2 to 4 links and, for an even number of
+    legs, the layout, radial for three in ten. Always drawn are:
 
     - half of the torso's length, log-uniform from 0.08 to 1.2 m;
     - the height at which it stands, 0.6 to 1.4 times that;
@@ -140,20 +159,24 @@ def draw_body(
     Raises:
         ValueError: a value out of range.
     """
-    drawn_legs, drawn_links = (int(random.integers(low, high + 1)) for low, high in (LEGS, (2, LINKS[1])))
-    legs, links = drawn_legs if legs is None else legs, drawn_links if links is None else links
-    legs, links = checks.integer("legs", legs, *LEGS), checks.integer("links", links, *LINKS)
-    drawn_layout = "radial" if random.uniform() < 0.3 or legs % 2 else "pairs"
-    layout = _check_layout(layout or drawn_layout, legs)
+    # The order of the draws stands for a seed's body, and each is made whether it is used or not.
+    random_legs = int(random.integers(LEGS[0], LEGS[1] + 1))
+    random_links = int(random.integers(2, LINKS[1] + 1))
+    legs = checks.integer("legs", random_legs if legs is None else legs, *LEGS)
+    links = checks.integer("links", random_links if links is None else links, *LINKS)
+    is_radial = random.uniform() < 0.3 or legs % 2 == 1
+    random_layout = "radial" if is_radial else "pairs"
+    layout = _check_layout(layout or random_layout, legs)
     half_length = math.exp(random.uniform(math.log(0.08), math.log(1.2)))
     height = half_length * random.uniform(0.6, 1.4)
-    width = random.uniform(0.35, 0.7)
-    unequal = random.uniform() < 0.4
-    reaches = random.uniform(0.7, 1.2) * (random.uniform(0.75, 1.3, legs) if unequal else np.ones(legs))
+    width_share = random.uniform(0.35, 0.7)
+    has_unequal_legs = random.uniform() < 0.4
+    reach = random.uniform(0.7, 1.2)  # of the height
+    reaches = reach * (random.uniform(0.75, 1.3, legs) if has_unequal_legs else np.ones(legs))
     proportions = Proportions(
         height=height,
         half_length=half_length,
-        half_width=half_length * (1.0 if layout == "radial" else width),
+        half_width=half_length * (1.0 if layout == "radial" else width_share),
         thickness=random.uniform(0.15, 0.3),
         fan=random.uniform(15.0, 45.0),
         profile=[
@@ -184,21 +207,33 @@ def scaled(body: Body, factor: float) -> Body:
     if body.source:
         raise ValueError(f"scale: {body.name} was imported, and keeps the size of its file")
 
-    def times(lengths: Sequence[float]) -> tuple[float, ...]:
-        return tuple(factor * length for length in lengths)
+    standing_height = factor * body.torso.standing_height
+    solids = tuple(_scale_solid(solid, factor) for solid in body.torso.solids)
+    torso = Torso(standing_height=standing_height, solids=solids)
+    ballast = tuple(_scale_solid(solid, factor) for solid in body.ballast)
+    legs = [_scale_leg(leg, factor) for leg in body.legs]
+    return _change_body(body, "scaled", torso=torso, ballast=ballast, legs=legs)
 
-    def solid(shape: Solid) -> Solid:
-        mass = {"mass": factor**3 * shape.mass} if isinstance(shape, Ballast) else {}
-        return shape.replace(size=times(shape.size), position=times(shape.position), **mass)
 
-    def leg(leg: Leg) -> Leg:
-        links = tuple(link.replace(end=times(link.end), radius=factor * link.radius) for link in leg.links)
-        foot = leg.foot.replace(radius=factor * leg.foot.radius)
-        return leg.replace(mount=times(leg.mount), links=links, foot=foot)
+def _scale_solid(solid: Solid, factor: float) -> Solid:
+    scaled_solid = solid.replace(
+        size=_scale_lengths(solid.size, factor), position=_scale_lengths(solid.position, factor)
+    )
+    if isinstance(scaled_solid, Ballast):
+        return scaled_solid.replace(mass=factor**3 * scaled_solid.mass)
+    return scaled_solid
 
-    torso = Torso(standing_height=factor * body.torso.standing_height, solids=tuple(map(solid, body.torso.solids)))
-    ballast = tuple(map(solid, body.ballast))
-    return _changed(body, "scaled", torso=torso, ballast=ballast, legs=tuple(map(leg, body.legs)))
+
+def _scale_leg(leg: Leg, factor: float) -> Leg:
+    links = []
+    for link in leg.links:
+        links.append(link.replace(end=_scale_lengths(link.end, factor), radius=factor * link.radius))
+    foot = leg.foot.replace(radius=factor * leg.foot.radius)
+    return leg.replace(mount=_scale_lengths(leg.mount, factor), links=tuple(links), foot=foot)
+
+
+def _scale_lengths(lengths: Sequence[float], factor: float) -> tuple[float, ...]:
+    return tuple(factor * length for length in lengths)
 
 
 def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
@@ -217,13 +252,18 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
     Raises:
         ValueError: a value out of range, or a length grown out of range.
     """
-    random, amount = np.random.default_rng(checks.seed(seed)), checks.number("amount", amount, 0.0, 0.5)
-    return deform_legs(body, amount * random.standard_normal(deformation_count(body)))
+    random = np.random.default_rng(checks.seed(seed))
+    amount = checks.number("amount", amount, 0.0, 0.5)
+    changes = amount * random.standard_normal(deformation_count(body))
+    return deform_legs(body, changes)
 
 
 def deformation_count(body: Body) -> int:
-    """Return how many changes `deformed` takes: for every leg without a mirror image before it, its links and one."""
-    return sum(len(leg.links) + 1 for leg, _ in _with_images(body))
+    """Return how many changes `deform_legs` takes.
+
+    Each leg together with its mirror images takes one for each link, and one more.
+    """
+    return sum(len(leg.links) + 1 for leg, _ in _legs_with_images(body))
 
 
 def deform_legs(body: Body, changes: np.ndarray) -> Body:
@@ -240,45 +280,73 @@ def deform_legs(body: Body, changes: np.ndarray) -> Body:
     Raises:
         ValueError: a length grown out of range.
     """
-    legs, first = {}, 0
-    for leg, images in _with_images(body):
-        last = first + len(leg.links)
-        legs[leg.name] = changed = _deformed_leg(leg, changes[first:last, None], float(changes[last]))
-        legs |= {name: changed.mirrored(name) for name in images}
-        first = last + 1
-    return _changed(body, "mutated", legs=tuple(legs[leg.name] for leg in body.legs))
+    deformed_legs = {}
+    first = 0  # index of the leg's changes
+    for leg, image_names in _legs_with_images(body):
+        turn_index = first + len(leg.links)
+        deformed_leg = _deform_leg(leg, changes[first:turn_index, None], float(changes[turn_index]))
+        deformed_legs[leg.name] = deformed_leg
+        for name in image_names:
+            deformed_legs[name] = deformed_leg.mirrored(name)
+        first = turn_index + 1
+    return _change_body(body, "mutated", legs=[deformed_legs[leg.name] for leg in body.legs])
 
 
-def _with_images(body: Body) -> Iterator[tuple[Leg, list[str]]]:
-    """Yield every leg without a mirror image before it, and the names of its images behind it."""
-    seen = set()
+def _legs_with_images(body: Body) -> Iterator[tuple[Leg, list[str]]]:
+    """Yield legs, each with the names of its mirror images among later legs. Images are not yielded themselves."""
+    known_names = set()
     for leg in body.legs:
-        if leg.name not in seen:
-            seen.add(leg.name)
-            images = [other.name for other in body.legs if other.name not in seen and leg.mirrored(other.name) == other]
-            seen.update(images)
-            yield leg, images
+        if leg.name in known_names:
+            continue
+        known_names.add(leg.name)
+        image_names = []
+        for candidate in body.legs:
+            if candidate.name not in known_names and leg.mirrored(candidate.name) == candidate:
+                image_names.append(candidate.name)
+        known_names.update(image_names)
+        yield leg, image_names
 
 
-def _deformed_leg(leg: Leg, logarithms: np.ndarray, turn: float) -> Leg:
+def _deform_leg(leg: Leg, logarithms: np.ndarray, turn: float) -> Leg:
+    """Return a leg whose links are longer by factors, and whose foot stays at its height if it can.
+
+    Args:
+        leg: to change.
+        logarithms: (links, 1) of the factors.
+        turn: of the leg about the vertical, rad.
+    """
     ends = np.array([link.end for link in leg.links])
-    drop = ends[:, 2].sum()
+    drop = ends[:, 2].sum()  # of the foot below the mount, m
     ends *= np.exp(logarithms)
-    if ends[:, 2].sum() * drop > 0.0:
-        ends[:, 2] *= drop / ends[:, 2].sum()
-    links = tuple(link.replace(end=tuple(map(float, end))) for link, end in zip(leg.links, ends, strict=True))
-    return leg.replace(links=links, yaw_deg=leg.yaw_deg + math.degrees(turn))
+    deformed_drop = ends[:, 2].sum()
+    if deformed_drop * drop > 0.0:
+        ends[:, 2] *= drop / deformed_drop
+    links = [link.replace(end=tuple(map(float, end))) for link, end in zip(leg.links, ends, strict=True)]
+    return leg.replace(links=tuple(links), yaw_deg=leg.yaw_deg + math.degrees(turn))
 
 
-def _changed(body: Body, how: str, legs: Sequence[Leg], **fields) -> Body:
-    """Return a body with other legs and fields, a name that says how it came about, and all open that can be sized."""
+def _change_body(body: Body, change: str, legs: Sequence[Leg], **fields) -> Body:
+    """Return a body with other legs and fields, to be sized anew.
 
-    def opened(link: Link) -> Link:
-        return link.replace(joint=link.joint and link.joint.replace(armature=None, damping=None, motor=None))
+    Args:
+        body: to change.
+        change: in its name, "scaled" or "mutated".
+        legs: of the body.
+        **fields: of the body.
+    """
+    stem = _SUFFIX.sub("", body.name)[: MAX_NAME - len(change) - 1]
+    legs_to_size = tuple(_forget_sizes(leg) for leg in legs)
+    return body.replace(name=f"{stem}_{change}", legs=legs_to_size, simulation=None, camera=None, **fields)
 
-    stem = _CHANGED.sub("", body.name)[: MAX_NAME - len(how) - 1]
-    legs = tuple(leg.replace(links=tuple(map(opened, leg.links))) for leg in legs)
-    return body.replace(name=f"{stem}_{how}", legs=legs, simulation=None, camera=None, **fields)
+
+def _forget_sizes(leg: Leg) -> Leg:
+    """Return a leg whose joints are to be sized."""
+    links = []
+    for link in leg.links:
+        if link.joint:
+            link = link.replace(joint=link.joint.replace(armature=None, damping=None, motor=None))
+        links.append(link)
+    return leg.replace(links=tuple(links))
 
 
 def _check_layout(layout: str | None, legs: int) -> str:
@@ -290,22 +358,29 @@ def _check_layout(layout: str | None, legs: int) -> str:
 
 
 def assemble_body(name: str, legs: int, layout: str, proportions: Proportions) -> Body:
-    """Return a body of given proportions; checked legs and layout are as in `generate`."""
-    p = proportions
+    """Return a body of proportions; the number of legs and the layout are as in `generate`, and not checked."""
+    half_length = proportions.half_length
+    half_width = proportions.half_width
     if layout == "radial":
-        mounts = radial_mounts(legs, 0.8 * p.half_length, 0.8 * p.half_width)
-        all_legs = tuple(_leg(f"leg{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
+        label = "leg"
+        mounts = radial_mounts(legs, 0.8 * half_length, 0.8 * half_width)
     else:
-        mounts = left_mounts(legs // 2, 0.8 * p.half_length, 0.6 * p.half_width, p.fan)
-        left = tuple(_leg(f"l{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
-        all_legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
-    size = (p.half_length, p.half_width, p.thickness * p.height)
+        label = "l"
+        mounts = left_mounts(legs // 2, 0.8 * half_length, 0.6 * half_width, proportions.fan)
+    body_legs = []
+    for index, (mount, heading) in enumerate(mounts):
+        leg = _make_leg(f"{label}{index + 1}", mount, heading, proportions.reaches[index], proportions)
+        body_legs.append(leg)
+    if layout == "pairs":
+        body_legs += [leg.mirrored(leg.name.replace("l", "r")) for leg in body_legs]
+    size = (half_length, half_width, proportions.thickness * proportions.height)
     chassis = Solid(name="chassis", shape="ellipsoid", size=size)
-    return Body(name=name, torso=Torso(standing_height=p.height, solids=(chassis,)), legs=all_legs)
+    torso = Torso(standing_height=proportions.height, solids=(chassis,))
+    return Body(name=name, torso=torso, legs=tuple(body_legs))
 
 
 def mount_shares(legs: int, layout: str) -> np.ndarray:
-    """Return how far ahead the legs of `Proportions.reaches` are mounted: from 1, in front, to -1."""
+    """Return how far ahead legs are mounted, from 1, in front, to -1: one share for each of `Proportions.reaches`."""
     if layout == "pairs":
         return np.linspace(1.0, -1.0, legs // 2)
     return np.cos(np.radians(_headings(legs)))
@@ -316,11 +391,11 @@ def left_mounts(pairs: int, along: float, across: float, fan: float) -> list[tup
 
     Args:
         pairs: number of legs, at least 2.
-        along: of the first mount in front of the middle, m.
-        across: of the mounts left of it, m.
+        along: distance of the first mount in front of the middle, m.
+        across: distance of the mounts to the left of it, m.
         fan: degrees by which the first leg points forward and the last one backward.
     """
-    shares = [1.0 - 2.0 * i / (pairs - 1) for i in range(pairs)]
+    shares = [1.0 - 2.0 * pair / (pairs - 1) for pair in range(pairs)]  # from 1, in front, to -1
     return [((along * share, across, 0.0), 90.0 - fan * share) for share in shares]
 
 
@@ -340,23 +415,36 @@ def _headings(legs: int) -> list[float]:
     """Return the headings of legs around a torso, degrees."""
     # An even number leaves the front free, so that both sides have as many.
     start = 0.0 if legs % 2 else 180.0 / legs
-    return [(start + 360.0 * i / legs + 180.0) % 360.0 - 180.0 for i in range(legs)]
+    headings = [start + 360.0 * leg / legs for leg in range(legs)]
+    return [(heading + 180.0) % 360.0 - 180.0 for heading in headings]  # from -180 to 180
 
 
-def _leg(name: str, mount: Vector, heading: float, reach: float, p: Proportions) -> Leg:
-    """Return a leg that points to a heading (degrees, counter-clockwise from forward) and ends on the floor."""
-    links = len(p.profile)
-    foot_radius = 0.06 * p.height
-    out = reach * p.height / sum(share * _cos(elevation) for share, elevation in p.profile)
-    down = (p.height - foot_radius) / -sum(share * _sin(elevation) for share, elevation in p.profile)
-    chain = []
-    for i, (share, elevation) in enumerate(p.profile):
+def _make_leg(name: str, mount: Vector, heading: float, reach: float, proportions: Proportions) -> Leg:
+    """Return a leg that points to a heading and ends on the floor.
+
+    Args:
+        name: of the leg.
+        mount: m.
+        heading: degrees, counter-clockwise from forward.
+        reach: from mount to foot, seen from above, of the height.
+        proportions: of the body.
+    """
+    profile = proportions.profile
+    height = proportions.height
+    foot_radius = _FOOT_RADIUS * height
+    # Factors of the profile, so that the leg reaches out and down as far as it should.
+    out = reach * height / sum(share * _cos(elevation) for share, elevation in profile)
+    down = (height - foot_radius) / -sum(share * _sin(elevation) for share, elevation in profile)
+    link_count = len(profile)
+    links = []
+    for index, (share, elevation) in enumerate(profile):
         # Links lie in the y-z plane of the first link's frame, which the leg's yaw turns outwards.
         end = (0.0, out * share * _cos(elevation), down * share * _sin(elevation))
-        joint = (_HIP if i == 0 else _BEND).replace(name=JOINT_NAMES[i])
-        radius = 0.8 * foot_radius * (1.0 + 0.35 * (links - 1 - i))  # thinner than the foot, so that the foot touches
-        chain.append(Link(name=LINK_NAMES[links][i], end=end, radius=radius, joint=joint))
-    return Leg(name=name, mount=mount, links=tuple(chain), foot=Foot(radius=foot_radius), yaw_deg=heading - 90.0)
+        joint = (_HIP if index == 0 else _BEND).replace(name=JOINT_NAMES[index])
+        links_after = link_count - 1 - index
+        radius = _LINK_THICKNESS * foot_radius * (1.0 + _LINK_THICKENING * links_after)
+        links.append(Link(name=LINK_NAMES[link_count][index], end=end, radius=radius, joint=joint))
+    return Leg(name=name, mount=mount, links=tuple(links), foot=Foot(radius=foot_radius), yaw_deg=heading - 90.0)
 
 
 def _cos(degrees: float) -> float:
