@@ -23,19 +23,19 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
         The model; `mjcf_text.to_mjcf` makes a text of it.
 
     Raises:
-        ValueError: an imported body, of which there is a text alone.
+        ValueError: an imported body, which has no PyMJCF model; `text` returns its MJCF.
     """
     if body.source:
         raise ValueError(f"{body.name} was imported: `models.text` has its MJCF")
-    body = sizing.size_body(body)
-    root = builder.build(body)
+    sized_body = sizing.size_body(body)
+    root = builder.build(sized_body)
     if arena is None:
         root.find("joint", "root").remove()
         root.option.remove()
     else:
-        arena.add_to(root, **builder.contact(body.simulation))
+        arena.add_to(root, **builder.contact(sized_body.simulation))
     if decorated:
-        visuals.decorate(root, body)
+        visuals.decorate(root, sized_body)
     return root
 
 
@@ -51,17 +51,17 @@ def text(body: Body, arena: Arena | None = FLAT, decorated: bool = False) -> str
 def model_spec(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mujoco.MjSpec:
     """Assemble a body in an arena as `assemble` does, and return MuJoCo's own spec of the model.
 
-    Heights of the ground go in as numbers. MuJoCo's parser reports "unknown error" of a long list
+    Heights of the ground go in as numbers, not as text: MuJoCo's parser reports "unknown error" for a long list
     when the heap cannot grow in place, although the memory is there.
     """
     if body.source:
         return source.model_spec(sizing.size_body(body), arena, decorated)
     root = assemble(body, arena, decorated)
     fields = root.find_all("hfield")
-    heights = [np.reshape(field.elevation, (field.nrow, field.ncol)) for field in fields]
+    elevations = [np.reshape(field.elevation, (field.nrow, field.ncol)) for field in fields]
     for field in fields:
         del field.elevation
     spec = mujoco.MjSpec.from_string(root.to_xml_string())
-    for field, values in zip(spec.hfields, heights, strict=True):
-        field.userdata = values[::-1].ravel()  # MJCF lists rows from the far side in y
+    for field, elevation in zip(spec.hfields, elevations, strict=True):
+        field.userdata = elevation[::-1].ravel()  # MJCF lists rows from the far side in y
     return spec

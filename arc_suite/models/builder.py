@@ -9,18 +9,27 @@ from dm_control import mjcf
 from arc_suite.models.outline import outline, torso_box
 from arc_suite.robots.spec import Body, Joint, Leg, Simulation, Solid
 
-WORLD, ACTUATOR, SENSOR = "worldbody", "actuator", "sensor"  # sections of a model
+# Sections of a model.
+WORLD = "worldbody"
+ACTUATOR = "actuator"
+SENSOR = "sensor"
 
-_HIDDEN = 4  # group of sites
+_SITE_GROUP = 4  # which pictures do not show
 _TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
 
-# Cameras that ride along: azimuth from straight ahead and elevation, rad.
-_VIEWS = (("portrait", math.radians(-35.0), math.radians(13.0)), ("profile", math.radians(-65.0), math.radians(12.0)))
-EYE = "eye"  # the camera that looks ahead from the torso's front, for policies that see
-CAMERAS = ("tracking", *(name for name, *_ in _VIEWS), EYE)
-_FIELD, _DOWN = 70.0, math.radians(15.0)  # of the eye: field of view, degrees, and how far it looks down
-_FOVY = 30.0  # degrees, as MJCF wants it whatever the compiler's angle
-_ASPECT, _MARGIN = 4.0 / 3.0, 1.3  # of the picture; room for legs that swing
+EYE = "eye"  # the camera that looks ahead from the torso's front, for policies with pictures
+CAMERAS = ("tracking", "portrait", "profile", EYE)
+
+# Cameras that frame the body: azimuth from straight ahead and elevation, rad, by name.
+_VIEWS = {
+    "portrait": (math.radians(-35.0), math.radians(13.0)),
+    "profile": (math.radians(-65.0), math.radians(12.0)),
+}
+_VIEW_FOVY = 30.0  # degrees, vertical field of view; MJCF has degrees here whatever the compiler's angle
+_VIEW_ASPECT = 4.0 / 3.0  # width by height of the picture
+_VIEW_MARGIN = 1.3  # factor on the size of the body: room for legs that swing
+_EYE_FOVY = 70.0  # degrees
+_EYE_PITCH = math.radians(15.0)  # downwards
 
 FLAGS = {
     "filterparent": "enable",
@@ -33,7 +42,7 @@ class Element(NamedTuple):
 
     Attributes:
         tag: its kind.
-        parent: name of the rigid part, or of the section, that holds it.
+        parent: name of the rigid part or of the section that it is in.
         attributes: by name.
     """
 
@@ -84,19 +93,19 @@ def elements(body: Body) -> list[Element]:
     Args:
         body: the spec, with nothing left to be sized.
     """
-    listed = parts(body, body.simulation)
+    body_elements = parts(body, body.simulation)
     for name, joint in zip(body.joint_names, body.joints, strict=True):
-        listed.append(_motor(name, joint))
-    for name, view in cameras(body).items():
-        listed.append(Element("camera", "torso", {"name": name, "mode": "trackcom", **view}))
-    listed.append(Element("camera", "torso", {"name": EYE, "mode": "fixed", **eye(body)}))
-    listed.append(_site("torso", 0.01))
+        body_elements.append(_motor(name, joint))
+    for name, camera in cameras(body).items():
+        body_elements.append(Element("camera", "torso", {"name": name, "mode": "trackcom", **camera}))
+    body_elements.append(Element("camera", "torso", {"name": EYE, "mode": "fixed", **eye(body)}))
+    body_elements.append(_site("torso", radius=0.01))
     for name, leg in zip(body.foot_names, body.legs, strict=True):
-        listed.append(_site(name, leg.foot.radius))
-    # The accelerometer is what makes every mj_step fill cfrc_ext, which the task observes: MuJoCo
-    # computes contact forces on bodies only where a sensor needs them.
-    listed.append(Element("accelerometer", SENSOR, {"name": "torso_acceleration", "site": "torso"}))
-    return listed
+        body_elements.append(_site(name, leg.foot.radius))
+    # The accelerometer makes every mj_step fill cfrc_ext, which the task observes: MuJoCo computes contact forces on
+    # bodies only where a sensor needs them.
+    body_elements.append(Element("accelerometer", SENSOR, {"name": "torso_acceleration", "site": "torso"}))
+    return body_elements
 
 
 def parts(body: Body, simulation: Simulation | None = None) -> list[Element]:
@@ -106,38 +115,52 @@ def parts(body: Body, simulation: Simulation | None = None) -> list[Element]:
         body: the spec.
         simulation: its constants; None leaves out contacts, and the limits and dynamics of joints.
     """
-    geom = {"density": body.density}
+    # Attributes of all geoms of the body except ballast.
+    material = {"density": body.density}
     if simulation:
-        # Robot geoms meet only the floor (conaffinity 1), never one another.
-        geom |= {"contype": 1, "conaffinity": 0, **contact(simulation)}
-    listed = [
+        # Geoms of the robot touch only the floor, whose conaffinity is 1, and never one another.
+        material |= {"contype": 1, "conaffinity": 0, **contact(simulation)}
+    rigid_parts = [
         Element("body", WORLD, {"name": "torso", "pos": (0.0, 0.0, body.torso.standing_height)}),
         Element("freejoint", "torso", {"name": "root"}),
     ]
     for solid in body.torso.solids:
-        listed.append(Element("geom", "torso", {**_shape(solid), **geom}))
+        rigid_parts.append(Element("geom", "torso", {**_shape(solid), **material}))
     for ballast in body.ballast:
-        listed.append(Element("geom", "torso", {**_shape(ballast), "mass": ballast.mass, **_TOUCHES_NOTHING}))
+        rigid_parts.append(Element("geom", "torso", {**_shape(ballast), "mass": ballast.mass, **_TOUCHES_NOTHING}))
     for leg in body.legs:
-        listed += _leg(leg, geom, simulation)
-    return listed
+        rigid_parts += _leg_elements(leg, material, simulation)
+    return rigid_parts
 
 
-def _leg(leg: Leg, geom: dict[str, Any], simulation: Simulation | None) -> list[Element]:
-    listed = []
+def _leg_elements(leg: Leg, material: dict[str, Any], simulation: Simulation | None) -> list[Element]:
+    """Return the links and the foot of a leg.
+
+    Args:
+        leg: of the body.
+        material: attributes of its geoms.
+        simulation: as of `parts`.
+    """
+    leg_elements = []
     joint_names = iter(leg.joint_names)
-    *link_names, foot = leg.part_names
-    parent, pos, yaw = "torso", leg.mount, math.radians(leg.yaw_deg)
+    *link_names, foot_name = leg.part_names
+    # Where the next part begins, in the frame of its parent.
+    parent = "torso"
+    position = leg.mount
+    yaw = math.radians(leg.yaw_deg)
     for name, link in zip(link_names, leg.links, strict=True):
-        listed.append(Element("body", parent, {"name": name, "pos": pos, "euler": (0.0, 0.0, yaw)}))
+        leg_elements.append(Element("body", parent, {"name": name, "pos": position, "euler": (0.0, 0.0, yaw)}))
         if link.joint:
-            listed.append(_joint(name, next(joint_names), link.joint, simulation))
+            leg_elements.append(_joint(name, next(joint_names), link.joint, simulation))
         capsule = {"name": name, "type": "capsule", "fromto": (0.0, 0.0, 0.0, *link.end), "size": (link.radius,)}
-        listed.append(Element("geom", name, {**capsule, **geom}))
-        parent, pos, yaw = name, link.end, 0.0
-    listed.append(Element("body", parent, {"name": foot, "pos": pos}))
-    listed.append(Element("geom", foot, {"name": foot, "type": "sphere", "size": (leg.foot.radius,), **geom}))
-    return listed
+        leg_elements.append(Element("geom", name, {**capsule, **material}))
+        parent = name
+        position = link.end
+        yaw = 0.0
+    leg_elements.append(Element("body", parent, {"name": foot_name, "pos": position}))
+    ball = {"name": foot_name, "type": "sphere", "size": (leg.foot.radius,)}
+    leg_elements.append(Element("geom", foot_name, {**ball, **material}))
+    return leg_elements
 
 
 def contact(simulation: Simulation) -> dict:
@@ -179,7 +202,7 @@ def _motor(name: str, joint: Joint) -> Element:
 
 
 def _site(part: str, radius: float) -> Element:
-    return Element("site", part, {"name": part, "size": (radius,), "group": _HIDDEN})
+    return Element("site", part, {"name": part, "size": (radius,), "group": _SITE_GROUP})
 
 
 def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:
@@ -189,35 +212,48 @@ def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:
         body: the spec.
         points: (n, 3) in the torso's frame that they show; None for those of `outline`.
     """
-    points = outline(body) if points is None else points
-    tracking = {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}
-    views = {name: {"fovy": _FOVY, **_framing(points, azimuth, elevation)} for name, azimuth, elevation in _VIEWS}
-    return {"tracking": tracking, **views}
+    if points is None:
+        points = outline(body)
+    camera_of_name = {"tracking": {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}}
+    for name, (azimuth, elevation) in _VIEWS.items():
+        camera_of_name[name] = {"fovy": _VIEW_FOVY, **_framing_pose(points, azimuth, elevation)}
+    return camera_of_name
 
 
 def eye(body: Body) -> dict:
-    """Return the camera in the middle of the front of the box around the torso, in whose frame it is fixed."""
+    """Return the camera in the middle of the front of the box around the torso, fixed in the torso's frame."""
     low, high = torso_box(body)
-    place = (float(high[0]), *(0.5 * (low + high)[1:]).tolist())
-    axes = (0.0, -1.0, 0.0, math.sin(_DOWN), 0.0, math.cos(_DOWN))
-    return {"pos": place, "xyaxes": axes, "fovy": _FIELD}
+    middle = 0.5 * (low + high)
+    position = (float(high[0]), *middle[1:].tolist())
+    right = (0.0, -1.0, 0.0)
+    up = (math.sin(_EYE_PITCH), 0.0, math.cos(_EYE_PITCH))
+    return {"pos": position, "xyaxes": (*right, *up), "fovy": _EYE_FOVY}
 
 
-def _framing(points: np.ndarray, azimuth: float, elevation: float) -> dict:
-    """Return the nearest position from which a camera in a given direction sees all points (n, 3).
+def _framing_pose(points: np.ndarray, azimuth: float, elevation: float) -> dict:
+    """Return the pose of the nearest camera in a direction that sees all points.
 
     With a point (u, v, b) along the camera's right, up and back, the camera at (cu, cv, cb) and t
     the tangent of half its field of view, the point is in view if |u - cu| <= t (cb - b), and
-    |v - cv| <= t (cb - b): each side of the picture is a plane that touches the hull of the outline.
+    |v - cv| <= t (cb - b): each side of the picture is a plane that touches the hull of the points.
+
+    Args:
+        points: (n, 3) in the torso's frame, m.
+        azimuth: of the camera from straight ahead, rad.
+        elevation: of the camera, rad.
     """
     back = np.array(
         (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation))
     )
     right = np.array((-math.sin(azimuth), math.cos(azimuth), 0.0))
-    axes = np.stack((right, np.cross(back, right), back))
-    points = points @ axes.T
-    half_field = math.tan(math.radians(_FOVY / 2.0)) / _MARGIN * np.array((_ASPECT, 1.0))
-    depth = half_field * points[:, 2:]
-    high, low = (points[:, :2] + depth).max(axis=0), (points[:, :2] - depth).min(axis=0)
-    place = (*((high + low) / 2.0), ((high - low) / (2.0 * half_field)).max())
-    return {"pos": tuple(place @ axes), "xyaxes": tuple(axes[:2].ravel())}
+    up = np.cross(back, right)
+    axes = np.stack((right, up, back))
+    camera_points = points @ axes.T
+    right_and_up = camera_points[:, :2]
+    tangents = math.tan(math.radians(_VIEW_FOVY / 2.0)) / _VIEW_MARGIN * np.array((_VIEW_ASPECT, 1.0))
+    half_widths = tangents * camera_points[:, 2:]  # of the field of view at the depth of the points
+    high = (right_and_up + half_widths).max(axis=0)
+    low = (right_and_up - half_widths).min(axis=0)
+    distance = ((high - low) / (2.0 * tangents)).max()
+    position = (*((high + low) / 2.0), distance)
+    return {"pos": tuple(position @ axes), "xyaxes": tuple(axes[:2].ravel())}

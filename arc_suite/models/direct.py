@@ -10,6 +10,7 @@ from arc_suite.models import builder
 from arc_suite.models.builder import Element
 from arc_suite.robots.spec import Body
 
+# Shapes of a body.
 GEOMS = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -17,6 +18,7 @@ GEOMS = {
     "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
     "box": mujoco.mjtGeom.mjGEOM_BOX,
 }
+# MuJoCo's enumerations by the words of MJCF.
 _GEOMS = {**GEOMS, "plane": mujoco.mjtGeom.mjGEOM_PLANE}
 _JOINTS = {"hinge": mujoco.mjtJoint.mjJNT_HINGE}
 _CAMERA_MODES = {"fixed": mujoco.mjtCamLight.mjCAMLIGHT_FIXED, "trackcom": mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM}
@@ -26,7 +28,7 @@ _FLAGS = {"filterparent": mujoco.mjtDisableBit.mjDSBL_FILTERPARENT, "island": mu
 
 
 def on_flat_ground(body: Body) -> mujoco.MjSpec:
-    """Return the spec whose compiled model has the bytes of the compiled MJCF of `assemble(body)`.
+    """Return the spec of a body on a plane; its compiled model has the bytes of the compiled MJCF of `assemble(body)`.
 
     Args:
         body: without a source, and with nothing left to be sized.
@@ -39,8 +41,8 @@ def on_flat_ground(body: Body) -> mujoco.MjSpec:
     spec.option.integrator = _INTEGRATORS[options["integrator"]]
     spec.option.solver = _SOLVERS[options["solver"]]
     spec.option.iterations = options["iterations"]
-    for name, choice in builder.FLAGS.items():
-        if choice == "disable":
+    for name, value in builder.FLAGS.items():
+        if value == "disable":
             spec.option.disableflags |= _FLAGS[name]
     return spec
 
@@ -55,9 +57,10 @@ def write(elements: Iterable[Element]) -> mujoco.MjSpec:
     spec.compiler.degree = False
     parents = {builder.WORLD: spec.worldbody, builder.ACTUATOR: spec, builder.SENSOR: spec}
     for tag, parent, attributes in elements:
-        element = _ADD[tag](parents[parent], **attributes)
+        add = _ADD[tag]
+        spec_element = add(parents[parent], **attributes)
         if tag == "body":
-            parents[attributes["name"]] = element
+            parents[attributes["name"]] = spec_element
     return spec
 
 
@@ -72,7 +75,8 @@ def _add_joint(part: mujoco.MjsBody, name: str, type: str, axis, limited: bool =
 
 
 def _add_geom(part: mujoco.MjsBody, type: str, size, **attributes: Any) -> None:
-    part.add_geom(type=_GEOMS[type], size=(*size, 0.0, 0.0)[:3], **attributes)
+    padded_size = (*size, 0.0, 0.0)[:3]  # MuJoCo has three numbers for any shape
+    part.add_geom(type=_GEOMS[type], size=padded_size, **attributes)
 
 
 def _add_site(part: mujoco.MjsBody, size, **attributes: Any) -> None:
@@ -97,6 +101,7 @@ def _add_accelerometer(spec: mujoco.MjSpec, name: str, site: str) -> None:
     spec.add_sensor(name=name, type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
 
 
+# Functions that add an element to its parent, by tag.
 _ADD = {
     "body": mujoco.MjsBody.add_body,
     "freejoint": mujoco.MjsBody.add_freejoint,

@@ -8,27 +8,28 @@ from dm_control import mjcf
 from arc_suite.models.visuals import bastion, leaper, queen, tick
 from arc_suite.models.visuals.generic import generic_visuals
 from arc_suite.models.visuals.scene import add_scene
-from arc_suite.models.visuals.spec import Visuals
+from arc_suite.models.visuals.spec import Ornament, Visuals
 from arc_suite.robots import palettes
 from arc_suite.robots.spec import Body, Leg, Link
 
 # A creature without an entry has the visuals `generic`.
 VISUALS = {"queen": queen.VISUALS, "bastion": bastion.VISUALS, "tick": tick.VISUALS, "leaper": leaper.VISUALS}
 
-GROUP = 2  # of decorations; what weighs or touches is in group 0
+GROUP = 2  # of decorations; geoms that weigh or touch something are in group 0
 _INERT = {"group": GROUP, "mass": 0.0, "contype": 0, "conaffinity": 0}
 
-# How materials shine, where not like a limb: emission, specular, shininess.
-_PLAIN = (0.0, 0.35, 0.4)
+# How materials shine: emission, specular, shininess.
 _FINISHES = {"shell": (0.0, 0.5, 0.6), "frame": (0.0, 0.6, 0.5), "glow": (0.7, 0.2, 0.5), "eye": (0.9, 0.6, 0.9)}
+_DEFAULT_FINISH = (0.0, 0.35, 0.4)
 
-_POOR, _RICH = np.array((0.9, 0.08, 0.05, 1.0)), np.array((0.1, 0.9, 0.2, 1.0))
+_NO_REWARD = np.array((0.9, 0.08, 0.05, 1.0))  # red, rgba
+_FULL_REWARD = np.array((0.1, 0.9, 0.2, 1.0))  # green, rgba
 
 
 def reward_color(share: float) -> np.ndarray:
     """Return the color of a share of the greatest reward, from red for 0 to green for 1: rgba (4,)."""
-    share = min(max(share, 0.0), 1.0)
-    return (1.0 - share) * _POOR + share * _RICH
+    bounded_share = min(max(share, 0.0), 1.0)
+    return (1.0 - bounded_share) * _NO_REWARD + bounded_share * _FULL_REWARD
 
 
 def decorate(root: mjcf.RootElement, body: Body) -> None:
@@ -50,62 +51,94 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
         root.find("geom", solid.name).material = visuals.solids.get(solid.name, "shell")
     torso = root.find("body", "torso")
     for ornament in visuals.ornaments:
-        for part in (ornament, ornament.mirrored()) if ornament.paired else (ornament,):
-            euler = [math.radians(angle) for angle in part.euler_deg]
-            _add(torso, part.name, part.material, part.shape, part.size, pos=part.position, euler=euler)
+        _add_ornament(torso, ornament)
+        if ornament.paired:
+            _add_ornament(torso, ornament.mirrored())
     for leg in body.legs:
-        _dress(root, leg, visuals)
+        _decorate_leg(root, leg, visuals)
 
 
 def _visuals(body: Body) -> Visuals:
+    """Return the visuals of a robot by its name, or those that suit any body."""
     return VISUALS.get(body.name) or generic_visuals(body)
 
 
 def add_materials(root: mjcf.RootElement, body: Body) -> None:
     """Add the materials of a body."""
-    visuals = _visuals(body)
-    own = {} if body.palette is None else palettes.colors(body.palette)
-    for name, color in {**visuals.colors, **own}.items():
-        emission, specular, shininess = _FINISHES.get(name, _PLAIN)
+    colors = dict(_visuals(body).colors)
+    if body.palette is not None:
+        colors |= palettes.colors(body.palette)
+    for name, color in colors.items():
+        emission, specular, shininess = _FINISHES.get(name, _DEFAULT_FINISH)
         root.asset.add(
             "material", name=name, rgba=(*color, 1.0), emission=emission, specular=specular, shininess=shininess
         )
 
 
-def _dress(root: mjcf.RootElement, leg: Leg, visuals: Visuals) -> None:
-    radius = 0.0
+def _add_ornament(torso, ornament: Ornament) -> None:
+    euler = [math.radians(angle) for angle in ornament.euler_deg]
+    _add_geom(
+        torso,
+        ornament.name,
+        ornament.material,
+        ornament.shape,
+        ornament.size,
+        pos=ornament.position,
+        euler=euler,
+    )
+
+
+def _decorate_leg(root: mjcf.RootElement, leg: Leg, visuals: Visuals) -> None:
+    """Give the parts of a leg their materials, and add its joints, plates and boot."""
+    previous_radius = 0.0  # of the link nearer to the torso, m
     for link in leg.links:
         name = leg.full_name(link)
         part = root.find("body", name)
         root.find("geom", name).material = "limb"
-        radius = max(radius, link.radius)  # the wider of the two links that meet here
         if link.joint:
-            light = "glow" if visuals.glowing is None or link.joint.name in visuals.glowing else "trim"
-            axis = link.joint.axis
-            _add(part, f"{name}_hub", "frame", "cylinder", (1.12 * radius, radius), zaxis=axis)
-            _add(part, f"{name}_band", light, "cylinder", (1.2 * radius, 0.3 * radius), zaxis=axis)
-            _add(part, f"{name}_cap", light, "cylinder", (0.6 * radius, 1.06 * radius), zaxis=axis)
+            glows = visuals.glowing is None or link.joint.name in visuals.glowing
+            _add_joint(part, name, link, radius=max(previous_radius, link.radius), light="glow" if glows else "trim")
         _add_plate(part, name, link)
-        radius = link.radius
+        previous_radius = link.radius
     name = leg.full_name(leg.foot)
     root.find("geom", name).material = "frame"
-    _add(root.find("body", name), f"{name}_boot", "frame", "sphere", (1.04 * max(radius, leg.foot.radius),))
+    boot_radius = 1.04 * max(previous_radius, leg.foot.radius)
+    _add_geom(root.find("body", name), f"{name}_boot", "frame", "sphere", (boot_radius,))
+
+
+def _add_joint(part, name: str, link: Link, radius: float, light: str) -> None:
+    """Add a hub, a band and a cap about the axis of a joint.
+
+    Args:
+        part: of the link.
+        name: of the part.
+        link: whose joint it is.
+        radius: of the wider of the two links that meet at the joint, m.
+        light: material of band and cap.
+    """
+    axis = link.joint.axis
+    _add_geom(part, f"{name}_hub", "frame", "cylinder", (1.12 * radius, radius), zaxis=axis)
+    _add_geom(part, f"{name}_band", light, "cylinder", (1.2 * radius, 0.3 * radius), zaxis=axis)
+    _add_geom(part, f"{name}_cap", light, "cylinder", (0.6 * radius, 1.06 * radius), zaxis=axis)
 
 
 def _add_plate(part, name: str, link: Link) -> None:
     """Add a plate along the link on the side that faces up and outwards."""
     end = np.array(link.end)
     length = np.linalg.norm(end)
-    outwards = np.array((0.0, 0.0, 1.0)) + _unit(end * (1.0, 1.0, 0.0))
-    outwards = _unit(outwards - outwards @ end / length**2 * end)
+    horizontal = _unit(end * (1.0, 1.0, 0.0))
+    up_and_outwards = np.array((0.0, 0.0, 1.0)) + horizontal
+    normal = _unit(up_and_outwards - up_and_outwards @ end / length**2 * end)  # to the link
     size = (1.1 * link.radius, 1.1 * link.radius, 0.42 * length)
-    place = 0.52 * end + 0.35 * link.radius * outwards
-    _add(part, f"{name}_plate", "shell", "ellipsoid", size, pos=tuple(place), zaxis=link.end)
+    position = 0.52 * end + 0.35 * link.radius * normal
+    _add_geom(part, f"{name}_plate", "shell", "ellipsoid", size, pos=tuple(position), zaxis=link.end)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
+    """Return a vector of length 1 in the same direction; 0 for a vector of 0."""
     return vector / max(np.linalg.norm(vector), 1e-9)
 
 
-def _add(part, name: str, material: str, shape: str, size, **place) -> None:
-    part.add("geom", name=f"visual-{name}", material=material, type=shape, size=size, **place, **_INERT)
+def _add_geom(part, name: str, material: str, shape: str, size, **pose) -> None:
+    """Add a geom without mass or contacts to a part."""
+    part.add("geom", name=f"visual-{name}", material=material, type=shape, size=size, **pose, **_INERT)

@@ -10,9 +10,12 @@ from arc_suite.robots.spec import Body
 def generic_visuals(body: Body) -> Visuals:
     """Return visuals for a body: slate armor, violet joints, and an eye on a snout in front of the torso."""
     corners = solid_corners(body.torso.solids[0])
-    center, half = corners.mean(axis=0), np.ptp(corners, axis=0) / 2.0
-    r = 0.4 * min(half)
-    x, y, z = center + half * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
+    center = corners.mean(axis=0)
+    half_extents = np.ptp(corners, axis=0) / 2.0
+    radius = 0.4 * min(half_extents)
+    eye_size = (0.4 * radius, 0.7 * radius, 0.7 * radius)
+    x, y, z = center + half_extents * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
+    half_length = half_extents[0] / 2.0  # of the snout
     return Visuals(
         colors={
             "shell": (0.62, 0.66, 0.72),
@@ -22,7 +25,7 @@ def generic_visuals(body: Body) -> Visuals:
             "glow": (0.36, 0.18, 0.85),
         },
         ornaments=(
-            Ornament("snout", "frame", "cylinder", (r, half[0] / 2.0), (x - half[0] / 2.0, y, z), (0, 90, 0)),
-            Ornament("eye", "glow", "ellipsoid", (0.4 * r, 0.7 * r, 0.7 * r), (x, y, z)),
+            Ornament("snout", "frame", "cylinder", (radius, half_length), (x - half_length, y, z), (0, 90, 0)),
+            Ornament("eye", "glow", "ellipsoid", eye_size, (x, y, z)),
         ),
     )

@@ -16,8 +16,8 @@ class Ornament(NamedTuple):
         shape: a MuJoCo geom type.
         size: half-extents as MuJoCo takes them for the shape, m.
         position: center in the torso's frame, m.
-        euler_deg: turns about the x, y and z axes of the turning frame, in that order.
-        paired: has a twin across the x-z plane, `visual-<name>_right`.
+        euler_deg: turns about the x, y and z axes of the turning frame, in that order, degrees.
+        paired: whether it has a twin across the x-z plane, `visual-<name>_right`.
     """
 
     name: str
@@ -30,8 +30,14 @@ class Ornament(NamedTuple):
 
     def mirrored(self) -> "Ornament":
         """Return the twin: a reflection at y -> -y keeps turns about y and reverses those about x and z."""
-        (x, y, z), (a, b, c) = self.position, self.euler_deg
-        return self._replace(name=f"{self.name}_right", position=(x, -y, z), euler_deg=(-a, b, -c), paired=False)
+        x, y, z = self.position
+        x_angle, y_angle, z_angle = self.euler_deg
+        return self._replace(
+            name=f"{self.name}_right",
+            position=(x, -y, z),
+            euler_deg=(-x_angle, y_angle, -z_angle),
+            paired=False,
+        )
 
 
 class Visuals(NamedTuple):
@@ -39,7 +45,7 @@ class Visuals(NamedTuple):
 
     Attributes:
         colors: of the materials; "shell", "trim", "frame", "limb" and "glow" are those of any body.
-        solids: materials of the torso's solids and ballast by name, where not "shell".
+        solids: materials of the torso's solids and ballast by name; those without an entry are "shell".
         ornaments: on the torso.
         glowing: names of the joints that glow; None for all of them.
     """
