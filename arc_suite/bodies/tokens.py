@@ -339,9 +339,9 @@ class Tokens(NamedTuple):
     def _input_indices(task: Task) -> np.ndarray:
         """Return the indices (n,) in the task's observation of the numbers that tokens are made from."""
         body = task.scene.body
-        block_slices = blocks.places(task.sizes)
+        block_slices = blocks.slices(task.sizes)
         block_indices = {name: np.arange(part.start, part.stop) for name, part in block_slices.items()}
-        parts = {name: [block_indices[name][part] for part in task.blocks[name].places] for name in BLOCKS}
+        parts = {name: [block_indices[name][part] for part in task.blocks[name].slices] for name in BLOCKS}
         height, orientation, angles = parts["posture"]
         linear_velocity, angular_velocity, joint_velocities = parts["velocities"]
         (forces,) = parts["contact_forces"]
