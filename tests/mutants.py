@@ -29,13 +29,13 @@ MUTANTS = {
     "sign of zero kept": "float(value)« + 0.0→»",
     "a body's joints not looked at": "«body.joint_names != robot.joint_names→False»",
     "both sides of a body in step": 'side_offset = «0.5→0.0» if leg.side == "right"',
-    "feet of a random body above the floor": "«(p.height - foot_radius)→p.height * 0.9» /",
-    "a scaled robot keeps its name": 'name=«f"{stem}_{how}"→body.name»',
+    "feet of a random body above the floor": "down = «(height - foot_radius)→height * 0.9» /",
+    "a scaled robot keeps its name": 'name=«f"{stem}_{change}"→body.name»',
     # Models.
     "contact margin doubled": "default=«0.005→0.01»",
     "ballast touches the floor": '"mass": ballast.mass, **«_TOUCHES_NOTHING→touches_floor»}',
     "wrong number of substeps": "2, 1000, default=«25→24»",
-    "joints of a giant as fast as a mite's": "«_STIFFNESS / control_timestep(body)→7.0»",
+    "joints of a giant as fast as a mite's": "«_FREQUENCY_SHARE / control_timestep(body)→7.0»",
     "contacts of a giant as hard as a mite's": '"solref": («simulation.contact_time→0.02», 1.0)',
     # Arenas.
     "triangles of the ground exchanged": "right = u «>→<» v",
