@@ -185,7 +185,7 @@ def _name_field(**kwargs):
     return _field(_check_name, **kwargs)
 
 
-def _number_field(low, high, **kwargs):
+def _number_field(low: float, high: float, **kwargs):
     return _field(_check_number, low, high, **kwargs)
 
 
@@ -251,7 +251,7 @@ class Motor(_Spec):
         gear: torque at a control of 1, N m; controls are in [-1, 1].
     """
 
-    gear: float = _number_field(_MIN_GEAR, _MAX_GEAR)
+    gear: float = _number_field(low=_MIN_GEAR, high=_MAX_GEAR)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -264,9 +264,9 @@ class Servo(_Spec):
         limit: the largest torque, N m.
     """
 
-    stiffness: float = _number_field(_MIN_GEAR, _MAX_GEAR)
-    damping: float = _number_field(0.0, _MAX_JOINT_CONSTANT)
-    limit: float = _number_field(_MIN_GEAR, _MAX_GEAR)
+    stiffness: float = _number_field(low=_MIN_GEAR, high=_MAX_GEAR)
+    damping: float = _number_field(low=0.0, high=_MAX_JOINT_CONSTANT)
+    limit: float = _number_field(low=_MIN_GEAR, high=_MAX_GEAR)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -287,8 +287,8 @@ class Joint(_Spec):
     name: str = _name_field()
     axis: Vector = _field(_check_vector, 3, -_MAX_AXIS, _MAX_AXIS)
     range_deg: tuple[float, float] = _field(_check_vector, 2, -180.0, 180.0)
-    armature: float | None = _number_field(0.0, _MAX_JOINT_CONSTANT, default=None, optional=True)
-    damping: float | None = _number_field(0.0, _MAX_JOINT_CONSTANT, default=None, optional=True)
+    armature: float | None = _number_field(low=0.0, high=_MAX_JOINT_CONSTANT, default=None, optional=True)
+    damping: float | None = _number_field(low=0.0, high=_MAX_JOINT_CONSTANT, default=None, optional=True)
     motor: Motor | None = _field(_check_instance, Motor, default=None, optional=True)
     servo: Servo | None = _field(_check_instance, Servo, default=None, optional=True)
     alias: str | None = _field(_check_text, 1, MAX_ALIAS, default=None, optional=True)
@@ -375,7 +375,7 @@ class Leg(_Spec):
     mount: Vector = _position_field()
     links: tuple[Link, ...] = _field(_check_items, Link, 1, _MAX_LINKS)
     foot: Foot = _field(_check_instance, Foot)
-    yaw_deg: float = _number_field(-360.0, 360.0, default=0.0)
+    yaw_deg: float = _number_field(low=-360.0, high=360.0, default=0.0)
 
     def _check_conditions(self):
         _check_unique(self, "links", [link.name for link in self.links] + [self.foot.name])
@@ -474,7 +474,7 @@ class Solid(_Spec):
 class Ballast(Solid):
     """A shape fixed to the torso that weighs `mass` and touches nothing."""
 
-    mass: float = _number_field(1e-9, 1e9)
+    mass: float = _number_field(low=1e-9, high=1e9)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -529,10 +529,10 @@ class Simulation(_Spec):
         substeps: number in a control step.
     """
 
-    timestep: float = _number_field(1e-6, 0.1, default=0.002)
-    contact_time: float = _number_field(2e-6, 1.0, default=0.02)
-    contact_width: float = _number_field(1e-9, MAX_LENGTH, default=0.001)
-    contact_margin: float = _number_field(0.0, MAX_LENGTH, default=0.005)
+    timestep: float = _number_field(low=1e-6, high=0.1, default=0.002)
+    contact_time: float = _number_field(low=2e-6, high=1.0, default=0.02)
+    contact_width: float = _number_field(low=1e-9, high=MAX_LENGTH, default=0.001)
+    contact_margin: float = _number_field(low=0.0, high=MAX_LENGTH, default=0.005)
     substeps: int = _field(_check_integer, 2, 1000, default=25)
 
     def _check_conditions(self):
@@ -580,10 +580,10 @@ class Body(_Spec):
     torso: Torso = _field(_check_instance, Torso)
     legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, _MAX_LEGS)
     camera: TrackingCamera | None = _field(_check_instance, TrackingCamera, default=None, optional=True)
-    density: float = _number_field(1e-9, _MAX_DENSITY, default=DENSITY)
+    density: float = _number_field(low=1e-9, high=_MAX_DENSITY, default=DENSITY)
     ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, _MAX_SHAPES, default=())
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
-    agility: float = _number_field(0.1, 10.0, default=1.0)
+    agility: float = _number_field(low=0.1, high=10.0, default=1.0)
     palette: str | int | None = _field(_check_palette, default=None, optional=True)
     source: str | None = _field(_check_text, 1, MAX_SOURCE, default=None, optional=True)
     held: tuple[Held, ...] = _field(_check_items, Held, 0, _MAX_HELD_JOINTS, default=())
@@ -609,7 +609,7 @@ class Body(_Spec):
         if not _MIN_LENGTH <= height <= MAX_LENGTH:
             reason = f"feet end {abs(height):.4g} m {'below' if height > 0.0 else 'above'} the torso's origin"
             self._fail("torso", f"standing_height cannot be derived: {reason}")
-        return float(f"{height:.12g}")  # rounded, as sums of decimal lengths are decimal, too
+        return float(f"{height:.12g}")  # lengths are decimal numbers, and so are their sums
 
     def _check_source(self) -> None:
         """Raise SpecError for fields that only bodies with a source may have, or only bodies without one."""
@@ -636,7 +636,7 @@ class Body(_Spec):
 
         A part has at least the inertia of a ball of its smallest radius or half-extent: 8/15 pi density radius^5.
         """
-        min_size = (_MIN_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2  # m
+        min_size = (_MIN_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2  # m, by the fifth root
         sizes = [("torso", solid.name, min(solid.size)) for solid in self.torso.solids]
         for leg in self.legs:
             sizes += [("legs", name, part.radius) for name, part in zip(leg.part_names, leg.parts, strict=True)]
