@@ -23,7 +23,7 @@ from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots import ROBOTS, spec_files
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 
 ONE_CYCLE, CONNECTED, APART = 0.85, 0.85, 0.08  # legs of two joints often stop from poses of their own
 LOW = 0.01  # of a sole that slips
@@ -37,7 +37,7 @@ class Kept(Recorder):
 
 def apart(body, one, other) -> float:
     """Return the distance of the farthest part of two poses above the same place of the ground, standing heights."""
-    model = compiled(body)
+    model = compile_model(body)
     data, places = mujoco.MjData(model), []
     for pose in (one, other):
         data.qpos[:] = np.concatenate([pose.position, pose.quaternion, pose.joints])

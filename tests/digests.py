@@ -24,7 +24,7 @@ import arc_suite
 from arc_suite.arenas import FLAT
 from arc_suite.cpg import Demonstrator
 from arc_suite.robots import ROBOTS
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import TASKS
 
 FILE = pathlib.Path(__file__).parent / "golden" / "digests.json"
@@ -94,7 +94,7 @@ def arithmetic() -> str:
     matrix = np.sin(np.outer(numbers[:40], numbers[100:140])) + 9.0 * np.eye(40)
     results = [np.sin(numbers), np.cos(numbers), np.exp(numbers), np.arctan2(numbers, numbers[::-1])]
     results += [np.hypot(numbers, 1.3), matrix @ matrix, np.linalg.solve(matrix, numbers[:40])]
-    model = compiled(ROBOTS["queen"], FLAT)
+    model = compile_model(ROBOTS["queen"], FLAT)
     data = mujoco.MjData(model)
     for step in range(2000):
         data.ctrl[:] = 0.4 * ((step // 100) % 2) - 0.2

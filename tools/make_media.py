@@ -245,7 +245,7 @@ def draw(media: Media) -> None:
         size = (2 * width, 2 * height) if is_large else (width, height)
         view_pictures = list(media.source(view, size, media.steps))
         if media.captions:
-            view_pictures = [films.captioned(picture, name, _CAPTION_HEIGHT) for picture in view_pictures]
+            view_pictures = [films.add_caption(picture, name, _CAPTION_HEIGHT) for picture in view_pictures]
         pictures_of_views.append(view_pictures)
     frames = [arrange(list(views), media) for views in zip(*pictures_of_views, strict=True)]
     path = ROOT / media.path

@@ -119,7 +119,7 @@ def anchor(robot: str, task: str) -> anchors.Returns:
     setup = Setup.of(robot, task)
     names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets_of(setup.body))]
     bar = program.progress(names, desc=f"{task} {robot}", leave=False)
-    returns = {name: anchors.played(setup, name, range(evaluation.EPISODES)) for name in bar}
+    returns = {name: anchors.play_returns(setup, name, range(evaluation.EPISODES)) for name in bar}
     return {name: returns[name] for name in (anchors.ZERO, anchors.of_returns(returns).preset)}
 
 

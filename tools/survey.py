@@ -50,7 +50,7 @@ def picture(outcomes: list[walks.Outcome]) -> np.ndarray:
         environment, _ = walks.play(outcome.case)
         caption = ", ".join((f"seed {outcome.case.seed}: {outcome.legs} x {outcome.links}", *outcome.failures))
         view = environment.physics.render(300, 400, "portrait", quality="still")
-        views.append(films.captioned(view, caption))
+        views.append(films.add_caption(view, caption))
         environment.close()
     return films.grid(views, min(4, len(views)))
 

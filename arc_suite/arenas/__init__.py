@@ -8,8 +8,8 @@ FLAT = Flat()
 
 ARENAS = {
     "flat": lambda body: FLAT,
-    "bumps": bumps.fitted,
-    **{kind: terrain.fitted(kind) for kind in terrain.KINDS},
+    "bumps": bumps.fit_bumps,
+    **{kind: terrain.lanes_of_kind(kind) for kind in terrain.KINDS},
 }
 
 __all__ = ["ARENAS", "FLAT", "Arena"]

@@ -11,36 +11,38 @@ from arc_suite.arenas import field
 from arc_suite.arenas.arena import Arena
 from arc_suite.robots.spec import Body
 
-_CELL = 0.5  # of the standing height; feet sink into smaller cells
-_LENGTH, _WIDTH = 80.0, 40.0  # of the field, in standing heights: the way of 1000 steps, to either side
-_BASE = 2.0  # thickness of the ground below its lowest point, in standing heights
-_WAVE = 4.0  # from bump to bump, in standing heights
-_HIGHEST = 0.15  # in standing heights
+# Lengths in standing heights.
+_CELL = 0.5  # feet sink into smaller cells
+_LENGTH = 80.0  # of the field, to the front and to the back: the way of 1000 control steps
+_WIDTH = 40.0  # of the field
+_THICKNESS = 2.0  # of the ground below its lowest point
+_WAVELENGTH = 4.0  # from bump to bump
+_MAX_HEIGHT = 0.15
 
 
 @dataclasses.dataclass(frozen=True)
 class Bumps(Arena):
-    """Bumps on a field about the start; beyond its edge the ground goes on at the edge's height.
+    """Bumps on a field around the start; beyond its edge, the ground has the height of the edge.
 
     Attributes:
-        unit: m, the standing height of the body; all lengths are multiples of it.
-        highest: of the bumps, in units.
+        unit: the standing height of the body, m; other lengths are multiples of it.
+        highest: height of the highest bump, in units.
     """
 
     unit: float
-    highest: float = _HIGHEST
+    highest: float = _MAX_HEIGHT
 
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
         """Add the height field `floor`."""
-        field.add(root, self._shares, (*self._halves, self.highest * self.unit, _BASE * self.unit), **contact)
+        field.add(root, self._shares, (*self._halves, self.highest * self.unit, _THICKNESS * self.unit), **contact)
 
     def height(self, x, y):
         """Return the height (...) of MuJoCo's collision triangles under points, m."""
-        shares, (half_x, half_y) = self._shares, self._halves
-        rows, columns = shares.shape
+        half_x, half_y = self._halves
+        rows, columns = self._shares.shape
         u = (x + half_x) / (2.0 * half_x) * (columns - 1)
         v = (y + half_y) / (2.0 * half_y) * (rows - 1)
-        return self.highest * self.unit * field.height(shares, u, v)
+        return self.highest * self.unit * field.height(self._shares, u, v)
 
     @property
     def _halves(self) -> tuple[float, float]:
@@ -52,12 +54,13 @@ class Bumps(Arena):
         """Return the height of every node as a share of the highest, (rows, columns), in single precision."""
         x = np.arange(-_LENGTH, _LENGTH + _CELL, _CELL)
         y = np.arange(-0.5 * _WIDTH, 0.5 * _WIDTH + _CELL, _CELL)
-        turn = 2.0 * math.pi / _WAVE
-        wave = 0.5 - 0.5 * np.cos(turn * x) * np.cos(turn * y)[:, None]
-        wave *= (np.hypot(x, y[:, None]) / _WAVE - 0.5).clip(0.0, 1.0)  # level where a body stands at first
-        return field.shares(wave)
+        wave_number = 2.0 * math.pi / _WAVELENGTH
+        heights = 0.5 - 0.5 * np.cos(wave_number * x) * np.cos(wave_number * y)[:, None]
+        distance = np.hypot(x, y[:, None])
+        heights *= (distance / _WAVELENGTH - 0.5).clip(0.0, 1.0)  # level around the start
+        return field.shares(heights)
 
 
-def fitted(body: Body) -> Bumps:
+def fit_bumps(body: Body) -> Bumps:
     """Return bumps of the size of a body."""
     return Bumps(body.torso.standing_height)

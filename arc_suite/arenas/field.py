@@ -30,20 +30,24 @@ def height(nodes: np.ndarray, u, v):
 
     Args:
         nodes: (rows, columns)
-        u: (...) place along the columns, in cells; beyond the edge, the edge's height.
-        v: (...) place along the rows, in cells; beyond the edge, the edge's height.
+        u: (...) coordinate along the columns, in cells; beyond the edge, the height is that of the edge.
+        v: (...) coordinate along the rows, in cells; beyond the edge, the height is that of the edge.
     """
-    numpy = u.__array_namespace__()
+    xp = u.__array_namespace__()
     rows, columns = nodes.shape
-    nodes = numpy.asarray(nodes).ravel()
-    u, v = u.clip(0.0, columns - 1), v.clip(0.0, rows - 1)
-    column = numpy.floor(u).astype(int).clip(0, columns - 2)
-    row = numpy.floor(v).astype(int).clip(0, rows - 2)
-    u, v = u - column, v - row
-    first = row * columns + column
-    low, high = nodes[first], nodes[first + columns + 1]
-    # The diagonal joins the corners of lowest and highest indices; (u, v) lies right or left of it.
-    right = u > v
-    corner = nodes[first + numpy.where(right, 1, columns)]
-    along, across = numpy.where(right, u, v), numpy.where(right, v, u)
-    return low + along * (corner - low) + across * (high - corner)
+    heights = xp.asarray(nodes).ravel()
+    u = u.clip(0.0, columns - 1)
+    v = v.clip(0.0, rows - 1)
+    column = xp.floor(u).astype(int).clip(0, columns - 2)
+    row = xp.floor(v).astype(int).clip(0, rows - 2)
+    u_in_cell = u - column
+    v_in_cell = v - row
+    # A diagonal joins the corners of lowest and highest indices. The point lies in the triangle right or left of it.
+    is_right = u_in_cell > v_in_cell
+    first_corner = row * columns + column
+    start = heights[first_corner]
+    end = heights[first_corner + columns + 1]
+    middle = heights[first_corner + xp.where(is_right, 1, columns)]
+    larger = xp.where(is_right, u_in_cell, v_in_cell)
+    smaller = xp.where(is_right, v_in_cell, u_in_cell)
+    return start + larger * (middle - start) + smaller * (end - middle)

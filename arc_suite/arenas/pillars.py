@@ -1,7 +1,7 @@
-"""Pillars: a level floor with round pillars, placed anew in every episode.
+"""Pillars: a level floor with round pillars, at new positions in every episode.
 
-They stand on a grid of square cells, one near the middle of each; goals are corners of cells. So no
-pillar is near a goal, and a body fits between any two.
+The pillars stand on a grid of square cells, one near the middle of each cell. Goals are corners of cells, so that no
+pillar is near a goal, and a body fits between any two pillars.
 """
 
 import dataclasses
@@ -11,11 +11,11 @@ from dm_control import mjcf
 
 from arc_suite.arenas.flat import Flat
 
-CELLS = 4  # along each side of the grid, about the start
+CELLS = 4  # along each side of the grid, whose center is the start
 COUNT = CELLS * CELLS
-PITCH = 4.2  # width of a cell, in units, as are the next two; goals are at least this far apart
-SHIFT = 0.25  # most that a pillar is off the middle of its cell, along either side
-RADIUS = 0.35
+PITCH = 4.2  # width of a cell, R; goals are at least so far apart
+SHIFT = 0.25  # largest displacement of a pillar from the middle of its cell along either side, R
+RADIUS = 0.35  # of a pillar, R
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,9 +23,8 @@ class Pillars(Flat):
     """The plane z = 0 with movable pillars; their bodies are the last of the model, in the order of `places`.
 
     Attributes:
-        unit: m, the mean distance R of the feet of the body for which it is made from their center: lengths across
-            are multiples of it.
-        top: of the pillars, m.
+        unit: R, the mean distance of the feet of the body from their center, m; horizontal lengths are multiples of it.
+        top: height of the pillars, m.
     """
 
     unit: float
@@ -37,7 +36,7 @@ class Pillars(Flat):
         for number, place in enumerate(self.places(np.zeros((COUNT, 2)))):
             name = f"floor_pillar_{number}"
             pillar = root.worldbody.add("body", name=name, mocap=True, pos=place)
-            # A capsule whose ends' middles are at the floor and at the top: as a cylinder between them.
+            # Between floor and top, the capsule is a cylinder: the centers of its caps are at the floor and at the top.
             size = (RADIUS * self.unit, 0.5 * self.top)
             pillar.add("geom", name=name, type="capsule", size=size, mass=0.0, contype=0, conaffinity=1, **contact)
 
@@ -45,14 +44,14 @@ class Pillars(Flat):
         """Return the centers of the pillars (COUNT, 3), m.
 
         Args:
-            shifts: (COUNT, 2) off the middle of each one's cell, from -1 to 1.
+            shifts: (COUNT, 2) displacement from the middle of the cell, from -1 to 1.
         """
         middles = np.arange(CELLS) - 0.5 * (CELLS - 1)
         grid = np.stack(np.meshgrid(middles, middles, indexing="ij"), axis=-1).reshape(COUNT, 2)
-        across = self.unit * (PITCH * grid + SHIFT * shifts)
-        return np.concatenate([across, np.full((COUNT, 1), 0.5 * self.top)], axis=-1)
+        centers = self.unit * (PITCH * grid + SHIFT * shifts)
+        return np.concatenate([centers, np.full((COUNT, 1), 0.5 * self.top)], axis=-1)
 
     @property
     def lists_contacts(self) -> bool:
-        """Return False: pairs of pillars and parts are many, and few are near one another."""
+        """Return False, as pairs of pillars and parts are many, and few of them are near each other."""
         return False

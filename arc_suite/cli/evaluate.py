@@ -70,7 +70,7 @@ def main() -> None:
 def print_reports(players: list[reports.Player], seeds: range) -> list[evaluation.Report]:
     """Play the episodes behind progress bars, print a line for each body, and return the reports."""
     labels = [reports.label(player.setup, player.preset) for player in players]
-    label_width = max(reports.LABEL, *(len(label) for label in labels))  # of the first column
+    label_width = max(reports.MIN_LABEL_WIDTH, *(len(label) for label in labels))  # of the first column
     reports_of_robots: list[evaluation.Report] = []
     for player in players:
         bar = functools.partial(progress, desc=player.setup.body.name, unit="episode", leave=False)

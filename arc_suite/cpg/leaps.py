@@ -19,7 +19,7 @@ from arc_suite.models.sizing import GRAVITY, control_timestep, simulation, size_
 from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.batch import Batch
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import readings
 
 
@@ -157,7 +157,7 @@ def simulate_flights(body: Body, rest: np.ndarray, angles: np.ndarray, crouched:
 
 def _simulated(body: Body, rest: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places of torsos (leaps, steps, 3) and of soles (leaps, steps, legs, 3), m, and cosines of tilts between."""
-    model, pose, count = compiled(body), pose_mechanics(body, rest), len(rest)
+    model, pose, count = compile_model(body), pose_mechanics(body, rest), len(rest)
     layout, driven = readings.layout(model, body), drive(body, pose.inertias)
     batch = Batch(model, len(angles), 1)
     data, every = batch.data, np.ones(len(angles), bool)

@@ -24,7 +24,7 @@ from arc_suite.envs.calls import (
 from arc_suite.envs.prepare import checked_changes, prepare_task
 from arc_suite.envs.task_view import TaskView
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import checked_fields
+from arc_suite.simulation.model import check_fields
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM
@@ -126,7 +126,7 @@ class Environment(KnownAttributes, control.Environment):
         Raises:
             ValueError: an unknown field, one without effect, or a value that does not fit.
         """
-        self.physics.change_model(checked_fields(self.physics.model.ptr, fields), lasting=True)
+        self.physics.change_model(check_fields(self.physics.model.ptr, fields), lasting=True)
 
     @one_thread_at_a_time
     def change_settings(self, settings: Mapping[str, Any]) -> None:
@@ -166,7 +166,7 @@ class Environment(KnownAttributes, control.Environment):
         run = self.task  # dm_control calls a `TaskRun` the task
         if run.memory is None:
             super().reset()
-        check_simulations = functools.partial(self.physics.checked, fields=run.definition.reads)
+        check_simulations = functools.partial(self.physics.check_snapshot, fields=run.definition.reads)
         state, (present_tasks, next_tasks) = snapshots.from_arrays(
             self._state(), run.definition, check_simulations, arrays, [run.opened], self.task_kwargs
         )

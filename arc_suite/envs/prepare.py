@@ -10,7 +10,7 @@ import mujoco
 from arc_suite import checks, registry
 from arc_suite.models.sizing import simulation
 from arc_suite.models.standing import standing_qpos
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import modified_task, parameters
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.mirrors import Symmetry
@@ -46,7 +46,7 @@ def prepare_task(
     settings = task_class.settings_for(body, task_settings)
     arena = task_class.arena(body, settings) if chosen_arena is None else registry.arena_of(chosen_arena, body)
 
-    model = compiled(body, arena)
+    model = compile_model(body, arena)
     substeps = simulation(body).substeps
     control_timestep = substeps * model.opt.timestep
     scene = Scene(

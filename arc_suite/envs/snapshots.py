@@ -12,7 +12,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import with_changes
-from arc_suite.simulation.state_arrays import bounded, fitting
+from arc_suite.simulation.state_arrays import check_finite, check_same_form
 from arc_suite.tasks import Task
 
 # Names of the arrays of the environment itself, as opposed to its simulations and its task. They have a leading axis
@@ -111,7 +111,7 @@ def from_arrays(
         memory = _read_memory(like.memory, task, arrays)
         environment_arrays = {}
         for name, array in like.environment_arrays.items():
-            environment_arrays[name] = bounded(name, fitting(name, arrays[name], array)).copy()
+            environment_arrays[name] = check_finite(name, check_same_form(name, arrays[name], array)).copy()
         randoms = _read_randoms(arrays, len(like.streams))
         streams = []
         for index, opened_task in enumerate(opened_tasks):
@@ -148,7 +148,7 @@ def _read_memory(like, task: Task, arrays: Mapping[str, np.ndarray]) -> Any:
 
     def read_leaf(leaf, marked_leaf):
         array = arrays[f"memory/{next(leaf_indices)}"]
-        return bounded("memory", fitting("memory", array, leaf), np.isnan(marked_leaf)).copy()
+        return check_finite("memory", check_same_form("memory", array, leaf), np.isnan(marked_leaf)).copy()
 
     return trees.map_leaves(read_leaf, like, marked_memory)
 
@@ -157,7 +157,7 @@ def _read_randoms(arrays: Mapping[str, np.ndarray], num_envs: int) -> list[tuple
     """Return the state of each environment's `RandomState`."""
     for name, (dtype, smallest, largest) in _RANDOM_ARRAYS.items():
         shape = (num_envs, _KEY_COUNT) if name == "random/keys" else (num_envs,)
-        array = fitting(name, arrays[name], np.empty(shape, dtype))
+        array = check_same_form(name, arrays[name], np.empty(shape, dtype))
         if not ((array >= smallest) & (array <= largest)).all():
             raise ValueError(f"{name}: expected numbers from {smallest} to {largest}")
     keys, positions, halves, normals = (arrays[name] for name in _RANDOM_ARRAYS)
@@ -172,7 +172,7 @@ def _read_stream(like, leaves_by_index: Mapping[str, np.ndarray]) -> Any:
     def read_leaf(leaf):
         array = leaves_by_index[str(next(leaf_indices))]
         leaf_array = np.asarray(leaf)
-        checked_array = bounded("stream", fitting("stream", array, leaf_array), np.isnan(leaf_array))
+        checked_array = check_finite("stream", check_same_form("stream", array, leaf_array), np.isnan(leaf_array))
         return number(checked_array, leaf)
 
     return trees.map_leaves(read_leaf, like)

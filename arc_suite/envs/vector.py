@@ -28,7 +28,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.cores import usable_cores
-from arc_suite.simulation.model import checked_fields
+from arc_suite.simulation.model import check_fields
 from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM, Inputs
 
@@ -363,7 +363,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.batch.change_model(self._checked_fields(fields), mask)
 
     def _checked_fields(self, fields: Any) -> dict[str, np.ndarray]:
-        return checked_fields(self.batch.models[0], fields, self.num_envs)
+        return check_fields(self.batch.models[0], fields, self.num_envs)
 
     @one_thread_at_a_time
     def change_settings(self, settings: Mapping[str, Any], mask=None) -> None:
@@ -521,7 +521,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._consume_commands()
         _, _, task_kwargs = self.arguments
         return snapshots.from_arrays(
-            self._state(), self._task, self.batch.checked, arrays, self._opened_tasks, task_kwargs
+            self._state(), self._task, self.batch.check_snapshot, arrays, self._opened_tasks, task_kwargs
         )
 
     def _restore_state(self, state: snapshots.State, tasks: list[list[Task]]) -> None:

@@ -1,9 +1,9 @@
-"""Anchors of a score: what standing still and the best demonstrator earn with a robot, a task and settings.
+"""Anchors of a score: returns of standing still and of the best demonstrator with a robot, a task and settings.
 
 `anchors.csv` holds both for robots of the suite in tasks with default settings: the returns of the protocol's episodes,
-written by `python tools/results.py --anchors`. In places that it lacks they are measured, in ten episodes. Episodes run
-in a batch, where policies observe float32 as learners do. `arc-suite evaluate` has float64, and chaotic walks diverge:
-Leaper's `medium` earns 2619.8 here and 2610.4 there, over ten episodes.
+written by `python tools/results.py --anchors`. Other anchors are measured in ten episodes. Episodes run in a batch,
+where policies observe float32 as learners do. `arc-suite evaluate` has float64, with which chaotic walks diverge:
+over ten episodes, Leaper's `medium` has a return of 2619.8 here and of 2610.4 there.
 """
 
 import contextlib
@@ -31,12 +31,12 @@ Returns = Mapping[str, np.ndarray]  # (episodes,) by policy: `zero`, or a preset
 
 
 class Anchors(NamedTuple):
-    """Returns between which a score lies.
+    """Returns that have the scores 0 and 1.
 
     Attributes:
         zero: mean return of standing still, score 0.
         demonstrator: mean return of the best demonstrator, score 1; None where the body has none.
-        preset: its name; None where the body has none.
+        preset: name of the best demonstrator; None where the body has none.
     """
 
     zero: float
@@ -44,7 +44,9 @@ class Anchors(NamedTuple):
     preset: str | None = None
 
     def score(self, returns):
-        """Return (return - standing still) / (best demonstrator - standing still); NaN where that one earns no more.
+        """Return (return - standing still) / (best demonstrator - standing still), or NaN.
+
+        It is NaN where the demonstrator has no higher return than standing still.
 
         Args:
             returns: (...) returns, or means of several.
@@ -54,92 +56,102 @@ class Anchors(NamedTuple):
         return (np.asarray(returns, float) - self.zero) / (self.demonstrator - self.zero)
 
     def at(self, score: float) -> float:
-        """Return the return of a score; infinite where no return has one."""
+        """Return the return of a score; infinite where returns have no scores."""
         if self.demonstrator is None or self.demonstrator <= self.zero:
             return np.inf
         return self.zero + score * (self.demonstrator - self.zero)
 
 
-def of_returns(played: Returns) -> Anchors:
-    """Return the anchors of returns by policy, `zero` among them."""
-    means = {name: float(returns.mean()) for name, returns in played.items()}
+def of_returns(returns_by_policy: Returns) -> Anchors:
+    """Return the anchors of returns by policy, one of which is `zero`."""
+    means = {name: float(returns.mean()) for name, returns in returns_by_policy.items()}
     zero = means.pop(ZERO)
     best = max(means, key=means.__getitem__, default=None)
     return Anchors(zero, None if best is None else means[best], best)
 
 
 def anchors(setup: Setup) -> Anchors:
-    """Return the anchors of a robot, a task and settings, measured where they are not committed.
+    """Return the anchors of a robot, a task and settings; those that are not committed are measured.
 
     Raises:
         ValueError: a setting of the task that does not fit, or episodes that need not end.
     """
     if setup.several:
         return _of_several(setup)
-    return of_returns(known(setup) or measured(setup))
+    returns_by_policy = committed_returns(setup)
+    if returns_by_policy is None:
+        returns_by_policy = measure_returns(setup)
+    return of_returns(returns_by_policy)
 
 
 @functools.lru_cache(maxsize=16)
 def _of_several(setup: Setup) -> Anchors:
-    """The anchors of bodies, each in an episode with its own suited demonstrator."""
-    zero, demonstrators = [], []
+    """Return the anchors of several bodies, each in one episode with the demonstrator that suits it."""
+    zero = []
+    demonstrators = []
     members = setup.members()
-    for seed in tqdm(
-        range(protocol.CURVE_EPISODES), desc=f"anchors of {setup}", unit="body", leave=False, disable=None
-    ):
+    seeds = range(protocol.CURVE_EPISODES)
+    for seed in tqdm(seeds, desc=f"anchors of {setup}", unit="body", leave=False, disable=None):
         member = members[seed % len(members)]
-        zero.append(played(member, ZERO, range(seed, seed + 1)))
-        demonstrators.append(played(member, suited_preset(member.definition), range(seed, seed + 1)))
+        zero.append(play_returns(member, ZERO, range(seed, seed + 1)))
+        demonstrators.append(play_returns(member, suited_preset(member.definition), range(seed, seed + 1)))
     return Anchors(float(np.mean(zero)), float(np.mean(demonstrators)), "of each body")
 
 
-def known(setup: Setup) -> Returns | None:
-    """Return the committed returns of standing still and of the best demonstrator; None without any."""
-    return _table().get(str(setup)) if is_robot(setup.body) and not setup.task_kwargs else None
+def committed_returns(setup: Setup) -> Returns | None:
+    """Return the committed returns of standing still and of the best demonstrator; None if there are none."""
+    if setup.task_kwargs or not is_robot(setup.body):
+        return None
+    return _table().get(str(setup))
 
 
 @functools.lru_cache(maxsize=16)
-def measured(setup: Setup, episodes: int = protocol.CURVE_EPISODES) -> Returns:
+def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES) -> Returns:
     """Return the returns of standing still and of all presets that suit the task, from seed 0 on; see `anchors`."""
-    found = {}
+    returns_by_policy = {}
     names = (ZERO, *suited_presets(setup.definition))
     for name in tqdm(names, desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
         try:
-            found[name] = played(setup, name, range(episodes))
+            returns_by_policy[name] = play_returns(setup, name, range(episodes))
         except ValueError:
             if name == ZERO:
                 raise
-            # What one preset refuses, such as a body whose feet hang in the air, another one may take.
-    return found
+            # Another preset may take a body that one preset refuses, such as one whose feet hang in the air.
+    return returns_by_policy
 
 
-def played(setup: Setup, name: str, seeds: range) -> np.ndarray:
+def play_returns(setup: Setup, name: str, seeds: range) -> np.ndarray:
     """Return the returns (episodes,) of standing still, `zero`, or of a preset of the demonstrator.
 
     Raises:
         ValueError: as `policies.policy`.
     """
     environment = setup.make_vec(len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
-    chosen = (ZERO, ()) if name == ZERO else ("cpg", name)
+    policy_name = ZERO if name == ZERO else "cpg"
+    presets = () if name == ZERO else name
     with contextlib.closing(environment):
-        policy = policies.policy(chosen[0], setup.body, chosen[1], len(seeds), task=environment.task.definition)
-        return np.array([each.total for each in protocol.episodes_in_batch(environment, policy, seeds)])
+        policy = policies.policy(policy_name, setup.body, presets, len(seeds), task=environment.task.definition)
+        episodes = protocol.episodes_in_batch(environment, policy, seeds)
+    return np.array([episode.total for episode in episodes])
 
 
 def read(path: Path) -> dict[str, dict[str, np.ndarray]]:
-    """Return the returns in a table, each (episodes,), by place, which is the text of a setup, and by policy.
+    """Return the returns in a table, (episodes,) each, by place and policy; a place is the text of a setup.
 
     Raises:
         ValueError: a damaged table.
     """
-    found: dict[str, dict[str, list[float]]] = {}
+    returns: dict[str, dict[str, list[float]]] = {}
     try:
         with path.open(encoding="utf-8", newline="") as file:
             for line in csv.DictReader(file):
-                found.setdefault(line["place"], {}).setdefault(line["policy"], []).append(float(line["return"]))
+                returns.setdefault(line["place"], {}).setdefault(line["policy"], []).append(float(line["return"]))
     except (KeyError, TypeError, ValueError, csv.Error) as error:
         raise ValueError(f"{path}: no table of returns: {checks.quote(error)}") from None
-    return {place: {name: np.array(values) for name, values in every.items()} for place, every in found.items()}
+    return {
+        place_name: {policy: np.array(values) for policy, values in returns_by_policy.items()}
+        for place_name, returns_by_policy in returns.items()
+    }
 
 
 def write(path: Path, table: Mapping[str, Returns]) -> None:
@@ -147,9 +159,10 @@ def write(path: Path, table: Mapping[str, Returns]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(HEADS)
-        for place, every in table.items():
-            for name, returns in every.items():
-                lines.writerows((place, name, seed, repr(float(total))) for seed, total in enumerate(returns))
+        for place_name, returns_by_policy in table.items():
+            for policy, returns in returns_by_policy.items():
+                for seed, value in enumerate(returns):
+                    lines.writerow((place_name, policy, seed, repr(float(value))))
 
 
 @functools.cache

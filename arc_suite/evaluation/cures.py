@@ -1,4 +1,4 @@
-"""First walks of bodies: whether the demonstrator walks one, and which fields of its spec keep it from that."""
+"""First walks of bodies: whether the demonstrator walks a body, and which fields of its spec prevent it."""
 
 import itertools
 from typing import NamedTuple
@@ -9,9 +9,9 @@ from arc_suite.evaluation import protocol
 from arc_suite.evaluation.walking import Verdict, WalkWatcher
 from arc_suite.robots.spec import Body, Link
 
-_STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
-_STEPS_OF_IMPORTED = 1000  # 20 s, as some of their robots fall late
-FIELDS = ("motor", "damping", "armature")  # of joints, which are sized where a spec leaves them out
+_STEPS = 100  # control steps; 5 s of the four robots, of which the first 2 s are the start
+_STEPS_OF_IMPORTED = 1000  # control steps, as some imported robots fall late
+FIELDS = ("motor", "damping", "armature")  # of joints; where a spec leaves them out, they are sized
 
 
 class FirstWalk(NamedTuple):
@@ -19,8 +19,8 @@ class FirstWalk(NamedTuple):
 
     Attributes:
         length: control steps until a fall or divergence, or of the whole walk.
-        verdict: what it came to.
-        target: m/s that the task wants.
+        verdict: on the walk.
+        target: target velocity of the task, m/s.
     """
 
     length: int
@@ -35,14 +35,16 @@ class FirstWalk(NamedTuple):
     @property
     def quality(self) -> int:
         """2 for what counts as walking, 1 for what is too slow or drags the torso, 0 for a fall."""
-        return 0 if self.verdict.fell else 1 + self.verdict.walks
+        if self.verdict.fell:
+            return 0
+        return 2 if self.verdict.walks else 1
 
 
 def walk(body: Body) -> FirstWalk:
     """Let the demonstrator `medium` walk a body.
 
     Raises:
-        ValueError: a body that cannot walk whatever the demonstrator does.
+        ValueError: a body that no demonstrator can walk.
     """
     environment = Setup.of(body, "walk", {"on_divergence": "terminate"}).load()
     steps = _STEPS_OF_IMPORTED if body.source else _STEPS
@@ -53,33 +55,43 @@ def walk(body: Body) -> FirstWalk:
 
 
 def given_fields(body: Body) -> list[str]:
-    """Return the fields of joints that a spec has and could leave out: none of an imported body."""
+    """Return the fields of joints that a spec has and could leave out; an imported body has none."""
     joints = () if body.source else body.joints
     return [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
 
 
 def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | None:
-    """Return the fields of joints without which a body walks best, and that walk.
+    """Return the fields of joints without which a body walks best, and that walk; None if no walk is better.
 
-    The best walk has the highest quality; among equals, the fewest fields are left out, then the speed counts.
+    The best walk has the highest quality; among these, that with the fewest fields left out, then the fastest.
 
     Args:
-        body: to leave fields out of.
-        quality: of its own walk; None is returned if no other has a higher one.
+        body: any.
+        quality: of its walk with all fields.
     """
-    given, better = given_fields(body), {}
-    for count in range(1, len(given) + 1):
-        walks = {names: walk(_leaving_out(body, names)) for names in itertools.combinations(given, count)}
-        better |= {names: each for names, each in walks.items() if each.quality > quality}
-        if any(each.quality == 2 for each in better.values()):  # larger sets are no better
-            break
-    return max(better.items(), key=lambda item: (item[1].quality, -len(item[0]), item[1].speed), default=None)
+    names_in_spec = given_fields(body)
+    better_walks = {}
+    for count in range(1, len(names_in_spec) + 1):
+        for names in itertools.combinations(names_in_spec, count):
+            first_walk = walk(_leave_out(body, names))
+            if first_walk.quality > quality:
+                better_walks[names] = first_walk
+        if any(first_walk.quality == 2 for first_walk in better_walks.values()):
+            break  # with more fields left out, none is better
+
+    def rank(item: tuple[tuple[str, ...], FirstWalk]) -> tuple:
+        names, first_walk = item
+        return first_walk.quality, -len(names), first_walk.speed
+
+    return max(better_walks.items(), key=rank, default=None)
 
 
-def _leaving_out(body: Body, names: tuple[str, ...]) -> Body:
+def _leave_out(body: Body, names: tuple[str, ...]) -> Body:
     """Return a body whose joints leave out fields."""
 
-    def changed(link: Link) -> Link:
-        return link.replace(joint=link.joint and link.joint.replace(**dict.fromkeys(names)))
+    def without_fields(link: Link) -> Link:
+        if link.joint is None:
+            return link
+        return link.replace(joint=link.joint.replace(**dict.fromkeys(names)))
 
-    return body.replace(legs=tuple(leg.replace(links=tuple(map(changed, leg.links))) for leg in body.legs))
+    return body.replace(legs=tuple(leg.replace(links=tuple(map(without_fields, leg.links))) for leg in body.legs))

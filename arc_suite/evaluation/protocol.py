@@ -1,4 +1,4 @@
-"""The evaluation protocol, in one place: seeded episodes and deterministic actions."""
+"""The evaluation protocol: seeded episodes and deterministic actions."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -12,8 +12,8 @@ from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
 from arc_suite.simulation.episode_loop import play_episode
 
-EPISODES = 100  # of a final policy, from seed 0
-CURVE_EPISODES = 10  # of a point of a learning curve: the paper's Section 6, Experimental Setting
+EPISODES = 100  # that evaluate a final policy, from seed 0
+CURVE_EPISODES = 10  # that evaluate a point of a learning curve (the paper's Section 6, Experimental Setting)
 
 _PROGRESS = "progress_"  # prefix of the task's metrics in an info
 
@@ -33,20 +33,24 @@ class EpisodeResult(NamedTuple):
 
 
 def expert_return(setup: Setup) -> float | None:
-    """Return what the paper's demonstrator earns; None for other tasks, settings and robots than the paper's."""
+    """Return the return of the paper's demonstrator; None for a task, settings or a robot that the paper lacks."""
     return published.DEMONSTRATORS.get(setup.name) if _is_published(setup) else None
 
 
 def published_returns(setup: Setup, algorithms: Iterable[str], steps: int) -> dict[str, float]:
-    """Return the paper's returns after environment steps by algorithm, of those given, or of the best without any.
+    """Return the paper's returns after environment steps by algorithm: of those given, else of the best one.
 
-    Empty for other tasks, settings and robots than the paper's, and before the first points of its curves.
+    Empty for a task, settings or a robot that the paper lacks, and before the first points of its curves.
     """
-    curves = published.CURVES.get(setup.name, {}) if _is_published(setup) else {}
-    found = {name: point for name in curves if (point := published.at(setup.name, name, steps)) is not None}
-    if given := {name: found[name] for name in algorithms if name in found}:
-        return given
-    return {name: point for name, point in found.items() if point == max(found.values())}
+    if not _is_published(setup):
+        return {}
+    returns = {name: published.at(setup.name, name, steps) for name in published.CURVES.get(setup.name, {})}
+    returns = {name: value for name, value in returns.items() if value is not None}
+    returns_of_algorithms = {name: returns[name] for name in algorithms if name in returns}
+    if returns_of_algorithms or not returns:
+        return returns_of_algorithms
+    best_return = max(returns.values())
+    return {name: value for name, value in returns.items() if value == best_return}
 
 
 def _is_published(setup: Setup) -> bool:
@@ -54,10 +58,10 @@ def _is_published(setup: Setup) -> bool:
 
 
 def check_ends(limit: float) -> None:
-    """Check that episodes end, given the longest duration, in control steps or s.
+    """Check that episodes end, given their longest duration, in control steps or s.
 
     Raises:
-        ValueError: they need not.
+        ValueError: episodes that need not end.
     """
     if limit == math.inf:
         raise ValueError("time_limit: expected a finite number, as every episode must end, got inf")
@@ -70,10 +74,10 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
         environment: of `arc_suite.load`.
         policy: made for one environment.
         seed: of the episode's start.
-        max_steps: to stop early.
+        max_steps: control steps after which to stop; None for a whole episode.
 
     Yields:
-        The `TimeStep` of the reset and of every step; the environment stands there meanwhile.
+        The `TimeStep` of the reset and of every step; meanwhile the environment is in that state.
 
     Raises:
         ValueError: an episode that need not end.
@@ -93,7 +97,7 @@ def run(
         policy: see `rollout`.
         seed: see `rollout`.
         max_steps: see `rollout`.
-        watchers: called with every `TimeStep`, also that of the reset, while the environment stands there.
+        watchers: called with every `TimeStep`, also that of the reset, while the environment is in that state.
     """
     rewards = []
     for timestep in rollout(environment, policy, seed, max_steps):
@@ -137,26 +141,30 @@ def episodes_in_batch(
         ValueError: episodes that need not end.
     """
     check_ends(environment.step_limit)
-    num_envs, seeds = environment.num_envs, range(environment.num_envs) if seeds is None else seeds
-    observations, _ = environment.reset(seed=list(seeds))
-    policy.reset(range(num_envs), list(seeds))
-    totals, rewards, lengths = np.zeros(num_envs), np.zeros(num_envs), np.zeros(num_envs, int)
+    num_envs = environment.num_envs
+    seeds = list(range(num_envs) if seeds is None else seeds)
+    observations, _ = environment.reset(seed=seeds)
+    policy.reset(range(num_envs), seeds)
+    rewards = np.zeros(num_envs)
+    totals = np.zeros(num_envs)
+    lengths = np.zeros(num_envs, int)
     progress = [{}] * num_envs
-    playing = np.ones(num_envs, bool)
+    is_playing = np.ones(num_envs, bool)
     if watch is not None:
-        watch(~playing, ~playing)
-    while playing.any():
+        watch(~is_playing, ~is_playing)
+    while is_playing.any():
         actions = policy.act(environment.task.split(observations), rewards)
         observations, rewards, terminated, truncated, info = environment.step(actions)
-        totals[playing] += rewards[playing]
-        lengths += playing
+        totals[is_playing] += rewards[is_playing]
+        lengths += is_playing
         if watch is not None:
-            watch(playing, playing & terminated)
-        ended = playing & (terminated | truncated)
-        for index in np.flatnonzero(ended):
+            watch(is_playing, is_playing & terminated)
+        has_ended = is_playing & (terminated | truncated)
+        for index in np.flatnonzero(has_ended):
             metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}
             progress[index] = {name.removeprefix(_PROGRESS): float(values[index]) for name, values in metrics.items()}
-        playing &= ~ended
-        if ended.any() and playing.any():
-            environment.rest(~playing)
-    return [EpisodeResult(*each) for each in zip(totals.tolist(), lengths.tolist(), progress, strict=True)]
+        is_playing &= ~has_ended
+        if has_ended.any() and is_playing.any():
+            environment.rest(~is_playing)
+    results = zip(totals.tolist(), lengths.tolist(), progress, strict=True)
+    return [EpisodeResult(total, length, metrics) for total, length, metrics in results]

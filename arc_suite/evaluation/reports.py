@@ -1,4 +1,4 @@
-"""What a policy is worth in a setup: `evaluate` plays the episodes, and a report holds and prints what they say."""
+"""Evaluation of a policy in a setup: `evaluate` plays the episodes, and a report holds and prints their results."""
 
 import functools
 import os
@@ -17,17 +17,18 @@ from arc_suite.evaluation.statistics import Summary
 from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
 
-_WIDTHS = (18, 9, 7, 26, 9, 12)  # of the columns that every task has
+# Columns that every task has, with their widths; the last one only for the paper's demonstrator.
+_WIDTHS = (18, 9, 7, 26, 9, 12)
 _HEADS = ("return", "zero", "score", "IQM [95 % interval]", "steps", "paper's cpg")
+MIN_LABEL_WIDTH = 12  # of the first column
 _bar = functools.partial(tqdm, unit="episode", leave=False)
-LABEL = 12  # least width of the first column
 
 
 class Player(NamedTuple):
-    """A policy at the start of its episodes.
+    """A policy with an environment in which it is evaluated.
 
     Attributes:
-        setup: that it plays in.
+        setup: of the environment.
         policy: made for one environment.
         environment: of the setup.
         preset: of the demonstrator; None for another policy.
@@ -40,18 +41,18 @@ class Player(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What a policy is worth in a setup. As text it is the table of `arc-suite evaluate`.
+    """Results of a policy in a setup. As text it is the table of `arc-suite evaluate`.
 
     Attributes:
-        setup: that it has played in.
+        setup: of the episodes.
         preset: of the demonstrator; None for another policy.
         returns: over the episodes.
         zero: mean return of standing still.
-        score: 0 for standing still, 1 for the best demonstrator; None outside the places of the benchmark.
+        score: 0 for standing still, 1 for the best demonstrator; None where no anchors are committed.
         length: control steps.
         progress: the task's metrics by name.
-        expert: what the paper's demonstrator earns; None for other setups than the paper's.
-        episodes: all of them, in the order of their seeds.
+        expert: return of the paper's demonstrator; None for other setups than the paper's.
+        episodes: all episodes, in the order of their seeds.
     """
 
     setup: Setup
@@ -66,7 +67,7 @@ class Report(NamedTuple):
 
     @property
     def of_the_paper(self) -> bool:
-        """Whether the paper's demonstrator has played, so that the table ends with the paper's return."""
+        """Whether the paper's demonstrator was evaluated; then the table ends with the return in the paper."""
         return self.expert is not None and self.preset == "medium"
 
     @property
@@ -74,13 +75,13 @@ class Report(NamedTuple):
         """The body, and the preset if there is one."""
         return label(self.setup, self.preset)
 
-    def heading(self, width: int = LABEL) -> str:
-        """Return the heading of the table; the first column has a width."""
-        shown = _HEADS if self.of_the_paper else _HEADS[:-1]
-        return _line("robot".ljust(width), {name: name for name in self.progress}, shown)
+    def heading(self, width: int = MIN_LABEL_WIDTH) -> str:
+        """Return the heading of the table, given the width of the first column."""
+        heads = _HEADS if self.of_the_paper else _HEADS[:-1]
+        return _line("robot".ljust(width), {name: name for name in self.progress}, heads)
 
-    def line(self, width: int = LABEL) -> str:
-        """Return the row of the table; the first column has a width."""
+    def line(self, width: int = MIN_LABEL_WIDTH) -> str:
+        """Return the row of the table, given the width of the first column."""
         low, high = self.returns.interval
         cells = [
             f"{self.returns.mean:.1f} +- {self.returns.deviation:.1f}",
@@ -89,15 +90,17 @@ class Report(NamedTuple):
             f"{self.returns.iqm:.1f} [{low:.1f}, {high:.1f}]",
             f"{self.length.mean:.1f}",
         ]
-        own = {name: f"{summary.mean:.3f}" for name, summary in self.progress.items()}
-        return _line(self.label.ljust(width), own, cells + ([f"{self.expert:.0f}"] if self.of_the_paper else []))
+        if self.of_the_paper:
+            cells.append(f"{self.expert:.0f}")
+        metrics = {name: f"{summary.mean:.3f}" for name, summary in self.progress.items()}
+        return _line(self.label.ljust(width), metrics, cells)
 
     def __str__(self) -> str:
-        width = max(LABEL, len(self.label))
+        width = max(MIN_LABEL_WIDTH, len(self.label))
         return f"{self.heading(width)}\n{self.line(width)}"
 
     def to_json(self) -> dict[str, Any]:
-        """Return what `arc-suite evaluate --json` holds of a robot."""
+        """Return the entry of a robot in the file of `arc-suite evaluate --json`."""
         return {
             "provenance": provenance.of_setup(self.setup),
             "preset": self.preset,
@@ -131,23 +134,27 @@ def evaluate(
         task: its name; None for that of a trained policy with its settings, which `task_kwargs` change, or walk.
         task_kwargs: see `arc_suite.load`.
         preset: of the demonstrator; None for the one that suits task and body.
-        episodes: how many.
+        episodes: number of episodes.
         seed: of the first episode; the others count on from it.
         progress: wraps the seeds.
 
     Raises:
-        ValueError: no robot, an unknown name, a value out of range, or a policy that has learned from these episodes.
+        ValueError: no robot, an unknown name, a value out of range, or a policy that was trained in these episodes.
         OSError: a file that cannot be read.
     """
     seeds = range(checks.seed(seed), checks.seed(seed + checks.integer("episodes", episodes, 1) - 1) + 1)
-    own = policies.setup_of(policy)
-    own = own and own.judging()
-    if robot is None and (own is None or own.several):
-        raise ValueError("robot: expected a body, as the policy brings none")
+    setup_of_policy = policies.setup_of(policy)
+    if setup_of_policy is not None:
+        setup_of_policy = setup_of_policy.judging()
+    if robot is None:
+        if setup_of_policy is None or setup_of_policy.several:
+            raise ValueError("robot: expected a body, as the policy brings none")
+        robot = setup_of_policy.body
     settings = dict(task_kwargs or {})
-    if own is not None and task is None:
-        task, settings = own.task, own.task_kwargs | settings
-    setup = Setup.of(own.body if robot is None else robot, task or "walk", settings)
+    if task is None and setup_of_policy is not None:
+        task = setup_of_policy.task
+        settings = setup_of_policy.task_kwargs | settings
+    setup = Setup.of(robot, task or "walk", settings)
     provenance.training_seeds(policy, seeds)
     return report(player(policy, setup, preset), seeds, progress)
 
@@ -162,44 +169,51 @@ def player(policy: str | os.PathLike | Policy | Callable, setup: Setup, preset: 
     environment = setup.load()
     if policy == "cpg" and preset is None:
         preset = suited_preset(environment.task.definition)
-    made = policies.acting(policy, environment.task.definition, preset)
-    return Player(setup, made, environment, preset if policy == "cpg" else None)
+    acting_policy = policies.acting(policy, environment.task.definition, preset)
+    return Player(setup, acting_policy, environment, preset if policy == "cpg" else None)
 
 
-def report(played: Player, seeds: Sequence[int], progress: Callable[[Iterable[int]], Iterable[int]] = iter) -> Report:
-    """Play an episode for each seed and return what they say.
+def report(
+    evaluated: Player, seeds: Sequence[int], progress: Callable[[Iterable[int]], Iterable[int]] = iter
+) -> Report:
+    """Play an episode for each seed, and return their results.
 
     Args:
-        played: the policy.
+        evaluated: the policy and its environment.
         seeds: of the episodes.
         progress: wraps the seeds.
 
     Raises:
         ValueError: episodes that need not end.
     """
-    setup, policy, environment, preset = played
-    found = protocol.episodes(environment, policy, progress(seeds))
-    known = anchors.known(setup)
-    returns = statistics.summary([episode.total for episode in found])
+    setup, policy, environment, preset = evaluated
+    episodes = protocol.episodes(environment, policy, progress(seeds))
+    returns = statistics.summary([episode.total for episode in episodes])
+    anchor_returns = anchors.committed_returns(setup)
+    score = None
+    if anchor_returns is not None:
+        score = float(anchors.of_returns(anchor_returns).score(returns.mean))
+    metrics = episodes[0].progress
     return Report(
         setup=setup,
         preset=preset,
         returns=returns,
-        zero=float(anchors.played(setup, anchors.ZERO, seeds[:CURVE_EPISODES]).mean()),
-        score=None if known is None else float(anchors.of_returns(known).score(returns.mean)),
-        length=statistics.summary([episode.length for episode in found]),
-        progress={name: statistics.summary([each.progress[name] for each in found]) for name in found[0].progress},
+        zero=float(anchors.play_returns(setup, anchors.ZERO, seeds[:CURVE_EPISODES]).mean()),
+        score=score,
+        length=statistics.summary([episode.length for episode in episodes]),
+        progress={name: statistics.summary([episode.progress[name] for episode in episodes]) for name in metrics},
         expert=protocol.expert_return(setup),
-        episodes=found,
+        episodes=episodes,
     )
 
 
 def label(setup: Setup, preset: str | None) -> str:
-    """Return how a table names a body, and the preset if there is one."""
+    """Return the label of a row: the body, and the preset if there is one."""
     return setup.body.name if preset is None else f"{setup.body.name}, {preset}"
 
 
 def _line(first: str, metrics: Mapping[str, str], cells: Iterable[str]) -> str:
-    """Return a line of the table: the first cell, the task's own metrics by name, and cells that every task has."""
-    own = [f"{cell:>{max(len(name), 6)}}" for name, cell in metrics.items()]
-    return " ".join([first, *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=False))])
+    """Return a line of the table: the first cell, metrics of the task by name, and cells that every task has."""
+    metric_cells = [f"{cell:>{max(len(name), 6)}}" for name, cell in metrics.items()]
+    common_cells = [f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=False)]
+    return " ".join([first, *metric_cells, *common_cells])

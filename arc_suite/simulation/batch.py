@@ -9,12 +9,12 @@ import mujoco.batch
 import numpy as np
 
 from arc_suite.simulation import forks, timers
-from arc_suite.simulation.model import ReadOnly, change, field
-from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, checked_snapshot, model_fields
+from arc_suite.simulation.model import ReadOnly, change_fields, field
+from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, check_snapshot, model_fields
 
-_SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-# Sizes of models that make no difference to `MjData`.
-_TEXTS = ("nbuffer", "nnames", "nnames_map", "npaths", "ntext", "ntextdata")
+_NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+# Sizes of models on which `MjData` does not depend.
+_TEXT_SIZES = ("nbuffer", "nnames", "nnames_map", "npaths", "ntext", "ntextdata")
 
 
 class Batch:
@@ -37,22 +37,27 @@ class Batch:
         """Allocate the simulations.
 
         Args:
-            model: of them all, copied; or one for each, all of one `layout`, which stay as they are.
+            model: one for all simulations, which is copied; or one for each, all of one `layout`, which are kept.
             count: number of simulations.
-            threads: to step on; 0 for as many as there are CPUs.
-            fields: of `MjData` that `data` has; qpos, qvel and ctrl always are among them.
+            threads: number of threads; 0 for as many as there are CPUs.
+            fields: fields of `MjData` that `data` has, in addition to qpos, qvel and ctrl.
         """
         self._forks = forks.count
-        # Models as compiled, and as they now are, one for each simulation; None while they share one.
+        # Models as compiled, and with changes, one for each simulation; None while they share one.
         self._compiled = None if isinstance(model, mujoco.MjModel) else list(model)
-        self._own = self._compiled
-        self._simulations = mujoco.batch.Batch(model if self._compiled is None else model[0], count, threads)
+        self._models = self._compiled
+        first_model = model if self._compiled is None else model[0]
+        self._simulations = mujoco.batch.Batch(first_model, count, threads)
         forks.keep(self._simulations)
-        self._simulations.set_models(self._own)
-        self._changed: dict[str, None] = {}  # names of fields that ever were
-        self._lasting: dict[str, np.ndarray] = {}  # (count, *shape) values that stay over resets, NaN for none
-        self._silent = _silent(model) if self._compiled is None else [_silent(each) for each in model]
-        # What is bound is filled by every call, so it must be bound before the first.
+        self._simulations.set_models(self._models)
+        self._changed_fields: dict[str, None] = {}  # an ordered set of names
+        self._lasting: dict[str, np.ndarray] = {}  # (count, *shape) values that stay over resets, NaN for no change
+        # Models without sensors, for all substeps but the last.
+        if self._compiled is None:
+            self._silent = _without_sensors(model)
+        else:
+            self._silent = [_without_sensors(compiled) for compiled in self._compiled]
+        # Every call fills bound arrays, so they are bound before the first one.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
         self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
 
@@ -69,12 +74,13 @@ class Batch:
     @property
     def models(self) -> list[ReadOnly]:
         """The model of each simulation, to read; `change_model` changes them."""
-        return [ReadOnly(model) for model in self._own or [self._simulations.model] * self._simulations.nsim]
+        models = self._models or [self._simulations.model] * self._simulations.nsim
+        return [ReadOnly(model) for model in models]
 
     @property
     def changed(self) -> list[str]:
-        """Names of the models' fields that ever were changed."""
-        return list(self._changed)
+        """Names of the models' fields that were changed at any time."""
+        return list(self._changed_fields)
 
     def part(self, mask: np.ndarray | int) -> types.SimpleNamespace:
         """Return `data` of some simulations: copies for a mask (count,), views without that axis for an index."""
@@ -83,15 +89,14 @@ class Batch:
     def step(self, nstep: int, mask: np.ndarray) -> np.ndarray:
         """Advance some simulations by `nstep` substeps, as `Physics.step` does.
 
-        Where these diverge, MuJoCo goes on from the model's default state, says nothing and counts
-        a warning.
+        Where these diverge, MuJoCo continues from the model's default state and counts a warning.
 
         Args:
             nstep: number of substeps, at least 2.
-            mask: (count,) of those to advance.
+            mask: (count,) simulations to advance.
 
         Returns:
-            Mask (count,) of those that diverged.
+            Mask (count,) of simulations that diverged.
 
         Raises:
             ForkError: made before a fork.
@@ -104,7 +109,7 @@ class Batch:
             try:
                 simulations.step(mask, nstep - 1)
             finally:
-                simulations.set_models(self._own)
+                simulations.set_models(self._models)
             simulations.step(mask)
         return simulations.warning[..., 1].any(axis=-1)
 
@@ -119,11 +124,11 @@ class Batch:
         """Restart some simulations, as dm_control's `reset_context` does.
 
         Args:
-            mask: (count,) of those to restart.
+            mask: (count,) simulations to restart.
             qpos: (restarted, nq) their positions.
             qvel: (restarted, nv) their velocities.
             mocap_pos: (restarted, nmocap, 3) positions of the arena's movable bodies; None for the model's.
-            models: (restarted,) fields of the model by name that differ until the next reset; empty for none.
+            models: (restarted,) fields of each model that differ until the next reset, by name; empty for none.
 
         Raises:
             ForkError: made before a fork.
@@ -131,10 +136,11 @@ class Batch:
         self._check_process()
         self._simulations.set_models(self._compiled)
         self._simulations.reset(mask)  # runs mj_forward, from whose result the solver starts next
-        if self._own is not self._compiled or any(models):
-            self._change(mask, models or [{}] * len(qpos))  # with lasting changes
-        self._simulations.set_models(self._own)
-        self.data.qpos[mask], self.data.qvel[mask] = qpos, qvel
+        if self._models is not self._compiled or any(models):
+            self._change_for_episode(mask, models or [{}] * len(qpos))
+        self._simulations.set_models(self._models)
+        self.data.qpos[mask] = qpos
+        self.data.qvel[mask] = qvel
         if mocap_pos is not None:
             self.mocap_pos[mask] = mocap_pos
         self._simulations.forward(mask)
@@ -143,8 +149,8 @@ class Batch:
         """Move some simulations to other positions and update derived quantities.
 
         Args:
-            mask: (count,) of those to move.
-            qpos: (moved, nq) where to.
+            mask: (count,) simulations to move.
+            qpos: (moved, nq) their positions.
 
         Raises:
             ForkError: made before a fork.
@@ -158,7 +164,7 @@ class Batch:
 
         Args:
             fields: values (count, *shape) by name.
-            mask: (count,) of those to change.
+            mask: (count,) simulations whose models change.
 
         Raises:
             ForkError: made before a fork.
@@ -167,62 +173,71 @@ class Batch:
         for name, values in fields.items():
             lasting = self._lasting.setdefault(name, np.full(values.shape, np.nan))
             lasting[mask] = values[mask]
-        self._write(mask, [{name: fields[name][index] for name in fields} for index in np.flatnonzero(mask)])
-        self._simulations.set_models(self._own)
+        changes = [{name: values[index] for name, values in fields.items()} for index in np.flatnonzero(mask)]
+        self._write(mask, changes)
+        self._simulations.set_models(self._models)
 
-    def _change(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
-        """Let models of some simulations be the compiled ones with lasting changes, and with fields of one episode."""
-        self._changed |= dict.fromkeys(name for fields in models for name in fields)
+    def _change_for_episode(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
+        """Set models of some simulations to the compiled ones with fields of one episode, and with lasting changes."""
+        self._changed_fields |= dict.fromkeys(name for fields in models for name in fields)
         compiled = self._compiled or [self._simulations.model] * len(mask)
         changes = []
         for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
-            unchanged = {name: field(compiled[index], name) for name in self._changed}
-            changes.append({**unchanged, **fields, **self.lasting(index)})
+            compiled_fields = {name: field(compiled[index], name) for name in self._changed_fields}
+            changes.append({**compiled_fields, **fields, **self.lasting(index)})
         self._write(mask, changes)
 
     def _write(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
-        self._changed |= dict.fromkeys(name for fields in models for name in fields)
-        if self._own is self._compiled:
+        """Write fields (changed,) into models of some simulations, which get a model each at the first change."""
+        self._changed_fields |= dict.fromkeys(name for fields in models for name in fields)
+        if self._models is self._compiled:
             compiled = self._compiled or [self._simulations.model] * len(mask)
-            self._own, self._silent = [copy.copy(each) for each in compiled], [_silent(each) for each in compiled]
+            self._models = [copy.copy(model) for model in compiled]
+            self._silent = [_without_sensors(model) for model in compiled]
         scratch = mujoco.MjData(self._simulations.model)
         for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
-            for own in (self._own[index], self._silent[index]):
-                change(own, fields, scratch)
+            change_fields(self._models[index], fields, scratch)
+            change_fields(self._silent[index], fields, scratch)
 
     def lasting(self, index: int) -> dict[str, np.ndarray]:
         """Return fields of a simulation's model that stay over resets, by name."""
-        return {name: each[index] for name, each in self._lasting.items() if not np.isnan(each[index]).any()}
+        fields = {name: values[index] for name, values in self._lasting.items()}
+        return {name: values for name, values in fields.items() if not np.isnan(values).any()}
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""
         fields = {name: array.copy() for name, array in vars(self.data).items()}
-        models = {f"{OF_MODEL}{name}": np.stack([field(own, name) for own in self._own]) for name in self._changed}
+        models = {
+            f"{OF_MODEL}{name}": np.stack([field(model, name) for model in self._models])
+            for name in self._changed_fields
+        }
         lasting = {f"{LASTING}{name}": values.copy() for name, values in self._lasting.items()}
         return {"state": self._simulations.state.copy(), **fields, **models, **lasting}
 
-    def checked(self, arrays: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+    def check_snapshot(self, arrays: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
         """Return the arrays of a snapshot if `restore` can take them.
 
         Raises:
             ValueError: an array is missing, too many, of another shape or type, or holds a value out of range.
         """
         models = self._compiled or [self._simulations.model] * self._simulations.nsim
-        return checked_snapshot({"state": self._simulations.state, **vars(self.data)}, models, arrays)
+        return check_snapshot({"state": self._simulations.state, **vars(self.data)}, models, arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue bit-identically from the arrays of `snapshot`."""
-        models, self._lasting = model_fields(arrays)
-        if models or self._own is not self._compiled:
-            each = range(self._simulations.nsim)
-            self._change(np.ones(len(each), bool), [{name: models[name][index] for name in models} for index in each])
-            self._simulations.set_models(self._own)
+        fields, self._lasting = model_fields(arrays)
+        if fields or self._models is not self._compiled:
+            count = self._simulations.nsim
+            changes = [{name: values[index] for name, values in fields.items()} for index in range(count)]
+            self._change_for_episode(np.ones(count, bool), changes)
+            self._simulations.set_models(self._models)
         self._simulations.state[...] = arrays["state"]
         for name, bound in vars(self.data).items():
             _fill(bound, arrays[name])
 
     def __getstate__(self):
-        simulations, model = self._simulations, self._compiled or self._simulations.model
+        simulations = self._simulations
+        model = self._compiled or simulations.model
         return model, simulations.nsim, simulations.nthread, list(vars(self.data)), self.snapshot()
 
     def __setstate__(self, state):
@@ -237,20 +252,21 @@ class Batch:
 
 def layout(model: mujoco.MjModel) -> tuple[int, ...]:
     """Return the sizes of a model that simulations of one batch share; names and texts may differ."""
-    names = (name for name in dir(model) if name.startswith("n") and name not in _TEXTS)
-    return tuple(size for size in (getattr(model, name) for name in names) if isinstance(size, int))
+    names = [name for name in dir(model) if name.startswith("n") and name not in _TEXT_SIZES]
+    attributes = [getattr(model, name) for name in names]
+    return tuple(attribute for attribute in attributes if isinstance(attribute, int))
 
 
-def _silent(model: mujoco.MjModel) -> mujoco.MjModel:
+def _without_sensors(model: mujoco.MjModel) -> mujoco.MjModel:
     """Return a copy of a model with sensors disabled."""
-    model = copy.copy(model)
-    model.opt.disableflags |= _SENSOR
-    return model
+    silent_model = copy.copy(model)
+    silent_model.opt.disableflags |= _NO_SENSORS
+    return silent_model
 
 
 def _fill(array: np.ndarray, values: np.ndarray) -> None:
-    """Write into a bound array, including read-only outputs."""
-    writeable = array.flags.writeable
+    """Write into a bound array, which may be a read-only output."""
+    was_writeable = array.flags.writeable
     array.flags.writeable = True
     array[...] = values
-    array.flags.writeable = writeable
+    array.flags.writeable = was_writeable

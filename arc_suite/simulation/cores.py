@@ -1,23 +1,24 @@
-"""Cores that this process may use, less than the machine's in containers and on clusters; and the one of a learner."""
+"""Cores that this process may use: in containers and on clusters, fewer than the machine has."""
 
 import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
-_GROUPS, _MOUNT = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
-# One thread a run: two runs on two cores learn twice as much, two threads in a run hardly more than one.
+_GROUPS = Path("/proc/self/cgroup")
+_MOUNT = Path("/sys/fs/cgroup")
+# A second thread hardly makes a run faster, so that two cores serve two runs better.
 _ONE_THREAD = {"NPROC": "1", "OMP_NUM_THREADS": "1", "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
 
 
 def use_one_thread() -> None:
-    """Have JAX compute on one thread, unless the environment says otherwise; before it is imported."""
+    """Let JAX compute on one thread, unless environment variables are set; call this before JAX is imported."""
     for name, value in _ONE_THREAD.items():
         os.environ.setdefault(name, value)
 
 
 def usable_cores(groups: Path = _GROUPS, mount: Path = _MOUNT) -> int:
-    """Return how many cores this process may use by its affinity and the quotas of its control groups, at least 1.
+    """Return the number of cores that this process may use, at least 1: by its affinity and its control groups.
 
     Args:
         groups: file that names the control groups of the process.
@@ -29,24 +30,30 @@ def usable_cores(groups: Path = _GROUPS, mount: Path = _MOUNT) -> int:
 
 def _quotas(groups: Path, mount: Path) -> Iterator[float]:
     """Yield the CPU quotas, cores, of all control groups of a process, those of version 1 and 2."""
-    yield math.inf
+    yield math.inf  # without control groups
     for line in _text(groups).splitlines():
         _, controllers, path = line.split(":", 2)
         if controllers and "cpu" not in controllers.split(","):
             continue
         root = mount / controllers if controllers else mount
-        own = root / path.strip("/")
-        for folder in (own, *own.parents):
+        group = root / path.strip("/")
+        for folder in (group, *group.parents):
             if folder == root.parent:
                 break
             yield _quota(folder)
 
 
 def _quota(folder: Path) -> float:
-    """Quota of one control group, cores; infinite where there is none."""
-    texts = _text(folder / "cpu.max") or " ".join(_text(folder / f"cpu.cfs_{name}_us") for name in ("quota", "period"))
-    quota, period, *_ = (*texts.split(), "max", "1")
-    return math.inf if quota in ("max", "-1") or not float(period) else float(quota) / float(period)
+    """Return the quota of a control group, cores; infinite without one."""
+    numbers = _text(folder / "cpu.max").split()  # version 2: quota and period
+    if not numbers:  # version 1
+        numbers = [*_text(folder / "cpu.cfs_quota_us").split(), *_text(folder / "cpu.cfs_period_us").split()]
+    if len(numbers) < 2:
+        return math.inf
+    quota, period = numbers
+    if quota in ("max", "-1") or float(period) == 0.0:
+        return math.inf
+    return float(quota) / float(period)
 
 
 def _text(file: Path) -> str:

@@ -15,8 +15,11 @@ from arc_suite import versions
 from arc_suite.models.builder import EYE
 from arc_suite.simulation.episode_loop import play_episode
 
-_ROUNDING = 1e-6  # control steps
-_SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
+_TOLERANCE = 1e-6  # control steps, of times
+_MIN_FRAME_SECONDS = 0.02  # players change the pace of a GIF with shorter frames
+_WEBP_METHOD = 4  # of the encoder, 0 to 6
+_GIF_COLORS = 128
+_GIF_SAMPLES = 4  # frames from which the palette is made
 
 
 class Footage:
@@ -24,9 +27,9 @@ class Footage:
 
     Attributes:
         robot: its name.
-        earned: sum of the rewards so far.
+        episode_return: sum of the rewards so far.
         steps: control steps so far.
-        advance: cycles that the gait clock made in the latest step; 0 before the first, or without a gait clock.
+        advance: of the gait clock in the latest step, cycles; 0 before the first step, or without a gait clock.
     """
 
     def __init__(
@@ -36,30 +39,32 @@ class Footage:
 
         Args:
             robot: its name.
-            environment: of `arc_suite.load`; the take closes it.
+            environment: of `arc_suite.load`; `close` closes it.
             policy: maps a `TimeStep` to an action.
             camera: one of `builder.CAMERAS`.
             size: width and height of a view in pixels.
-            quality: of views; see `pictures.QUALITIES`. The eye has its own.
+            quality: of views; see `pictures.QUALITIES`. The camera `eye` has another quality.
         """
         self.robot = robot
-        self.earned = 0.0
+        self.episode_return = 0.0
         self.steps = 0
         self.advance = 0.0
         self._environment = environment
         self._episode = play_episode(environment, policy)
         self._time_step = next(self._episode)
-        self._before = self._state()
-        self._camera, self._size, self._quality = camera, size, None if camera == EYE else quality
+        self._state_before = self._state()  # at the start of the latest step
+        self._camera = camera
+        self._size = size
+        self._quality = None if camera == EYE else quality
 
     @property
     def ended(self) -> bool:
-        """Whether the episode is over; stepping on changes nothing then."""
+        """Whether the episode is over; further steps change nothing."""
         return self._time_step.last()
 
     @property
     def phase(self) -> float:
-        """Phase of the gait clock, in cycles from 0 to 1; 0 in a task that has none."""
+        """Phase of the gait clock, in cycles from 0 to 1; 0 in a task without a gait clock."""
         sine, cosine = self._time_step.observation.get("gait_clock", (0.0, 1.0))
         return float(np.arctan2(sine, cosine) / (2.0 * np.pi) % 1.0)
 
@@ -72,47 +77,51 @@ class Footage:
         """Advance by one control step."""
         if self.ended:
             return
-        before, self._before = self.phase, self._state()
+        phase_before = self.phase
+        self._state_before = self._state()
         self._time_step = next(self._episode)
-        self.advance = (self.phase - before) % 1.0
-        self.earned += self._time_step.reward
+        self.advance = (self.phase - phase_before) % 1.0
+        self.episode_return += self._time_step.reward
         self.steps += 1
 
     def view(self, share: float = 1.0) -> np.ndarray:
-        """Return what the camera sees.
+        """Return the picture (height, width, 3) uint8 of the camera.
 
         Args:
-            share: of the latest control step that is over; the pose between its ends is a cubic through both.
-
-        Returns:
-            (height, width, 3) uint8.
+            share: of the latest control step, at which the pose is interpolated; 1 for its end.
         """
-        (width, height), physics = self._size, self._environment.physics
-        qpos = physics.data.qpos if share == 1.0 else self.between(share)
+        width, height = self._size
+        physics = self._environment.physics
+        qpos = physics.data.qpos if share == 1.0 else self.interpolate(share)
         return physics.render(height, width, self._camera, quality=self._quality, qpos=qpos)
 
     def at(self, time: float) -> np.ndarray:
-        """Step on until a time of the episode, s, and return what the camera sees then."""
+        """Step until a time of the episode, s, and return the picture at that time."""
         steps = time / self.control_timestep
-        while not self.ended and self.steps < steps - _ROUNDING:
+        while not self.ended and self.steps < steps - _TOLERANCE:
             self.step()
         share = 1.0 - (self.steps - steps)
-        return self.view(share if _ROUNDING < share < 1.0 - _ROUNDING else 1.0)
+        is_between_steps = _TOLERANCE < share < 1.0 - _TOLERANCE
+        return self.view(share if is_between_steps else 1.0)
 
     def _state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return qpos (nq,) and qvel (nv,)."""
         data = self._environment.physics.data
         return data.qpos.copy(), data.qvel.copy()
 
-    def between(self, share: float) -> np.ndarray:
+    def interpolate(self, share: float) -> np.ndarray:
         """Return positions (nq,) at a share of the latest control step: Hermite's cubic, by velocities at its ends."""
-        (start, velocity), (end, last) = self._before, self._state()
-        model, way = self._environment.physics.model.ptr, np.empty_like(velocity)
-        mujoco.mj_differentiatePos(model, way, 1.0, start, end)
-        rest, step = 1.0 - share, self.control_timestep
-        way *= share**2 * (1.0 + 2.0 * rest)
-        way += step * share * rest * (rest * velocity - share * last)
+        start, start_velocity = self._state_before
+        end, end_velocity = self._state()
+        model = self._environment.physics.model.ptr
+        displacement = np.empty_like(start_velocity)
+        mujoco.mj_differentiatePos(model, displacement, 1.0, start, end)
+        remaining = 1.0 - share
+        displacement *= share**2 * (1.0 + 2.0 * remaining)
+        tangents = remaining * start_velocity - share * end_velocity
+        displacement += self.control_timestep * share * remaining * tangents
         qpos = start.copy()
-        mujoco.mj_integratePos(model, qpos, way, 1.0)
+        mujoco.mj_integratePos(model, qpos, displacement, 1.0)
         return qpos
 
     def close(self) -> None:
@@ -124,16 +133,20 @@ def cycle(footage: Footage, count: int) -> Iterator[np.ndarray]:
     """Yield views of the next whole gait cycle, evenly spaced, captioned with the gait clock's phase.
 
     Args:
-        footage: whose gait clock advanced in the latest step.
-        count: of views.
+        footage: an episode whose gait clock advanced in the latest step.
+        count: number of views.
     """
-    while not footage.ended and not (footage.phase + 0.5 * footage.advance) % 1.0 < footage.advance:
+    while not footage.ended and not _is_nearest_to_start_of_cycle(footage):
         footage.step()
     start = footage.steps
-    for i in range(count):
-        while not footage.ended and footage.steps < start + round(i / (count * footage.advance)):
+    for number in range(count):
+        while not footage.ended and footage.steps < start + round(number / (count * footage.advance)):
             footage.step()
-        yield captioned(footage.view(), f"phase {footage.phase:.2f}")
+        yield add_caption(footage.view(), f"phase {footage.phase:.2f}")
+
+
+def _is_nearest_to_start_of_cycle(footage: Footage) -> bool:
+    return (footage.phase + 0.5 * footage.advance) % 1.0 < footage.advance
 
 
 def frames(footages: Sequence[Footage], seconds: float, frame: float) -> Iterator[list[np.ndarray]]:
@@ -142,34 +155,35 @@ def frames(footages: Sequence[Footage], seconds: float, frame: float) -> Iterato
     Args:
         footages: of the episodes.
         seconds: of the film.
-        frame: seconds that a frame lasts; the last one shows the end.
+        frame: duration of a frame, s; the last one shows the end.
     """
     start = footages[0].steps * footages[0].control_timestep
-    for number in range(1, math.ceil(seconds / frame - _ROUNDING) + 1):
+    for number in range(1, math.ceil(seconds / frame - _TOLERANCE) + 1):
         yield [footage.at(start + min(number * frame, seconds)) for footage in footages]
         if all(footage.ended for footage in footages):
             return
 
 
 def frame_seconds(control_timestep: float) -> float:
-    """Return how long a frame of a film lasts, s: whole control steps, of a pace that players keep."""
-    return control_timestep * math.ceil(_SHORTEST_FRAME / control_timestep)
+    """Return the duration of a frame of a film, s: a whole number of control steps, not shorter than players show."""
+    return control_timestep * math.ceil(_MIN_FRAME_SECONDS / control_timestep)
 
 
 def check_fps(fps: float, extension: str) -> None:
-    """Check that players show so many frames a second of a film.
+    """Check that players show a film at so many frames a second.
 
     Raises:
-        ValueError: more than those of a GIF.
+        ValueError: they do not, as it is a GIF with too many.
     """
-    if extension == ".gif" and fps * _SHORTEST_FRAME > 1.0:
-        raise ValueError(f"fps: expected at most {1.0 / _SHORTEST_FRAME:g} for a GIF, got {fps:g}")
+    if extension == ".gif" and fps * _MIN_FRAME_SECONDS > 1.0:
+        raise ValueError(f"fps: expected at most {1.0 / _MIN_FRAME_SECONDS:g} for a GIF, got {fps:g}")
 
 
-def captioned(picture: np.ndarray, text: str, size: int | None = None) -> np.ndarray:
-    """Return the picture with a text in its lower left corner, of a size in pixels that by default suits its height."""
+def add_caption(picture: np.ndarray, text: str, size: int | None = None) -> np.ndarray:
+    """Return the picture with a text in its lower left corner, of a size in pixels, by default by its height."""
     image = Image.fromarray(picture)
-    size = size or max(11, image.height // 22)
+    if size is None:
+        size = max(11, image.height // 22)
     font = ImageFont.load_default(size)
     ImageDraw.Draw(image).text((size, image.height - size), text, (235, 240, 245), font, anchor="ls")
     return np.asarray(image)
@@ -177,13 +191,14 @@ def captioned(picture: np.ndarray, text: str, size: int | None = None) -> np.nda
 
 def grid(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
     """Return pictures of one size side by side, row by row; black fills the last row."""
-    pictures = [*pictures, *(-len(pictures) % columns * [np.zeros_like(pictures[0])])]
-    rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
+    empty_cells = -len(pictures) % columns
+    cells = [*pictures, *empty_cells * [np.zeros_like(pictures[0])]]
+    rows = [np.concatenate(cells[first : first + columns], axis=1) for first in range(0, len(cells), columns)]
     return np.concatenate(rows, axis=0)
 
 
 def write_png(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
-    """Write the only frame, however many seconds it stands for."""
+    """Write the only frame; the duration has no effect."""
     (frame,) = frames
     Image.fromarray(frame).save(path, optimize=True)
 
@@ -194,7 +209,7 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
     Args:
         path: of the file.
         frames: (height, width, 3) uint8.
-        seconds: that a frame lasts.
+        seconds: duration of a frame.
 
     Raises:
         ValueError: imageio-ffmpeg is not installed.
@@ -216,41 +231,44 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
 
 
 def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:
-    """Write a film that plays forever; one palette for all frames, undithered, keeps it small and calm.
+    """Write a film that repeats; one palette for all frames, without dithering, keeps it small and steady.
 
     Args:
         path: of the file, or an open one.
         frames: (height, width, 3) uint8.
-        seconds: that a frame lasts; the format counts in hundredths, so single frames are off by less than one.
+        seconds: duration of a frame. The format counts in hundredths of a second, to which frames are rounded.
     """
     frames = list(frames)
-    sample = Image.fromarray(np.concatenate(frames[:: -(-len(frames) // _GIF_SAMPLES)]))
-    # Of Pillow's methods the octree is the one that keeps small bright spots: eyes and glows.
-    palette = sample.quantize(_GIF_COLORS, Image.Quantize.FASTOCTREE)
-    first, *others = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    durations = _durations(len(frames), seconds, 10)
-    first.save(path, "GIF", save_all=True, append_images=others, duration=durations, loop=0)
+    samples = frames[:: math.ceil(len(frames) / _GIF_SAMPLES)]
+    # Of Pillow's methods, the octree alone keeps small bright spots, such as eyes and glows.
+    palette = Image.fromarray(np.concatenate(samples)).quantize(_GIF_COLORS, Image.Quantize.FASTOCTREE)
+    images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    durations = _durations(len(frames), seconds, unit=10)
+    images[0].save(path, "GIF", save_all=True, append_images=images[1:], duration=durations, loop=0)
 
 
 def write_webp(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float, quality: int = 50) -> None:
-    """Write a film that plays forever, in full colors; arguments as of `write_gif`, and Pillow's `quality`.
+    """Write a film that repeats, in full colors; arguments as of `write_gif`, and Pillow's `quality`.
 
     The encoder's best method takes twenty times as long for a size that is at most 5 % smaller.
     """
-    first, *others = map(Image.fromarray, frames)
-    durations = _durations(1 + len(others), seconds, 1)
-    first.save(
-        path, "WEBP", save_all=True, append_images=others, duration=durations, loop=0, quality=quality, method=_METHOD
+    images = list(map(Image.fromarray, frames))
+    images[0].save(
+        path,
+        "WEBP",
+        save_all=True,
+        append_images=images[1:],
+        duration=_durations(len(images), seconds, unit=1),
+        loop=0,
+        quality=quality,
+        method=_WEBP_METHOD,
     )
 
 
 def _durations(count: int, seconds: float, unit: int) -> list[int]:
-    """How long each frame lasts, ms, in a format that counts in a unit, ms; their sum is off by less than one."""
+    """Return the duration of each frame, ms, in multiples of a unit, ms; the error of their sum is less than a unit."""
     ends = [round(1000.0 * seconds * frame / unit) for frame in range(count + 1)]
     return [unit * (end - start) for start, end in itertools.pairwise(ends)]
 
 
-_METHOD = 4  # of WebP's encoder
-_GIF_COLORS = 128
-_GIF_SAMPLES = 4  # frames that the palette is made from
 WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif, ".webp": write_webp}

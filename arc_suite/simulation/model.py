@@ -14,36 +14,36 @@ from arc_suite.models import direct
 from arc_suite.models.sizing import size_body
 from arc_suite.robots.spec import Body
 
-_MOST = 1e6  # of a value of a model's field
-_ROUNDING = 1e-6  # of the length of a quaternion
-_POSITIVE = ("body_mass", "body_inertia")  # which accelerations divide by
+_MAX_VALUE = 1e6  # of a model's field
+_TOLERANCE = 1e-6  # of the length of a quaternion
+_POSITIVE = ("body_mass", "body_inertia")  # fields that must not be 0, as accelerations divide by them
 
 # Fields that `checked_fields` takes, with the bounds of their values.
 FIELDS = {
-    "gravity": (-_MOST, _MOST),  # of `opt`
-    **dict.fromkeys(_POSITIVE, (0.0, _MOST)),
-    "body_ipos": (-_MOST, _MOST),
+    "gravity": (-_MAX_VALUE, _MAX_VALUE),  # of the model's `opt`
+    **dict.fromkeys(_POSITIVE, (0.0, _MAX_VALUE)),
+    "body_ipos": (-_MAX_VALUE, _MAX_VALUE),
     "body_iquat": (-1.0, 1.0),
-    "dof_armature": (0.0, _MOST),
-    "dof_damping": (0.0, _MOST),
-    "dof_frictionloss": (0.0, _MOST),
-    "jnt_stiffness": (0.0, _MOST),
-    "actuator_gear": (-_MOST, _MOST),
-    "actuator_gainprm": (-_MOST, _MOST),
-    "actuator_biasprm": (-_MOST, _MOST),
-    "jnt_actfrcrange": (-_MOST, _MOST),
-    "pair_friction": (0.0, _MOST),
-    "pair_solref": (-_MOST, _MOST),
-    "pair_solimp": (0.0, _MOST),
-    "pair_margin": (0.0, _MOST),
-    "geom_friction": (0.0, _MOST),
+    "dof_armature": (0.0, _MAX_VALUE),
+    "dof_damping": (0.0, _MAX_VALUE),
+    "dof_frictionloss": (0.0, _MAX_VALUE),
+    "jnt_stiffness": (0.0, _MAX_VALUE),
+    "actuator_gear": (-_MAX_VALUE, _MAX_VALUE),
+    "actuator_gainprm": (-_MAX_VALUE, _MAX_VALUE),
+    "actuator_biasprm": (-_MAX_VALUE, _MAX_VALUE),
+    "jnt_actfrcrange": (-_MAX_VALUE, _MAX_VALUE),
+    "pair_friction": (0.0, _MAX_VALUE),
+    "pair_solref": (-_MAX_VALUE, _MAX_VALUE),
+    "pair_solimp": (0.0, _MAX_VALUE),
+    "pair_margin": (0.0, _MAX_VALUE),
+    "geom_friction": (0.0, _MAX_VALUE),
 }
 
-_LARGE = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+_LARGE_GEOMS = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_DAMPER | mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
 
-def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
+def compile_model(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
     """Compile the model that simulations of a body in an arena step.
 
     Simulation results are bit-equal to those of `models.assemble`, with two differences in the model.
@@ -52,19 +52,19 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
     only planes and height fields have pairs. The integrator is Euler's where results stay the same.
 
     Args:
-        body: the spec; what it leaves open is sized.
-        arena: where it moves.
+        body: the spec; numbers that it leaves out are sized.
+        arena: the ground and obstacles.
 
     Returns:
-        The model; the caller's own, to write to.
+        A new model, to which the caller may write.
     """
     return copy.copy(_compiled(body, arena))
 
 
 @functools.lru_cache(maxsize=32)
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
-    quick = arena == FLAT and not body.source
-    spec = direct.on_flat_ground(size_body(body)) if quick else models.model_spec(body, arena)
+    has_fast_path = arena == FLAT and not body.source
+    spec = direct.on_flat_ground(size_body(body)) if has_fast_path else models.model_spec(body, arena)
     model = spec.compile()
     list_contacts(spec, model, all_geoms=arena.lists_contacts)
     model = spec.compile()
@@ -73,13 +73,13 @@ def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
     return model
 
 
-def change(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: mujoco.MjData) -> None:
+def change_fields(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: mujoco.MjData) -> None:
     """Write fields of a model, by name, and update the constants that MuJoCo derives from them.
 
     Args:
-        model: to write to.
-        fields: values by name, of the shapes that the model's fields have.
-        scratch: data of such a model; overwritten.
+        model: the model, which is changed.
+        fields: values by name, in the shapes of the model's fields.
+        scratch: data of such a model, which is overwritten.
     """
     for name, values in fields.items():
         field(model, name)[:] = values
@@ -91,56 +91,59 @@ def field(model: mujoco.MjModel, name: str) -> np.ndarray:
     return getattr(model if hasattr(model, name) else model.opt, name)
 
 
-def checked_fields(
+def check_fields(
     model: mujoco.MjModel, fields: Any, count: int | None = None, every: bool = False
 ) -> dict[str, np.ndarray]:
     """Return values of a model's fields, each in the field's shape.
 
     Args:
-        model: as compiled.
-        fields: values by name: what broadcasts to the field's shape, or of several models (count, *shape).
-        count: number of models, which the values then have as a leading axis; None for one model.
+        model: the compiled model.
+        fields: values by name, which broadcast to the field's shape, with a leading axis for several models.
+        count: number of models; None for one model without the leading axis.
         every: whether fields without effect on this model are taken, too.
 
     Raises:
         ValueError: no such field, one without effect on this model, or values that do not fit.
     """
-    without = {
+    has_no_effect = {
         "geom_friction": not model.geom_contype.any(),
         "jnt_actfrcrange": not model.jnt_actfrclimited.any(),
         "actuator_biasprm": not model.actuator_biastype.any(),
     }
-    valid = [name for name in FIELDS if every or not without.get(name)]
+    valid = [name for name in FIELDS if every or not has_no_effect.get(name)]
     if "geom_friction" in checks.mapping("model", fields) and "geom_friction" not in valid:
         raise ValueError("model field 'geom_friction': contacts of this model read pair_friction; change that")
-    found = {}
+    checked_values = {}
     for name, values in checks.mapping("model", fields).items():
         like = field(model, checks.name(name, valid, "model field"))
-        found[name] = _values(name, values, like if count is None else np.broadcast_to(like, (count, *like.shape)))
-    return found
+        if count is not None:
+            like = np.broadcast_to(like, (count, *like.shape))
+        checked_values[name] = _check_values(name, values, like)
+    return checked_values
 
 
-def _values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
+def _check_values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
+    """Return values of a field in the shape of the present ones, `like`."""
     low, high = FIELDS[name]
     try:
-        found = np.broadcast_to(np.asarray(values, float), like.shape).copy()
+        array = np.broadcast_to(np.asarray(values, float), like.shape).copy()
     except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(
             f"model field {name!r}: expected numbers of shape {like.shape}, got {checks.preview(values)}"
         ) from None
-    least = np.where(like > 0.0, 1e-15, low) if name in _POSITIVE else low
-    if not ((found >= least) & (found <= high)).all():
+    lowest = np.where(like > 0.0, 1e-15, low) if name in _POSITIVE else low
+    if not ((array >= lowest) & (array <= high)).all():
         above = ", above 0 where the model's are" if name in _POSITIVE else ""
         raise ValueError(
             f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {checks.preview(values)}"
         )
-    if name == "body_iquat" and (abs(np.linalg.norm(found, axis=-1) - 1.0) > _ROUNDING).any():
+    if name == "body_iquat" and (abs(np.linalg.norm(array, axis=-1) - 1.0) > _TOLERANCE).any():
         raise ValueError(f"model field {name!r}: expected quaternions of length 1, got {checks.preview(values)}")
-    return found
+    return array
 
 
 class ReadOnly:
-    """A model whose fields can be read."""
+    """A model whose fields can only be read."""
 
     def __init__(self, model: mujoco.MjModel):
         """View a model, or its options."""
@@ -163,46 +166,56 @@ def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel, all_geoms: bool = 
     Args:
         spec: the model to change; every geom that touches another has a name.
         model: the same, compiled; no two geoms of moving bodies touch one another.
-        all_geoms: write those of all geoms; else only of planes and height fields, which are endless or large, so that
-            a search finds them near every body.
+        all_geoms: whether to write pairs of all geoms, or only those with planes and height fields. These are so large
+            that MuJoCo's search finds them near every body.
     """
     body = model.body_weldid[model.geom_bodyid]
-    large = np.isin(model.geom_type, _LARGE)
+    is_large = np.isin(model.geom_type, _LARGE_GEOMS)
     touches = (model.geom_contype[:, None] & model.geom_conaffinity) != 0
     touches = np.triu((touches | touches.T) & (body[:, None] != body))
     if not all_geoms:
-        touches &= large[:, None] | large
+        touches &= is_large[:, None] | is_large
     for first, second in np.argwhere(touches):
         names = {"geomname1": model.geom(first).name, "geomname2": model.geom(second).name}
         spec.add_pair(**names, **_contact(model, first, second))
     for geom in spec.geoms:
-        if all_geoms or geom.type in _LARGE:
-            geom.contype = geom.conaffinity = 0
+        if all_geoms or geom.type in _LARGE_GEOMS:
+            geom.contype = 0
+            geom.conaffinity = 0
 
 
 def _contact(model: mujoco.MjModel, first: int, second: int) -> dict:
-    """Return the attributes of a contact pair, mixed from its geoms by MuJoCo's rules."""
-    both = np.array((first, second))
-    friction, condim, solimp = model.geom_friction[both], model.geom_condim[both], model.geom_solimp[both]
-    solref, priority, share = model.geom_solref[both], model.geom_priority[both], model.geom_solmix[both]
+    """Return the attributes of a contact pair, combined from those of its geoms by MuJoCo's rules."""
+    pair = np.array((first, second))
+    condim = model.geom_condim[pair]
+    friction = model.geom_friction[pair]
+    solref = model.geom_solref[pair]
+    solimp = model.geom_solimp[pair]
+    priority = model.geom_priority[pair]
     if priority[0] != priority[1]:
-        mixed = {"condim": condim, "friction": friction, "solref": solref, "solimp": solimp}
-        mixed = {name: values[priority.argmax()] for name, values in mixed.items()}
+        geom = priority.argmax()
+        contact = {
+            "condim": condim[geom],
+            "friction": friction[geom],
+            "solref": solref[geom],
+            "solimp": solimp[geom],
+        }
     else:
-        share = share[0] / share.sum()
-        mixed = {
+        weights = model.geom_solmix[pair]
+        share = weights[0] / weights.sum()
+        are_standard = (solref[:, 0] > 0.0).all()  # a time constant and a damping ratio
+        mean_solref = share * solref[0] + (1.0 - share) * solref[1]
+        contact = {
             "condim": condim.max(),
             "friction": friction.max(axis=0),
-            "solref": share * solref[0] + (1.0 - share) * solref[1]
-            if (solref[:, 0] > 0.0).all()
-            else solref.min(axis=0),
+            "solref": mean_solref if are_standard else solref.min(axis=0),
             "solimp": share * solimp[0] + (1.0 - share) * solimp[1],
         }
-    slide, spin, roll = mixed["friction"]
-    return mixed | {
-        "friction": (slide, slide, spin, roll, roll),
-        "margin": model.geom_margin[both].sum(),
-        "gap": model.geom_gap[both].sum(),
+    sliding, torsional, rolling = contact["friction"]
+    return contact | {
+        "friction": (sliding, sliding, torsional, rolling, rolling),
+        "margin": model.geom_margin[pair].sum(),
+        "gap": model.geom_gap[pair].sum(),
     }
 
 

@@ -15,11 +15,11 @@ from arc_suite.arenas import FLAT, Arena
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
-from arc_suite.simulation.model import change, compiled, field
-from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, checked_snapshot, model_fields
+from arc_suite.simulation.model import change_fields, compile_model, field
+from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, check_snapshot, model_fields
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-_SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+_NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
 
 class Physics(dm_mujoco.Physics):
@@ -29,18 +29,18 @@ class Physics(dm_mujoco.Physics):
     state. Only the last of its substeps computes sensors, and with them `cfrc_ext`, so that the
     result is bit-equal to plain substeps and cheaper.
 
-    The model lists its contacts as pairs of geoms where its arena says so (`model.npair` > 0): at run
-    time, write `pair_friction`, `pair_solref`, `pair_solimp`, `pair_margin` and `pair_gap`; those of
-    geoms, and `contype` and `conaffinity`, reach no contact. Steps leave `data.timer` at 0; see `timers`.
+    In most arenas the model lists its contacts as pairs of geoms (`model.npair` > 0). There, at run
+    time, write `pair_friction`, `pair_solref`, `pair_solimp`, `pair_margin` and `pair_gap`; fields of
+    geoms, `contype` and `conaffinity` have no effect. Steps leave `data.timer` at 0; see `timers`.
 
     Attributes:
-        body: what is simulated.
-        arena: where.
+        body: the body.
+        arena: the ground and obstacles.
         shown_reward: share of the greatest reward, 0 to 1, that pictures show as the color of
             the material `glow`; None keeps its own color.
         marker: returns the debug markers of pictures, given this simulation; None for none.
         failed_legs: returns the names of the legs that pictures show dark; None for none.
-        divergence: how the physics diverged in the latest step, or None.
+        divergence: a text on how the physics diverged in the latest step, or None.
     """
 
     divergence: str | None = None
@@ -48,18 +48,24 @@ class Physics(dm_mujoco.Physics):
 
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> Physics:
-        """Simulate a body in an arena, from its standing pose."""
-        model = compiled(body, arena)
-        model.vis.global_.offwidth, model.vis.global_.offheight = MAX_WIDTH, MAX_HEIGHT  # for renderers of others
+        """Return the simulation of a body in an arena, in its standing pose."""
+        model = compile_model(body, arena)
+        model.vis.global_.offwidth = MAX_WIDTH  # for renderers of other packages
+        model.vis.global_.offheight = MAX_HEIGHT
         physics = cls.from_model(wrapper.MjModel(model))
-        physics.body, physics.arena = body, arena
+        physics.body = body
+        physics.arena = arena
         return physics
 
     def _reload_from_data(self, data):
         super()._reload_from_data(data)
         self._decorated = None
-        self._unchanged, self._lasting, self._scratch = {}, {}, None
-        self.shown_reward = self.marker = self.failed_legs = None
+        self._unchanged = {}  # compiled values of changed fields of the model
+        self._lasting = {}  # fields of the model that stay over resets
+        self._scratch = None
+        self.shown_reward = None
+        self.marker = None
+        self.failed_legs = None
         self._forks = forks.count
         self._option = self.model.ptr.opt
 
@@ -67,14 +73,14 @@ class Physics(dm_mujoco.Physics):
         """Restart from the default pose, as in dm_control, with the compiled model and its lasting changes."""
         self._check_process()
         if self._unchanged:
-            self._change(self._unchanged)
+            self._write_fields(self._unchanged)
         super().reset(keyframe_id)
         if self._lasting:
-            self._change(self._lasting)
+            self._write_fields(self._lasting)
         self._unchanged = {name: self._unchanged[name] for name in self._lasting}
 
     def after_reset(self) -> None:
-        """Compute what follows from the start; servos act in it, where dm_control disables motors."""
+        """Compute derived quantities of the start; servos act, whereas dm_control disables motors."""
         self.forward()
 
     def change_model(self, fields: Mapping[str, np.ndarray], lasting: bool = False) -> None:
@@ -82,22 +88,23 @@ class Physics(dm_mujoco.Physics):
 
         Args:
             fields: values by name, in the shapes of the model's fields.
-            lasting: whether they stay over resets, in place of others that are set later; else until the next reset.
+            lasting: whether they stay over resets and prevail over later values; else they hold until the next reset.
         """
         model = self.model.ptr
         self._unchanged = {name: field(model, name).copy() for name in fields} | self._unchanged
-        self._lasting = {**self._lasting, **fields} if lasting else self._lasting
-        self._change({**fields, **{name: self._lasting[name] for name in fields if name in self._lasting}})
+        if lasting:
+            self._lasting = {**self._lasting, **fields}
+        self._write_fields({name: self._lasting.get(name, values) for name, values in fields.items()})
 
     @property
     def lasting(self) -> Mapping[str, np.ndarray]:
         """Fields of the model that stay over resets, by name."""
         return self._lasting
 
-    def _change(self, fields: Mapping[str, np.ndarray]) -> None:
+    def _write_fields(self, fields: Mapping[str, np.ndarray]) -> None:
         if self._scratch is None:
             self._scratch = mujoco.MjData(self.model.ptr)
-        change(self.model.ptr, fields, self._scratch)
+        change_fields(self.model.ptr, fields, self._scratch)
 
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps.
@@ -118,7 +125,7 @@ class Physics(dm_mujoco.Physics):
         with timers.off:
             if nstep > 1 and not self._shared:  # whose options another thread may be using
                 flags = option.disableflags
-                option.disableflags = flags | _SENSOR
+                option.disableflags = flags | _NO_SENSORS
                 try:
                     mujoco.mj_step(model, data, nstep - 1)
                 finally:  # an interrupt from the keyboard arrives here
@@ -151,11 +158,10 @@ class Physics(dm_mujoco.Physics):
             ForkError: made before a fork.
         """
         self._check_process()
-        return pictures.picture(
-            self.body, self.arena, height=height, width=width, camera_id=camera_id, **self._pose() | kwargs
-        )
+        options = self._pose() | kwargs
+        return pictures.picture(self.body, self.arena, height=height, width=width, camera_id=camera_id, **options)
 
-    def decorated(self) -> pictures.Decorated:
+    def pose_decorated(self) -> pictures.Decorated:
         """Return the decorated body in the present pose, for a window; the same object at every call."""
         if self._decorated is None:
             self._decorated = pictures.Decorated.from_body(self.body, self.arena)
@@ -187,14 +193,17 @@ class Physics(dm_mujoco.Physics):
                 Its `reset` leaves the model as it is. Each may be stepped by a thread of its own; steps of both cost
                 more from then on, as all of their substeps compute sensors.
         """
-        copied = super().copy(share_model)
-        mujoco.mj_copyData(copied.data.ptr, copied.model.ptr, self.data.ptr)
-        copied.body, copied.arena = self.body, self.arena
+        physics = super().copy(share_model)
+        mujoco.mj_copyData(physics.data.ptr, physics.model.ptr, self.data.ptr)
+        physics.body = self.body
+        physics.arena = self.arena
         if share_model:
-            self._shared = copied._shared = True
+            self._shared = True
+            physics._shared = True
         else:
-            copied._unchanged, copied._lasting = self._unchanged, self._lasting
-        return copied
+            physics._unchanged = self._unchanged
+            physics._lasting = self._lasting
+        return physics
 
     def snapshot(self, fields: Iterable[str]) -> dict[str, np.ndarray]:
         """Return the simulation's state and derived fields of `MjData` as a snapshot of a `Batch` of one."""
@@ -206,25 +215,28 @@ class Physics(dm_mujoco.Physics):
         lasting = {f"{LASTING}{name}": np.array(values)[None] for name, values in self._lasting.items()}
         return {"state": state, **{name: getattr(data, name)[None].copy() for name in fields}, **models, **lasting}
 
-    def checked(self, arrays: Mapping[str, np.ndarray], fields: Iterable[str]) -> Mapping[str, np.ndarray]:
-        """Return the arrays of a snapshot if `restore` can take them; see `Batch.checked`."""
-        own = self.snapshot(fields)
-        like = {name: own[name] for name in own if not name.startswith((OF_MODEL, LASTING))}
-        return checked_snapshot(like, [self.model.ptr], arrays)
+    def check_snapshot(self, arrays: Mapping[str, np.ndarray], fields: Iterable[str]) -> Mapping[str, np.ndarray]:
+        """Return the arrays of a snapshot if `restore` can take them; see `Batch.check_snapshot`."""
+        present = self.snapshot(fields)
+        like = {name: array for name, array in present.items() if not name.startswith((OF_MODEL, LASTING))}
+        return check_snapshot(like, [self.model.ptr], arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue bit-identically from the arrays of `snapshot`."""
         self._check_process()
-        models, lasting = ({name: each[0] for name, each in fields.items()} for fields in model_fields(arrays))
+        fields_of_batch, lasting_of_batch = model_fields(arrays)
+        fields = {name: values[0] for name, values in fields_of_batch.items()}
+        lasting = {name: values[0] for name, values in lasting_of_batch.items()}
         if self._unchanged:
-            self._change(self._unchanged)
-        self._unchanged, self._lasting = {}, {name: each for name, each in lasting.items() if not np.isnan(each).any()}
-        if models:
-            self.change_model(models)
+            self._write_fields(self._unchanged)
+        self._unchanged = {}
+        self._lasting = {name: values for name, values in lasting.items() if not np.isnan(values).any()}
+        if fields:
+            self.change_model(fields)
         model, data = self.model.ptr, self.data.ptr
         mujoco.mj_setState(model, data, arrays["state"][0], _STATE)
         mujoco.mj_forward(model, data)
-        mujoco.mj_setState(model, data, arrays["state"][0], _STATE)  # from which the solver starts, too
+        mujoco.mj_setState(model, data, arrays["state"][0], _STATE)  # again, as the solver starts from it
         for name, array in arrays.items():
             if name != "state" and not name.startswith((OF_MODEL, LASTING)):
                 getattr(data, name)[:] = array[0]
@@ -234,9 +246,10 @@ class Physics(dm_mujoco.Physics):
         return super().__getstate__(), self.body, self.arena, self._unchanged, self._lasting
 
     def __setstate__(self, state):
-        data, self.body, self.arena, *changes = state
+        data, self.body, self.arena, unchanged, lasting = state
         # dm_control recomputes the derived quantities; here they are one substep behind the state.
-        as_it_stands = copy.copy(data.ptr)
+        saved_data = copy.copy(data.ptr)
         super().__setstate__(data)
-        mujoco.mj_copyData(data.ptr, data.model.ptr, as_it_stands)
-        self._unchanged, self._lasting = changes
+        mujoco.mj_copyData(data.ptr, data.model.ptr, saved_data)
+        self._unchanged = unchanged
+        self._lasting = lasting

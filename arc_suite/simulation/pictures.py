@@ -22,14 +22,14 @@ _SHAPES = {"arrow": mujoco.mjtGeom.mjGEOM_ARROW, "cylinder": mujoco.mjtGeom.mjGE
 
 
 class Quality(NamedTuple):
-    """How carefully a picture is drawn.
+    """The quality of a picture.
 
     Attributes:
-        shadows: pixels of the shadow map's sides.
-        scale: a picture is drawn so many times as large and averaged. That is faster than OpenGL's samples, and smooths
-            edges of shadows, too.
-        faces: of a round solid, around and along.
-        ornaments: whether visuals are drawn that have no mass and touch nothing.
+        shadows: size of the shadow map, pixels.
+        scale: factor on the size at which a picture is drawn before it is averaged. That is faster than OpenGL's
+            multisampling, and also smooths edges of shadows.
+        faces: numbers of faces of a round solid, around and along it.
+        ornaments: whether ornaments are drawn, which have no mass and touch nothing.
     """
 
     shadows: int
@@ -38,20 +38,21 @@ class Quality(NamedTuple):
     ornaments: bool = True
 
 
-# For policies that see, without what would stand before the eye; for people; for films; for pictures that are kept.
+# "sense" is for policies: it leaves out ornaments, which could cover the view of the camera `eye`. "fast" is for live
+# views, "film" for films, "still" for single pictures.
 QUALITIES = {
     "sense": Quality(0, 1, faces=(12, 8), ornaments=False),
     "fast": Quality(2048, 2),
     "film": Quality(4096, 2),
     "still": Quality(4096, 4),
 }
-LARGEST = 2  # times the largest picture's sides: what OpenGL draws at once
+MAX_SCALE = 2  # of the largest picture
 
-_LIMP = (0.07, 0.07, 0.08, 1.0)  # color of a leg whose motors have failed
+_FAILED_LEG_COLOR = (0.07, 0.07, 0.08, 1.0)
 
 
 class Decorated(dm_mujoco.Physics):
-    """A body with its visuals in an arena; it takes poses and is never stepped.
+    """A body with its visuals in an arena, for pictures of poses; it is never stepped.
 
     Attributes:
         markers: debug markers of pictures; those of depth or segments show none.
@@ -73,19 +74,22 @@ class Decorated(dm_mujoco.Physics):
         """
         decorated = cls.from_model(wrapper.MjModel(models.model_spec(body, arena, decorated=True).compile()))
         drawing = decorated.model.vis.quality
-        drawing.shadowsize, drawing.offsamples = quality.shadows, 0
+        drawing.shadowsize = quality.shadows
+        drawing.offsamples = 0
         drawing.numslices, drawing.numstacks = quality.faces
         if not quality.ornaments:
             groups = decorated.model.geom_group
-            groups[groups > 0] = mujoco.mjNGROUP - 1  # which pictures leave out
+            groups[groups > 0] = mujoco.mjNGROUP - 1  # a group that pictures leave out
         if ground is not None:
-            still = decorated.model.geom_bodyid == 0
-            decorated.model.geom_matid[still], decorated.model.geom_rgba[still] = -1, ground
-        decorated._legs = _legs(body, decorated.model.ptr)
+            is_of_world = decorated.model.geom_bodyid == 0
+            decorated.model.geom_matid[is_of_world] = -1
+            decorated.model.geom_rgba[is_of_world] = ground
+        decorated._legs = _geoms_by_leg(body, decorated.model.ptr)
         decorated._colors = decorated.model.geom_rgba.copy()
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
         buffer = decorated.model.vis.global_
-        buffer.offwidth = buffer.offheight = 1  # grows with the size of pictures
+        buffer.offwidth = 1  # it grows with the size of pictures
+        buffer.offheight = 1
         return decorated
 
     def pose(
@@ -99,14 +103,16 @@ class Decorated(dm_mujoco.Physics):
         """Take a pose and show a reward.
 
         Args:
-            qpos: (nq,) positions of the simulation to look at.
+            qpos: (nq,) positions of the simulation.
             share: of the greatest reward, 0 to 1, shown as the color of the material `glow`; None
                 keeps its own color.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
             markers: debug markers to show.
             failed_legs: names of legs to show dark.
         """
-        model, data, self.markers = self.model.ptr, self.data.ptr, markers
+        self.markers = markers
+        model = self.model.ptr
+        data = self.data.ptr
         data.qpos[:] = qpos
         if mocap_pos is not None:
             data.mocap_pos[:] = mocap_pos
@@ -116,25 +122,27 @@ class Decorated(dm_mujoco.Physics):
         self.darken(failed_legs)
 
     def darken(self, failed_legs: Iterable[str]) -> None:
-        """Show legs dark, given their names, and all others as they are."""
+        """Show legs dark, given their names, and all other legs in their own colors."""
         colors = self.model.geom_rgba
         colors[:] = self._colors
         for name in failed_legs:
-            colors[self._legs[name]] = _LIMP  # goes before that of the material
+            colors[self._legs[name]] = _FAILED_LEG_COLOR  # prevails over the color of the material
 
     def render(self, height, width, camera_id, **kwargs):
         """Draw the pose; arguments as in dm_control."""
         buffer = self.model.vis.global_
-        buffer.offheight, buffer.offwidth = max(height, buffer.offheight), max(width, buffer.offwidth)
-        own = kwargs.pop("scene_callback", None)
+        buffer.offheight = max(height, buffer.offheight)
+        buffer.offwidth = max(width, buffer.offwidth)
+        callback_of_caller = kwargs.pop("scene_callback", None)
+        shows_markers = not (kwargs.get("depth") or kwargs.get("segmentation"))
 
         def callback(physics, scene):
-            if not (kwargs.get("depth") or kwargs.get("segmentation")):
+            if shows_markers:
                 for marker in self.markers:
                     scene.ngeom += 1
                     geom_of(marker, scene.geoms[scene.ngeom - 1])
-            if own is not None:
-                own(physics, scene)
+            if callback_of_caller is not None:
+                callback_of_caller(physics, scene)
 
         return super().render(height, width, camera_id, scene_callback=callback, **kwargs)
 
@@ -146,22 +154,24 @@ class Decorated(dm_mujoco.Physics):
 
 def geom_of(marker: Marker, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeom:
     """Return a debug marker as a geom of a scene, a new one or the given one."""
-    geom, kind = geom or mujoco.MjvGeom(), _SHAPES[marker.shape]
+    if geom is None:
+        geom = mujoco.MjvGeom()
+    kind = _SHAPES[marker.shape]
     mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(marker.color, np.float32))
     mujoco.mjv_connector(geom, kind, marker.radius, marker.start, marker.end)
     if marker.shape == "arrow":
-        geom.size[2] *= 2.0  # MuJoCo draws an arrow half as long as a connector is
+        geom.size[2] *= 2.0  # MuJoCo draws arrows half as long as other connectors
     return geom
 
 
-def _legs(body: Body, model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """The geoms of a decorated model (geoms,), booleans, that belong to each leg."""
-    owners = [model.body(index).name for index in model.geom_bodyid]
-    return {leg.name: np.isin(owners, leg.part_names) for leg in body.legs}
+def _geoms_by_leg(body: Body, model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """Return a mask (geoms,) of the geoms of each leg of a decorated model, by name."""
+    part_names = [model.body(index).name for index in model.geom_bodyid]
+    return {leg.name: np.isin(part_names, leg.part_names) for leg in body.legs}
 
 
-# Shared by all pictures of the same body; used in OpenGL's thread alone.
-_shared = functools.lru_cache(maxsize=8)(Decorated.from_body)
+# Shared by all pictures of a body, and used in OpenGL's thread alone.
+_decorated_body = functools.lru_cache(maxsize=8)(Decorated.from_body)
 
 
 def picture(
@@ -191,9 +201,9 @@ def picture(
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
         failed_legs: names of legs to show dark.
-        quality: of `QUALITIES`; pictures of depth or segments are not averaged, the largest ones less. "sense" shows
-            what has mass or touches: no ornaments, markers, reward or failed legs. None for "sense" through the camera
-            `eye`, else "fast".
+        quality: a name of `QUALITIES`. Pictures of depth or segments are not averaged, and the largest pictures less.
+            "sense" has no ornaments, markers, reward or failed legs. None for "sense" through the camera `eye`, and
+            for "fast" through others.
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
@@ -207,22 +217,26 @@ def picture(
     if quality is None:
         quality = "sense" if camera_id == EYE else "fast"
     if quality == "sense":
-        share, markers, failed_legs = None, (), ()
+        share = None
+        markers = ()
+        failed_legs = ()
     drawing = QUALITIES[checks.name(quality, QUALITIES, "quality")]
-    single = kwargs.get("depth") or kwargs.get("segmentation")
-    scale = 1 if single else min(drawing.scale, LARGEST * MAX_HEIGHT // height, LARGEST * MAX_WIDTH // width)
+    if kwargs.get("depth") or kwargs.get("segmentation"):
+        scale = 1
+    else:
+        scale = min(drawing.scale, MAX_SCALE * MAX_HEIGHT // height, MAX_SCALE * MAX_WIDTH // width)
 
     def draw():
-        decorated = _shared(body, arena, drawing)
+        decorated = _decorated_body(body, arena, drawing)
         check_camera(decorated.model.ptr, camera_id)
         decorated.pose(qpos, share, mocap_pos, markers, failed_legs)
         return decorated.render(scale * height, scale * width, camera_id, **kwargs)
 
-    drawn = opengl.call(draw)
-    return drawn if scale == 1 else smaller(drawn, scale)
+    pixels = opengl.call(draw)
+    return pixels if scale == 1 else shrink(pixels, scale)
 
 
-def smaller(picture: np.ndarray, scale: int) -> np.ndarray:
+def shrink(picture: np.ndarray, scale: int) -> np.ndarray:
     """Return the means of squares of pixels.
 
     Args:
@@ -232,9 +246,12 @@ def smaller(picture: np.ndarray, scale: int) -> np.ndarray:
     Returns:
         (height, width, channels) uint8.
     """
-    rows, columns = np.divmod(np.arange(scale * scale), scale)
-    total = sum(picture[row::scale, column::scale].astype(np.uint16) for row, column in zip(rows, columns, strict=True))
-    return ((total + scale * scale // 2) // (scale * scale)).astype(np.uint8)
+    pixels = scale * scale  # of a square
+    total = np.zeros_like(picture[::scale, ::scale], np.uint16)
+    for row in range(scale):
+        for column in range(scale):
+            total += picture[row::scale, column::scale]
+    return ((total + pixels // 2) // pixels).astype(np.uint8)
 
 
 def check_size(height: int, width: int) -> None:
@@ -251,7 +268,7 @@ def check_camera(model: mujoco.MjModel, camera_id: int | str) -> None:
     """Check that a model has a camera: a name, an index, or -1 for the free one.
 
     Raises:
-        ValueError: it has not.
+        ValueError: it has no such camera.
     """
     cameras = [model.camera(index).name for index in range(model.ncam)]
     if isinstance(camera_id, str):

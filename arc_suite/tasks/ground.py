@@ -352,7 +352,7 @@ class Lanes(Ground):
             difficulties = (float(self.difficulty),)
         copies = dict.fromkeys(self.kinds, self._copies)
         sizes = {name: getattr(self, name) for name in terrain.SIZES if getattr(self, name) is not None}
-        return terrain.made(body, copies, float(length), difficulties, self.terrain_seed, sizes)
+        return terrain.make_lanes(body, copies, float(length), difficulties, self.terrain_seed, sizes)
 
     def first(self) -> Stream:
         """Return the level at which a stream begins; without an outcome, the first episode has it."""

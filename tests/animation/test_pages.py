@@ -18,7 +18,7 @@ import arc_suite
 from arc_suite.animation import pages, scenery
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.style import record
 from arc_suite.tasks.modifiers import Kicks
 from arc_suite.tasks.modifiers.motors import FAILS_FROM
@@ -177,7 +177,7 @@ def shown(browser, tracks, tmp_path_factory):
 def test_the_picture_is_the_track(shown, tracks):
     """At the ends of control steps all parts are where MuJoCo has them, and halfway between two halfway."""
     body = ROBOTS["tick"]
-    model = compiled(body)
+    model = compile_model(body)
     data, parts = mujoco.MjData(model), [model.body(name).id for name in body.part_names]
     shown.evaluate("viewer.pause(false)")
     for row in (0, 7, 30, STEPS - 1):

@@ -146,5 +146,5 @@ def test_standing_still_has_score_0(tmp_path):
     assert abs(float(lines[-1].split()[8])) < 0.02
     setup = Setup.of("tick")
     scale = anchors.anchors(setup)
-    assert report["zero_return"] == pytest.approx(anchors.known(setup)["zero"][:10].mean())
+    assert report["zero_return"] == pytest.approx(anchors.committed_returns(setup)["zero"][:10].mean())
     assert report["score"] == pytest.approx(scale.score(report["return"]["mean"]))

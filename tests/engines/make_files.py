@@ -21,7 +21,7 @@ from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.importing import import_robot
 from arc_suite.robots import ROBOTS, spec_files
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 
 OTHERS = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"  # files of robots that are imported
 FEW = ("walk", "turn_left", "stop", "idle")
@@ -64,7 +64,7 @@ def main(folder: str, kind: str = "") -> None:
 
 def truth(body, clips) -> dict[str, np.ndarray]:
     """Return where MuJoCo has the parts, (frames, parts, 3) in the axes of glTF, by animation; and their names."""
-    model = compiled(body)
+    model = compile_model(body)
     data, parts, places = mujoco.MjData(model), [model.body(name).id for name in body.part_names], {}
     for clip in clips:
         for motion, end in ((clip.motion, ""), (clip.motion._replace(root=0.0 * clip.motion.root), "_in_place")):
@@ -82,7 +82,7 @@ def bound(body, clips) -> dict[str, np.ndarray]:
 
     Parts without a joint have NaN.
     """
-    model, (idle,) = compiled(body), [clip for clip in clips if clip.name == "idle"]
+    model, (idle,) = compile_model(body), [clip for clip in clips if clip.name == "idle"]
     data = mujoco.MjData(model)
     data.qpos[:] = idle.motion.poses()[0]
     mujoco.mj_kinematics(model, data)

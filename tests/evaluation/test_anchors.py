@@ -47,7 +47,7 @@ def _same_as_fresh(robot, task):
     """The first episode of each anchor, played anew. Chaotic motions differ between processors, so falls may too."""
     setup = Setup.of(robot, task)
     for name, returns in TABLE[str(setup)].items():
-        (fresh,) = anchors.played(setup, name, range(1))
+        (fresh,) = anchors.play_returns(setup, name, range(1))
         assert fresh == pytest.approx(returns[0], rel=0.01), (robot, task, name)
 
 
@@ -64,7 +64,7 @@ def test_fresh_episodes_earn_what_the_table_says(place):
 
 def test_other_settings_are_measured():
     setup = Setup.of("tick", "walk", {"time_limit": 1.0})
-    assert anchors.known(setup) is None
+    assert anchors.committed_returns(setup) is None
     scale, whole = anchors.anchors(setup), anchors.anchors(Setup.of("tick"))
     assert 0.0 < scale.zero < 0.05 * whole.zero and scale.demonstrator > scale.zero
-    assert list(anchors.measured(setup)) == ["zero", *suited_presets(setup.definition)]
+    assert list(anchors.measure_returns(setup)) == ["zero", *suited_presets(setup.definition)]

@@ -12,7 +12,7 @@ from tiers import tiers
 from arc_suite.arenas import ARENAS
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.batch import Batch
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.simulation.physics import Physics
 
 NUM_ENVS = 3
@@ -44,8 +44,8 @@ def test_environments_are_simulations(arena, threads):
     body = ROBOTS["leaper"]
     arena = ARENAS[arena](body)
     singles = [Physics.from_body(body, arena) for _ in range(NUM_ENVS)]
-    batch = Batch(compiled(body, arena), NUM_ENVS, threads)
-    states = starts(compiled(body, arena))
+    batch = Batch(compile_model(body, arena), NUM_ENVS, threads)
+    states = starts(compile_model(body, arena))
     batch.reset(ALL, *states)
     for physics, *state in zip(singles, *states, strict=True):
         begin(physics, *state)
@@ -59,7 +59,7 @@ def test_environments_are_simulations(arena, threads):
 
 
 def test_data_has_the_fields_asked_for_and_those_that_are_written():
-    model = compiled(ROBOTS["tick"])
+    model = compile_model(ROBOTS["tick"])
     batch = Batch(model, NUM_ENVS, fields=("site_xpos", "qvel"))
     assert set(vars(batch.data)) == {"qpos", "qvel", "ctrl", "site_xpos"}
     batch.reset(ALL, *starts(model))
@@ -70,7 +70,7 @@ def test_data_has_the_fields_asked_for_and_those_that_are_written():
 
 def test_environments_are_placed_elsewhere_and_the_others_stay():
     body = ROBOTS["tick"]
-    model = compiled(body)
+    model = compile_model(body)
     batch, (qpos, qvel) = Batch(model, NUM_ENVS, 2), starts(model)
     batch.reset(ALL, qpos, qvel)
     before = {name: array.copy() for name, array in vars(batch.data).items()}
@@ -89,7 +89,7 @@ def test_environments_are_placed_elsewhere_and_the_others_stay():
 
 def test_obstacles_stand_where_a_reset_puts_them():
     body = ROBOTS["tick"]
-    model = compiled(body, Obstacle())
+    model = compile_model(body, Obstacle())
     batch = Batch(model, NUM_ENVS, 2)
     post = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "post")
     batch.reset(ALL, *starts(model))
@@ -105,7 +105,7 @@ def test_obstacles_stand_where_a_reset_puts_them():
 
 def test_environments_have_models_of_their_own_until_their_next_reset():
     body = ROBOTS["tick"]
-    model = compiled(body)
+    model = compile_model(body)
     batch, singles, (qpos, qvel) = (
         Batch(model, NUM_ENVS, 2),
         [Physics.from_body(body) for _ in range(NUM_ENVS)],
@@ -137,7 +137,7 @@ def test_environments_have_models_of_their_own_until_their_next_reset():
 
 
 def test_sensors_are_back_after_an_exception():
-    model = compiled(ROBOTS["tick"])
+    model = compile_model(ROBOTS["tick"])
     batch, twin = Batch(model, NUM_ENVS, 1), Batch(model, NUM_ENVS, 1)
     with pytest.raises(ValueError):
         batch.step(25, np.ones(NUM_ENVS + 1, bool))

@@ -20,7 +20,7 @@ from arc_suite.models import direct
 from arc_suite.models.sizing import size_body
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import EXAMPLES, load_body
-from arc_suite.simulation.model import compiled, euler_suffices, list_contacts
+from arc_suite.simulation.model import compile_model, euler_suffices, list_contacts
 
 BODIES = ROBOTS | {f"random {seed}": random_body(seed) for seed in range(4)}
 EULER, IMPLICITFAST = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -42,8 +42,8 @@ def test_the_model_on_flat_ground_is_that_of_the_builder_byte_for_byte(body):
     assert saved(direct.on_flat_ground(size_body(body)).compile()) == saved(model)
     list_contacts(spec, model)
     listed = spec.compile()
-    listed.opt.integrator = compiled(body).opt.integrator
-    assert saved(compiled(body)) == saved(listed)
+    listed.opt.integrator = compile_model(body).opt.integrator
+    assert saved(compile_model(body)) == saved(listed)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the heap of glibc")
@@ -98,7 +98,7 @@ _CASES = [(body, arena, course) for body in BODIES for arena in ARENAS for cours
 def test_same_bits_as_the_written_model(body, arena, course):
     start, actions = course(BODIES[body])
     arena = ARENAS[arena](BODIES[body])
-    plain, fast = written(BODIES[body], arena), compiled(BODIES[body], arena)
+    plain, fast = written(BODIES[body], arena), compile_model(BODIES[body], arena)
     assert (plain.npair, plain.opt.integrator) == (0, IMPLICITFAST)
     assert fast.opt.integrator == EULER
     large = np.isin(plain.geom_type, (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD))
@@ -151,7 +151,7 @@ def test_contacts_are_mixed_as_mujoco_mixes_them():
 
 
 def test_an_arena_may_keep_the_masks_of_what_is_small():
-    model, plain = compiled(ROBOTS["tick"], Obstacle()), written(ROBOTS["tick"], Obstacle())
+    model, plain = compile_model(ROBOTS["tick"], Obstacle()), written(ROBOTS["tick"], Obstacle())
     plane = model.geom("floor").id
     assert model.npair > 0 and ((model.pair_geom1 == plane) | (model.pair_geom2 == plane)).all()
     for masks in ("geom_contype", "geom_conaffinity"):
@@ -160,9 +160,9 @@ def test_an_arena_may_keep_the_masks_of_what_is_small():
 
 
 def test_models_are_the_callers_own():
-    one = compiled(ROBOTS["tick"])
+    one = compile_model(ROBOTS["tick"])
     one.pair_friction[:] = 0.0
-    assert compiled(ROBOTS["tick"]).pair_friction.all()
+    assert compile_model(ROBOTS["tick"]).pair_friction.all()
 
 
 def final_state(model, integrator):
@@ -202,5 +202,5 @@ def test_a_body_without_damping_keeps_its_integrator():
         leg.replace(links=tuple(k.replace(joint=k.joint and k.joint.replace(damping=0.0)) for k in leg.links))
         for leg in body.legs
     )
-    assert compiled(body).opt.integrator == EULER
-    assert compiled(body.replace(name="loose", legs=legs)).opt.integrator == IMPLICITFAST
+    assert compile_model(body).opt.integrator == EULER
+    assert compile_model(body.replace(name="loose", legs=legs)).opt.integrator == IMPLICITFAST

@@ -150,7 +150,7 @@ def test_pictures_are_those_of_a_context_of_ones_own():
             own.forward()
             drawn = own.render(FAST.scale * height, FAST.scale * width, "portrait")
             picture = environment.physics.render(height, width, "portrait")
-            np.testing.assert_array_equal(picture, pictures.smaller(drawn, FAST.scale))
+            np.testing.assert_array_equal(picture, pictures.shrink(drawn, FAST.scale))
             picture = environment.physics.render(height, width, "portrait", depth=True)
             np.testing.assert_array_equal(picture, own.render(height, width, "portrait", depth=True))
             own.free()

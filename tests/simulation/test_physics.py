@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 from tiers import tiers
 
 from arc_suite.arenas import FLAT
-from arc_suite.arenas.bumps import fitted
+from arc_suite.arenas.bumps import fit_bumps
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.physics import Physics
 
@@ -27,11 +27,11 @@ COPIES = {
 
 @pytest.mark.parametrize("way", tiers(COPIES, lambda way: way == "pickled"))
 def test_copies_go_on_in_the_same_arena(way):
-    physics = Physics.from_body(BODY, fitted(BODY))
+    physics = Physics.from_body(BODY, fit_bumps(BODY))
     physics.set_control(np.linspace(-1.0, 1.0, physics.model.nu))
     physics.step(100)
     twin = COPIES[way](physics)
-    assert (twin.body, twin.arena) == (BODY, fitted(BODY))
+    assert (twin.body, twin.arena) == (BODY, fit_bumps(BODY))
     assert_array_equal(twin.data.cfrc_ext, physics.data.cfrc_ext)
     twin.step(25), physics.step(25)
     for field in ("qpos", "cfrc_ext", "xpos"):
@@ -44,7 +44,7 @@ def test_flat_ground_is_the_default():
     assert physics.arena == FLAT
     assert physics.model.name2id("floor", "geom") == 0
     assert physics.model.nhfield == 0
-    assert Physics.from_body(BODY, fitted(BODY)).model.nhfield == 1
+    assert Physics.from_body(BODY, fit_bumps(BODY)).model.nhfield == 1
 
 
 def test_a_copy_that_shares_the_model_changes_nothing_in_it():

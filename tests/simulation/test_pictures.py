@@ -12,7 +12,7 @@ from arc_suite.bodies import generator
 from arc_suite.markers import Marker
 from arc_suite.models.outline import torso_box
 from arc_suite.robots import ROBOTS
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.simulation.physics import Physics
 from arc_suite.simulation.pictures import QUALITIES, Decorated, check_camera, picture
 
@@ -35,7 +35,7 @@ def test_a_state_looks_like_the_simulation_in_it(arena, share):
 
 @pytest.mark.slow
 def test_the_ground_and_the_reward_are_seen():
-    qpos = compiled(BODY).qpos0
+    qpos = compile_model(BODY).qpos0
     views = [picture(BODY, arena(BODY), qpos, 60, 80, "tracking") for arena in ARENAS.values()]
     views.append(picture(BODY, FLAT, qpos, 60, 80, "tracking", share=0.0))
     for index, view in enumerate(views[1:], 1):
@@ -47,7 +47,7 @@ def test_obstacles_are_seen_where_they_stand():
     def drawn(*place):
         return picture(BODY, Obstacle(), qpos, 60, 80, "tracking", mocap_pos=np.array([place]))
 
-    qpos = compiled(BODY, Obstacle()).qpos0
+    qpos = compile_model(BODY, Obstacle()).qpos0
     near, far = drawn(0.0, 2.0, 0.5), drawn(90.0, 90.0, 0.5)
     assert not np.array_equal(near, far)
     assert_array_equal(drawn(0.0, 2.0, 0.5), near)
@@ -57,7 +57,7 @@ def test_obstacles_are_seen_where_they_stand():
 
 
 def test_marks_are_seen_and_have_no_depth():
-    qpos = compiled(BODY).qpos0
+    qpos = compile_model(BODY).qpos0
     foot, way = np.array([0.0, 0.0, 1.2]), np.array([0.0, 0.8, 0.0])
     views = {None: picture(BODY, FLAT, qpos, 60, 80, "tracking")}
     for shape in ("arrow", "cylinder"):
@@ -73,7 +73,7 @@ def test_marks_are_seen_and_have_no_depth():
 
 def test_an_arrow_ends_at_its_tip():
     """MuJoCo draws one half as long as a cylinder between the same ends; here they are as long."""
-    qpos, foot, way = compiled(BODY).qpos0, np.array([-1.0, 0.0, 1.2]), np.array([2.0, 0.0, 0.0])
+    qpos, foot, way = compile_model(BODY).qpos0, np.array([-1.0, 0.0, 1.2]), np.array([2.0, 0.0, 0.0])
     plain, widths = picture(BODY, FLAT, qpos, 120, 160, "tracking"), {}
     for shape in ("arrow", "cylinder"):
         marker = Marker(shape, foot, foot + way, 0.05, (1.0, 0.0, 0.0, 1.0))
@@ -84,7 +84,7 @@ def test_an_arrow_ends_at_its_tip():
 
 
 def test_a_limp_leg_is_dark():
-    qpos = compiled(BODY).qpos0
+    qpos = compile_model(BODY).qpos0
     plain, dark = (
         picture(BODY, FLAT, qpos, 120, 160, "profile", failed_legs=failed_legs).astype(int)
         for failed_legs in ((), ("r2",))
@@ -102,7 +102,7 @@ def test_a_limp_leg_is_dark():
 
 
 def test_cameras_are_checked_on_a_model():
-    model = compiled(BODY)
+    model = compile_model(BODY)
     for camera in ("tracking", "portrait", "profile", 0, 2, -1):
         check_camera(model, camera)
     with pytest.raises(ValueError, match=r"^no camera 4: "):
@@ -127,7 +127,7 @@ def test_the_eye_looks_ahead_from_the_torso_s_front_and_nothing_is_before_it(bod
 
 
 def test_the_eye_sees_neither_markers_nor_failed_legs():
-    qpos = compiled(BODY).qpos0
+    qpos = compile_model(BODY).qpos0
     mark = Marker("arrow", qpos[:3] + (2.0, -1.0, 0.0), qpos[:3] + (2.0, 1.0, 0.0), 0.2, (1.0, 0.0, 0.0, 1.0))
     shown = {"markers": [mark], "failed_legs": [BODY.legs[0].name], "share": 0.1}
     plain = picture(BODY, FLAT, qpos, 64, 64, "eye")

@@ -13,7 +13,7 @@ import pytest
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation import timers
 from arc_suite.simulation.batch import Batch
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.simulation.physics import Physics
 
 BODY = ROBOTS["tick"]
@@ -33,7 +33,7 @@ def clock():
 
 def seconds_of_steps():
     """What MuJoCo measures of steps that are not ours: > 0 if there is a clock."""
-    model = compiled(BODY)
+    model = compile_model(BODY)
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 10)
     return data.timer[STEP].duration
@@ -45,7 +45,7 @@ def test_our_steps_read_no_clock_and_others_do(clock):
     assert physics.data.ptr.timer[STEP].number >= 25
     assert physics.data.ptr.timer[STEP].duration == 0.0
     assert seconds_of_steps() > 0.0
-    Batch(compiled(BODY), 2, 2).step(25, np.ones(2, bool))
+    Batch(compile_model(BODY), 2, 2).step(25, np.ones(2, bool))
     assert seconds_of_steps() > 0.0
 
 
@@ -56,7 +56,7 @@ def test_an_exception_puts_the_clock_and_sensors_back(clock):
         physics.step(2.5)
     assert seconds_of_steps() > 0.0 and physics.model.opt.disableflags == flags
     with pytest.raises(ValueError):
-        Batch(compiled(BODY), 2, 2).step(25, np.ones(3, bool))
+        Batch(compile_model(BODY), 2, 2).step(25, np.ones(3, bool))
     assert seconds_of_steps() > 0.0
 
 

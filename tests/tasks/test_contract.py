@@ -19,7 +19,7 @@ from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.batch import Batch
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.walk import Walk
 
@@ -59,7 +59,7 @@ def frozen(memory):
 
 def started(task, seed=0):
     """A simulation of one environment at the start of an episode, its data, and the memory."""
-    batch = Batch(compiled(task.scene.body, task.scene.arena), 1, 1, task.reads)
+    batch = Batch(compile_model(task.scene.body, task.scene.arena), 1, 1, task.reads)
     start = task.start(np.random.RandomState(seed), task.first())
     mask = np.ones(1, bool)
     batch.reset(mask, start.qpos[None], start.qvel[None])

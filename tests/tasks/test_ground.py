@@ -20,7 +20,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.ground import LEVELS, Lanes, Stream, next_level
 from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
@@ -123,8 +123,8 @@ def test_settings_that_do_not_fit_are_one_line(task, settings, message):
 
 def test_a_lane_is_the_same_beside_others():
     body, places = ROBOTS["queen"], np.linspace(0.0, 20.0, 300)
-    alone = terrain.made(body, {"gaps": 1}, 40.0)
-    beside = terrain.made(body, {"rough": 2, "gaps": 2}, 40.0)
+    alone = terrain.make_lanes(body, {"gaps": 1}, 40.0)
+    beside = terrain.make_lanes(body, {"rough": 2, "gaps": 2}, 40.0)
     assert beside.lanes[2] == alone.lanes[0]
     heights = [arena.height(places, arena.start(lane) + 0.0 * places) for arena, lane in ((alone, 0), (beside, 2))]
     assert heights[0].any()
@@ -133,7 +133,7 @@ def test_a_lane_is_the_same_beside_others():
 
 def test_a_height_field_lies_over_the_plane_below_stairs():
     """Of two surfaces at one height both would touch a foot."""
-    model = compiled(ROBOTS["tick"], terrain.made(ROBOTS["tick"], {"rough": 1, "stairs": 1}, 20.0))
+    model = compile_model(ROBOTS["tick"], terrain.make_lanes(ROBOTS["tick"], {"rough": 1, "stairs": 1}, 20.0))
     assert model.geom("floor_bottom").pos[2] < model.geom("floor").pos[2]
 
 
@@ -147,7 +147,7 @@ def test_difficulty_0_is_level(kind):
 @pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "bastion"))
 def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
-    level = terrain.made(ROBOTS[robot], {"rough": 3}, levels=(0.0,))
+    level = terrain.make_lanes(ROBOTS[robot], {"rough": 3}, levels=(0.0,))
     returns = []
     for arena in (level, "flat"):
         envs = VectorEnv(

@@ -11,7 +11,7 @@ import mujoco
 import arc_suite
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation import timers
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from benchmark import ordinary
 
 FULL = "mj_step, full model"
@@ -53,8 +53,8 @@ class Contestant(NamedTuple):
 
 def singles(robot: str, ordinary_id: str) -> Iterator[Contestant]:
     """Yield plain MuJoCo and the environments that run alone."""
-    lean = compiled(ROBOTS[robot])
-    silent = compiled(ROBOTS[robot])
+    lean = compile_model(ROBOTS[robot])
+    silent = compile_model(ROBOTS[robot])
     silent.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
     full = mujoco.MjModel.from_xml_string(ordinary.full_model(robot).to_xml_string())
     yield _mujoco(FULL, robot, full, contextlib.nullcontext())

@@ -8,7 +8,7 @@ import numpy as np
 from arc_suite.robots import queen
 from arc_suite.robots.spec import Body, Leg, Link
 from arc_suite.simulation import timers
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 
 LEGS = (2, 4, 6, 8, 10, 12)
 LINKS = (1, 2, 3, 4)
@@ -37,7 +37,7 @@ class Bodies:
 
     def __init__(self):
         """Compile all bodies."""
-        self._models = [compiled(body(*size)) for size in SIZES]
+        self._models = [compile_model(body(*size)) for size in SIZES]
         self._times = [[] for _ in SIZES]
 
     def play(self) -> None:

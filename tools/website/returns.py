@@ -25,7 +25,7 @@ def demonstrators(robots=tuple(ROBOTS), tasks=tuple(TASKS)) -> str:
     for task in tasks:
         for robot in robots:
             setup = Setup.of(robot, task)
-            returns_of_presets = anchors.known(setup)
+            returns_of_presets = anchors.committed_returns(setup)
             if returns_of_presets:
                 lines.append(_demonstrator_cells(setup, returns_of_presets))
     return table(("robot, task", "standing", "best demonstrator", "preset"), lines) if lines else ""

@@ -137,7 +137,7 @@ def write_views(
             frames, frame_seconds = film_frames(footages, steps)
         films.WRITERS[extension](path, frames, frame_seconds)
         for footage in footages:
-            print(f"{footage.robot}: return {footage.earned:.1f} in {footage.steps} steps")
+            print(f"{footage.robot}: return {footage.episode_return:.1f} in {footage.steps} steps")
 
 
 def picture_frames(footages: list[films.Footage], steps: int) -> Iterator[np.ndarray]:
@@ -199,6 +199,6 @@ def join_views(footages: list[films.Footage], views: list[np.ndarray]) -> np.nda
     if len(footages) == 1:
         return views[0]
     captioned_views = [
-        films.captioned(view, footage.robot.capitalize()) for view, footage in zip(views, footages, strict=True)
+        films.add_caption(view, footage.robot.capitalize()) for view, footage in zip(views, footages, strict=True)
     ]
     return films.grid(captioned_views, columns=2)

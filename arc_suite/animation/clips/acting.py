@@ -17,7 +17,7 @@ from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
 from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import readings
 
 # Durations are multiples of sqrt(h / g), h being the standing height.
@@ -148,7 +148,7 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     substeps = sized_body.simulation.substeps
     joint_count = len(body.joint_names)
     is_imported = bool(body.source)
-    model = copy.copy(compiled(body))
+    model = copy.copy(compile_model(body))
     model.dof_damping[6:] *= damping_share  # the first six are the torso's
     layout = readings.layout(model, body)
     data = mujoco.MjData(model)

@@ -34,7 +34,7 @@ from arc_suite.animation.clips.loops import (
 from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording, TurnRecording
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 
 _MAX_CYCLES_IN_STEP = 4  # gait cycles of loops that stay in step
 _MAX_CYCLES_ALONE = 12  # gait cycles of a loop with a gait of its own
@@ -74,7 +74,7 @@ class Draft(NamedTuple):
 
     def stance_height_and_contacts(self, body: Body) -> tuple[float, list[FootContact]]:
         """Return the median height of soles in stance, m, and the foot contact events; none without a gait."""
-        heights = sole_heights(compiled(body), body, self.motion.poses())
+        heights = sole_heights(compile_model(body), body, self.motion.poses())
         if self.stands:
             return float(np.median(heights)), []
         min_rise = MIN_RISE if self.cycles else _MIN_RISE_IN_GESTURE
@@ -89,7 +89,7 @@ class Draft(NamedTuple):
 
     def put_on_ground(self, body: Body) -> "Draft":
         """Return the draft with soles in stance on the ground, and none deep in it."""
-        lowest = float(sole_heights(compiled(body), body, self.motion.poses()).min())
+        lowest = float(sole_heights(compile_model(body), body, self.motion.poses()).min())
         stance_height, _ = self.stance_height_and_contacts(body)
         height = min(stance_height, lowest + _MAX_SOLE_DEPTH * body.torso.standing_height)
         return self._replace(motion=self.motion.lower(height))

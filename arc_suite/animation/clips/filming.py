@@ -11,7 +11,7 @@ from arc_suite.models.standing import standing_qpos
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl, pictures
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import readings
 
 _FREE_CAMERA = -1  # MuJoCo's number of the camera without a name
@@ -97,7 +97,7 @@ def _render(body: Body, clip: Clip, frames, headings, size: int, transparent: bo
     poses = motion_in_place.poses()[frames]
     poses[:, :2] = rotations.to_heading_frame(poses[:, :2], -headings)
     poses[:, 3:7] = rotations.turn_about_z(poses[:, 3:7], headings)
-    model = compiled(body)
+    model = compile_model(body)
     positions = readings.positions(poses, readings.layout(model, body), standing_qpos(model))
     framed_positions = positions[: _count_frames(clip)]
     stage = opengl.call(lambda: _prepare_stage(body, framed_positions, transparent))
@@ -146,13 +146,13 @@ def _render_pose(stage: pictures.Decorated, qpos: np.ndarray, size: int, transpa
     """Return a picture (size, size, 3 or 4), drawn larger and reduced."""
     stage.pose(qpos)
     quality = _TRANSPARENT_QUALITY if transparent else _OPAQUE_QUALITY
-    scale = min(quality.scale, pictures.LARGEST * MAX_HEIGHT // size)  # pixels drawn, for each of the picture
+    scale = min(quality.scale, pictures.MAX_SCALE * MAX_HEIGHT // size)  # pixels drawn, for each of the picture
     colors = stage.render(scale * size, scale * size, _FREE_CAMERA)
     if not transparent:
-        return pictures.smaller(colors, scale)
+        return pictures.shrink(colors, scale)
     geoms = stage.render(scale * size, scale * size, _FREE_CAMERA, segmentation=True)[..., :1]  # -1 where none is
     shows_body = (geoms >= 0) & (stage.model.ptr.geom_bodyid[geoms] > 0)
-    alpha = pictures.smaller(np.uint8(255) * shows_body, scale)
-    premultiplied = pictures.smaller(colors * shows_body, scale)
+    alpha = pictures.shrink(np.uint8(255) * shows_body, scale)
+    premultiplied = pictures.shrink(colors * shows_body, scale)
     straight_colors = premultiplied * (255.0 / np.maximum(alpha, 1))
     return np.concatenate([straight_colors.clip(0.0, 255.0).round().astype(np.uint8), alpha], axis=-1)

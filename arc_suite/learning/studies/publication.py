@@ -162,7 +162,7 @@ def _publish_demonstrators(runs: Sequence[Run], published: Path) -> None:
 
 def _demonstrated(setup: Setup) -> anchors.Returns:
     """Return the returns of the evaluation protocol of standing still and of demonstrators of a body, by policy."""
-    found = dict(anchors.known(setup) or anchors.measured(setup, evaluation.EPISODES))
+    found = dict(anchors.committed_returns(setup) or anchors.measure_returns(setup, evaluation.EPISODES))
     usual = COMMANDED if "command" in setup.definition.blocks else PRESETS
     missing = [preset for preset in usual if preset in presets_of(setup.body) and preset not in found]
-    return found | {preset: anchors.played(setup, preset, range(evaluation.EPISODES)) for preset in missing}
+    return found | {preset: anchors.play_returns(setup, preset, range(evaluation.EPISODES)) for preset in missing}

@@ -148,10 +148,10 @@ def test_poses_between_control_steps_are_those_of_the_physics():
         footage.step()
     mujoco.mj_setState(model, data, state, full)
     data.ctrl[:] = physics.data.ctrl
-    np.testing.assert_allclose(footage.between(0.0), data.qpos, atol=1e-12)
+    np.testing.assert_allclose(footage.interpolate(0.0), data.qpos, atol=1e-12)
     mujoco.mj_step(model, data, 10)
-    np.testing.assert_allclose(footage.between(10 / 25), data.qpos, atol=0.003)
-    np.testing.assert_allclose(footage.between(1.0), physics.data.qpos, atol=1e-12)
+    np.testing.assert_allclose(footage.interpolate(10 / 25), data.qpos, atol=0.003)
+    np.testing.assert_allclose(footage.interpolate(1.0), physics.data.qpos, atol=1e-12)
     footage.close()
 
 
@@ -169,10 +169,10 @@ def test_a_take_stays_at_its_end():
         if footage.ended:
             break
         footage.step()
-    before = footage.steps, footage.earned
+    before = footage.steps, footage.episode_return
     footage.step()
     assert footage.ended
-    assert (footage.steps, footage.earned) == before
+    assert (footage.steps, footage.episode_return) == before
     footage.close()
 
 

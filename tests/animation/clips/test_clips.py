@@ -22,7 +22,7 @@ from arc_suite.bodies.generator import random_body
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS, spec_files
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import compile_model
 
 PRESETS = [(robot, preset) for robot in ROBOTS for preset in ("slow", "medium", "fast", "tuned")]
 # Tests share the clips of a robot. `make check` has one walk alone.
@@ -383,7 +383,7 @@ def test_idle_breathes_on_its_feet(robot):
     assert np.ptp(feet, axis=0).max() < 0.012 * height
     assert abs(feet[..., 2] - [leg.foot.radius for leg in body.legs]).max() < 0.012 * height
     assert 0.001 * height < np.ptp(clip.motion.positions[:, 2]) < 0.013 * height
-    ranges = compiled(body).jnt_range[1:]
+    ranges = compile_model(body).jnt_range[1:]
     assert (clip.motion.joints >= ranges[:, 0] - 1e-9).all() and (clip.motion.joints <= ranges[:, 1] + 1e-9).all()
 
 
