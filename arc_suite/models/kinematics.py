@@ -21,23 +21,23 @@ class Legs(NamedTuple):
 
     Attributes:
         mounts: (legs, 3) where they begin, m.
-        turns: (legs, 3, 3) orientations there.
+        mount_rotations: (legs, 3, 3) orientations there.
         axes: (legs, links, 3) of the joint at the beginning of each link, unit vectors; 0 where it is fixed.
         ends: (legs, links, 3) of links from their beginnings, m.
         radii: (legs,) of the feet, m.
-        joints: (legs, links) indices; 0 where a link is fixed.
-        moves: (legs, links) whether a link has a joint.
+        joint_indices: (legs, links) of joints in the body; 0 where a link is fixed.
+        has_joint: (legs, links) whether a link has a joint.
         low: (legs, links) lower bounds of targets, rad.
         high: (legs, links) upper bounds of targets, rad.
     """
 
     mounts: np.ndarray
-    turns: np.ndarray
+    mount_rotations: np.ndarray
     axes: np.ndarray
     ends: np.ndarray
     radii: np.ndarray
-    joints: np.ndarray
-    moves: np.ndarray
+    joint_indices: np.ndarray
+    has_joint: np.ndarray
     low: np.ndarray
     high: np.ndarray
 
@@ -52,8 +52,8 @@ class Legs(NamedTuple):
         shape = (len(body.legs), max(len(leg.links) for leg in body.legs))
         axes = np.zeros((*shape, 3))
         ends = np.zeros((*shape, 3))
-        joints = np.zeros(shape, int)
-        moves = np.zeros(shape, bool)
+        joint_indices = np.zeros(shape, int)
+        has_joint = np.zeros(shape, bool)
         low = np.zeros(shape)
         high = np.zeros(shape)
         joint_count = 0
@@ -64,8 +64,8 @@ class Legs(NamedTuple):
                 if not link.joint:
                     continue
                 axes[index] = np.array(link.joint.axis) / np.linalg.norm(link.joint.axis)
-                joints[index] = joint_count
-                moves[index] = True
+                joint_indices[index] = joint_count
+                has_joint[index] = True
                 low_limit, high_limit = np.radians(link.joint.range_deg)
                 unused_range = 0.5 * (1.0 - used) * (high_limit - low_limit)  # at either limit
                 low[index] = low_limit + unused_range
@@ -74,17 +74,17 @@ class Legs(NamedTuple):
         mounts = np.array([leg.mount for leg in body.legs])
         radii = np.array([leg.foot.radius for leg in body.legs])
         yaws = np.radians([leg.yaw_deg for leg in body.legs])
-        turns = _rotations(np.tile(_VERTICAL, (len(mounts), 1)), yaws)
-        return cls(mounts, turns, axes, ends, radii, joints, moves, low, high)
+        mount_rotations = _rotations(np.tile(_VERTICAL, (len(mounts), 1)), yaws)
+        return cls(mounts, mount_rotations, axes, ends, radii, joint_indices, has_joint, low, high)
 
     def by_leg(self, values) -> np.ndarray:
         """Return values (..., joints) as (..., legs, links), 0 where a link is fixed."""
         xp = values.__array_namespace__()
-        return xp.where(self.moves, values[..., self.joints], 0.0)
+        return xp.where(self.has_joint, values[..., self.joint_indices], 0.0)
 
     def by_joint(self, values) -> np.ndarray:
         """Return values (..., legs, links) as (..., joints)."""
-        return values[..., self.moves]
+        return values[..., self.has_joint]
 
     def soles(self, angles) -> tuple[np.ndarray, np.ndarray]:
         """Return the positions (..., legs, 3) of the soles, m, and their Jacobians (..., legs, 3, links).
@@ -93,7 +93,7 @@ class Legs(NamedTuple):
             angles: (..., legs, links) rad.
         """
         xp = angles.__array_namespace__()
-        orientation = self.turns
+        orientation = self.mount_rotations
         position = self.mounts
         axes_and_anchors = []
         for link in range(angles.shape[-1]):
