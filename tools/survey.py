@@ -34,9 +34,9 @@ flags.DEFINE_string(
 )
 flags.DEFINE_integer("first", 0, "First seed.", lower_bound=0)
 flags.DEFINE_integer("count", 500, "Number of bodies.", 1, MAX_COUNT)
-flags.DEFINE_integer("legs", None, "Number of legs, of the family random. [default: random]", *generator.LEGS)
+flags.DEFINE_integer("legs", None, "Number of legs, of the family random. [default: random]", *generator.LEG_RANGE)
 flags.DEFINE_integer(
-    "links", None, "Actuated links of each leg, of the family random. [default: random, 2 to 4]", *generator.LINKS
+    "links", None, "Actuated links of each leg, of the family random. [default: random, 2 to 4]", *generator.LINK_RANGE
 )
 flags.DEFINE_float("seconds", 20.0, "How long each body walks.", lower_bound=1.0)
 flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)

@@ -31,7 +31,7 @@ class BodiesTask(NamedTuple):
 
     name: str
     step_limit: float
-    sizes: Mapping[str, int] = tokens.FLAT
+    sizes: Mapping[str, int] = tokens.FLAT_SIZES
 
     @property
     def definition(self) -> "BodiesTask":
@@ -426,15 +426,19 @@ def _find_bodies(bodies: Any) -> list[Body]:
 def _spaces(flat: bool) -> tuple[gymnasium.Space, gymnasium.Space]:
     """Return the spaces of observations and of actions of one environment."""
     if flat:
-        size = sum(tokens.FLAT.values())
+        size = sum(tokens.FLAT_SIZES.values())
         observations = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS * tokens.JOINTS,), np.float32)
+        actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.MAX_LEGS * tokens.MAX_JOINTS,), np.float32)
         return observations, actions
-    shapes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
+    shapes = {
+        "legs": (tokens.MAX_LEGS, tokens.LEG_SIZE),
+        "torso": (tokens.TORSO_SIZE,),
+        "command": (tokens.COMMAND_SIZE,),
+    }
     boxes: dict[str, gymnasium.Space] = {
         name: gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32) for name, shape in shapes.items()
     }
-    actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS, tokens.JOINTS), np.float32)
+    actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.MAX_LEGS, tokens.MAX_JOINTS), np.float32)
     return gymnasium.spaces.Dict(boxes), actions
 
 

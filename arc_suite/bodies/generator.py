@@ -14,9 +14,9 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
-LEGS = (4, 12)  # fewest and most
-LINKS = (1, 4)  # fewest and most, of a leg
-SCALE = (0.01, 100.0)  # smallest and largest factor
+LEG_RANGE = (4, 12)  # fewest and most
+LINK_RANGE = (1, 4)  # fewest and most, of a leg
+SCALE_RANGE = (0.01, 100.0)  # smallest and largest factor
 LAYOUTS = ("pairs", "radial")
 
 # A leg in its vertical plane, by number of links: of each, its share of the leg's length and its
@@ -92,8 +92,8 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
     Raises:
         ValueError: a value out of range.
     """
-    legs = checks.integer("legs", legs, *LEGS)
-    links = checks.integer("links", links, *LINKS)
+    legs = checks.integer("legs", legs, *LEG_RANGE)
+    links = checks.integer("links", links, *LINK_RANGE)
     layout = _check_layout(layout, legs)
     if layout == "radial":
         half_length = _SPACING * _HEIGHT * legs / (2.0 * math.pi)  # radius of a circle of legs
@@ -160,10 +160,10 @@ def draw_body(
         ValueError: a value out of range.
     """
     # The order of the draws stands for a seed's body, and each is made whether it is used or not.
-    random_legs = int(random.integers(LEGS[0], LEGS[1] + 1))
-    random_links = int(random.integers(2, LINKS[1] + 1))
-    legs = checks.integer("legs", random_legs if legs is None else legs, *LEGS)
-    links = checks.integer("links", random_links if links is None else links, *LINKS)
+    random_legs = int(random.integers(LEG_RANGE[0], LEG_RANGE[1] + 1))
+    random_links = int(random.integers(2, LINK_RANGE[1] + 1))
+    legs = checks.integer("legs", random_legs if legs is None else legs, *LEG_RANGE)
+    links = checks.integer("links", random_links if links is None else links, *LINK_RANGE)
     is_radial = random.uniform() < 0.3 or legs % 2 == 1
     random_layout = "radial" if is_radial else "pairs"
     layout = _check_layout(layout or random_layout, legs)
@@ -203,7 +203,7 @@ def scaled(body: Body, factor: float) -> Body:
     Raises:
         ValueError: the factor, or a length of the scaled body, is out of range.
     """
-    factor = checks.number("scale", factor, *SCALE)
+    factor = checks.number("scale", factor, *SCALE_RANGE)
     if body.source:
         raise ValueError(f"scale: {body.name} was imported, and keeps the size of its file")
 

@@ -8,8 +8,8 @@ from arc_suite import checks
 from arc_suite.bodies import generator
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Leg, Solid, Vector
 
-FACTOR = (0.1, 10.0)  # bounds of a factor of lengths
-FAN = (-90.0, 90.0)  # degrees, bounds
+FACTOR_RANGE = (0.1, 10.0)  # bounds of a factor of lengths
+FAN_RANGE = (-90.0, 90.0)  # degrees, bounds
 
 _SUFFIX = "_shaped"  # of names
 _MIDLINE = 1e-9  # m, half of its width
@@ -61,16 +61,16 @@ def shaped(body: Body, **changes) -> Body:
     """
     shape = Shape(**changes)
     link_factors = {
-        checks.name(name, link_names(body), "link"): checks.number(f"links[{name!r}]", factor, *FACTOR)
+        checks.name(name, link_names(body), "link"): checks.number(f"links[{name!r}]", factor, *FACTOR_RANGE)
         for name, factor in shape.links.items()
     }
     body_ends = link_ends(body)
     ends = {checks.name(name, body_ends, "part"): end for name, end in shape.ends.items()}
-    length = checks.number("length", shape.length, *FACTOR)
-    width = checks.number("width", shape.width, *FACTOR)
-    thickness = checks.number("thickness", shape.thickness, *FACTOR)
+    length = checks.number("length", shape.length, *FACTOR_RANGE)
+    width = checks.number("width", shape.width, *FACTOR_RANGE)
+    thickness = checks.number("thickness", shape.thickness, *FACTOR_RANGE)
     torso_factors = (length, width, thickness)
-    fan = checks.number("fan", shape.fan, *FAN)
+    fan = checks.number("fan", shape.fan, *FAN_RANGE)
 
     keeps_links = all(factor == 1.0 for factor in link_factors.values())
     keeps_ends = all(tuple(end) == body_ends[name] for name, end in ends.items())

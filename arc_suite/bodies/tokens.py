@@ -30,8 +30,8 @@ from arc_suite.tasks.parts import (
     joint_places,
 )
 
-LEGS = 12  # at most, of a body
-JOINTS = 4  # at most, of a leg
+MAX_LEGS = 12  # at most, of a body
+MAX_JOINTS = 4  # at most, of a leg
 
 # The blocks that tokens are made from, and the parts that each has to have.
 BLOCKS = {
@@ -43,25 +43,25 @@ BLOCKS = {
 _UPWARD_FORCE = 5  # its index among the torque and force on a rigid part
 
 # Sizes of what changes in every step: of a leg, of the torso and of the command.
-LEG = 2 * JOINTS + 4
-TORSO = 12
-COMMAND = 6
+LEG_SIZE = 2 * MAX_JOINTS + 4
+TORSO_SIZE = 12
+COMMAND_SIZE = 6
 
 # Sizes of the description, which stays the same: of a leg and of the torso.
-LEG_DESCRIPTION = 9 + 8 * JOINTS
-TORSO_DESCRIPTION = 10
+LEG_DESCRIPTION_SIZE = 9 + 8 * MAX_JOINTS
+TORSO_DESCRIPTION_SIZE = 10
 
 # Sizes of the blocks of one vector that holds everything.
-FLAT = {
-    "legs": LEGS * LEG,
-    "torso": TORSO,
-    "command": COMMAND,
-    "leg_descriptions": LEGS * LEG_DESCRIPTION,
-    "torso_description": TORSO_DESCRIPTION,
+FLAT_SIZES = {
+    "legs": MAX_LEGS * LEG_SIZE,
+    "torso": TORSO_SIZE,
+    "command": COMMAND_SIZE,
+    "leg_descriptions": MAX_LEGS * LEG_DESCRIPTION_SIZE,
+    "torso_description": TORSO_DESCRIPTION_SIZE,
 }
 
 # Inputs of a network for one leg: token and description of the leg, token and description of the torso, and command.
-LEG_INPUTS = LEG + LEG_DESCRIPTION + TORSO + COMMAND + TORSO_DESCRIPTION
+LEG_INPUT_SIZE = LEG_SIZE + LEG_DESCRIPTION_SIZE + TORSO_SIZE + COMMAND_SIZE + TORSO_DESCRIPTION_SIZE
 _JOINT_COUNTS = slice(8, 12)  # of a leg's description: the number of joints, as one of four
 
 _MIN_CARRIED_SHARE = 0.05  # of the weight, on a foot that counts as loaded
@@ -71,7 +71,7 @@ _MIN_HEADING = np.float32(1e-6)  # length of the forward axis seen from above, i
 
 # Sizes of the parts of what `Tokens.gather_inputs` returns, before the command: posture, velocities, joint angles,
 # joint velocities, forces, clock.
-_INPUT_SIZES = (5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2)
+_INPUT_SIZES = (5, 6, MAX_LEGS * MAX_JOINTS, MAX_LEGS * MAX_JOINTS, MAX_LEGS, 2)
 
 
 class Description(NamedTuple):
@@ -95,9 +95,9 @@ class Description(NamedTuple):
 
 def pad_joints(body: Body, values: np.ndarray) -> np.ndarray:
     """Return values (joints, ...) of a body's joints as (12, 4, ...), 0 where there is none."""
-    padded_values = np.zeros((LEGS * JOINTS, *np.shape(values)[1:]))
+    padded_values = np.zeros((MAX_LEGS * MAX_JOINTS, *np.shape(values)[1:]))
     padded_values[joint_slots(body)] = values
-    return padded_values.reshape(LEGS, JOINTS, *padded_values.shape[1:])
+    return padded_values.reshape(MAX_LEGS, MAX_JOINTS, *padded_values.shape[1:])
 
 
 def privileged_sizes(task: Task) -> dict[str, int]:
@@ -124,7 +124,7 @@ def spread(padding: Padding, vectors: np.ndarray) -> np.ndarray:
 
 def _padding(block: Block) -> Padding:
     """Return the indices of a block's numbers in the block of a body of 12 legs of 4 joints."""
-    return join_padding([part.padding(LEGS, JOINTS) for part in block.parts])
+    return join_padding([part.padding(MAX_LEGS, MAX_JOINTS) for part in block.parts])
 
 
 def joint_slots(body: Body) -> np.ndarray:
@@ -138,11 +138,11 @@ def joint_slots(body: Body) -> np.ndarray:
 
 @functools.lru_cache(maxsize=256)
 def _cached_slots(body: Body) -> tuple[int, ...]:
-    return joint_places(body, LEGS, JOINTS)
+    return joint_places(body, MAX_LEGS, MAX_JOINTS)
 
 
 def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) -> np.ndarray:
-    """Return tokens and a description as one vector (environments, 664), blocks as in `FLAT`.
+    """Return tokens and a description as one vector (environments, 664), blocks as in `FLAT_SIZES`.
 
     Args:
         tokens: see `Tokens.make_tokens`.
@@ -154,8 +154,8 @@ def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np
 
 
 def split_flat(vectors) -> dict[str, Any]:
-    """Return vectors (..., 664) of NumPy or JAX as the blocks of `FLAT`, by name."""
-    return {name: vectors[..., part] for name, part in blocks.slices(FLAT).items()}
+    """Return vectors (..., 664) of NumPy or JAX as the blocks of `FLAT_SIZES`, by name."""
+    return {name: vectors[..., part] for name, part in blocks.slices(FLAT_SIZES).items()}
 
 
 def leg_inputs(vectors):
@@ -167,14 +167,14 @@ def leg_inputs(vectors):
     xp = vectors.__array_namespace__()
     legs, torso, command, leg_descriptions, torso_description = split_flat(vectors).values()
     batch_shape = vectors.shape[:-1]
-    leg_tokens = legs.reshape(*batch_shape, LEGS, LEG)
-    descriptions = leg_descriptions.reshape(*batch_shape, LEGS, LEG_DESCRIPTION)
+    leg_tokens = legs.reshape(*batch_shape, MAX_LEGS, LEG_SIZE)
+    descriptions = leg_descriptions.reshape(*batch_shape, MAX_LEGS, LEG_DESCRIPTION_SIZE)
     shared = xp.concatenate([torso, command, torso_description], axis=-1)[..., None, :]
-    shared_by_legs = xp.broadcast_to(shared, (*batch_shape, LEGS, shared.shape[-1]))
+    shared_by_legs = xp.broadcast_to(shared, (*batch_shape, MAX_LEGS, shared.shape[-1]))
     inputs = xp.concatenate([leg_tokens, descriptions, shared_by_legs], axis=-1)
     # A leg of k joints has the joints 0 to k - 1. Entry k - 1 of its counts is 1.
     counts = descriptions[..., _JOINT_COUNTS]
-    has_joint = [counts[..., joint:].sum(axis=-1) for joint in range(JOINTS)]
+    has_joint = [counts[..., joint:].sum(axis=-1) for joint in range(MAX_JOINTS)]
     mask = xp.stack(has_joint, axis=-1) > 0.5
     return inputs, mask
 
@@ -186,12 +186,12 @@ def repeat_for_legs(values: np.ndarray, counts: float) -> np.ndarray:
         values: (81,) in the order of `leg_inputs`.
         counts: in place of the numbers of joints.
     """
-    ends = np.cumsum((LEG, LEG_DESCRIPTION, TORSO, COMMAND))
+    ends = np.cumsum((LEG_SIZE, LEG_DESCRIPTION_SIZE, TORSO_SIZE, COMMAND_SIZE))
     leg, leg_description, torso, command, torso_description = np.split(values, ends)
     leg_description = leg_description.copy()
     leg_description[_JOINT_COUNTS] = counts
-    legs = np.tile(leg, LEGS)
-    leg_descriptions = np.tile(leg_description, LEGS)
+    legs = np.tile(leg, MAX_LEGS)
+    leg_descriptions = np.tile(leg_description, MAX_LEGS)
     return np.concatenate([legs, torso, command, leg_descriptions, torso_description]).astype(np.float32)
 
 
@@ -210,7 +210,7 @@ def body_description(task: Task) -> Description:
     leg_count = len(body.legs)
     ranges = np.radians([joint.range_deg for joint in body.joints])
 
-    legs = np.zeros((LEGS, LEG_DESCRIPTION))
+    legs = np.zeros((MAX_LEGS, LEG_DESCRIPTION_SIZE))
     legs[:leg_count] = _describe_legs(body, pose, ranges, duty_factor)
     first_solid = body.torso.solids[0]
     missing_extents = 3 - len(first_solid.size)  # of solids that are round about an axis
@@ -218,7 +218,7 @@ def body_description(task: Task) -> Description:
     lengths = np.array((*half_extents, *pose.center, pose.margin, reach(body))) / height
     return Description(
         legs=legs.astype(np.float32),
-        torso=np.array((leg_count / LEGS, *lengths, duty_factor), np.float32),
+        torso=np.array((leg_count / MAX_LEGS, *lengths, duty_factor), np.float32),
         mask=pad_joints(body, np.ones(len(ranges))).astype(bool),
         reach=pad_joints(body, abs(ranges).max(axis=-1)).astype(np.float32),
     )
@@ -239,7 +239,7 @@ def _describe_legs(body: Body, pose: PoseMechanics, ranges: np.ndarray, duty_fac
     mounts = np.array([leg.mount for leg in body.legs])  # (legs, 3) m
     foot_distances = np.maximum(np.hypot(feet[:, 0], feet[:, 1]), _MIN_LENGTH)  # from the torso, seen from above
     foot_directions = feet[:, :2] / foot_distances[:, None]
-    joint_counts = np.eye(JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]
+    joint_counts = np.eye(MAX_JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]
     jacobians = pad_joints(body, np.concatenate([jacobian.T for jacobian in pose.jacobians]))[:leg_count]
     stiffness, damping = position_gains(size_body(body), pose.inertias)
     parts = [
@@ -313,7 +313,7 @@ class Tokens(NamedTuple):
         pose = measure_standing(body)
         # Forces are in weights where a task has a command, else in N.
         weight = 1.0 if "command" in task.blocks else pose.mass * GRAVITY
-        phases = np.zeros(LEGS)  # rad
+        phases = np.zeros(MAX_LEGS)  # rad
         phases[: len(body.legs)] = parameters.phase_offsets
         mid_stance = math.pi * parameters.duty_factor  # phase, rad
         mask = pad_joints(body, np.ones(len(body.joint_names)))
@@ -346,7 +346,7 @@ class Tokens(NamedTuple):
         linear_velocity, angular_velocity, joint_velocities = parts["velocities"]
         (forces,) = parts["contact_forces"]
         rigid_parts = task.blocks["contact_forces"].parts[0]
-        upward_forces = np.zeros(LEGS, int)
+        upward_forces = np.zeros(MAX_LEGS, int)
         for leg, name in enumerate(body.foot_names):
             upward_forces[leg] = forces[rigid_parts.places(name)[_UPWARD_FORCE]]
         indices = [

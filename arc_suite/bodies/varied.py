@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.bodies import generator
-from arc_suite.bodies.generator import JOINT_NAMES, LEGS, LINK_NAMES, PROFILES
+from arc_suite.bodies.generator import JOINT_NAMES, LEG_RANGE, LINK_NAMES, PROFILES
 from arc_suite.robots import bastion, leaper, queen, tick
 from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
-LINKS = (2, 4)  # fewest and most; a leg of one link cannot lift its foot
+LINK_RANGE = (2, 4)  # fewest and most; a leg of one link cannot lift its foot
 
 ROBOTS = (queen.BODY, bastion.BODY, tick.BODY, leaper.BODY)  # never more, as a seed stands for a body
 _ROBOT_SHARE = 0.2  # of bodies, that are mutated robots
@@ -104,8 +104,8 @@ def _draw_robot(random: np.random.Generator) -> Body:
 
 def _draw_generated(random: np.random.Generator) -> Body:
     """Draw a body of new proportions. The order of the draws stands for a seed's body: it must stay."""
-    leg_count = int(random.integers(LEGS[0], LEGS[1] + 1))
-    link_count = int(random.integers(LINKS[0], LINKS[1] + 1))
+    leg_count = int(random.integers(LEG_RANGE[0], LEG_RANGE[1] + 1))
+    link_count = int(random.integers(LINK_RANGE[0], LINK_RANGE[1] + 1))
     is_radial = random.uniform() < _RADIAL_SHARE or leg_count % 2 == 1
     half_length = math.exp(random.uniform(math.log(0.08), math.log(1.2)))
     height = half_length * random.uniform(0.5, 1.6)

@@ -38,7 +38,7 @@ flags.DEFINE_enum(
     list(generator.LAYOUTS),
     "Pairs, left and right, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
 )
-flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE)
+flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE_RANGE)
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
 flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")
 flags.DEFINE_bool("no_arena", False, "Leave floor and free joint to the scene that takes the model.")

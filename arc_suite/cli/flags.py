@@ -37,12 +37,12 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     flags.DEFINE_string(
         "spec", None, f"A body in place of a robot: a file in JSON, MJCF or URDF, or one of {examples}."
     )
-    flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
+    flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEG_RANGE)
     flags.DEFINE_integer(
         "links",
         None,
         f"Actuated links of each leg of a body made to order. [default: {DEFAULT_LINKS}]",
-        *generator.LINKS,
+        *generator.LINK_RANGE,
     )
     flags.DEFINE_multi_string(
         "length",

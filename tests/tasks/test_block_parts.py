@@ -198,7 +198,7 @@ def test_a_view_of_many_numbers_is_refused_in_one_line():
 def test_every_number_has_a_name_and_a_place(task):
     for name, block in blocks_of(task).items():
         assert len(block.entries()) == block.size, name
-        padding = join_padding([part.padding(tokens.LEGS, tokens.JOINTS) for part in block.parts])
+        padding = join_padding([part.padding(tokens.MAX_LEGS, tokens.MAX_JOINTS) for part in block.parts])
         assert len(set(padding.places)) == block.size <= padding.size, name
         assert padding.places.max() < padding.size, name
 

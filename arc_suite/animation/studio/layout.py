@@ -57,8 +57,8 @@ _PROPORTIONS = (
 def add_source(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
     """Add widgets for the source of the body, with the values of a sketch."""
     sources = list_with(sketch.source, sketches.sources())
-    min_legs, max_legs = generator.LEGS
-    min_links, max_links = generator.LINKS
+    min_legs, max_legs = generator.LEG_RANGE
+    min_links, max_links = generator.LINK_RANGE
     layouts = [DEFAULT_CHOICE, *generator.LAYOUTS]
     return {
         "source": gui.add_dropdown("Body", sources, initial_value=sketch.source),

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite.bodies import tokens
-from arc_suite.bodies.tokens import JOINTS, LEGS
+from arc_suite.bodies.tokens import MAX_JOINTS, MAX_LEGS
 from arc_suite.learning.agents import critic_blocks as blocks_of_critics
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.networks import ACTIVATION
@@ -193,9 +193,9 @@ class AnyLegs(NamedTuple):
         joints: numbers of an action.
     """
 
-    inputs: int = tokens.LEG_INPUTS
-    size: int = sum(tokens.FLAT.values())
-    joints: int = LEGS * JOINTS
+    inputs: int = tokens.LEG_INPUT_SIZE
+    size: int = sum(tokens.FLAT_SIZES.values())
+    joints: int = MAX_LEGS * MAX_JOINTS
 
     symmetric = False
 
@@ -210,7 +210,7 @@ class AnyLegs(NamedTuple):
 
     def drawn(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""
-        return _draw_parameters(random, (self.inputs, hidden, hidden), JOINTS, last_gain)
+        return _draw_parameters(random, (self.inputs, hidden, hidden), MAX_JOINTS, last_gain)
 
     def drawn_values(self, random, hidden):
         """Draw the parameters of a network of values."""
