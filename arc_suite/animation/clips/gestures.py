@@ -195,6 +195,7 @@ def hit(body: Body, rest: Pose, side: str) -> Motion:
     ending = fade_out(times / _HIT_DURATION * 2.0 - 1.0)  # falls in the second half
     sway = (impulse(0.0) - _HIT_REBOUND * impulse(2.0 * _HIT_PEAK_TIME)) * ending
     sink = (impulse(0.2 * _HIT_PEAK_TIME) + 0.3 * impulse(_HIT_PEAK_TIME)) * ending
+    # Height, forward, left, roll, pitch and yaw.
     largest_sway = np.array((0.0, _HIT_PUSH * forward, _HIT_PUSH * left, -_HIT_TILT * left, _HIT_TILT * forward, 0.0))
     poses = sway[:, None] * largest_sway
     poses[:, _HEIGHT] = -_HIT_SINK * sink
@@ -278,7 +279,7 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
         body: the spec.
         rest: pose from which the torso moves.
         poses: (samples, 6) of the torso from there; see `posture`.
-        lifts: (samples, legs, 3) by which feet leave their places, standing heights; None for feet that stay.
+        lifts: (samples, legs, 3) by which feet leave their positions, standing heights; None for feet that stay.
     """
     standing_height = body.torso.standing_height
     torso_rotation = rotations.matrix(rest.quaternion)
@@ -323,7 +324,7 @@ def _follow_with_legs(
     max_misses = standing_height * _allowed_misses(lifts)
     max_joint_step = _MAX_JOINT_SPEED * math.sqrt(sizing.GRAVITY / standing_height) * _time_step(body)
     for size, sink_factor in itertools.product(_SIZES, _SINK_FACTORS):
-        sized_poses = size * poses * (sink_factor, 1.0, 1.0, 1.0, 1.0, 1.0)
+        sized_poses = size * poses * (sink_factor, 1.0, 1.0, 1.0, 1.0, 1.0)  # the height comes first
         joints, misses = keep_feet_in_place(body, rest, sized_poses, size * lifts)
         joints = _smooth(joints)
         joint_steps = abs(np.diff(joints, axis=0))
@@ -342,7 +343,7 @@ def _allowed_misses(lifts: np.ndarray) -> np.ndarray:
 
 def _make_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> Motion:
     """Return a motion of the torso (samples, 6) from rest, and of joints (samples, joints), rad."""
-    up, forward, left = (poses[:, [number]] for number in range(3))
+    up, forward, left = (poses[:, [column]] for column in range(3))
     offsets = body.torso.standing_height * np.concatenate([forward, left, up], axis=-1)
     quaternions = np.broadcast_to(rest.quaternion, (len(poses), 4))
     half_angles = 0.5 * poses[:, 3:]  # of roll, pitch and yaw

@@ -132,6 +132,7 @@ def _find_stances(is_low: np.ndarray, min_swing: int, max_stance: int | None) ->
         min_swing: samples; a shorter swing does not end a stance.
         max_stance: samples; stances of so many samples or more are left out. None for no limit.
     """
+    # Where the foot becomes low, and where it no longer is, in turn.
     edges = np.flatnonzero(np.diff(is_low.astype(int), prepend=0, append=0)).reshape(-1, 2)
     stances: list[tuple[int, int]] = []
     for start, end in edges.tolist():
@@ -162,7 +163,7 @@ def _move_feet_nearer(
     """
     samples = slice(None)  # of the motion
     corrected_motion = motion
-    if loops:  # the corrections are those of the second of three rounds
+    if loops:  # take the corrections of the second of three rounds, which has stances before and after it
         loop_samples = len(motion.joints) - 1
         samples = slice(loop_samples, 2 * loop_samples + 1)
         corrected_motion = _repeat_three_times(motion)
