@@ -324,10 +324,12 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         checked_snapshots = []  # all of them, before the first group is restored
         for number, place in enumerate(self._places):
             prefix = f"{number}/"
-            group_arrays = {
-                name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)
-            }
-            group_arrays["steps"] = steps[place.indices] if has_steps else steps  # the group refuses other shapes
+            group_arrays = {}
+            for name, array in arrays.items():
+                if name.startswith(prefix):
+                    group_arrays[name.removeprefix(prefix)] = array
+            # Steps of another shape go to the group, too: it refuses them.
+            group_arrays["steps"] = steps[place.indices] if has_steps else steps
             checked_snapshots.append(place.group._checked_snapshot(group_arrays))
         for place, snapshot in zip(self._places, checked_snapshots, strict=True):
             place.group._restore_state(*snapshot)
@@ -382,7 +384,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
 
     def _make_tokens(self) -> dict[str, np.ndarray]:
         """Return the tokens of all environments."""
-        inputs = np.empty(self._tokens.places.shape, np.float32)
+        inputs = np.empty(self._tokens.input_indices.shape, np.float32)
         for group, indices, group_tokens in self._places:
             inputs[indices] = group_tokens.gather_inputs(group._observation)
         return self._tokens.make_tokens(inputs)
@@ -397,7 +399,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """Return the final observations of a group's episodes.
 
         Args:
-            place: of the group.
+            place: the group, its indices and tokens.
             vectors: (environments of the group,) objects: observations of the bodies' own tasks, None for episodes
                 that go on.
 

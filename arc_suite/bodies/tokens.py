@@ -260,41 +260,41 @@ class Tokens(NamedTuple):
     """Constants that turn observations of environments into tokens, in float32; the leading axis is for environments.
 
     Attributes:
-        places: (environments, n) indices in the body's own observation vector of the torso's posture and velocity
-            (5 + 6), joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command (6, or
-            0); any index for legs and joints that the body does not have.
+        input_indices: (environments, n) in the body's own observation vector: indices of the torso's posture and
+            velocity (5 + 6), joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command
+            (6, or 0); any index for legs and joints that the body does not have.
         mask: (environments, 12, 4) 1 for a joint of the body.
         legs: (environments, 12) 1 for a leg of the body.
         height: (environments,) h, m.
-        speed: (environments,) sqrt(g h), m/s.
-        rate: (environments,) sqrt(g / h), rad/s.
-        units: (environments, 3) of the command; see `fitting.velocity_units`.
-        turn: (environments,) R / h.
-        forward: (environments,) 1 for a walk forward, -1 for one backward.
-        loaded: (environments,) upward force from which on a foot is loaded, in units of the block.
-        offset: (environments, 12, 2) sine and cosine of the phase of each leg over the clock.
-        middle: (environments, 2) sine and cosine of the phase in the middle of stance.
+        velocity_unit: (environments,) sqrt(g h), m/s.
+        rate_unit: (environments,) sqrt(g / h), rad/s.
+        command_units: (environments, 3) of the command; see `fitting.velocity_units`.
+        turn_scale: (environments,) R / h.
+        direction: (environments,) 1 for a walk forward, -1 for one backward.
+        loaded_force: (environments,) upward force from which on a foot is loaded, in units of the block.
+        leg_phase: (environments, 12, 2) sine and cosine of the phase of each leg over the clock.
+        mid_stance: (environments, 2) sine and cosine of the phase in the middle of stance.
     """
 
-    places: np.ndarray
+    input_indices: np.ndarray
     mask: np.ndarray
     legs: np.ndarray
     height: np.ndarray
-    speed: np.ndarray
-    rate: np.ndarray
-    units: np.ndarray
-    turn: np.ndarray
-    forward: np.ndarray
-    loaded: np.ndarray
-    offset: np.ndarray
-    middle: np.ndarray
+    velocity_unit: np.ndarray
+    rate_unit: np.ndarray
+    command_units: np.ndarray
+    turn_scale: np.ndarray
+    direction: np.ndarray
+    loaded_force: np.ndarray
+    leg_phase: np.ndarray
+    mid_stance: np.ndarray
 
     @classmethod
     def of(cls, tasks: Sequence[Task]) -> Self:
         """Return the tokens of a batch whose environment i does the i-th task.
 
         Raises:
-            ValueError: see `described`, or a task that does not observe the blocks `BLOCKS`.
+            ValueError: see `body_description`, or a task that does not observe the blocks `BLOCKS`.
         """
         task_by_id = {id(task): task for task in tasks}
         values_by_id = {key: cls._of_task(task) for key, task in task_by_id.items()}
@@ -315,28 +315,29 @@ class Tokens(NamedTuple):
         weight = 1.0 if "command" in task.blocks else pose.mass * GRAVITY
         phases = np.zeros(MAX_LEGS)  # rad
         phases[: len(body.legs)] = parameters.phase_offsets
-        mid_stance = math.pi * parameters.duty_factor  # phase, rad
+        mid_stance_phase = math.pi * parameters.duty_factor  # rad
         mask = pad_joints(body, np.ones(len(body.joint_names)))
         units = velocity_units(body, parameters.target_velocity)
         tokens = cls(
-            places=cls._input_indices(task),
+            input_indices=cls._find_input_indices(task),
             mask=mask,
             legs=mask.any(axis=-1),
             height=pose.height,
-            speed=math.sqrt(GRAVITY * pose.height),
-            rate=math.sqrt(GRAVITY / pose.height),
-            units=units,
-            turn=units[0] / units[2] / pose.height,
-            forward=math.copysign(1.0, parameters.target_velocity),
-            loaded=min(_MIN_CARRIED_SHARE * weight, _MAX_THRESHOLD),
-            offset=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
-            middle=np.array((math.sin(mid_stance), math.cos(mid_stance))),
+            velocity_unit=math.sqrt(GRAVITY * pose.height),
+            rate_unit=math.sqrt(GRAVITY / pose.height),
+            command_units=units,
+            turn_scale=units[0] / units[2] / pose.height,
+            direction=math.copysign(1.0, parameters.target_velocity),
+            loaded_force=min(_MIN_CARRIED_SHARE * weight, _MAX_THRESHOLD),
+            leg_phase=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
+            mid_stance=np.array((math.sin(mid_stance_phase), math.cos(mid_stance_phase))),
         )
+        # Everything except the indices is float32.
         indices, *numbers = tokens
         return cls(indices, *(np.asarray(number, np.float32) for number in numbers))
 
     @staticmethod
-    def _input_indices(task: Task) -> np.ndarray:
+    def _find_input_indices(task: Task) -> np.ndarray:
         """Return the indices (n,) in the task's observation of the numbers that tokens are made from."""
         body = task.scene.body
         block_slices = blocks.slices(task.sizes)
@@ -367,11 +368,11 @@ class Tokens(NamedTuple):
 
         Vectors of bodies with different joints have different sizes; these numbers have one layout.
         """
-        return np.take_along_axis(vectors, self.places, axis=-1)
+        return np.take_along_axis(vectors, self.input_indices, axis=-1)
 
     @staticmethod
     def split_inputs(inputs: np.ndarray) -> list[np.ndarray]:
-        """Return gathered numbers (..., n), or their indices, in the parts that `places` names."""
+        """Return gathered numbers (..., n), or their indices, in the parts that `input_indices` names."""
         return np.split(inputs, np.cumsum(_INPUT_SIZES), axis=-1)
 
     def make_tokens(self, inputs: np.ndarray) -> dict[str, np.ndarray]:
@@ -401,14 +402,14 @@ class Tokens(NamedTuple):
         vx, vy, vz, *angular_velocity = velocities.T  # in the world
         forward_velocity = cos_heading * vx + sin_heading * vy
         left_velocity = cos_heading * vy - sin_heading * vx
-        linear_rates = [velocity / self.speed for velocity in (forward_velocity, left_velocity, vz)]
-        angular_rates = [velocity / self.rate for velocity in angular_velocity]
+        linear_rates = [velocity / self.velocity_unit for velocity in (forward_velocity, left_velocity, vz)]
+        angular_rates = [velocity / self.rate_unit for velocity in angular_velocity]
         torso = np.stack([height / self.height, *up, forward_x, forward_y, *linear_rates, *angular_rates], axis=-1)
 
         if not command.shape[-1]:  # without a command, along world x, and back into that direction
-            turn = (-sin_heading * self.turn).clip(-1.0, 1.0)
-            desired = [self.forward * cos_heading, -self.forward * sin_heading, turn]
-            forward_unit, left_unit, turn_unit = self.units.T
+            turn = (-sin_heading * self.turn_scale).clip(-1.0, 1.0)
+            desired = [self.direction * cos_heading, -self.direction * sin_heading, turn]
+            forward_unit, left_unit, turn_unit = self.command_units.T
             motion = [
                 forward_velocity / forward_unit,
                 left_velocity / left_unit,
@@ -428,20 +429,20 @@ class Tokens(NamedTuple):
         """
         masked_angles = angles.reshape(self.mask.shape) * self.mask
         masked_velocities = joint_velocities.reshape(self.mask.shape) * self.mask
-        offset_sine = self.offset[..., 0]
-        offset_cosine = self.offset[..., 1]
+        offset_sine = self.leg_phase[..., 0]
+        offset_cosine = self.leg_phase[..., 1]
         # Sine and cosine of each leg's phase: that of the clock plus the leg's offset.
         sine = clock[:, :1] * offset_cosine + clock[:, 1:] * offset_sine
         cosine = clock[:, 1:] * offset_cosine - clock[:, :1] * offset_sine
         has_stopped = clock == 0.0  # in both numbers, for a body that is to stand
         # A leg stands while its phase is nearer to mid-stance than phase 0 is, the touchdown.
-        middle_sine = self.middle[:, :1]
-        middle_cosine = self.middle[:, 1:]
+        middle_sine = self.mid_stance[:, :1]
+        middle_cosine = self.mid_stance[:, 1:]
         is_in_stance = sine * middle_sine + cosine * middle_cosine >= middle_cosine
         is_to_stand = is_in_stance | (has_stopped[:, :1] & has_stopped[:, 1:])
-        is_loaded = forces >= self.loaded[:, None]
+        is_loaded = forces >= self.loaded_force[:, None]
         phase = np.stack([sine, cosine, is_to_stand, is_loaded], axis=-1) * self.legs[..., None]
-        return np.concatenate([masked_angles, masked_velocities / self.rate[:, None, None], phase], axis=-1)
+        return np.concatenate([masked_angles, masked_velocities / self.rate_unit[:, None, None], phase], axis=-1)
 
     def select(self, indices) -> Self:
         """Return the tokens of some environments."""

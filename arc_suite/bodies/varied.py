@@ -71,8 +71,7 @@ class _Shape(NamedTuple):
 def draw_varied_body(random: np.random.Generator) -> Body:
     """Draw a body, `varied`.
 
-    Eight in ten are put together. The others are robots of the suite, mutated by 0.05 to 0.2 and 0.25 to 4 times as
-    large. Of those put together:
+    Two in ten are robots of the suite, mutated by 0.05 to 0.2 and 0.25 to 4 times as large. The others are new:
 
     - legs, layout, size and proportions are drawn as in `generator.random_body`, with wider bounds;
     - joint ranges differ to both sides, and three in ten bends bend one way only;
@@ -89,7 +88,7 @@ def draw_varied_body(random: np.random.Generator) -> Body:
     """
     if random.uniform() < _ROBOT_SHARE:
         return _draw_robot(random)
-    return _draw_generated(random)
+    return _draw_new_body(random)
 
 
 def _draw_robot(random: np.random.Generator) -> Body:
@@ -102,7 +101,7 @@ def _draw_robot(random: np.random.Generator) -> Body:
     return body.replace(name="varied", torso=body.torso.replace(standing_height=None))
 
 
-def _draw_generated(random: np.random.Generator) -> Body:
+def _draw_new_body(random: np.random.Generator) -> Body:
     """Draw a body of new proportions. The order of the draws stands for a seed's body: it must stay."""
     leg_count = int(random.integers(LEG_RANGE[0], LEG_RANGE[1] + 1))
     link_count = int(random.integers(LINK_RANGE[0], LINK_RANGE[1] + 1))

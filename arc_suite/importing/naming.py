@@ -43,13 +43,13 @@ def choose_names(robot: Robot, legs: tuple[Leg, ...]) -> Names:
     used_names.update(joints.values())
     used_names.update(bodies.values())
 
-    held = tuple(joint for joint in robot.joints if joint not in joints)
-    for joint in held:
+    other_joints = tuple(joint for joint in robot.joints if joint not in joints)
+    for joint in other_joints:
         joints[joint] = _add_unique_name(robot.joint_name(joint), "joint", used_names)
     for body in robot.bodies:
         if body not in bodies:
             bodies[body] = _add_unique_name(robot.model.body(body).name, "body", used_names)
-    return Names(labels, joints, bodies, held)
+    return Names(labels, joints, bodies, held=other_joints)
 
 
 def _part_names(label: str, leg: Leg) -> Iterator[str]:
