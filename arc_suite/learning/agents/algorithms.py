@@ -26,9 +26,10 @@ class Algorithm(NamedTuple):
         summary: a line for people.
         evaluate_every: environment steps between evaluations, by default.
         steps: environment steps of a run, by default.
-        terrain_steps: the same in another arena than the flat one; None for as many.
+        terrain_steps: environment steps of a run in any arena except the flat one, by default; None for `steps`.
         extends: whether a run can be extended to more steps, as no schedule depends on them.
-        source: what it learns from, other than its own steps: nothing, prior data, a demonstrator or a policy.
+        source: what it learns from in addition to its own steps: "nothing", "prior data", "a demonstrator" or
+            "a policy".
         several: whether it can learn with several bodies.
         acts: whether it steps environments.
     """
@@ -61,22 +62,29 @@ class Algorithm(NamedTuple):
             ValueError: no such hyperparameter, or a value of another type.
         """
         fields = dataclasses.asdict(self.hyperparameters)
-        changes = {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
+        changed_fields = {}
         for name, value in changes.items():
-            kind = type(fields[checks.name(name, fields, "hyperparameter")])
-            kinds = (int, float) if kind is float else kind
-            if not isinstance(value, kinds) or isinstance(value, bool) != (kind is bool):
-                example = fields[name]
-                raise ValueError(
-                    f"hyperparameter {name}: expected {kind.__name__} like {example!r}, got {checks.preview(value)}"
-                )
-        return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changes))
+            checks.name(name, fields, "hyperparameter")
+            changed_fields[name] = tuple(value) if isinstance(value, list) else value
+            if not _has_type_of(changed_fields[name], fields[name]):
+                expected = f"{type(fields[name]).__name__} like {fields[name]!r}"
+                preview = checks.preview(changed_fields[name])
+                raise ValueError(f"hyperparameter {name}: expected {expected}, got {preview}")
+        return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changed_fields))
+
+
+def _has_type_of(value, example) -> bool:
+    """Return whether a value has the type of an example; an integer also counts as a float, and a bool never does."""
+    if isinstance(value, bool) or isinstance(example, bool):
+        return isinstance(value, bool) and isinstance(example, bool)
+    if isinstance(example, float):
+        return isinstance(value, int | float)
+    return isinstance(value, type(example))
 
 
 _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
-
-_PARALLEL = SoftActorCritic(
+_SAC_PARALLEL = SoftActorCritic(
     learning_rate=5e-4,
     discount=0.97,
     n_step=3,
@@ -96,7 +104,7 @@ _PARALLEL = SoftActorCritic(
 
 
 def _learn(hp, context) -> Iterator[Any]:
-    """Learn by the learner of this package that has such hyperparameters.
+    """Learn by the learner of this package that takes this class of hyperparameters.
 
     Raises:
         ValueError: JAX is not installed.
@@ -107,13 +115,14 @@ def _learn(hp, context) -> Iterator[Any]:
     return learners[type(hp)].learn(hp, context)
 
 
+# Kinds of algorithms; the further arguments of each are its hyperparameters and its summary.
 _off_policy = functools.partial(Algorithm, _learn, extends=True)
 _with_prior = functools.partial(_off_policy, source="prior data")
 _on_policy = functools.partial(Algorithm, _learn, several=True)
 _finetune = functools.partial(_on_policy, source="a policy")
 _dagger = functools.partial(Algorithm, _learn, source="a demonstrator", several=True)
 
-# The paper's six, as in its published code, and others: docs/agents.md.
+# First the six algorithms of the ARC-RL paper, as in its published code, then others: docs/agents.md.
 ALGORITHMS = {
     "sac": _off_policy(_SAC, "soft actor-critic"),
     "speq": _off_policy(_SPEQ, "SAC with phases in which the critics alone learn"),
@@ -136,13 +145,13 @@ ALGORITHMS = {
     ),
     # What each part gives: docs/algorithms.md.
     "sac_parallel": _off_policy(
-        _PARALLEL,
+        _SAC_PARALLEL,
         "SAC from nothing in 32 environments, with 3-step returns and a short horizon",
         evaluate_every=20_000,
         steps=100_000,
     ),
     "xqc": _off_policy(
-        dataclasses.replace(_PARALLEL, critics="categorical", reward_scale=0.03, initial_temperature=0.001),
+        dataclasses.replace(_SAC_PARALLEL, critics="categorical", reward_scale=0.03, initial_temperature=0.001),
         "SAC as sac_parallel, whose critics learn distributions over returns, with batch and weight norm",
         evaluate_every=20_000,
         steps=100_000,
@@ -151,7 +160,7 @@ ALGORITHMS = {
     "ppo": _on_policy(
         ProximalPolicy(network="legs", hidden=64, minibatch=512),
         "proximal policy optimization of a network that legs share",
-        100_000,
+        evaluate_every=100_000,
         terrain_steps=3_000_000,
     ),
     # Small steps around a good policy: the noise of `ppo` would undo it.
@@ -197,9 +206,15 @@ ALGORITHMS = {
         evaluate_every=122_880,
         steps=270_336,
     ),
-    # Its steps are updates.
+    # The steps of behavior cloning are updates.
     "bc": Algorithm(
-        _learn, BehaviorCloning(), "behavior cloning of a dataset", 2500, 5000, source="prior data", acts=False
+        _learn,
+        BehaviorCloning(),
+        "behavior cloning of a dataset",
+        evaluate_every=2500,
+        steps=5000,
+        source="prior data",
+        acts=False,
     ),
 }
 

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 
 from arc_suite import checks, registry
 
-_POSITIVE = (1e-6, 1e3)
-# Contact forces are 114 to 150 numbers, without which learners that act are better: docs/algorithms.md.
+_POSITIVE_RANGE = (1e-6, 1e3)  # of numbers that must not be 0
+# Blocks that networks do not see by default. Contact forces are 114 to 150 numbers; learners that act are better
+# without them: docs/algorithms.md.
 BLOCKS_LEFT_OUT = ("contact_forces",)
-# Functions that make an architecture for a task, see `architectures.of`; or where they are, as those need JAX.
+# Functions that make an architecture for a task, see `architectures.of`; as `module:name`, since they need JAX.
 NETWORKS = {
     "perceptron": "arc_suite.learning.agents.architectures:Perceptron.of",
     "legs": "arc_suite.learning.agents.leg_networks:Legs.of",
@@ -28,35 +29,35 @@ class SoftActorCritic:
         n_step: control steps of the rewards in a target, before the critics' value.
         tau: step of the target networks towards the critics in each update.
         batch: transitions of an update from each source of data.
-        buffer_size: latest online transitions that are kept.
+        buffer_size: number of the latest online transitions, from which batches are drawn.
         dropout: share of units that the critics drop.
-        critics: what they learn: "squared", values by squared errors; or "categorical", distributions over returns by
-            cross-entropy, with batch norm and weights on the unit sphere; see `categorical`.
-        network: what acts and values: "perceptron", which sees all of an observation; or "legs", which all legs share,
-            half of whose first units are means over legs; see `leg_networks.Legs`.
-        prior: use of prior data: "none"; "protected", in one buffer with online data, never overwritten; or
-            "symmetric_sampling", a second batch in every update.
+        critics: "squared": they learn values, by squared errors. "categorical": they learn distributions over returns,
+            by cross-entropy, with batch norm and weights on the unit sphere; see `categorical`.
+        network: of policy and critics. "perceptron": it sees the complete observation. "legs": all legs share it, and
+            half of its first units are means over legs; see `leg_networks.Legs`.
+        prior: use of prior data. "none"; "protected": in one buffer with online data, never overwritten; or
+            "symmetric_sampling": a second batch in every update.
         num_envs: environments, which step together.
-        utd_ratio: updates of an environment step, a share where several environments step together; of several
-            updates of a step all but the last update the critics alone.
-        start_steps: actions are uniform while the buffer has at most this many transitions, never if it is 0;
-            updates do not wait.
+        utd_ratio: updates of an environment step; a share where several environments step together. Of several
+            updates of a step, the last one moves the policy too; all others move the critics alone.
+        start_steps: actions are uniform while the buffer has at most this many transitions; 0 for never. Updates do
+            not wait.
         reward_scale: factor of rewards.
         initial_std: standard deviation of actions at the start, before the tanh.
         last_gain: factor of the initial weights of the policy's last layers.
         initial_temperature: weight of the entropy at the start.
-        target_entropy: of a joint, which the temperature follows.
+        target_entropy: entropy of a joint's action, which the temperature is adapted to.
         symmetry_augmentation: whether every other transition of a batch is mirrored, for symmetric bodies.
         normalize: whether running moments normalize observations.
         exclude_blocks: names of blocks of the observation that networks do not see, where a task has them.
         phase_every: environment steps between stabilization phases.
-        phase_updates: the most updates of the critics alone in a phase; 0 for no phases.
+        phase_updates: largest number of updates of the critics alone in a phase; 0 for no phases.
         early_stop: rule that ends a phase early: "none", "published" or "sign_safe"; see `stopping`.
         held_out: share of the online transitions in the validation set of a phase.
-        scored_batches: the most batches of each source in a validation loss.
+        scored_batches: largest number of batches of each source in a validation loss.
         check_every: updates between two validation losses.
         patience: updates without improvement that end a phase.
-        improvement: relative improvement that counts.
+        improvement: relative improvement of the validation loss that counts as one.
     """
 
     hidden: int = 256
@@ -92,12 +93,21 @@ class SoftActorCritic:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        positive = dict.fromkeys(("reward_scale", "initial_std", "initial_temperature"), _POSITIVE)
-        ranges = {"start_steps": (0,), "phase_updates": (0,), "tau": (1e-6, 1.0), "dropout": (0.0, 0.9)}
-        ranges |= {"last_gain": (0.0, 1e3), "target_entropy": (-100.0, 100.0), "utd_ratio": (0.0, 1e3)}
-        _check(self, ranges | positive)
-        whole = self.utd_ratio if self.utd_ratio > 1.0 else self.num_envs * self.utd_ratio
-        if not whole or whole != round(whole):
+        ranges = {
+            "start_steps": (0,),
+            "phase_updates": (0,),
+            "tau": (1e-6, 1.0),
+            "dropout": (0.0, 0.9),
+            "last_gain": (0.0, 1e3),
+            "target_entropy": (-100.0, 100.0),
+            "utd_ratio": (0.0, 1e3),
+            "reward_scale": _POSITIVE_RANGE,
+            "initial_std": _POSITIVE_RANGE,
+            "initial_temperature": _POSITIVE_RANGE,
+        }
+        _check_numbers(self, ranges)
+        updates = self.utd_ratio if self.utd_ratio > 1.0 else self.num_envs * self.utd_ratio
+        if not updates or updates != round(updates):
             raise ValueError(
                 f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, of each if "
                 f"it is above 1, got {checks.preview(self.utd_ratio)}"
@@ -105,11 +115,12 @@ class SoftActorCritic:
         checks.name(self.critics, ("squared", "categorical"), "critics")
         checks.name(self.network, NETWORKS, "network of soft actor-critic")
         if self.dropout and (self.critics == "categorical" or self.network == "legs"):
-            kind = "categorical critics" if self.critics == "categorical" else "a network of legs"
-            raise ValueError(f"dropout: expected 0 with {kind}, got {self.dropout}")
+            reason = "categorical critics" if self.critics == "categorical" else "a network of legs"
+            raise ValueError(f"dropout: expected 0 with {reason}, got {self.dropout}")
         checks.name(self.prior, ("none", "protected", "symmetric_sampling"), "prior")
         checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
-        if self.buffer_size <= self.start_steps and self.prior != "protected":  # prior data in the same buffer count
+        # Prior data in the same buffer count towards the start steps.
+        if self.buffer_size <= self.start_steps and self.prior != "protected":
             raise ValueError(
                 f"buffer_size: expected more than start_steps, {self.start_steps}, after which the policy acts, "
                 f"got {self.buffer_size}"
@@ -117,7 +128,7 @@ class SoftActorCritic:
 
     @property
     def updates_of_a_step(self) -> int:
-        """Updates after all environments have stepped once."""
+        """Number of updates after all environments have stepped once."""
         return round(self.num_envs * self.utd_ratio)
 
 
@@ -129,9 +140,9 @@ class DAgger:
         preset: of the demonstrator; "" for the preset that suits the task.
         num_envs: environments; the demonstrator acts in half of them.
         noise: standard deviation of the noise on actions.
-        left_out: first control steps of an episode that are not learned from, as the demonstrator starts by a
-            clock that the network does not see.
-        round: control steps between fits.
+        left_out: number of the first control steps of an episode that are not learned from, as the demonstrator
+            starts by a clock that the network does not see.
+        round: control steps of each environment between fits.
         updates: of a fit.
         last_updates: of the last fit, over which the learning rate falls to 0.
         batch: labels of an update.
@@ -154,7 +165,7 @@ class DAgger:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        _check(self, {"num_envs": (2,), "left_out": (0,), "noise": (0.0, 10.0)})
+        _check_numbers(self, {"num_envs": (2,), "left_out": (0,), "noise": (0.0, 10.0)})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,7 +186,7 @@ class BehaviorCloning:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        _check(self, {})
+        _check_numbers(self, {})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,14 +195,14 @@ class ProximalPolicy:
 
     Attributes:
         start: folder of a run, or a policy file, whose policy learning starts from; "" for none.
-        simulation: what simulates the environments: "mujoco", on a processor; or "mjx" or "warp", the
-            implementations of `arc_suite.learning.worlds.mjx`, where all of learning stays on JAX's device.
+        simulation: simulator of the environments. "mujoco": on a processor. "mjx" or "warp": the implementations of
+            `arc_suite.learning.worlds.mjx`, with which all of learning stays on JAX's device.
         num_envs: environments.
         horizon: control steps of each environment between updates.
-        network: what acts and values: "perceptron", two layers that see all of an observation; "legs", which
-            all legs share, see `leg_networks`; or `module:name` of one that another package has.
-        symmetry_augmentation: whether left and right are alike, for symmetric bodies: a perceptron learns from a
-            mirrored copy of each transition, legs share one network.
+        network: of policy and values. "perceptron": two layers that see the complete observation. "legs": all legs
+            share it, see `leg_networks`. `module:name`: that of another package.
+        symmetry_augmentation: whether left and right are alike, for symmetric bodies. A perceptron learns from a
+            mirrored copy of each transition; left and right legs share one network.
         epochs: passes over the transitions of a horizon.
         minibatch: transitions of an update, mirrored ones counted.
         discount: of a control step.
@@ -240,25 +251,45 @@ class ProximalPolicy:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        names = ("initial_std", "final_std", "initial_desired_kl", "final_desired_kl", "gradient_norm")
-        ranges = {"value_warm_up": (0,), "gae_lambda": (0.0, 1.0), "normalize_until": (0.0, 1.0)}
-        _check(self, ranges | dict.fromkeys(names, _POSITIVE))
+        ranges = {
+            "value_warm_up": (0,),
+            "gae_lambda": (0.0, 1.0),
+            "normalize_until": (0.0, 1.0),
+            "initial_std": _POSITIVE_RANGE,
+            "final_std": _POSITIVE_RANGE,
+            "initial_desired_kl": _POSITIVE_RANGE,
+            "final_desired_kl": _POSITIVE_RANGE,
+            "gradient_norm": _POSITIVE_RANGE,
+        }
+        _check_numbers(self, ranges)
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
         registry.find_entry("network", self.network, NETWORKS)
-        mirrored = self.symmetry_augmentation and self.network == "perceptron"
-        if self.minibatch > self.num_envs * self.horizon * (2 if mirrored else 1):
+        transitions = self.num_envs * self.horizon
+        if self.symmetry_augmentation and self.network == "perceptron":
+            transitions *= 2  # each has a mirrored copy
+        if self.minibatch > transitions:
             raise ValueError(f"minibatch: expected at most the transitions of a horizon, got {self.minibatch}")
 
 
-def _check(hp, ranges: Mapping[str, tuple]) -> None:
-    """Check numbers by their ranges; the others are integers from 1, or shares between 0 and 1."""
+def _check_numbers(hp, ranges: Mapping[str, tuple]) -> None:
+    """Check the values of hyperparameters.
+
+    Args:
+        hp: a dataclass of hyperparameters.
+        ranges: the lowest, and maybe the highest, allowed number by name. Integers without a range are at least 1, and
+            other numbers without a range are shares between 0 and 1.
+
+    Raises:
+        ValueError: a number out of its range, or a tuple of anything but names.
+    """
     for field in dataclasses.fields(hp):
-        name, value = field.name, getattr(hp, field.name)
+        name = field.name
+        value = getattr(hp, name)
         if field.type is int:
             checks.integer(name, value, *ranges.get(name, (1,)))
         elif field.type is float:
             checks.number(name, value, *ranges.get(name, ()))
             if name not in ranges and not 0.0 < value < 1.0:
                 raise ValueError(f"{name}: expected a number between 0 and 1, got {checks.preview(value)}")
-        elif isinstance(value, tuple) and not all(isinstance(each, str) for each in value):
+        elif isinstance(value, tuple) and not all(isinstance(block, str) for block in value):
             raise ValueError(f"{name}: expected names of blocks, got {checks.preview(value)}")
