@@ -1,4 +1,4 @@
-"""Configurations of runs: one value, read and written as JSON, from the flags or a study to the training."""
+"""Configurations of runs: values that flags and studies make, that training takes, and that files hold as JSON."""
 
 import dataclasses
 import json
@@ -20,15 +20,15 @@ from arc_suite.policies import network
 from arc_suite.tasks import leg_views
 from arc_suite.tasks.contract import CURRICULUM
 
-# Names in the file of a configuration.
-_OWN = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior", "training")
-CONFIGURATION_FIELDS = ("robot", "task", "task_kwargs", *_OWN)
-# Names in the record of a run that follow from its configuration, the data and the installed packages; `learner` is in
-# records of earlier versions.
-PRIOR_SHA256, TRAINING_SEEDS = "prior_sha256", "training_seeds"
+# Fields in the file of a configuration: those of the setup, and the others.
+_LEARNING_FIELDS = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior", "training")
+CONFIGURATION_FIELDS = ("robot", "task", "task_kwargs", *_LEARNING_FIELDS)
+
+# Further fields in the record of a run, which follow from its configuration, the data and the installed packages.
+# `learner` is in records of earlier versions.
+PRIOR_SHA256 = "prior_sha256"
+TRAINING_SEEDS = "training_seeds"
 DATA_FIELDS = (PRIOR_SHA256, TRAINING_SEEDS)
-# Hyperparameters that hold names which other packages may have registered, and their kinds.
-_NAMES_IN_HYPERPARAMETERS = {"network": "network", "preset": "law"}
 PROVENANCE_FIELDS = (
     "task_version",
     "body_sha256",
@@ -40,10 +40,13 @@ PROVENANCE_FIELDS = (
     "versions",
 )
 
+# Hyperparameters whose values are names that other packages may have registered, and the kinds of these names.
+_KINDS_OF_NAMES = {"network": "network", "preset": "law"}
+
 
 @dataclasses.dataclass(frozen=True)
 class Configuration:
-    """Everything that a run depends on, apart from installed packages; make it by `of` or `from_dict`.
+    """Everything that a run depends on, except installed packages; make it by `of` or `from_dict`.
 
     Attributes:
         setup: body, or bodies, task and settings.
@@ -77,32 +80,30 @@ class Configuration:
         prior: str | None = None,
         training: Mapping[str, Any] | None = None,
     ) -> Self:
-        """Return a configuration with the algorithm's defaults for all that is not given.
+        """Return a configuration; arguments that are None have the algorithm's defaults.
 
         Args:
-            setup: body, or bodies, task and settings by which the policy is judged.
+            setup: body, or bodies, task and settings by which the policy is evaluated.
             algorithm, seed, steps, evaluate_every, prior: see `Configuration`.
             hyperparameters: those that differ from the algorithm's. Where `start` names a policy of one body,
-                `network` and `hidden` are that policy's, unless they are given.
+                `network` and `hidden` are that policy's by default.
             training: settings of the task in training alone, such as kicks or a curriculum.
 
         Raises:
             ValueError: an unknown algorithm or hyperparameter, a value out of its range, or a damaged policy to start
                 from.
         """
-        given = hyperparameters or {}
-        definition = algorithms.algorithm(algorithm).with_hyperparameters(given)
+        changes = hyperparameters or {}
+        definition = algorithms.algorithm(algorithm).with_hyperparameters(changes)
         start = getattr(definition.hyperparameters, "start", "")
-        if start and not setup.several and not {"network", "hidden"} <= given.keys():
-            definition = definition.with_hyperparameters({**network_hyperparameters(start), **given})
-        if setup.several and not definition.several:
-            those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
-            raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
-        left_out = getattr(definition.hyperparameters, "exclude_blocks", ())
-        if setup.several and set(left_out) - set(BLOCKS_LEFT_OUT):
-            raise ValueError(f"exclude_blocks: expected none with several bodies, got {', '.join(left_out)}")
-        steps = definition.steps_of(setup) if steps is None else steps
-        evaluate_every = definition.evaluate_every if evaluate_every is None else evaluate_every
+        if start and not setup.several and not {"network", "hidden"} <= changes.keys():
+            definition = definition.with_hyperparameters({**network_hyperparameters(start), **changes})
+        if setup.several:
+            _check_learns_several(setup, algorithm, definition)
+        if steps is None:
+            steps = definition.steps_of(setup)
+        if evaluate_every is None:
+            evaluate_every = definition.evaluate_every
         checks.integer("seed", seed, 0, MAX_RUN_SEED)
         checks.integer("steps", steps, 1)
         checks.integer("evaluate_every", evaluate_every, 1)
@@ -110,10 +111,16 @@ class Configuration:
             raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
         training = checks.mapping("training", training)
         _check_training(setup, definition, training)
-        text = checks.json_text("training", dict(training))
-        algorithm = registry.importable_name("algorithm", registry.bare_name(algorithm))
-        hyperparameters = _with_modules(definition.hyperparameters)
-        return cls(setup, algorithm, hyperparameters, seed, steps, evaluate_every, prior, text)
+        return cls(
+            setup=setup,
+            algorithm=registry.importable_name("algorithm", registry.bare_name(algorithm)),
+            hyperparameters=_with_modules(definition.hyperparameters),
+            seed=seed,
+            steps=steps,
+            evaluate_every=evaluate_every,
+            prior=prior,
+            training_json=checks.json_text("training", dict(training)),
+        )
 
     @property
     def training(self) -> dict[str, Any]:
@@ -123,32 +130,35 @@ class Configuration:
     @property
     def policy_setup(self) -> Setup:
         """Setup of the policy: `setup`, whose task leaves out the blocks that networks do not see."""
-        return self.setup.with_settings(self._excluded())
+        excluded_blocks = self._excluded_blocks()
+        return self.setup.with_settings({"exclude_blocks": excluded_blocks} if excluded_blocks else {})
 
     @property
     def training_setup(self) -> Setup:
         """Setup in which the algorithm learns: that of the policy, with the settings of training.
 
         Raises:
-            ValueError: a setting that does not fit, or one by which observations or actions are others.
+            ValueError: a setting that does not fit, or one that changes observations or actions.
         """
-        judged, found = self.policy_setup, self.policy_setup.with_settings(self.training)
-        if found != judged:
-            here, there = found.definition, judged.definition
-            if (here.sizes, here.actions) != (there.sizes, there.actions):
+        policy_setup = self.policy_setup
+        training_setup = policy_setup.with_settings(self.training)
+        if training_setup != policy_setup:
+            training_task = training_setup.definition
+            policy_task = policy_setup.definition
+            if training_task.sizes != policy_task.sizes or training_task.actions != policy_task.actions:
                 others = "other observations or actions than those that it is judged by"
                 raise ValueError(f"training: expected settings of the same observations and actions, got {others}")
-        return found
+        return training_setup
 
-    def _excluded(self) -> dict[str, Any]:
-        """Setting of the blocks that networks do not see: those of the task, then those of the hyperparameters."""
+    def _excluded_blocks(self) -> list[str]:
+        """Return the blocks that networks do not see; an empty list leaves the setting of the task as it is."""
         names = getattr(self.hyperparameters, "exclude_blocks", ())
         if not names or self.setup.several:  # the inputs of several bodies are always the same
-            return {}
-        there = self.setup.judging().definition.sizes
-        own = self.setup.excluded_blocks
-        found = [*own, *(name for name in names if name in there and name not in own)]
-        return {"exclude_blocks": found} if found else {}
+            return []
+        task_blocks = self.setup.judging().definition.sizes
+        excluded_by_task = self.setup.excluded_blocks
+        excluded_by_hyperparameters = [name for name in names if name in task_blocks and name not in excluded_by_task]
+        return [*excluded_by_task, *excluded_by_hyperparameters]
 
     @property
     def validation(self) -> Setup:
@@ -163,44 +173,68 @@ class Configuration:
     def context(
         self, folder: str | os.PathLike, threads: int = 1, checkpoint: Mapping[str, np.ndarray] | None = None
     ) -> RunContext:
-        """Return what the learner is given; see `RunContext`.
+        """Return the context of the run, which its learner takes.
+
+        Args:
+            folder: of the run.
+            threads: of the simulation.
+            checkpoint: arrays to resume from; None for a new run.
 
         Raises:
             ValueError: as `training_setup`.
         """
-        own = {name: getattr(self, name) for name in ("setup", "seed", "steps", "evaluate_every", "prior")}
         return RunContext(
-            **own, training=self.training_setup, folder=Path(folder), threads=threads, checkpoint=checkpoint
+            setup=self.setup,
+            training=self.training_setup,
+            seed=self.seed,
+            steps=self.steps,
+            evaluate_every=self.evaluate_every,
+            folder=Path(folder),
+            prior=self.prior,
+            threads=threads,
+            checkpoint=checkpoint,
         )
 
     @property
     def name(self) -> str:
-        """Name of the run's folder, if no other is given."""
+        """Default name of the run's folder."""
         return f"{self.setup.name}-{self.setup.kind.name}-{self.algorithm}-{self.seed}".replace(":", ".")
 
     @property
     def command(self) -> str:
-        """Command line that trains the same policy; hyperparameters that are the algorithm's own are left out."""
-        usual = dataclasses.asdict(algorithms.algorithm(self.algorithm).hyperparameters)
-        changed = {n: v for n, v in dataclasses.asdict(self.hyperparameters).items() if v != usual[n]}
-        names = ("task", "algorithm", "steps", "seed", "evaluate_every", *["prior"] * (self.prior is not None))
-        flags = [f"--{name}={getattr(self.setup if name == 'task' else self, name)}" for name in names]
-        for flag, values in (("set", self.setup.task_kwargs), ("train_set", self.training), ("hp", changed)):
-            flags += [f"--{flag}={n}={v if isinstance(v, str) else json.dumps(v)}" for n, v in values.items()]
-        return shlex.join(["arc-suite", "train", f"--robot={self.setup.robot}", *flags])
+        """Command line that trains the same policy; hyperparameters with the algorithm's defaults are left out."""
+        defaults = dataclasses.asdict(algorithms.algorithm(self.algorithm).hyperparameters)
+        hyperparameters = dataclasses.asdict(self.hyperparameters)
+        changes = {name: value for name, value in hyperparameters.items() if value != defaults[name]}
+        words = [
+            "arc-suite",
+            "train",
+            f"--robot={self.setup.robot}",
+            f"--task={self.setup.task}",
+            f"--algorithm={self.algorithm}",
+            f"--steps={self.steps}",
+            f"--seed={self.seed}",
+            f"--evaluate_every={self.evaluate_every}",
+        ]
+        if self.prior is not None:
+            words.append(f"--prior={self.prior}")
+        words += _flags("set", self.setup.task_kwargs)
+        words += _flags("train_set", self.training)
+        words += _flags("hp", changes)
+        return shlex.join(words)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the configuration as files hold it, JSON-able."""
-        own = {"algorithm": self.algorithm, "hyperparameters": dataclasses.asdict(self.hyperparameters)}
-        own |= {name: getattr(self, name) for name in ("seed", "steps", "evaluate_every", "prior", "training")}
-        return self.setup.to_dict() | own
+        """Return the configuration as files hold it, plain values by field."""
+        learning_fields = {name: getattr(self, name) for name in _LEARNING_FIELDS}
+        learning_fields["hyperparameters"] = dataclasses.asdict(self.hyperparameters)
+        return self.setup.to_dict() | learning_fields
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
         """Return the configuration of a file; no module that it names is imported.
 
         Args:
-            fields: those of `to_dict` or `record`; all but `robot` have defaults.
+            fields: those of `to_dict` or `record`; all except `robot` have defaults.
 
         Raises:
             NotImported: the module of a name has not been imported yet.
@@ -214,57 +248,70 @@ class Configuration:
         for kind, name in _registered_names(fields):
             registry.refuse_import(kind, name)
         setup = Setup.of(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
-        return cls.of(setup, **{name: fields[name] for name in _OWN if name in fields})
+        return cls.of(setup, **{name: fields[name] for name in _LEARNING_FIELDS if name in fields})
 
     @property
     def modules(self) -> tuple[str, ...]:
-        """Modules that register what it names, for processes that read it from a file."""
-        names = [name for _, name in _registered_names(self.to_dict())]
-        return tuple(dict.fromkeys(name.rpartition(":")[0] for name in names if ":" in name))
+        """Modules that register the names in the configuration, for processes that read it from a file."""
+        modules = [name.rpartition(":")[0] for _, name in _registered_names(self.to_dict()) if ":" in name]
+        return tuple(dict.fromkeys(modules))  # each once
 
     def record(self) -> dict[str, Any]:
-        """Return, JSON-able, `to_dict` with hashes and versions of all that computes.
+        """Return `to_dict` with hashes and versions of everything that a run computes with, plain values by field.
 
         Raises:
             ValueError: a setting of the task that does not fit.
         """
         provenance = self.setup.provenance()
         packages = {name: versions.version_of(name) for name in ("jax", "jaxlib", "optax")}
-        own = {"episodes": evaluation.CURVE_EPISODES, "versions": provenance["versions"] | packages}
-        return self.to_dict() | provenance | own | self._views()
+        fields = self.to_dict() | provenance
+        fields["episodes"] = evaluation.CURVE_EPISODES
+        fields["versions"] = provenance["versions"] | packages
+        if self._depends_on_leg_views():
+            fields[LEG_VIEWS] = leg_views.VERSION
+        return fields
 
-    def _views(self) -> dict[str, int]:
-        """Return the version of what legs see, of a run whose legs see blocks that earlier versions did not turn."""
+    def _depends_on_leg_views(self) -> bool:
+        """Return whether legs see blocks that the first version of leg views did not turn."""
         if getattr(self.hyperparameters, "network", "") != "legs" or self.setup.several:
-            return {}
-        seen = [*self.policy_setup.definition.blocks, *getattr(self.hyperparameters, "critic_blocks", ())]
-        return {LEG_VIEWS: leg_views.VERSION} if set(seen) - set(leg_views.TURNED_BEFORE) else {}
+            return False
+        critic_blocks = getattr(self.hyperparameters, "critic_blocks", ())
+        seen_blocks = {*self.policy_setup.definition.blocks, *critic_blocks}
+        return not seen_blocks <= set(leg_views.TURNED_BEFORE)
+
+
+def _flags(flag: str, values: Mapping[str, Any]) -> list[str]:
+    """Return a flag `--flag=name=value` for each value: text as it is, all others as JSON."""
+    texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}
+    return [f"--{flag}={name}={text}" for name, text in texts.items()]
 
 
 def _registered_names(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield kind and name of all that other packages may have registered, in the fields of a configuration.
+    """Yield kind and name of everything in the fields of a configuration that other packages may have registered.
 
     Raises:
         ValueError: hyperparameters or settings that are no mappings.
     """
     hyperparameters = checks.mapping("hyperparameters", fields.get("hyperparameters"))
-    names = [("robot", name) for name in _names_of_bodies(fields.get("robot"))]
-    names += [("task", fields.get("task")), ("algorithm", fields.get("algorithm"))]
-    for key in ("task_kwargs", "training"):
-        settings = checks.mapping(key, fields.get(key))
-        names += [("arena", settings.get("arena")), *(("modifier", name) for name in settings)]
-    names += [(kind, hyperparameters.get(field)) for field, kind in _NAMES_IN_HYPERPARAMETERS.items()]
-    yield from ((kind, name) for kind, name in names if isinstance(name, str))
-
-
-def _names_of_bodies(robot) -> list[str]:
-    return registry.names_in_robot(robot) if isinstance(robot, str) else []
+    robot = fields.get("robot")
+    body_names = registry.names_in_robot(robot) if isinstance(robot, str) else []
+    names = [("robot", name) for name in body_names]
+    names.append(("task", fields.get("task")))
+    names.append(("algorithm", fields.get("algorithm")))
+    for settings_field in ("task_kwargs", "training"):
+        settings = checks.mapping(settings_field, fields.get(settings_field))
+        names.append(("arena", settings.get("arena")))
+        names += [("modifier", name) for name in settings]
+    names += [(kind, hyperparameters.get(field)) for field, kind in _KINDS_OF_NAMES.items()]
+    for kind, name in names:
+        if isinstance(name, str):
+            yield kind, name
 
 
 def _with_modules(hyperparameters):
-    """Return hyperparameters whose names of other packages have their modules, as other processes look them up."""
+    """Return hyperparameters with `module:name` for names of other packages, as other processes need the module."""
     changes = {}
-    for field, kind in _NAMES_IN_HYPERPARAMETERS.items():
+    for field, kind in _KINDS_OF_NAMES.items():
         name = getattr(hyperparameters, field, None)
         if isinstance(name, str) and registry.bare_name(name) in registry.ADDITIONS[kind]:
             changes[field] = registry.importable_name(kind, registry.bare_name(name))
@@ -272,31 +319,46 @@ def _with_modules(hyperparameters):
 
 
 def network_hyperparameters(start: str | os.PathLike) -> dict[str, Any]:
-    """Return the hyperparameters of the network of a policy file; none if there is no file, as a run may resume."""
+    """Return the hyperparameters of the network of a policy file.
+
+    They are empty if there is no file, as a run may resume without the policy that it started from.
+    """
     try:
         graph = network.load(start).graph
     except OSError:
         return {}
-    operators = {node.operator: node.inputs for node in reversed(graph.nodes)}  # of the first node of each operator
-    if "Linear" not in operators:
+    linear_nodes = [node for node in graph.nodes if node.operator == "Linear"]
+    if not linear_nodes:
         return {}
-    width = graph.arrays[str(operators["Linear"][-1])].size
-    return {"network": "legs" if "Product" in operators else "perceptron", "hidden": width}
+    first_bias = linear_nodes[0].inputs[-1]
+    is_of_legs = any(node.operator == "Product" for node in graph.nodes)
+    return {"network": "legs" if is_of_legs else "perceptron", "hidden": graph.arrays[str(first_bias)].size}
+
+
+def _check_learns_several(setup: Setup, name: str, definition: algorithms.Algorithm) -> None:
+    """Raise ValueError for an algorithm or hyperparameters that cannot learn with several bodies."""
+    if not definition.several:
+        names = [other_name for other_name, algorithm in algorithms.ALGORITHMS.items() if algorithm.several]
+        raise ValueError(f"algorithm {name}: learns with one body, got {setup.robot}; with several: {', '.join(names)}")
+    exclude_blocks = getattr(definition.hyperparameters, "exclude_blocks", ())
+    if not set(exclude_blocks) <= set(BLOCKS_LEFT_OUT):
+        raise ValueError(f"exclude_blocks: expected none with several bodies, got {', '.join(exclude_blocks)}")
 
 
 def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Mapping[str, Any]) -> None:
-    """Raise ValueError for settings of training that nothing would follow, and for a curriculum that judges."""
-    if setup.task_kwargs.get(CURRICULUM[0]):
+    """Raise ValueError for settings of training that have no effect, and for a curriculum in evaluations."""
+    curriculum_setting = CURRICULUM[0]
+    if setup.task_kwargs.get(curriculum_setting):
         raise ValueError(
-            f"setting {CURRICULUM[0]}: expected among the settings of training (--train_set), as an evaluation would "
-            f"begin at the first level, got {checks.preview(setup.task_kwargs[CURRICULUM[0]])}"
+            f"setting {curriculum_setting}: expected among the settings of training (--train_set), as an evaluation "
+            f"would begin at the first level, got {checks.preview(setup.task_kwargs[curriculum_setting])}"
         )
     if training and not definition.acts:
         raise ValueError(f"training: expected no settings, as the algorithm makes no step, got {', '.join(training)}")
     for name in training:
         if name in ("random", "exclude_blocks"):
-            other = "as every run has a seed" if name == "random" else "as it is a hyperparameter"
-            raise ValueError(f"training: setting {name}: expected none, {other}, got {checks.preview(training[name])}")
+            reason = "as every run has a seed" if name == "random" else "as it is a hyperparameter"
+            raise ValueError(f"training: setting {name}: expected none, {reason}, got {checks.preview(training[name])}")
 
 
 def read(path: Path) -> Configuration:
@@ -309,8 +371,8 @@ def read(path: Path) -> Configuration:
     """
     try:
         with files.reading(path):
-            found = files.read_json(path)
-        return Configuration.from_dict(checks.mapping("configuration", found))
+            fields = files.read_json(path)
+        return Configuration.from_dict(checks.mapping("configuration", fields))
     except registry.NotImported as error:
         raise registry.NotImported(f"{path}: {error}") from None
     except ValueError as error:
