@@ -28,23 +28,26 @@ except ImportError as error:
 
 IMPLEMENTATIONS = ("jax", "warp")
 
-# Of the solver under `jax`, whose loops run until the slowest world is done: fewer cost return, more only time. See
-# docs/gpu.md.
-SOLVER_ITERATIONS, LINE_SEARCH_ITERATIONS = 20, 8
+# Limits of the solver under `jax`, whose loops run until the slowest world is ready. Lower limits cost return, higher
+# ones only time. See docs/gpu.md.
+SOLVER_ITERATIONS = 20
+LINE_SEARCH_ITERATIONS = 8
 
-MAX_CONTACTS = 2000  # that are possible in a world under `jax`, each with four dense rows of constraints
+MAX_CONTACTS = 2000  # possible contacts of a world under `jax`, each of which has four dense rows of constraints
 
-_SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-_SOLVER = 1 << 9 | 1 << 10  # bits of Warp's overflow that tell of iterations, not of tables
-_LARGEST = 1e10  # of positions and velocities, beyond which MuJoCo calls a simulation diverged
-# Contact points of a geom with a plane.
-_POINTS = {
+_MIN_CONTACTS = 16  # of a world in Warp's table
+_DISABLE_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+_ITERATION_BITS = 1 << 9 | 1 << 10  # bits of Warp's overflow that report iterations, and not full tables
+_MAX_STATE = 1e10  # of positions and velocities, beyond which MuJoCo calls a simulation diverged
+
+# Number of contact points of a geom with a plane, where it is not 1.
+_PLANE_CONTACTS = {
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): 2,
     int(mujoco.mjtGeom.mjGEOM_BOX): 4,
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): 4,
 }
-# Sizes of a geom that grow with it in all directions: of a capsule the radius alone.
-_LENGTHS = {
+# How many of a geom's sizes, from the first, grow when it grows in all directions: of a capsule only the radius.
+_GROWING_SIZES = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): 1,
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): 1,
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 3,
@@ -54,14 +57,15 @@ _LENGTHS = {
 
 
 def choose_implementation(name: str | None) -> str:
-    """Return a checked name of an implementation; for None the faster one of this machine.
+    """Check the name of an implementation, and return it; for None return the faster one of this machine.
 
     Raises:
         ValueError: no such implementation.
         MissingExtra: a package of it is not installed.
     """
     if name is None:
-        return "warp" if jax.default_backend() == "gpu" and _has_warp() else "jax"
+        is_warp_faster = jax.default_backend() == "gpu" and _has_warp()
+        return "warp" if is_warp_faster else "jax"
     if checks.name(name, IMPLEMENTATIONS, "impl") == "warp" and not _has_warp():
         error = ImportError("No module named 'warp'")
         raise versions.MissingExtra("impl 'warp' needs warp-lang", "gpu", error)
@@ -76,23 +80,39 @@ def adapt_model(model: mujoco.MjModel, impl: str) -> mujoco.MjModel:
     """Return a copy of a model with the settings of an implementation."""
     model = copy.copy(model)
     if impl == "jax":
-        model.opt.iterations, model.opt.ls_iterations = SOLVER_ITERATIONS, LINE_SEARCH_ITERATIONS
-        model.opt.disableflags |= _SENSOR  # `advance` computes contact forces
-        return model
-    # Warp 3.17 forgets the margin in the distance to a height field, and turns the normal where geoms do not overlap.
-    # Geoms that are larger by the margin overlap where contacts begin, and push as they do in C.
-    field = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
-    pairs = field[model.pair_geom1] | field[model.pair_geom2]
-    geoms = np.where(field[model.pair_geom1], model.pair_geom2, model.pair_geom1)
-    for geom, margin in dict(zip(geoms[pairs], model.pair_margin[pairs], strict=True)).items():
-        model.geom_size[geom, : _LENGTHS[int(model.geom_type[geom])]] += margin
-        model.geom_aabb[geom, 3:] += margin
-        model.geom_rbound[geom] += math.sqrt(3.0) * margin
-    model.pair_margin[pairs] = 0.0
-    # Cells as deep as wide: in deeper ones Warp finds wrong contacts now and then, which throw a body.
-    wide = 2.0 * model.hfield_size[:, 0] / np.maximum(model.hfield_ncol - 1, 1)
-    model.hfield_size[:, 3] = np.minimum(model.hfield_size[:, 3], wide)
+        model.opt.iterations = SOLVER_ITERATIONS
+        model.opt.ls_iterations = LINE_SEARCH_ITERATIONS
+        model.opt.disableflags |= _DISABLE_SENSORS  # `advance` computes contact forces
+    else:
+        _move_margins_into_geoms(model)
+        _limit_cell_depth(model)
     return model
+
+
+def _move_margins_into_geoms(model: mujoco.MjModel) -> None:
+    """Enlarge geoms that touch height fields by the margin of their pair, and set the margin to 0.
+
+    Warp 3.17 forgets the margin in the distance to a height field, and turns the normal where geoms do not overlap.
+    Geoms that are larger by the margin overlap where contacts begin, and push as they do in C.
+    """
+    is_field = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
+    is_pair_with_field = is_field[model.pair_geom1] | is_field[model.pair_geom2]
+    other_geoms = np.where(is_field[model.pair_geom1], model.pair_geom2, model.pair_geom1)
+    geoms = other_geoms[is_pair_with_field]
+    margins = model.pair_margin[is_pair_with_field]
+    margin_of_geom = dict(zip(geoms, margins, strict=True))  # each geom once, though it may be in several pairs
+    for geom, margin in margin_of_geom.items():
+        growing_sizes = _GROWING_SIZES[int(model.geom_type[geom])]
+        model.geom_size[geom, :growing_sizes] += margin
+        model.geom_aabb[geom, 3:] += margin  # half-extents of the bounding box
+        model.geom_rbound[geom] += math.sqrt(3.0) * margin
+    model.pair_margin[is_pair_with_field] = 0.0
+
+
+def _limit_cell_depth(model: mujoco.MjModel) -> None:
+    """Make cells of height fields at most as deep as wide: in deeper ones Warp finds wrong contacts now and then."""
+    cell_widths = 2.0 * model.hfield_size[:, 0] / np.maximum(model.hfield_ncol - 1, 1)
+    model.hfield_size[:, 3] = np.minimum(model.hfield_size[:, 3], cell_widths)
 
 
 def put_model(model: mujoco.MjModel, impl: str) -> mjx.Model:
@@ -120,50 +140,61 @@ def make_data(model: mujoco.MjModel, impl: str, num_envs: int) -> mjx.Data:
     """
     if impl == "jax":
         data = mjx.make_data(model, impl=impl)
-        if (contacts := data._impl.ncon) > MAX_CONTACTS:
-            need = f"place for every possible contact, here {contacts}, and has it for {MAX_CONTACTS}"
+        possible_contacts = data._impl.ncon
+        if possible_contacts > MAX_CONTACTS:
+            need = f"place for every possible contact, here {possible_contacts}, and has it for {MAX_CONTACTS}"
             raise ValueError(f"impl 'jax': MJX needs {need}; use impl='warp'")
         return data
-    contacts, rows = table_sizes(model)
-    return mjx.make_data(model, impl=impl, naconmax=contacts * num_envs, njmax=rows)
+    contacts, constraints = table_sizes(model)
+    return mjx.make_data(model, impl=impl, naconmax=contacts * num_envs, njmax=constraints)
 
 
 def table_sizes(model: mujoco.MjModel) -> tuple[int, int]:
     """Return how many contacts and constraints a world of Warp has place for.
 
-    Half of the points that planes could touch, as bodies fall on one side; all that height fields could, since a geom
-    may touch several triangles.
+    It is half of the points that could touch planes, as bodies fall on one side. For height fields it is all points,
+    since a geom may touch several triangles.
     """
-    pairs = np.stack([model.pair_geom1, model.pair_geom2])
-    plane = (model.geom_type[pairs] == mujoco.mjtGeom.mjGEOM_PLANE).any(axis=0)
-    points = [max(_POINTS.get(int(kind), 1) for kind in model.geom_type[pair]) for pair in pairs.T]
-    contacts = max(16, int(np.dot(points, np.where(plane, 0.5, 1.0))))
-    return contacts, 4 * contacts + int(model.jnt_limited.sum())
+    geom_types = np.stack([model.geom_type[model.pair_geom1], model.geom_type[model.pair_geom2]])  # (2, pairs)
+    has_plane = (geom_types == mujoco.mjtGeom.mjGEOM_PLANE).any(axis=0)
+    points = [max(_PLANE_CONTACTS.get(int(kind), 1) for kind in pair_types) for pair_types in geom_types.T]
+    contacts = max(_MIN_CONTACTS, int(np.dot(points, np.where(has_plane, 0.5, 1.0))))
+    contact_constraints = 4 * contacts  # edges of the friction pyramid
+    limit_constraints = int(model.jnt_limited.sum())
+    return contacts, contact_constraints + limit_constraints
 
 
 def advance(model: mjx.Model, data: mjx.Data, substeps: int) -> mjx.Data:
     """Return data after substeps, with derived quantities one substep behind the state, as `mj_step` leaves them."""
-    if data.impl == mjx.Impl.WARP:  # which adds up overflows, and whose sensors compute contact forces
+    if data.impl == mjx.Impl.WARP:  # Warp adds up overflows
         data = data.tree_replace({"_impl.overflow": jnp.zeros_like(data._impl.overflow)})
-    data = jax.lax.fori_loop(0, substeps, lambda _, data: mjx.step(model, data), data)
-    # Contact forces of the last substep, before anything computes kinematics anew.
-    return mjx.rne_postconstraint(model, data) if data.impl == mjx.Impl.JAX else data
+    data = jax.lax.fori_loop(0, substeps, lambda _, substep_data: mjx.step(model, substep_data), data)
+    if data.impl == mjx.Impl.JAX:
+        # Contact forces of the last substep, before anything computes kinematics anew. Sensors of Warp compute them.
+        data = mjx.rne_postconstraint(model, data)
+    return data
 
 
 def select_fields(data: mjx.Data, names: Iterable[str]) -> types.SimpleNamespace:
-    """Return fields of data by their names in `MjData`, among them those that MJX keeps to its implementation."""
-    own = data._impl
-    return types.SimpleNamespace(**{name: getattr(own if hasattr(own, name) else data, name) for name in names})
+    """Return fields of data by their names in `MjData`; some of them MJX has in the part of an implementation."""
+    implementation_data = data._impl
+    values = {}
+    for name in names:
+        holder = implementation_data if hasattr(implementation_data, name) else data
+        values[name] = getattr(holder, name)
+    return types.SimpleNamespace(**values)
 
 
 def has_diverged(data: mjx.Data):
     """Return whether a position or velocity is no number, or beyond MuJoCo's bound."""
     state = jnp.concatenate([data.qpos, data.qvel])
-    return ~(abs(state) <= _LARGEST).all()
+    is_valid = abs(state) <= _MAX_STATE  # False for no number
+    return ~is_valid.all()
 
 
 def has_overflow(data: mjx.Data):
-    """Return whether Warp's tables had no place for a contact or constraint; MJX's own have place for all."""
+    """Return whether Warp's tables had no place for a contact or constraint; those of `jax` have place for all."""
     if data.impl == mjx.Impl.JAX:
         return jnp.zeros((), bool)
-    return (data._impl.overflow & ~_SOLVER).any()
+    table_bits = data._impl.overflow & ~_ITERATION_BITS
+    return table_bits.any()

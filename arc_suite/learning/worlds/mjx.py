@@ -5,7 +5,7 @@
     state = jax.jit(jax.vmap(env.step))(state, actions)     # state.data .obs .reward .done .metrics .info
 
 Functions take one world and are pure. The wrappers and trainers of MuJoCo Playground take an `Env` as it is.
-Needs the extra `gpu`; docs/gpu.md tells more.
+They need the extra `gpu`; see docs/gpu.md.
 """
 
 import dataclasses
@@ -23,30 +23,37 @@ from arc_suite.envs.prepare import prepare_task
 from arc_suite.learning.worlds import device, starts
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
-from arc_suite.tasks import privileged as seen
+from arc_suite.tasks import privileged as privileged_blocks
 from arc_suite.tasks import terms
 from arc_suite.tasks.contract import Inputs
 
-_MOST_ENVS = 1 << 20
-# Fields of the simulation that a start sets; all others follow from them in a step.
+_MAX_ENVS = 1 << 20
+
+# Fields of the simulation that a start sets; all other fields follow from them in a step.
 START_FIELDS = ("time", "qpos", "qvel", "qacc_warmstart", "mocap_pos")
 
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass
 class WorldState:
-    """The state of a world, or with leading axes of many.
+    """The state of a world, or of many worlds with leading axes.
+
+    The metrics of the latest step are the task's unweighted terms as `reward_<term>`, and `diverged` and `overflow`,
+    0 or 1. The info of a state has
+
+    - `memory`: of the task, and `first_memory`: that of the episode's start;
+    - `model`: the fields of the model that the episode has drawn;
+    - `privileged`: the privileged observation (size,), if the environment was loaded with it;
+    - `truncation`: 1.0 where the task ended the episode without failure, otherwise 0.0;
+    - each live command of the task by its name; NaN leaves the command to the task.
 
     Attributes:
         data: of the simulation, an `mjx.Data`.
         obs: (..., size) float32.
         reward: (...) of the latest step.
-        done: (...) 1.0 where the episode is over, else 0.0.
-        metrics: of the latest step: the task's unweighted terms as `reward_<term>`; `diverged` and `overflow`, 0 or 1.
-        info: `memory` of the task and `first_memory` of the episode's start; `model`, the fields of the model that
-            are the episode's own; `privileged`, the privileged observation (size,), where it was asked for;
-            `truncation`, 1.0 where the task ended the episode without failure; and each live command of the task by its
-            name, NaN for what the task itself would do.
+        done: (...) 1.0 where the episode is over, otherwise 0.0.
+        metrics: of the latest step, by name.
+        info: of the episode, by name.
     """
 
     data: Any
@@ -77,8 +84,8 @@ def load(
         task_kwargs: as in `arc_suite.load`, without `random`.
         impl: "jax" or "warp"; None for warp on NVIDIA's GPUs where it is installed, else jax.
         num_starts: episodes in the table of starts, at most 16,384.
-        first_seed: seed of the first of them; the others count on.
-        num_envs: worlds that will step together. Warp's tables have place for so many.
+        first_seed: seed of the first of these episodes; the others have the seeds after it.
+        num_envs: worlds that will step together; Warp's tables have place for so many.
         privileged: whether infos hold the privileged observation; see `tasks.privileged`.
 
     Raises:
@@ -95,15 +102,15 @@ class Env:
         task: the task, a value of the contract.
         impl: the implementation, "jax" or "warp".
         num_starts: episodes in the table of starts.
-        first_seed: seed of the first of them.
+        first_seed: seed of the first of these episodes.
         num_envs: worlds that Warp's tables have place for.
         episode_length: control steps of an episode, may be infinite. `step` does not count them: give the number to
             the wrapper that ends episodes.
         action_size: numbers of an action.
         observation_size: numbers of an observation.
-        dt: s between two actions.
-        sim_dt: s of a substep.
-        n_substeps: of a control step.
+        dt: duration of a control step, s.
+        sim_dt: duration of a substep, s.
+        n_substeps: number of substeps of a control step.
         mj_model: the model as compiled.
     """
 
@@ -111,24 +118,27 @@ class Env:
         """Draw the starts and put the model on the device; see `load`."""
         if "random" in checks.mapping("task_kwargs", task_kwargs):
             raise ValueError("random: expected none, as `reset` takes a key, and `start` a seed")
-        self.impl, self.num_envs = (
-            device.choose_implementation(impl),
-            checks.integer("num_envs", num_envs, 1, _MOST_ENVS),
-        )
-        self.num_starts, self.first_seed = num_starts, checks.seed(first_seed)
+        self.impl = device.choose_implementation(impl)
+        self.num_envs = checks.integer("num_envs", num_envs, 1, _MAX_ENVS)
+        self.num_starts = num_starts
+        self.first_seed = checks.seed(first_seed)
         self._starts = starts.draw_starts(domain_name, task_name, task_kwargs, num_starts, first_seed, privileged)
         settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
         self.task, self.mj_model = prepare_task(domain_name, task_name, settings)
         if self.task.adapts:
-            why = "as its starts depend on the episode before"
-            raise ValueError(f"task {self.task.name}: expected no curriculum, {why}")
+            reason = "as its starts depend on the episode before"
+            raise ValueError(f"task {self.task.name}: expected no curriculum, {reason}")
         model = device.adapt_model(self.mj_model, self.impl)
-        self._mjx_model = self._compiled = device.put_model(model, self.impl)
+        self._unchanged_model = device.put_model(model, self.impl)
+        self._mjx_model = self._unchanged_model  # which wrappers may replace
         self._data = device.make_data(model, self.impl, self.num_envs)
-        self.episode_length = self.task.step_limit
-        self.observation_size, self.action_size = self.task.size, len(self.task.scene.body.joint_names)
         scene = self.task.scene
-        self.dt, self.sim_dt, self.n_substeps = scene.control_timestep, self.mj_model.opt.timestep, scene.substeps
+        self.episode_length = self.task.step_limit
+        self.observation_size = self.task.size
+        self.action_size = len(scene.body.joint_names)
+        self.dt = scene.control_timestep
+        self.sim_dt = self.mj_model.opt.timestep
+        self.n_substeps = scene.substeps
 
     @property
     def mjx_model(self):
@@ -141,8 +151,9 @@ class Env:
         return self
 
     def reset(self, rng) -> WorldState:
-        """Return the start of an episode, one of the table, given a key of JAX."""
-        return self.start(np.uint32(self.first_seed) + jax.random.randint(rng, (), 0, self.num_starts).astype("uint32"))
+        """Return the start of an episode of the table, which a key of JAX draws."""
+        index = jax.random.randint(rng, (), 0, self.num_starts).astype("uint32")
+        return self.start(np.uint32(self.first_seed) + index)
 
     def start(self, seed) -> WorldState:
         """Return the start of the episode that any environment of the suite has after `reset(seed=seed)`.
@@ -157,9 +168,11 @@ class Env:
         info = {name: jnp.full(size, jnp.nan) for name, size in self.task.commands.items()}
         info |= {"memory": start.memory, "first_memory": start.memory, "model": start.model, "truncation": zero}
         if start.privileged is not None:
-            info["privileged"] = self._seen(start.model, seen.split(seen.sizes(self.task), start.privileged))
-        names = (*(f"reward_{name}" for name in self.task.settings.weights), "diverged", "overflow")
-        return WorldState(data, start.observation, zero, zero, dict.fromkeys(names, zero), info)
+            blocks = privileged_blocks.split(privileged_blocks.sizes(self.task), start.privileged)
+            info["privileged"] = self._privileged_vector(start.model, blocks)
+        metric_names = [f"reward_{name}" for name in self.task.settings.weights]
+        metrics = dict.fromkeys([*metric_names, "diverged", "overflow"], zero)
+        return WorldState(data, start.observation, reward=zero, done=zero, metrics=metrics, info=info)
 
     def step(self, state: WorldState, action) -> WorldState:
         """Return the state after a control step.
@@ -167,7 +180,7 @@ class Env:
         A world that diverges is done, with reward 0, and goes on from the model's default state, as in MuJoCo.
 
         Args:
-            state: before.
+            state: before the control step.
             action: (motors,), clipped to [-1, 1].
         """
         # Products in single precision, where the default of recent GPUs is less.
@@ -193,7 +206,7 @@ class Env:
             camera: name or index of a camera; None for the one that tracks the body.
             scene_option: None; wrappers hand it on.
             modify_scene_fns: None; wrappers hand it on.
-            index: of a world in states of many; None for states of one.
+            index: of the world to draw, in states of many worlds; None for states of one world.
 
         Raises:
             ValueError: no such camera, an impossible size, or options of a scene.
@@ -208,69 +221,117 @@ class Env:
         return [self._picture(state, index, height=height, width=width, camera_id=camera) for state in states]
 
     def _picture(self, state: WorldState, index: int | None, **options) -> np.ndarray:
-        scene, fields = self.task.scene, device.select_fields(state.data, ("mocap_pos", *self.task.reads))
-        alone = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], vars(fields))
-        memory = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], state.info["memory"])
-        markers = self.task.markers(memory, self.task.read(types.SimpleNamespace(**alone)))
-        pose = {"qpos": alone["qpos"], "mocap_pos": alone["mocap_pos"], "markers": markers}
-        return pictures.picture(scene.body, scene.arena, **pose, failed_legs=self.task.failed_legs(memory), **options)
+        """Return the picture of a world; see `render`."""
 
-    def _seen(self, model, blocks):
-        """The privileged observation (size,), given fields of the episode's model, and its blocks.
+        def select_world(leaf):
+            array = np.asarray(leaf)
+            return array if index is None else array[index]
 
-        Fields that wrappers have changed for good hold in place of what was drawn.
+        scene = self.task.scene
+        fields = device.select_fields(state.data, ("mocap_pos", *self.task.reads))
+        world_fields = jax.tree.map(select_world, vars(fields))
+        memory = jax.tree.map(select_world, state.info["memory"])
+        readings = self.task.read(types.SimpleNamespace(**world_fields))
+        return pictures.picture(
+            scene.body,
+            scene.arena,
+            qpos=world_fields["qpos"],
+            mocap_pos=world_fields["mocap_pos"],
+            markers=self.task.markers(memory, readings),
+            failed_legs=self.task.failed_legs(memory),
+            **options,
+        )
+
+    def _privileged_vector(self, model, blocks):
+        """Return the privileged observation (size,).
+
+        Fields of the model that wrappers have changed for all episodes replace what was drawn.
+
+        Args:
+            model: fields of the model that the episode has drawn, by name.
+            blocks: of the privileged observation, by name.
         """
-        names = [name for name in self.task.read_back_fields if name not in model]
-        pairs = {name: (getattr(self._mjx_model, name), getattr(self._compiled, name)) for name in names}
-        changed = {name: new for name, (new, old) in pairs.items() if new is not old}
-        return seen.vector(self.task, {**blocks, **self.task.read_back(blocks, changed)}, jnp.float32)
+        changed_fields = {}
+        for name in self.task.read_back_fields:
+            field = getattr(self._mjx_model, name)
+            is_changed = field is not getattr(self._unchanged_model, name)
+            if name not in model and is_changed:
+                changed_fields[name] = field
+        changed_blocks = self.task.read_back(blocks, changed_fields)
+        return privileged_blocks.vector(self.task, {**blocks, **changed_blocks}, jnp.float32)
 
     def _step(self, state: WorldState, action) -> WorldState:
-        task, info, before = self.task, state.info, state.data
-        # Wrappers may put the data of the start in place, and leave the memory.
-        begins = before.time == 0.0
-        memory = jax.tree.map(lambda first, now: jnp.where(begins, first, now), info["first_memory"], info["memory"])
-        for name in task.commands:
-            memory = task.with_command(memory, name, info[name])
-        moved, inputs = task.before(memory, action)
-        data = _written(before, inputs, task.scene.layout.torso)
-        data = device.advance(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
-        diverged, overflow = device.has_diverged(data), device.has_overflow(data)
+        task = self.task
+        info = state.info
+        data_before = state.data
 
+        # Wrappers may set the data to a start without the memory of the start.
+        is_start = data_before.time == 0.0
+        memory_before = jax.tree.map(
+            lambda first, latest: jnp.where(is_start, first, latest), info["first_memory"], info["memory"]
+        )
+        for name in task.commands:
+            memory_before = task.with_command(memory_before, name, info[name])
+
+        # Simulate.
+        memory, inputs = task.before(memory_before, action)
+        data = _with_inputs(data_before, inputs, task.scene.layout.torso)
+        data = device.advance(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
+        diverged = device.has_diverged(data)
+        overflow = device.has_overflow(data)
+
+        # Reward and observation.
         fields = device.select_fields(data, task.reads)
         readings = task.read(fields)
-        after = task.after(moved, readings)
-        found, reward = terms.reward(task.terms(after, readings), task.settings.weights, task.cost_limit)
-        observation = task.vector(task.observe(after, readings), jnp.float32)
-        terminated, truncated = task.ended(after, readings)
+        memory = task.after(memory, readings)
+        unweighted_terms, reward = terms.reward(task.terms(memory, readings), task.settings.weights, task.cost_limit)
+        observation = task.vector(task.observe(memory, readings), jnp.float32)
+        terminated, truncated = task.ended(memory, readings)
 
         # Sums of substeps round; the time after k control steps is k dt.
-        data = data.replace(time=(jnp.round(before.time / self.dt) + 1.0) * self.dt)
-        blank = self._data
+        data = data.replace(time=(jnp.round(data_before.time / self.dt) + 1.0) * self.dt)
+
+        # A world that has diverged goes on from the default state of the model, with the memory of before.
+        default_data = self._data
         data = data.replace(
-            qpos=jnp.where(diverged, blank.qpos, data.qpos),
-            qvel=jnp.where(diverged, blank.qvel, data.qvel),
-            qacc_warmstart=jnp.where(diverged, blank.qacc_warmstart, data.qacc_warmstart),
+            qpos=jnp.where(diverged, default_data.qpos, data.qpos),
+            qvel=jnp.where(diverged, default_data.qvel, data.qvel),
+            qacc_warmstart=jnp.where(diverged, default_data.qacc_warmstart, data.qacc_warmstart),
         )
-        after = jax.tree.map(lambda new, old: jnp.where(diverged, old, new).astype(old.dtype), after, memory)
-        metrics = {f"reward_{name}": jnp.where(diverged, 0.0, term) for name, term in found.items()}
+        next_memory = jax.tree.map(
+            lambda after, before: jnp.where(diverged, before, after).astype(before.dtype), memory, memory_before
+        )
+        metrics = {f"reward_{name}": jnp.where(diverged, 0.0, term) for name, term in unweighted_terms.items()}
         metrics |= {"diverged": diverged, "overflow": overflow}
-        told = {"memory": after, "truncation": _float(truncated & ~(terminated | diverged))}
+        next_info = {
+            **info,
+            "memory": next_memory,
+            "truncation": _to_float(truncated & ~(terminated | diverged)),
+        }
         if "privileged" in info:
-            told["privileged"] = jnp.where(diverged, 0.0, self._seen(info["model"], task.privileged(after, fields)))
+            vector = self._privileged_vector(info["model"], task.privileged(next_memory, fields))
+            next_info["privileged"] = jnp.where(diverged, 0.0, vector)
         return WorldState(
             data=data,
             obs=jnp.where(diverged, 0.0, observation),
-            reward=_float(jnp.where(diverged, 0.0, reward)),
-            done=_float(terminated | truncated | diverged),
-            metrics=state.metrics | {name: _float(metric) for name, metric in metrics.items()},  # and those of wrappers
-            info={**info, **told},
+            reward=_to_float(jnp.where(diverged, 0.0, reward)),
+            done=_to_float(terminated | truncated | diverged),
+            # Metrics of wrappers stay.
+            metrics=state.metrics | {name: _to_float(metric) for name, metric in metrics.items()},
+            info=next_info,
         )
 
 
-def _written(data, inputs: Inputs, torso: int):
-    """Return the data of a simulation with what a control step writes, given the torso's place among the bodies."""
-    data = data.replace(ctrl=data.ctrl.at[: inputs.ctrl.shape[-1]].set(inputs.ctrl))
+def _with_inputs(data, inputs: Inputs, torso: int):
+    """Return the data of a simulation with the inputs of a control step.
+
+    Args:
+        data: of the simulation.
+        inputs: of the control step.
+        torso: index of the torso among the bodies of the model.
+    """
+    controls = inputs.ctrl.shape[-1]  # those of the body come first
+    data = data.replace(ctrl=data.ctrl.at[:controls].set(inputs.ctrl))
     if inputs.kick is not None:
         data = data.replace(qvel=data.qvel + inputs.kick)
     if inputs.force is not None:
@@ -279,21 +340,24 @@ def _written(data, inputs: Inputs, torso: int):
 
 
 def restart_where_ended(state: WorldState, start: WorldState, ended) -> WorldState:
-    """Return the state of a world whose next step is the first of another episode, where one has ended.
+    """Return the state after a step; where the episode has ended, that of the first step of another episode.
 
     Args:
         state: after a step.
         start: of the other episode.
-        ended: () whether it begins.
+        ended: () whether the episode has ended.
     """
 
-    def chosen(new, old):
-        return jax.tree.map(lambda new, old: jnp.where(ended, new, old), new, old)
+    def choose(start_tree, tree):
+        return jax.tree.map(lambda first, latest: jnp.where(ended, first, latest), start_tree, tree)
 
-    written = {name: chosen(getattr(start.data, name), getattr(state.data, name)) for name in START_FIELDS}
-    data, info = state.data.replace(**written), chosen(start.info, state.info)
-    return state.replace(data=data, obs=chosen(start.obs, state.obs), info=info)
+    fields = {name: choose(getattr(start.data, name), getattr(state.data, name)) for name in START_FIELDS}
+    return state.replace(
+        data=state.data.replace(**fields),
+        obs=choose(start.obs, state.obs),
+        info=choose(start.info, state.info),
+    )
 
 
-def _float(value):
+def _to_float(value):
     return jnp.asarray(value).astype(float)

@@ -10,10 +10,10 @@ from arc_suite.envs import trees
 from arc_suite.envs.vector import VectorEnv
 
 MAX_STARTS = 16_384
-_CHUNK = 256  # seeds that are drawn together: models of their own take memory
+_SEEDS_PER_BATCH = 256  # seeds that are drawn together; more would take much memory, as each may have its own model
 
 # Fields of `MjModel` that `mj_setConst` derives from those that an episode changes, and that simulations read.
-_DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0")
+_DERIVED_FIELDS = ("body_subtreemass", "body_invweight0", "dof_invweight0")
 
 
 class Starts(NamedTuple):
@@ -41,32 +41,42 @@ class Starts(NamedTuple):
 def draw_starts(
     domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, count: int, seed: int, privileged: bool
 ) -> Starts:
-    """Return the starts of a number of seeds.
+    """Draw the starts of consecutive seeds.
 
     Args:
         domain_name: as in `arc_suite.load`.
         task_name: as in `arc_suite.load`.
         task_kwargs: as in `arc_suite.load`.
-        count: how many.
-        seed: the first.
-        privileged: whether they have the privileged observation.
+        count: number of seeds.
+        seed: the first seed.
+        privileged: whether starts have the privileged observation.
 
     Raises:
         ValueError: as `arc_suite.load`, or a count out of range.
     """
     checks.integer("num_starts", count, 1, MAX_STARTS)
-    environments = VectorEnv(domain_name, task_name, min(count, _CHUNK), task_kwargs=task_kwargs, privileged=privileged)
+    num_envs = min(count, _SEEDS_PER_BATCH)
+    environments = VectorEnv(domain_name, task_name, num_envs, task_kwargs=task_kwargs, privileged=privileged)
     batch = environments.batch
     parts = []
-    for first in range(0, count, _CHUNK):
+    for first in range(0, count, _SEEDS_PER_BATCH):
         observation, info = environments.reset(seed=seed + first)
-        state = batch.data.qpos.copy(), batch.data.qvel.copy(), batch.mocap_pos.copy()
-        names = [*batch.changed, *_DERIVED] if batch.changed else []
-        model = {name: np.stack([getattr(model, name) for model in batch.models]) for name in names}
-        parts.append(Starts(*state, environments._memory, observation, model, info.get("privileged")))
+        changed_fields = [*batch.changed, *_DERIVED_FIELDS] if batch.changed else []
+        part = Starts(
+            qpos=batch.data.qpos.copy(),
+            qvel=batch.data.qvel.copy(),
+            mocap_pos=batch.mocap_pos.copy(),
+            memory=environments._memory,
+            observation=observation,
+            model={name: np.stack([getattr(model, name) for model in batch.models]) for name in changed_fields},
+            privileged=info.get("privileged"),
+        )
+        parts.append(part)
     environments.close()
-    joined = {name: np.concatenate([part.model[name] for part in parts])[:count] for name in parts[0].model}
-    table = trees.map_leaves(
-        lambda *arrays: np.concatenate(arrays)[:count], *(part._replace(model=None) for part in parts)
-    )
-    return table._replace(model=joined)
+
+    def concatenate(*arrays):
+        return np.concatenate(arrays)[:count]  # the last batch may have more seeds
+
+    model = {name: concatenate(*(part.model[name] for part in parts)) for name in parts[0].model}
+    table = trees.map_leaves(concatenate, *(part._replace(model=None) for part in parts))
+    return table._replace(model=model)
