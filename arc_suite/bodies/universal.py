@@ -104,8 +104,8 @@ class Universal:
     def _trace_positions(self, vectors: Any) -> Any:
         """Write the nodes of positions (1, joints) for a traced observation (1, size)."""
         leg_descriptions, torso_description = self.descriptions
-        blocks = self.tokens.make_tokens(self.tokens.gather_inputs(vectors))
-        flat: Any = tokens.flatten_tokens(blocks, leg_descriptions, torso_description)
+        token_blocks = self.tokens.make_tokens(self.tokens.gather_inputs(vectors))
+        flat: Any = tokens.flatten_tokens(token_blocks, leg_descriptions, torso_description)
         return self.tokens.body_actions(repeated(self.network.graph, flat))  # type: ignore[arg-type]
 
     def _trace_torques(self, vectors: Any) -> Any:

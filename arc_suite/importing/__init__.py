@@ -104,9 +104,9 @@ def _import_file(path: Path, home: str | None, feet: Sequence[str]) -> ImportedR
         held=tuple(Held(name=names.joints[joint], servo=servos[joint]) for joint in names.held),
         file_joints=tuple(robot.joint_name(joint) for joint in order),
     )
-    import_notes = notes.import_notes(robot, stance, names, order)
-    omission_notes = notes.omission_notes(file, robot, stance, names)
-    return ImportedRobot(sources.check(body), (*import_notes, *motor_notes, *file.notes, *omission_notes))
+    first_notes = notes.import_notes(robot, stance, names, order)
+    last_notes = notes.omission_notes(file, robot, stance, names)
+    return ImportedRobot(sources.check(body), (*first_notes, *motor_notes, *file.notes, *last_notes))
 
 
 def _find_standing_robot(path: Path, home: str | None, feet: Sequence[str]) -> _StandingRobot:

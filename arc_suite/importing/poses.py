@@ -306,13 +306,13 @@ def _is_wheel(robot: Robot, data: mujoco.MjData, joint: int, end: _ChainEnd) -> 
 def _measure_sole(robot: Robot, data: mujoco.MjData, geoms: Sequence[int], height: float) -> tuple[np.ndarray, float]:
     """Return the middle (3,) of what touches the floor, and the radius of a ball in its place, m."""
     model = robot.model
-    lowest_point, lowest_geom = tree.lowest_point(robot, data, geoms)
-    contact_height = lowest_point[2] + _CONTACT_HEIGHT * height
+    lowest, lowest_geom = tree.lowest_point(robot, data, geoms)
+    contact_height = lowest[2] + _CONTACT_HEIGHT * height
     touching_geoms = [geom for geom in geoms if tree.lowest_point(robot, data, [geom])[0][2] < contact_height]
     shape = model.geom_type[lowest_geom]
     radius = float(model.geom_size[lowest_geom][0])
     if shape == _SPHERE and len(touching_geoms) == 1:
-        return lowest_point, radius
+        return lowest, radius
 
     azimuths = np.linspace(0.0, 2.0 * np.pi, _SOLE_DIRECTIONS, endpoint=False)
     downwards = np.full(_SOLE_DIRECTIONS, -1.0)
@@ -321,10 +321,10 @@ def _measure_sole(robot: Robot, data: mujoco.MjData, geoms: Sequence[int], heigh
     points = [tree.support_point(model, data, geom, direction) for direction in directions for geom in touching_geoms]
     floor_points = np.array(points)[:, :2]
     middle = 0.5 * (floor_points.max(axis=0) + floor_points.min(axis=0))
-    sole = np.array((*middle, lowest_point[2]))
+    sole = np.array((*middle, lowest[2]))
     if shape in _ROUND_SHAPES:
         return sole, radius
-    half_height = 0.5 * (tree.support_point(model, data, lowest_geom, -tree.DOWN)[2] - lowest_point[2])
+    half_height = 0.5 * (tree.support_point(model, data, lowest_geom, -tree.DOWN)[2] - lowest[2])
     return sole, float(min(half_height, _MAX_FOOT_RADIUS * height))
 
 
@@ -353,8 +353,8 @@ def _check_torso(robot: Robot, data: mujoco.MjData, legs: tuple[Leg, ...], heigh
     leg_joints = {joint for leg in legs for joint in leg.joints}
     other_geoms = [geom for geom in robot.colliders if not leg_joints.intersection(robot.chain_of_geom(geom))]
     if other_geoms:
-        lowest_point, _ = tree.lowest_point(robot, data, other_geoms)
-        if lowest_point[2] < -height:
+        lowest, _ = tree.lowest_point(robot, data, other_geoms)
+        if lowest[2] < -height:
             raise _Unfit("the torso is lower than the feet")
     margin = stability_margin(data.subtree_com[robot.root], [leg.sole for leg in legs])
     min_margin = _MIN_MARGIN if len(legs) > 2 else -_MAX_OVERHANG

@@ -262,10 +262,9 @@ def _lengthen_legs(body: Body, lengths: np.ndarray) -> Body:
 
 def _check_joints(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find legs that cannot take a step."""
-    strokes = np.array(
-        [_largest_strokes(leg, jacobian) for leg, jacobian in zip(body.legs, pose.jacobians, strict=True)]
-    )
-    forward, up = strokes.max(axis=0) / pose.height
+    legs_and_jacobians = zip(body.legs, pose.jacobians, strict=True)
+    leg_strokes = np.array([_largest_strokes(leg, jacobian) for leg, jacobian in legs_and_jacobians])  # (legs, 2) m
+    forward, up = leg_strokes.max(axis=0) / pose.height
     if forward < _MIN_STROKE:
         text = "no leg has a joint that sweeps its foot forward and back: a hip about axis [0, 0, 1], both ways, fits"
         yield Flaw(text, True)
