@@ -27,7 +27,7 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
     Raises:
         ValueError: no dataset, or one that does not fit.
     """
-    priors.check_prior_is_named(context.prior, True)
+    priors.check_prior(context.prior, True)
     with contextlib.closing(context.environment()) as environment:
         task = environment.task.definition
     replay = priors.open_replay(context, task)

@@ -146,8 +146,8 @@ class Configuration:
             training_task = training_setup.definition
             policy_task = policy_setup.definition
             if training_task.sizes != policy_task.sizes or training_task.actions != policy_task.actions:
-                others = "other observations or actions than those that it is judged by"
-                raise ValueError(f"training: expected settings of the same observations and actions, got {others}")
+                difference = "other observations or actions than those that it is judged by"
+                raise ValueError(f"training: expected settings of the same observations and actions, got {difference}")
         return training_setup
 
     def _excluded_blocks(self) -> list[str]:

@@ -59,7 +59,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
         OSError: the disk is too small for the buffer.
         Diverged: an action is not finite.
     """
-    priors.check_prior_is_named(context.prior, hp.prior != "none")
+    priors.check_prior(context.prior, hp.prior != "none")
     seed = context.seed
     update_hp = sac.update_hyperparameters(hp)
     environment = context.environment(hp.num_envs)

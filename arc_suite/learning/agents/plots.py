@@ -10,8 +10,8 @@ from matplotlib.ticker import EngFormatter
 
 from arc_suite.evaluation import curve
 
-# Color and marker of an algorithm in all pictures: Okabe and Ito's colors for the paper's six and PPO, Tol's muted
-# ones for the others. Both palettes are made for color-blind eyes; markers tell apart what is near.
+# Color and marker of an algorithm in all pictures. The paper's six algorithms and PPO have Okabe and Ito's colors, the
+# others have Tol's muted colors. Both palettes are made for color-blind eyes; markers separate similar colors.
 STYLES = {
     "sac": ("#0072B2", "o"),
     "speq": ("#009E73", "s"),
@@ -29,21 +29,40 @@ STYLES = {
     "dagger_bodies": ("#AA4499", "*"),
     "finetune_bodies": ("#117733", "p"),
 }
-_OTHERS = (("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other packages, in order
-# Line and hollow marker of further kinds of runs of one algorithm in a study; the first has the algorithm's own.
+_STYLES_OF_OTHERS = (("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other packages' algorithms, in order
+# Line style and hollow marker of further kinds of runs of one algorithm; the first kind has the algorithm's style.
 _VARIANTS = (("--", "o"), (":", "s"), ("-.", "^"), ((0, (8, 2)), "D"), ((0, (1, 4)), "v"))
-_MARKERS = 15  # of a curve, at most
+_MAX_MARKERS = 15  # of a curve
 _GRAY = "#6E6E6E"
-_ENTRY, _CHARACTER = 0.8, 0.08  # inches of a legend's entry without a text, and of a letter of the text
-_BESIDE = ("axes fraction", "data")  # coordinates of a label to the right of an axis
-_GAP = 0.052  # between the labels of two levels, as a share of the axis
+_LEGEND_ENTRY_WIDTH = 0.8  # of an entry without its text, inches
+_LEGEND_CHARACTER_WIDTH = 0.08  # inches
+_LABEL_COORDINATES = ("axes fraction", "data")  # x and y of a label to the right of an axis
+_LABEL_X = 1.04  # axes fraction
+_LABEL_GAP = 0.052  # between two labels, as a share of the height of the axis
+_TOP_MARGIN = 1.03  # ratio of the top of the axis to the highest level
+
+
+class _Level(NamedTuple):
+    """A return with a label on the right of the axis, and maybe a line across it; levels sort by the return.
+
+    Attributes:
+        value: the return.
+        name: in the label.
+        color: of line and label.
+        dashes: line style; "-" for the end of a curve, which has no line across the axis.
+    """
+
+    value: float
+    name: str
+    color: str
+    dashes: str
 
 
 class Curve(NamedTuple):
     """Returns of a kind of run.
 
     Attributes:
-        algorithm: which gives the color.
+        algorithm: name of the algorithm, which determines the color.
         steps: (points,) environment steps.
         returns: (runs, points) mean return of each evaluation.
     """
@@ -67,17 +86,19 @@ def plot_run(
         algorithm: of the run, named at the end of the curve.
         title: of the picture.
         lines: returns to compare with, by name.
-        finals: of the paper, by algorithm.
+        finals: final returns of the paper, by algorithm.
     """
     figure = Figure(figsize=(8.0, 4.5), dpi=120, layout="constrained")
     axis = figure.subplots()
     steps = np.unique(evaluations["step"])
     episodes = [evaluations["return"][evaluations["step"] == step] for step in steps]
-    low, mean, high = np.array([(each.min(), each.mean(), each.max()) for each in episodes]).T
+    lowest = np.array([returns.min() for returns in episodes])
+    mean = np.array([returns.mean() for returns in episodes])
+    highest = np.array([returns.max() for returns in episodes])
     color, marker = _styles([algorithm])[algorithm]
-    axis.fill_between(steps, low, high, color=color, alpha=0.15, linewidth=0)
-    axis.plot(steps, mean, color=color, marker=marker, markevery=_every(steps))
-    _finish(axis, title, lines, finals, _styles([algorithm, *finals]), {algorithm: mean[-1]})
+    axis.fill_between(steps, lowest, highest, color=color, alpha=0.15, linewidth=0)
+    axis.plot(steps, mean, color=color, marker=marker, markevery=_points_per_marker(steps))
+    _finish_axis(axis, title, lines, finals, _styles([algorithm, *finals]), {algorithm: mean[-1]})
     axis.set_ylabel("return: mean, lowest and highest episode")
     return figure
 
@@ -87,62 +108,92 @@ def plot_study(
     lines: Mapping[str, Mapping[str, float]],
     finals: Mapping[str, Mapping[str, float]],
 ) -> Figure:
-    """Draw the learning curves of a study, a panel for each place.
+    """Draw the learning curves of a study, with a panel for each place: a robot and a task.
 
     A curve is the interquartile mean over runs, with its 95 % bootstrap interval; of a single run the mean return.
 
     Args:
-        groups: by place and kind of run.
+        groups: curves by place and kind of run.
         lines: returns to compare with, by place and name.
-        finals: of the paper, by place and algorithm.
+        finals: final returns of the paper, by place and algorithm.
     """
     columns = min(len(groups), 2)
-    rows = -(-len(groups) // columns)
+    rows = -(-len(groups) // columns)  # rounded up
     figure = Figure(figsize=(7.5 * columns, 3.9 * rows + 0.5), dpi=100, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
-    used = [each.algorithm for kinds in groups.values() for each in kinds.values()]
-    styles = _styles([*used, *(name for every in finals.values() for name in every)])
+    algorithms = [kind_curve.algorithm for kinds in groups.values() for kind_curve in kinds.values()]
+    paper_algorithms = [algorithm for place_finals in finals.values() for algorithm in place_finals]
+    styles = _styles([*algorithms, *paper_algorithms])
     variants = _variants(groups)
-    for axis in axes.flat[len(groups) :]:
+    unused_axes = axes.flat[len(groups) :]
+    for axis in unused_axes:
         axis.remove()
     for axis, (place, kinds) in zip(axes.flat, groups.items(), strict=False):
-        for kind, each in kinds.items():
-            color, marker = styles[each.algorithm]
-            style = {"color": color, "marker": marker, "markersize": 5, "markevery": _every(each.steps)}
-            robust = curve([each.returns])
-            if len(each.returns) > 1:
-                axis.fill_between(each.steps, robust.low, robust.high, color=color, alpha=0.15, linewidth=0)
-            axis.plot(each.steps, robust.iqm, label=kind, **style | variants[kind])
-        _finish(axis, place, lines.get(place, {}), finals.get(place, {}), styles)
+        for kind, kind_curve in kinds.items():
+            _draw_curve(axis, kind, kind_curve, styles[kind_curve.algorithm], variants[kind])
+        _finish_axis(axis, place, lines.get(place, {}), finals.get(place, {}), styles)
     for axis in axes[:, 0]:
         axis.set_ylabel("return of an evaluation")
-    handles = {label: line for axis in axes.flat for line, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    fitting = int(figure.get_figwidth() / (_ENTRY + _CHARACTER * max(map(len, handles))))
-    ncols = min(len(handles), 3 * columns, max(fitting, 1))
-    figure.legend(handles.values(), handles, loc="outside upper left", ncols=ncols, frameon=False)
+    _draw_legend(figure, axes, max_columns=3 * columns)
     return figure
 
 
+def _draw_curve(axis, kind: str, kind_curve: Curve, style: tuple[str, str], variant: Mapping[str, Any]) -> None:
+    """Draw the curve of a kind of run; its style is a color and a marker, and a variant changes the line."""
+    color, marker = style
+    robust_means = curve([kind_curve.returns])
+    if len(kind_curve.returns) > 1:
+        axis.fill_between(kind_curve.steps, robust_means.low, robust_means.high, color=color, alpha=0.15, linewidth=0)
+    line_style = {
+        "color": color,
+        "marker": marker,
+        "markersize": 5,
+        "markevery": _points_per_marker(kind_curve.steps),
+        **variant,
+    }
+    axis.plot(kind_curve.steps, robust_means.iqm, label=kind, **line_style)
+
+
+def _draw_legend(figure: Figure, axes: np.ndarray, max_columns: int) -> None:
+    """Draw a legend of all kinds of runs above the panels."""
+    line_of_kind = {}
+    for axis in axes.flat:
+        axis_lines, kinds = axis.get_legend_handles_labels()
+        line_of_kind |= dict(zip(kinds, axis_lines, strict=True))
+    longest = max(len(kind) for kind in line_of_kind)  # characters
+    fitting_columns = int(figure.get_figwidth() / (_LEGEND_ENTRY_WIDTH + _LEGEND_CHARACTER_WIDTH * longest))
+    columns = min(len(line_of_kind), max_columns, max(fitting_columns, 1))
+    figure.legend(line_of_kind.values(), line_of_kind, loc="outside upper left", ncols=columns, frameon=False)
+
+
 def _styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Return colors and markers by algorithm; unknown ones get others, in order."""
-    others = itertools.cycle(_OTHERS)
-    return {name: STYLES[name] if name in STYLES else next(others) for name in dict.fromkeys(names)}
+    """Return colors and markers by algorithm; algorithms of other packages get the further styles, in order."""
+    further_styles = itertools.cycle(_STYLES_OF_OTHERS)
+    styles = {}
+    for name in dict.fromkeys(names):  # each once
+        styles[name] = STYLES[name] if name in STYLES else next(further_styles)
+    return styles
 
 
 def _variants(groups: Mapping[str, Mapping[str, Curve]]) -> dict[str, dict[str, Any]]:
-    """Return by kind what its line has other than the algorithm's style: kinds of one algorithm differ."""
-    kinds = {kind: each.algorithm for every in groups.values() for kind, each in every.items()}
-    others = [{"linestyle": dashes, "marker": marker, "markerfacecolor": "white"} for dashes, marker in _VARIANTS]
-    turns = {name: itertools.cycle([{}, *others]) for name in kinds.values()}
-    return {kind: next(turns[algorithm]) for kind, algorithm in kinds.items()}
+    """Return by kind of run the options of its line that differ from the style of its algorithm.
+
+    The first kind of an algorithm has none; further kinds of the same algorithm differ from each other.
+    """
+    algorithm_of_kind = {kind: kind_curve.algorithm for kinds in groups.values() for kind, kind_curve in kinds.items()}
+    hollow_variants = [
+        {"linestyle": dashes, "marker": marker, "markerfacecolor": "white"} for dashes, marker in _VARIANTS
+    ]
+    next_variants = {name: itertools.cycle([{}, *hollow_variants]) for name in algorithm_of_kind.values()}
+    return {kind: next(next_variants[algorithm]) for kind, algorithm in algorithm_of_kind.items()}
 
 
-def _every(steps: np.ndarray) -> int:
-    """Return the number of points to each marker, so that there are at most `_MARKERS`."""
-    return -(-len(steps) // _MARKERS)
+def _points_per_marker(steps: np.ndarray) -> int:
+    """Return how many points of a curve have one marker, so that there are at most `_MAX_MARKERS`."""
+    return -(-len(steps) // _MAX_MARKERS)  # rounded up
 
 
-def _finish(
+def _finish_axis(
     axis,
     title: str,
     lines: Mapping[str, float],
@@ -150,21 +201,32 @@ def _finish(
     styles: Mapping,
     ends: Mapping[str, float] | None = None,
 ) -> None:
-    """Draw levels to compare with, and label them and ends of curves on the right of the axis, where no line runs."""
-    levels = [(value, name, _GRAY, "--") for name, value in lines.items()]
-    levels += [(value, f"{name}, paper", styles[name][0], ":") for name, value in finals.items()]
-    for value, _, color, dashes in levels:
-        axis.axhline(value, color=color, linestyle=dashes, linewidth=1.0, zorder=0)
-    levels += [(value, name, styles[name][0], "-") for name, value in (ends or {}).items()]
-    low, high = axis.get_ylim()
-    low, high = min(low, 0.0), max([high, *(1.03 * value for value, *_ in levels)])
-    axis.set_ylim(low, high)
-    gap, levels = _GAP * (high - low), sorted(levels)
-    heights = _apart([value for value, *_ in levels], gap, high)
-    for (value, name, color, _), height in zip(levels, heights, strict=True):
-        arrow = {"arrowstyle": "-", "color": color, "linewidth": 0.6, "relpos": (0.0, 0.5), "shrinkB": 0.0}
-        text, places = f"{name} {value:.0f}", ((1.0, value), (1.04, height))
-        axis.annotate(text, *places, *[_BESIDE] * 2, arrow, va="center", fontsize=8, color=color)
+    """Draw levels to compare with, label them and ends of curves on the right of the axis, and set title and limits.
+
+    Args:
+        axis: of the panel.
+        title: of the panel.
+        lines: returns to compare with, by name.
+        finals: final returns of the paper, by algorithm.
+        styles: colors and markers by algorithm.
+        ends: final returns of curves, by algorithm; None for no labels at their ends.
+    """
+    levels = [_Level(value, name, _GRAY, "--") for name, value in lines.items()]
+    for algorithm, value in finals.items():
+        color, _ = styles[algorithm]
+        levels.append(_Level(value, f"{algorithm}, paper", color, ":"))
+    for level in levels:
+        axis.axhline(level.value, color=level.color, linestyle=level.dashes, linewidth=1.0, zorder=0)
+    for algorithm, value in (ends or {}).items():
+        color, _ = styles[algorithm]
+        levels.append(_Level(value, algorithm, color, "-"))
+
+    bottom, top = axis.get_ylim()
+    bottom = min(bottom, 0.0)
+    top = max([top, *(_TOP_MARGIN * level.value for level in levels)])
+    axis.set_ylim(bottom, top)
+    _draw_labels(axis, sorted(levels), gap=_LABEL_GAP * (top - bottom), top=top)
+
     axis.set_xlabel("environment steps")
     axis.set_title(title, loc="left", fontweight="bold")
     axis.xaxis.set_major_formatter(EngFormatter(sep=""))
@@ -172,11 +234,35 @@ def _finish(
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def _apart(values: Sequence[float], gap: float, top: float) -> list[float]:
+def _draw_labels(axis, levels: Sequence[_Level], gap: float, top: float) -> None:
+    """Label ascending levels on the right of the axis, each with a thin line from the level to the label."""
+    heights = _spread_heights([level.value for level in levels], gap, top)
+    for level, height in zip(levels, heights, strict=True):
+        axis.annotate(
+            f"{level.name} {level.value:.0f}",
+            xy=(1.0, level.value),
+            xytext=(_LABEL_X, height),
+            xycoords=_LABEL_COORDINATES,
+            textcoords=_LABEL_COORDINATES,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": level.color,
+                "linewidth": 0.6,
+                "relpos": (0.0, 0.5),  # from the middle of the left side of the label
+                "shrinkB": 0.0,
+            },
+            va="center",
+            fontsize=8,
+            color=level.color,
+        )
+
+
+def _spread_heights(values: Sequence[float], gap: float, top: float) -> list[float]:
     """Return heights near ascending values, `gap` or more apart, the highest at most at `top`."""
     heights: list[float] = []
     for value in values:
         heights.append(max(value, heights[-1] + gap) if heights else value)
     for index in reversed(range(len(heights))):
-        heights[index] = min(heights[index], top - gap * (len(heights) - 1 - index))
+        heights_above = len(heights) - 1 - index
+        heights[index] = min(heights[index], top - gap * heights_above)
     return heights

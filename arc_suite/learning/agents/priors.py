@@ -17,7 +17,7 @@ from arc_suite.tasks import Task
 _COUNTERS = "count.json"  # file of the counters of the transitions; written last: without it the files are incomplete
 
 
-def check_prior_is_named(prior: str | None, needed: bool) -> None:
+def check_prior(prior: str | None, needed: bool) -> None:
     """Check that a run names prior data if and only if its algorithm needs them.
 
     Raises:

@@ -19,7 +19,7 @@ STEPS = np.arange(1, 6) * 20_000
 
 def test_every_algorithm_has_a_style_of_its_own():
     assert plots.STYLES.keys() == ALGORITHMS.keys()
-    styles = [*plots.STYLES.values(), *plots._OTHERS]
+    styles = [*plots.STYLES.values(), *plots._STYLES_OF_OTHERS]
     colors = [color for color, _ in styles]
     assert len(set(colors)) == len(colors) and len(set(styles)) == len(styles)
 
