@@ -219,7 +219,7 @@ def _load_network(body: Body, name: str, command_task: Task) -> Network:
     """
     policy = policies.policy(name, body, task=command_task if name == universal.NAME else None)
     if other_libraries.find(name):
-        policy = policies.trained(name)  # the same policy as a network of this package
+        policy = policies.load_network(name)  # the same policy as a network of this package
     if isinstance(policy, Universal):  # acts in the task that it was trained in
         policy = universal.for_body(policy.network, Setup.of(body, policy.network.setup.task))
     if not isinstance(policy, Network):

@@ -15,7 +15,7 @@ from arc_suite.models.standing import measure_standing
 from arc_suite.policies import network
 from arc_suite.policies.graph import Graph
 from arc_suite.policies.network import PACKAGED, Network
-from arc_suite.policies.tracing import repeated, traced
+from arc_suite.policies.tracing import apply_graph, traced
 from arc_suite.tasks import Task
 
 NAME = "universal"  # of the policies in the package
@@ -106,7 +106,7 @@ class Universal:
         leg_descriptions, torso_description = self.descriptions
         token_blocks = self.tokens.make_tokens(self.tokens.gather_inputs(vectors))
         flat: Any = tokens.flatten_tokens(token_blocks, leg_descriptions, torso_description)
-        return self.tokens.body_actions(repeated(self.network.graph, flat))  # type: ignore[arg-type]
+        return self.tokens.body_actions(apply_graph(self.network.graph, flat))  # type: ignore[arg-type]
 
     def _trace_torques(self, vectors: Any) -> Any:
         """Write the nodes of torques (1, joints) for a traced observation (1, size)."""

@@ -1,4 +1,4 @@
-"""Collects datasets: plays the missing episodes, and keeps finished ones if it is killed."""
+"""Collection of datasets: it plays the missing episodes, and keeps finished ones if it is killed."""
 
 import contextlib
 import functools
@@ -18,12 +18,12 @@ from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import Task, terms
 
-NUM_ENVS = 64  # from here on a step costs the same for each, and a dataset's tail idles more
+NUM_ENVS = 64  # with more, steps are not faster, and more environments wait for the last episodes
 
-# A finished episode is written at once, unless writing has taken more than this share of the time so far, which
-# happens where episodes are short, or when those that wait have this size in bytes.
-SHARE = 0.1
-BYTES = 1 << 24
+# Finished episodes are written at once, unless writing has taken more than this share of the time so far. That happens
+# where episodes are short; then they wait until they have the size.
+MAX_WRITING_SHARE = 0.1
+MAX_PENDING_BYTES = 1 << 24
 
 
 def collect(
@@ -43,14 +43,14 @@ def collect(
     Args:
         dataset_id: Minari's.
         settings: what the episodes depend on; all their seeds are of `seed_ranges.COLLECTING`.
-        episodes: how many the dataset is to have.
+        episodes: number of episodes of the complete dataset.
         num_envs: number of episodes that are played at a time; the data do not depend on it.
-        threads: on which to simulate; None for all cores. The data do not depend on it.
-        overwrite: replace a dataset that is there, when the new one is complete.
+        threads: number of threads of the simulation; None for all cores. The data do not depend on it.
+        overwrite: whether to replace an existing dataset, once the new one is complete.
         progress: makes progress bars as `tqdm` does.
-        author: for Minari's metadata; None for none, or for the one that the dataset has already.
-        code_permalink: address of the code that made the dataset; None as for the author.
-        wait: wait for another process that collects the dataset; else that is an error.
+        author: for Minari's metadata; None keeps that of the dataset, if it has one.
+        code_permalink: address of the code that made the dataset; None keeps that of the dataset, if it has one.
+        wait: whether to wait for another process that collects the dataset; else that is an error.
 
     Returns:
         The number of episodes that were missing.
@@ -62,10 +62,13 @@ def collect(
         KeyboardInterrupt: the same.
     """
     _check(settings, episodes)
-    said = {} if author is None else {"author": [author]}  # Minari makes a set of it
-    said |= {} if code_permalink is None else {"code_permalink": code_permalink}
+    further_metadata = {}
+    if author is not None:
+        further_metadata["author"] = [author]  # Minari makes a set of it
+    if code_permalink is not None:
+        further_metadata["code_permalink"] = code_permalink
     provenance = settings.provenance()
-    with Storage.opened(dataset_id, overwrite, wait) as storage:
+    with Storage.open(dataset_id, overwrite, wait) as storage:
         if storage.metadata is not None:
             difference = _difference(storage.metadata["arc_suite"], provenance)
             if difference and storage.kept and not overwrite:
@@ -78,16 +81,18 @@ def collect(
                 if missing:
                     if storage.metadata is None:
                         storage.metadata = _metadata(dataset_id, settings, provenance, threads)
-                    storage.metadata |= said
+                    storage.metadata |= further_metadata
                     _play(storage, settings, missing, num_envs, threads, progress)
             finally:
                 if not overwrite or storage.kept.issuperset(missing):
                     storage.finish(functools.partial(progress, desc="merging", unit="episode", leave=False))
         except (ValueError, OSError, KeyboardInterrupt) as error:
-            kind = next(kind for kind in (ValueError, OSError, KeyboardInterrupt) if isinstance(error, kind))
-            cause = "interrupted" if kind is KeyboardInterrupt else error
-            kept = len(storage.kept.intersection(range(episodes)))
-            raise kind(f"{cause}; {kept} of {episodes} episodes of {dataset_id!r} are kept") from None
+            count = len(storage.kept.intersection(range(episodes)))
+            note = f"{count} of {episodes} episodes of {dataset_id!r} are kept"
+            if isinstance(error, KeyboardInterrupt):
+                raise KeyboardInterrupt(f"interrupted; {note}") from None
+            error_type = ValueError if isinstance(error, ValueError) else OSError
+            raise error_type(f"{error}; {note}") from None
         return len(missing)
 
 
@@ -95,50 +100,61 @@ def _check(settings: DatasetSettings, episodes: int) -> None:
     checks.integer("steps", settings.steps, 1)
     last = seed_ranges.COLLECTING[-1] - (episodes - 1)
     checks.integer(f"seed of the first of {episodes} episodes", settings.seed, seed_ranges.COLLECTING.start, last)
-    _policy(settings, num_envs=1)  # finds out whether there is such a policy
+    _policy(settings, num_envs=1)  # raises an error if there is no such policy
 
 
 def _policy(settings: DatasetSettings, num_envs: int, task: Task | None = None) -> policies.Policy:
     return policies.policy(settings.policy, settings.setup.body, settings.presets, num_envs, settings.noise, task)
 
 
-def _difference(was: dict, now: dict) -> str | None:
-    """Return in words the first difference of two provenances; None for none."""
-    was, now = (known["versions"] | known | {"versions": None} for known in (was, now))
-    for name, value in now.items():
-        if was.get(name) != value:
+def _difference(stored: dict, present: dict) -> str | None:
+    """Return a text on the first difference of two provenances; None if they are equal."""
+    stored = _with_versions_by_package(stored)
+    present = _with_versions_by_package(present)
+    for name, value in present.items():
+        if stored.get(name) != value:
             if name == "presets_sha256":
-                return f"its presets {' and '.join(now['presets'])} had other numbers"
-            there, here = (checks.quote(repr(each)) for each in (was.get(name), value))
-            return f"its {name} is {there}, and not {here}"
+                return f"its presets {' and '.join(present['presets'])} had other numbers"
+            return f"its {name} is {checks.quote(repr(stored.get(name)))}, and not {checks.quote(repr(value))}"
     return None
+
+
+def _with_versions_by_package(provenance: dict) -> dict:
+    return provenance["versions"] | provenance | {"versions": None}
 
 
 def _play(
     storage: Storage, settings: DatasetSettings, missing: list[int], num_envs: int, threads, progress: Callable
 ) -> None:
     """Play the missing episodes into the storage."""
-    # All environments are busy to the end, or nearly.
-    num_envs = math.ceil(len(missing) / math.ceil(len(missing) / num_envs))
+    # So many environments that each plays about the same number of episodes.
+    episodes_per_environment = math.ceil(len(missing) / num_envs)
+    num_envs = math.ceil(len(missing) / episodes_per_environment)
     environment = settings.environment(num_envs, threads)
     seeds = [settings.seed + index for index in missing]
-    pending, size, started, spent = {}, 0, time.monotonic(), 0.0
+    pending = {}  # finished episodes by index
+    pending_bytes = 0
+    start = time.monotonic()
+    writing_seconds = 0.0
+    first_count = len(storage.kept)
+    total = len(missing) + first_count
 
     def write():
-        nonlocal pending, size, spent
-        spent -= time.monotonic()
-        if waiting := {index: episode for index, episode in pending.items() if index not in storage.kept}:
-            storage.add(waiting)
-        spent += time.monotonic()
-        pending, size = {}, 0
+        nonlocal pending, pending_bytes, writing_seconds
+        start_of_writing = time.monotonic()
+        not_stored = {index: episode for index, episode in pending.items() if index not in storage.kept}
+        if not_stored:
+            storage.add(not_stored)
+        writing_seconds += time.monotonic() - start_of_writing
+        pending = {}
+        pending_bytes = 0
         bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)
 
-    total, done = len(missing) + len(storage.kept), len(storage.kept)
     with progress(
         desc=settings.setup.body.name,
         leave=False,
         total=total * settings.steps,
-        initial=done * settings.steps,
+        initial=first_count * settings.steps,
         unit="step",
         unit_scale=True,
     ) as bar:
@@ -148,11 +164,11 @@ def _play(
                 bar.update(step.playing)
                 for episode in step.finished:
                     pending[episode.seed - settings.seed] = episode._replace(preset=settings.preset(episode.seed))
-                    size += episode.nbytes
+                    pending_bytes += episode.nbytes
                     bar.update(settings.steps - episode.length)
-                    if size >= BYTES:
+                    if pending_bytes >= MAX_PENDING_BYTES:
                         write()
-                if pending and spent <= SHARE * (time.monotonic() - started):
+                if pending and writing_seconds <= MAX_WRITING_SHARE * (time.monotonic() - start):
                     write()
         finally:
             if pending:

@@ -1,4 +1,4 @@
-"""Opens datasets to be read."""
+"""Datasets of recorded episodes, to be read."""
 
 import contextlib
 import json
@@ -16,9 +16,10 @@ from arc_suite.data.settings import DatasetSettings
 from arc_suite.envs.setup import Setup
 
 METADATA = "metadata.json"
+MAIN = "main_data.hdf5"
 
-# What damage makes h5py, json and our own checks raise.
-_DAMAGES = (
+# Errors that h5py, json and our own checks raise for damaged files.
+_ERRORS_OF_DAMAGE = (
     ArithmeticError,
     AttributeError,
     LookupError,
@@ -28,7 +29,6 @@ _DAMAGES = (
     TypeError,
     ValueError,
 )
-MAIN = "main_data.hdf5"
 
 
 def open(dataset_id: str) -> "Dataset":
@@ -38,7 +38,7 @@ def open(dataset_id: str) -> "Dataset":
     that package first.
 
     Args:
-        dataset_id: such as "arc_suite/queen/walk/cpg-medium-v0"; Minari says where datasets lie.
+        dataset_id: such as "arc_suite/queen/walk/cpg-medium-v0"; Minari decides in which folder datasets lie.
 
     Raises:
         ValueError: no such dataset, one that is damaged or not of this suite, or one that needs a module
@@ -59,26 +59,27 @@ class Dataset:
 
     def __init__(self, dataset_id: str, path: Path):
         """Read the metadata; see `open`."""
-        self.id, self.path = dataset_id, path
+        self.id = dataset_id
+        self.path = path
         self.metadata = read_metadata(dataset_id, path / "data")
-        known = self.metadata["arc_suite"]
+        provenance = self.metadata["arc_suite"]
         try:
-            setup = Setup.from_dict(known)
+            setup = Setup.from_dict(provenance)
         except ValueError as error:
             raise ValueError(f"dataset {dataset_id!r}: {METADATA}: {checks.quote(error)}") from None
         with damages(dataset_id, path / "data" / METADATA):
-            presets = _typed("presets", known["presets"], list)
+            presets = _check_type("presets", provenance["presets"], list)
             self.settings = DatasetSettings(
                 setup=setup,
-                policy=_typed("policy", known["policy"], str),
-                presets=tuple(_typed("presets", preset, str) for preset in presets),
-                noise=checks.number("noise", known["noise"], 0.0),
-                seed=checks.seed(known["seed"]),
-                steps=checks.integer("steps", known["steps"], 1),
+                policy=_check_type("policy", provenance["policy"], str),
+                presets=tuple(_check_type("presets", preset, str) for preset in presets),
+                noise=checks.number("noise", provenance["noise"], 0.0),
+                seed=checks.seed(provenance["seed"]),
+                steps=checks.integer("steps", provenance["steps"], 1),
             )
             self._length = checks.integer("total_episodes", self.metadata["total_episodes"], 0, 1 << 32)
             checks.integer("total_steps", self.metadata["total_steps"], 0, 1 << 53)
-            _check_spec(self.metadata.get("env_spec"), self.settings, known)
+            _check_spec(self.metadata.get("env_spec"), self.settings, provenance)
 
     @property
     def seeds(self) -> range:
@@ -92,16 +93,18 @@ class Dataset:
         """Read one episode.
 
         Raises:
-            IndexError: there is none.
+            IndexError: there is no such episode.
             ValueError: it is damaged.
         """
         index = range(len(self))[index]
         joints = len(self.settings.setup.body.joint_names)
         with self.reading() as file:
             episode = episodes.read(file, index)
-            if episode.actions.shape[1] != joints:
-                found = episode.actions.shape[1]
-                raise ValueError(f"{episodes.name(index)}: expected actions of {joints} joints, found {found}")
+            joints_of_actions = episode.actions.shape[1]
+            if joints_of_actions != joints:
+                raise ValueError(
+                    f"{episodes.name(index)}: expected actions of {joints} joints, found {joints_of_actions}"
+                )
         return episode
 
     def __iter__(self) -> Iterator[Episode]:
@@ -118,7 +121,7 @@ class Dataset:
 
     @contextlib.contextmanager
     def reading(self):
-        """Yield the open HDF5 file; what goes wrong in reading it becomes a ValueError of one line."""
+        """Yield the open HDF5 file; errors in reading it become a ValueError of one line."""
         path = self.path / "data" / MAIN
         with damages(self.id, path), h5py.File(files.plain(path), "r") as file:
             yield file
@@ -126,40 +129,47 @@ class Dataset:
 
 @contextlib.contextmanager
 def damages(dataset_id: str, file: Path):
-    """Turn what h5py raises at a damaged file into one line that names dataset and file.
+    """Turn errors of a damaged file into one line that names dataset and file.
 
     Raises:
         ValueError: the file is damaged.
     """
     try:
         yield
-    except _DAMAGES as error:
+    except _ERRORS_OF_DAMAGE as error:
         raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {checks.quote(error)}") from None
 
 
-def _typed(name: str, value, kind: type):
+def _check_type(name: str, value, kind: type):
+    """Return a value of a type; raise a TypeError for a value of another type."""
     if not isinstance(value, kind):
         raise TypeError(f"expected {name} to be a {kind.__name__}")
     return value
 
 
-def _check_spec(spec: str | None, settings: DatasetSettings, known: Mapping[str, Any]) -> None:
-    """Compare Minari's spec of the environment, if there is one, with the settings, which are what we replay.
+def _check_spec(spec: str | None, settings: DatasetSettings, provenance: Mapping[str, Any]) -> None:
+    """Compare Minari's spec of the environment, if there is one, with the settings, by which episodes are replayed.
 
     Raises:
         ValueError: they differ.
     """
     if spec is None:
         return
-    there, here = json.loads(spec), json.loads(settings.setup.spec(settings.steps).to_json())
-    # A robot's text is that of the file; versions of tasks may have moved on since.
-    here["kwargs"]["domain_name"] = known["robot"]
-    for found in (there, here):
-        found["id"] = re.sub(r"-v\d+$", "", found["id"])
+    stored = json.loads(spec)
+    expected = json.loads(settings.setup.spec(settings.steps).to_json())
+    # A robot is written as in the file. Versions of tasks may have increased since.
+    expected["kwargs"]["domain_name"] = provenance["robot"]
+    stored["id"] = _without_version(stored["id"])
+    expected["id"] = _without_version(expected["id"])
     for name in ("id", "entry_point", "max_episode_steps", "kwargs"):
-        if there.get(name) != here[name]:
-            said, wanted = (checks.quote(json.dumps(each)) for each in (there.get(name), here[name]))
-            raise ValueError(f"{name} of its env_spec is {said}, and its settings say {wanted}")
+        if stored.get(name) != expected[name]:
+            stored_text = checks.quote(json.dumps(stored.get(name)))
+            expected_text = checks.quote(json.dumps(expected[name]))
+            raise ValueError(f"{name} of its env_spec is {stored_text}, and its settings say {expected_text}")
+
+
+def _without_version(env_id: str) -> str:
+    return re.sub(r"-v\d+$", "", env_id)
 
 
 def read_metadata(dataset_id: str, folder: Path) -> dict:
@@ -175,5 +185,5 @@ def read_metadata(dataset_id: str, folder: Path) -> dict:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
     with damages(dataset_id, path):
         for name, kind in (("versions", dict), ("model_sha256", str)):
-            _typed(f"{name} of arc_suite", metadata["arc_suite"][name], kind)
+            _check_type(f"{name} of arc_suite", metadata["arc_suite"][name], kind)
     return metadata

@@ -84,8 +84,9 @@ def write(file, index: int, episode: Episode) -> None:
     group = file.create_group(name(index))
     group.create_group(TERMS)
     for path, array in episode.arrays().items():
-        # h5py's `create_dataset` takes twice as long as this, which episodes of few steps would feel.
-        kind, space = h5py.h5t.py_create(array.dtype, logical=True), h5py.h5s.create_simple(array.shape)
+        # h5py's `create_dataset` takes twice as long, which matters for short episodes.
+        kind = h5py.h5t.py_create(array.dtype, logical=True)
+        space = h5py.h5s.create_simple(array.shape)
         dataset = h5py.h5d.create(group.id, path.encode(), kind, space)
         dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, array)
     group.attrs.update(_attributes(index, episode))
@@ -94,25 +95,26 @@ def write(file, index: int, episode: Episode) -> None:
 def read(file, index: int) -> Episode:
     """Read an episode from an open HDF5 file.
 
-    Sizes are compared with the file's before anything is read, and no link is followed.
+    Sizes are compared with that of the file before anything is read, and no link is followed.
 
     Raises:
-        ValueError: its attributes, such as the digest, do not fit its content, or it is stored otherwise than
-            `write` does.
-        KeyError: there is no such episode, or something in it is missing.
+        ValueError: its attributes, such as the digest, do not fit its content, or its layout is not that of `write`.
+        KeyError: there is no such episode, or an array or attribute is missing.
         OSError: it cannot be read.
     """
     group = _item(file, name(index), h5py.Group)
-    found, arrays = _found(group), _stored(group)
-    size, there = sum(map(_nbytes, arrays.values())), file.id.get_filesize()
-    if size > there:
-        raise ValueError(f"{group.name}: its arrays claim {size} bytes, and the file has {there}")
+    stored_attributes = _read_attributes(group)
+    arrays = _open_arrays(group)
+    size = sum(map(_nbytes, arrays.values()))
+    file_size = file.id.get_filesize()
+    if size > file_size:
+        raise ValueError(f"{group.name}: its arrays claim {size} bytes, and the file has {file_size}")
     values = {path: array[()] for path, array in arrays.items()}
     terms = {path.removeprefix(f"{TERMS}/"): values.pop(path) for path in list(values) if path.startswith(TERMS)}
-    episode = Episode(found["seed"], found.get("preset"), **values, terms=terms)
+    episode = Episode(stored_attributes["seed"], stored_attributes.get("preset"), **values, terms=terms)
     for key, value in _attributes(index, episode).items():
-        if found[key] != value:
-            raise ValueError(f"{name(index)}: expected {key} {value}, found {found[key]}")
+        if stored_attributes[key] != value:
+            raise ValueError(f"{name(index)}: expected {key} {value}, found {stored_attributes[key]}")
     return episode
 
 
@@ -125,14 +127,15 @@ def summary(file, index: int) -> dict:
         OSError: it cannot be read.
     """
     group = _item(file, name(index), h5py.Group)
-    found, steps = _found(group), _array(group, "rewards", (None,), float).shape[0]
-    if found["length"] != steps:
-        raise ValueError(f"{name(index)}: expected length {steps}, found {found['length']}")
-    return found
+    attributes = _read_attributes(group)
+    (steps,) = _open_array(group, "rewards", (None,), float).shape
+    if attributes["length"] != steps:
+        raise ValueError(f"{name(index)}: expected length {steps}, found {attributes['length']}")
+    return attributes
 
 
 def _item(group, key: str, kind: type):
-    """Return what a group holds itself."""
+    """Return a group or an array that a group holds itself, not by a link."""
     if "/" in key or group.id.links.get_info(key.encode()).type != h5py.h5l.TYPE_HARD:
         raise ValueError(f"{group.name.rstrip('/')}/{key}: a link to elsewhere")
     item = group[key]
@@ -141,52 +144,72 @@ def _item(group, key: str, kind: type):
     return item
 
 
-def _found(group) -> dict:
-    """Return the attributes that an episode has."""
-    kinds = _ATTRIBUTES | ({"preset": str} if "preset" in group.attrs else {})
-    return {key: _attribute(group, key, kind) for key, kind in kinds.items()}
+def _read_attributes(group) -> dict:
+    """Return the attributes of an episode in a file."""
+    kinds = dict(_ATTRIBUTES)
+    if "preset" in group.attrs:
+        kinds["preset"] = str
+    return {key: _read_attribute(group, key, kind) for key, kind in kinds.items()}
 
 
-def _attribute(group, key: str, kind: type):
+def _read_attribute(group, key: str, kind: type):
     attribute = group.attrs.get_id(key)
-    text = h5py.check_string_dtype(attribute.dtype)
-    fits = text is not None and text.length is None if kind is str else attribute.dtype.kind == np.dtype(kind).kind
+    if kind is str:
+        text = h5py.check_string_dtype(attribute.dtype)
+        fits = text is not None and text.length is None  # of any length
+    else:
+        fits = attribute.dtype.kind == np.dtype(kind).kind
     if attribute.shape != () or not fits:
         raise ValueError(f"{group.name}: expected the attribute {key} to be one {kind.__name__}")
     return kind(group.attrs[key])
 
 
-def _stored(group) -> dict[str, h5py.Dataset]:
-    """Return the arrays of an episode by their paths, unread."""
-    (steps,) = _array(group, "rewards", (None,), float).shape
+def _open_arrays(group) -> dict[str, h5py.Dataset]:
+    """Return the arrays of an episode by their paths, without reading their values."""
+    (steps,) = _open_array(group, "rewards", (None,), float).shape
     if not steps:
         raise ValueError(f"{group.name}: has no steps")
     arrays = {
-        "observations": _array(group, "observations", (steps + 1, None), np.float32),
-        "actions": _array(group, "actions", (steps, None), np.float32),
-        "rewards": _array(group, "rewards", (steps,), float),
-        "terminations": _array(group, "terminations", (steps,), bool),
-        "truncations": _array(group, "truncations", (steps,), bool),
+        "observations": _open_array(group, "observations", (steps + 1, None), np.float32),
+        "actions": _open_array(group, "actions", (steps, None), np.float32),
+        "rewards": _open_array(group, "rewards", (steps,), float),
+        "terminations": _open_array(group, "terminations", (steps,), bool),
+        "truncations": _open_array(group, "truncations", (steps,), bool),
     }
     terms = group
     for key in TERMS.split("/"):
         terms = _item(terms, key, h5py.Group)
-    return arrays | {f"{TERMS}/{term}": _array(terms, term, (steps,), float) for term in terms}
+    return arrays | {f"{TERMS}/{term}": _open_array(terms, term, (steps,), float) for term in terms}
 
 
-def _array(group, key: str, shape: tuple[int | None, ...], dtype) -> h5py.Dataset:
-    """Return an array as `write` stores it, unread: of a shape, where None is any length, and all in this file."""
+def _open_array(group, key: str, shape: tuple[int | None, ...], dtype) -> h5py.Dataset:
+    """Return an array as `write` stores it, in this file, without reading its values.
+
+    Args:
+        group: that holds it.
+        key: its name in the group.
+        shape: expected; None stands for any length.
+        dtype: expected.
+    """
     array = _item(group, key, h5py.Dataset)
-    found, layout = array.shape or (), array.id.get_create_plist()
-    same = len(found) == len(shape) and all(None in (n, m) or n == m for n, m in zip(found, shape, strict=True))
-    if not same or array.dtype != dtype:
-        wanted = " x ".join("n" if length is None else str(length) for length in shape)
-        raise ValueError(f"{array.name}: expected {wanted} of {np.dtype(dtype)}, found {found} of {array.dtype}")
+    actual_shape = array.shape or ()
+    fits = len(actual_shape) == len(shape)
+    for actual_length, length in zip(actual_shape, shape, strict=False):
+        if length is not None and actual_length != length:
+            fits = False
+    if not fits or array.dtype != dtype:
+        expected = " x ".join("n" if length is None else str(length) for length in shape)
+        raise ValueError(
+            f"{array.name}: expected {expected} of {np.dtype(dtype)}, found {actual_shape} of {array.dtype}"
+        )
+    layout = array.id.get_create_plist()
     if layout.get_layout() != h5py.h5d.CONTIGUOUS or layout.get_external_count():
         raise ValueError(f"{array.name}: expected values in one piece in this file")
-    start, size, there = array.id.get_offset(), _nbytes(array), group.file.id.get_filesize()
-    if size and (start is None or start + size > there):
-        raise ValueError(f"{array.name}: claims {size} bytes, and the file has {there}")
+    start = array.id.get_offset()
+    size = _nbytes(array)
+    file_size = group.file.id.get_filesize()
+    if size and (start is None or start + size > file_size):
+        raise ValueError(f"{array.name}: claims {size} bytes, and the file has {file_size}")
     return array
 
 

@@ -8,20 +8,21 @@ from minari.storage import get_dataset_path
 
 from arc_suite import checks
 
-_VERSIONED = re.compile(r"-v\d+$")
-_LONGEST = 1000  # characters; Minari's time to parse an id grows with the square of its length
+_VERSION_SUFFIX = re.compile(r"-v\d+$")
+_MAX_LENGTH = 1000  # characters; Minari's time to parse an id grows with the square of its length
 
 
 def check(dataset_id: str) -> str:
     """Return the id if Minari admits it, and it does not lie within another dataset.
 
     Raises:
-        ValueError: it is no such id, too long, or the version is missing.
+        ValueError: it is no such id, it is too long, or the version is missing.
     """
-    if isinstance(dataset_id, str) and len(dataset_id) > _LONGEST:
-        raise ValueError(f"dataset id {checks.preview(dataset_id)}: expected at most {_LONGEST} characters")
-    if not _valid(dataset_id):
-        example = checks.preview(next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0"))))
+    if isinstance(dataset_id, str) and len(dataset_id) > _MAX_LENGTH:
+        raise ValueError(f"dataset id {checks.preview(dataset_id)}: expected at most {_MAX_LENGTH} characters")
+    if not _is_valid(dataset_id):
+        with_version = f"{dataset_id}-v0"
+        example = checks.preview(with_version if _is_valid(with_version) else "arc_suite/queen/walk/cpg-medium-v0")
         raise ValueError(
             f"dataset id {checks.preview(dataset_id)}: expected names of letters, digits, '-' and '_' with '/' "
             f"between, two characters at least before the last '/', and a version at the end alone, such as {example}"
@@ -29,13 +30,15 @@ def check(dataset_id: str) -> str:
     return dataset_id
 
 
-def _valid(dataset_id: str) -> bool:
+def _is_valid(dataset_id: str) -> bool:
     try:
         namespace, _, _ = parse_dataset_id(dataset_id)
-    except (TypeError, ValueError):  # Minari's TypeError is that of a missing version
+    except (TypeError, ValueError):  # Minari raises a TypeError if the version is missing
         return False
-    # Minari lists no dataset within another, and replacing the outer one would delete it.
-    return namespace is None or not any(map(_VERSIONED.search, namespace.split("/")))
+    if namespace is None:
+        return True
+    # Minari lists no dataset within another one, and a replacement of the outer one would delete it.
+    return not any(_VERSION_SUFFIX.search(part) for part in namespace.split("/"))
 
 
 def folder(dataset_id: str) -> Path:
@@ -45,15 +48,15 @@ def folder(dataset_id: str) -> Path:
 
 def parts(dataset_id: str) -> Path:
     """Return the hidden folder of the episodes that are not merged into the dataset yet."""
-    place = folder(dataset_id)
-    return place.with_name(f".{place.name}.parts")
+    dataset_folder = folder(dataset_id)
+    return dataset_folder.with_name(f".{dataset_folder.name}.parts")
 
 
 def existing() -> list[str]:
-    """Return the ids of all datasets on this machine, hidden folders left out."""
+    """Return the ids of all datasets on this machine; hidden folders do not count."""
     root = get_dataset_path()
-    found = sorted(path.parent.parent.relative_to(root) for path in root.rglob("data/metadata.json"))
-    return [path.as_posix() for path in found if not any(part.startswith(".") for part in path.parts)]
+    folders = sorted(path.parent.parent.relative_to(root) for path in root.rglob("data/metadata.json"))
+    return [path.as_posix() for path in folders if not any(part.startswith(".") for part in path.parts)]
 
 
 def find(dataset_id: str) -> Path:
@@ -65,8 +68,8 @@ def find(dataset_id: str) -> Path:
     if not folder(dataset_id).joinpath("data").is_dir():
         if parts(dataset_id).is_dir():
             raise ValueError(f"dataset {checks.preview(dataset_id)} is unfinished: collect it again to continue it")
-        there = existing()
-        if not there:
+        dataset_ids = existing()
+        if not dataset_ids:
             raise ValueError(f"unknown dataset {checks.preview(dataset_id)}: there are none in {get_dataset_path()}")
-        checks.name(dataset_id, there, "dataset")
+        checks.name(dataset_id, dataset_ids, "dataset")
     return folder(dataset_id)

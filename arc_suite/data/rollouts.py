@@ -23,7 +23,7 @@ class Step(NamedTuple):
 
 
 def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: int) -> Iterator[Step]:
-    """Play one episode for each seed; an environment whose episode ends starts the next one at once.
+    """Play one episode for each seed; an environment whose episode has ended starts the next one.
 
     An episode depends on its seed and the policy alone, not on the number of environments, threads or its neighbors.
     Actions are rounded to float32 before they are applied, so that the recorded actions are the applied ones.
@@ -32,47 +32,50 @@ def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: in
         environment: with at most as many environments as there are seeds.
         policy: made for as many environments.
         seeds: of the episodes, started in this order.
-        steps: the most that an episode can have.
+        steps: largest number of control steps of an episode.
 
     Yields:
         A `Step` for every control step.
     """
     num_envs = environment.num_envs
     recording = _Recording(environment, steps)
-    waiting = iter(seeds)
-    seated = [next(waiting) for _ in range(num_envs)]  # the seed that each environment plays, None if it is done
-    observations, _ = environment.reset(seed=seated)
-    policy.reset(range(num_envs), seated)
+    remaining_seeds = iter(seeds)
+    playing_seeds = [next(remaining_seeds) for _ in range(num_envs)]  # of each environment; None after the last one
+    observations, _ = environment.reset(seed=playing_seeds)
+    policy.reset(range(num_envs), playing_seeds)
     for index in range(num_envs):
         recording.begin(index, observations)
     rewards = np.zeros(num_envs)
-    playing = np.ones(num_envs, bool)
-    while playing.any():
+    is_playing = np.ones(num_envs, bool)
+    while is_playing.any():
         actions = policy.act(environment.task.split(observations), rewards).clip(-1.0, 1.0).astype(np.float32)
         observations, rewards, terminated, truncated, info = environment.step(actions)
         terms = {name: info[f"reward_{name}"] for name in environment.task.settings.weights}
         recording.add(actions, observations, rewards, terms)
-        ended = np.flatnonzero((terminated | truncated) & playing)
-        finished = [recording.episode(index, seated[index], terminated[index], truncated[index]) for index in ended]
-        count = int(playing.sum())
-        for index in ended:
-            seated[index] = next(waiting, None)
-            playing[index] = seated[index] is not None
-        starting = [index for index in ended if playing[index]]
-        if starting:
+        ended_indices = np.flatnonzero((terminated | truncated) & is_playing)
+        finished_episodes = [
+            recording.episode(index, playing_seeds[index], terminated[index], truncated[index])
+            for index in ended_indices
+        ]
+        count = int(is_playing.sum())
+        for index in ended_indices:
+            playing_seeds[index] = next(remaining_seeds, None)
+            is_playing[index] = playing_seeds[index] is not None
+        starting_indices = [index for index in ended_indices if is_playing[index]]
+        if starting_indices:
             mask = np.zeros(num_envs, bool)
-            mask[starting] = True
-            observations, _ = environment.reset(seed=seated, options={"reset_mask": mask})
-            policy.reset(starting, [seated[index] for index in starting])
-            for index in starting:
+            mask[starting_indices] = True
+            observations, _ = environment.reset(seed=playing_seeds, options={"reset_mask": mask})
+            policy.reset(starting_indices, [playing_seeds[index] for index in starting_indices])
+            for index in starting_indices:
                 recording.begin(index, observations)
-        if len(starting) < len(ended):
-            environment.rest(~playing)
-        yield Step(count, finished)
+        if len(starting_indices) < len(ended_indices):
+            environment.rest(~is_playing)
+        yield Step(count, finished_episodes)
 
 
 class _Recording:
-    """Arrays of what happens in the environments: allocated once, filled from step to step."""
+    """Arrays of the present episodes of all environments, which steps fill."""
 
     def __init__(self, environment: VectorEnv, steps: int):
         num_envs = environment.num_envs
@@ -90,28 +93,28 @@ class _Recording:
         self._observations[index, 0] = observations[index]
 
     def add(self, actions, observations, rewards, terms) -> None:
-        """Take down a step of all environments; those that are done write over their last one."""
+        """Record a step of all environments; those without an episode overwrite their last step."""
         if self._terms is None:
             self._terms = {name: np.empty_like(self._rewards) for name in terms}
-        at = self._indices, np.minimum(self._clock, self._last)
-        self._actions[at] = actions
-        self._rewards[at] = rewards
+        steps = np.minimum(self._clock, self._last)
+        self._actions[self._indices, steps] = actions
+        self._rewards[self._indices, steps] = rewards
         for name, term in terms.items():
-            self._terms[name][at] = term
+            self._terms[name][self._indices, steps] = term
         self._clock += 1
         self._observations[self._indices, np.minimum(self._clock, self._last + 1)] = observations
 
     def episode(self, index: int, seed: int, terminated: bool, truncated: bool) -> Episode:
-        """Return a copy of the episode that has just ended in an environment."""
+        """Return a copy of the episode that the latest step has ended in an environment."""
         length = self._clock[index]
-        ends = np.arange(1, length + 1) == length
+        is_last_step = np.arange(1, length + 1) == length
         return Episode(
-            seed,
-            None,
-            self._observations[index, : length + 1].copy(),
-            self._actions[index, :length].copy(),
-            self._rewards[index, :length].copy(),
-            ends & terminated,
-            ends & truncated,
-            {name: term[index, :length].copy() for name, term in self._terms.items()},
+            seed=seed,
+            preset=None,
+            observations=self._observations[index, : length + 1].copy(),
+            actions=self._actions[index, :length].copy(),
+            rewards=self._rewards[index, :length].copy(),
+            terminations=is_last_step & terminated,
+            truncations=is_last_step & truncated,
+            terms={name: term[index, :length].copy() for name, term in self._terms.items()},
         )

@@ -14,7 +14,7 @@ from arc_suite.tasks.contract import STEPS
 
 
 class DatasetSettings(NamedTuple):
-    """Everything that the episodes of a dataset depend on; episode k has the seed `seed + k`.
+    """Settings on which the episodes of a dataset depend; episode k has the seed `seed + k`.
 
     Attributes:
         setup: body, task and settings of the task.
@@ -66,13 +66,13 @@ class DatasetSettings(NamedTuple):
             ValueError: a setting of the task that does not fit.
         """
         presets = presets_of(self.setup.body) if self.presets else {}
-        known = self.setup.provenance() | self._asdict() | {"presets": list(self.presets)}
-        del known["setup"]
-        known["presets_sha256"] = [_sha256(repr(presets.get(registry.bare_name(preset)))) for preset in self.presets]
+        record = self.setup.provenance() | self._asdict() | {"presets": list(self.presets)}
+        del record["setup"]
+        record["presets_sha256"] = [_sha256(repr(presets.get(registry.bare_name(preset)))) for preset in self.presets]
         if policies.is_file(self.policy):
-            known["policy_sha256"] = policies.digest(self.policy)
-            known["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]
-        return known
+            record["policy_sha256"] = policies.digest(self.policy)
+            record["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]
+        return record
 
 
 def _sha256(text: str) -> str:

@@ -13,7 +13,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import h5py
 from minari.dataset.minari_dataset import parse_dataset_id
@@ -25,8 +25,15 @@ from arc_suite.data.dataset import MAIN, METADATA, damages, read_metadata
 from arc_suite.data.episodes import Episode
 
 
+class StoredEpisode(NamedTuple):
+    """An episode on disk."""
+
+    path: Path  # of the HDF5 file
+    steps: int
+
+
 class Storage:
-    """The files of one dataset; `opened` makes one.
+    """The files of one dataset; `open` makes one.
 
     Attributes:
         id: Minari's.
@@ -34,13 +41,14 @@ class Storage:
     """
 
     def __init__(self, dataset_id: str, overwrite: bool):
-        """Read what is there; see `opened`."""
+        """Read the files that exist; see `open`."""
         self.id = dataset_id
         self.metadata: dict[str, Any] | None = None
-        self._data, self._parts = ids.folder(dataset_id) / "data", ids.parts(dataset_id)
+        self._data = ids.folder(dataset_id) / "data"
+        self._parts = ids.parts(dataset_id)
         self._overwrite = overwrite
         self._continues = False  # whether the parts belong to this collection
-        self._where: dict[int, tuple[Path, int]] = {}  # by index of an episode its file and its steps
+        self._stored: dict[int, StoredEpisode] = {}  # by index
         if self._data.is_symlink():  # nothing outside the dataset's folder is written
             raise ValueError(f"dataset {dataset_id!r} is damaged: expected a folder, and {self._data} is a link")
         if self._data.exists():
@@ -53,50 +61,55 @@ class Storage:
             self.clear()
 
     def _read(self) -> None:
-        begun = None
+        metadata_of_parts = None
         if (self._parts / METADATA).exists():
-            begun = read_metadata(self.id, self._parts)
+            metadata_of_parts = read_metadata(self.id, self._parts)
         else:  # parts whose deletion was interrupted
             shutil.rmtree(self._parts, ignore_errors=True)
         # A kill while the merged file takes its place leaves no metadata in the dataset: the parts hold all of it.
-        expected = METADATA if begun else "*"
-        if not self._overwrite and any(self._data.glob(expected)):
+        pattern = "*" if metadata_of_parts is None else METADATA
+        if not self._overwrite and any(self._data.glob(pattern)):
             self.metadata = read_metadata(self.id, self._data)
             self._scan(self._data / MAIN)
-        if begun and (self.metadata is None or self.metadata["arc_suite"] == begun["arc_suite"]):
-            self.metadata, self._continues = begun, True
+        if metadata_of_parts is None:
+            return
+        if self.metadata is None or self.metadata["arc_suite"] == metadata_of_parts["arc_suite"]:
+            self.metadata = metadata_of_parts
+            self._continues = True
             for part in sorted(self._parts.glob("[0-9]*.hdf5")):
                 self._scan(part)
 
     @classmethod
     @contextlib.contextmanager
-    def opened(cls, dataset_id: str, overwrite: bool, wait: bool = False) -> Iterator[Self]:
-        """Open a dataset to collect into; no other process can meanwhile.
+    def open(cls, dataset_id: str, overwrite: bool, wait: bool = False) -> Iterator[Self]:
+        """Open a dataset to add episodes; meanwhile, no other process can open it.
 
         Args:
-            dataset_id: of a dataset that is there or of a new one.
-            overwrite: start anew even if it is there; the old one stays until `finish`.
-            wait: until no other process collects it.
+            dataset_id: of an existing dataset or of a new one.
+            overwrite: whether to start a new dataset even if there is one, which stays until `finish`.
+            wait: whether to wait until no other process collects it; else that is an error.
 
         Raises:
-            ValueError: the dataset is damaged, or, unless we wait, being collected by another process.
+            ValueError: the dataset is damaged, or another process collects it.
             OSError: its files cannot be made.
         """
-        place = ids.folder(dataset_id)
+        folder = ids.folder(dataset_id)
         _make_namespace(dataset_id)
-        files.folder(place.parent)
+        files.folder(folder.parent)
         refusal = None if wait else f"dataset {dataset_id!r} is being collected by another process"
-        with files.hold_lock(place.with_name(f".{place.name}.lock"), refusal):
+        with files.hold_lock(folder.with_name(f".{folder.name}.lock"), refusal):
             yield cls(dataset_id, overwrite)
 
     @property
     def kept(self) -> frozenset[int]:
         """Return the indices of the episodes that are on disk."""
-        return frozenset(self._where)
+        return frozenset(self._stored)
 
     def clear(self) -> None:
-        """Forget what is there; the first episodes that are added replace the parts."""
-        self._where, self.metadata, self._continues = {}, None, False
+        """Forget all episodes; the first episodes that are added then replace the parts."""
+        self._stored = {}
+        self.metadata = None
+        self._continues = False
 
     def add(self, finished: Mapping[int, Episode]) -> None:
         """Put finished episodes on disk, by index.
@@ -107,17 +120,17 @@ class Storage:
         if not self._continues:
             shutil.rmtree(self._parts, ignore_errors=True)
             files.folder(self._parts)
-            _write_metadata(self._parts, self.metadata)  # first: episodes of unknown settings must not be continued
+            _write_metadata(self._parts, self.metadata)  # before episodes, whose settings must be known
             self._continues = True
         path = self._parts / f"{min(finished)}.hdf5"
-        # A full disk is Python's error and not HDF5's if the file is put together in memory.
+        # As the file is composed in memory, a full disk raises an error of Python and not one of HDF5.
         with h5py.File("image", "w", driver="core", backing_store=False) as file:
             for index, episode in finished.items():
                 episodes.write(file, index, episode)
             file.flush()
             with _writing(path) as temporary:
                 temporary.write_bytes(file.id.get_file_image())
-        self._where |= {index: (path, episode.length) for index, episode in finished.items()}
+        self._stored |= {index: StoredEpisode(path, episode.length) for index, episode in finished.items()}
 
     def finish(self, progress: Callable) -> None:
         """Merge the episodes before the first missing one into the dataset, and delete the parts if these are all.
@@ -128,39 +141,43 @@ class Storage:
         Raises:
             OSError: the disk has no space for two copies of the dataset; the parts stay.
         """
-        count = next(index for index in itertools.count() if index not in self._where)
-        if not self._continues or not count:
+        count = 0  # of episodes before the first missing one
+        while count in self._stored:
+            count += 1
+        if not self._continues or count == 0:
             return
         path = files.folder(self._data) / MAIN
-        needed = sum(file.stat().st_size for file in {file for file, _ in self._where.values()})
-        if shutil.disk_usage(self._data).free < needed:
-            raise OSError(f"cannot write {path}: no space left on device: {needed} bytes are needed")
+        paths = {episode.path for episode in self._stored.values()}
+        num_bytes = sum(part.stat().st_size for part in paths)
+        if shutil.disk_usage(self._data).free < num_bytes:
+            raise OSError(f"cannot write {path}: no space left on device: {num_bytes} bytes are needed")
         with _writing(path) as temporary:
             with h5py.File(temporary, "w") as merged:
-                for file, indices in itertools.groupby(progress(range(count)), key=lambda index: self._where[index][0]):
-                    with h5py.File(file, "r") as source:
+                indices_by_path = itertools.groupby(progress(range(count)), key=lambda index: self._stored[index].path)
+                for part, indices in indices_by_path:
+                    with h5py.File(part, "r") as source:
                         for index in indices:
                             source.copy(episodes.name(index), merged)
-            if self._overwrite:  # the old metadata describe other episodes
+            if self._overwrite:  # earlier metadata describe other episodes
                 (self._data / METADATA).unlink(missing_ok=True)
         counts = {
             "total_episodes": count,
-            "total_steps": sum(self._where[index][1] for index in range(count)),
+            "total_steps": sum(self._stored[index].steps for index in range(count)),
             "dataset_size": round(path.stat().st_size / 1e6, 1),  # MB, as Minari counts
         }
         _write_metadata(self._data, self.metadata | counts)
-        if count == len(self._where):
+        if count == len(self._stored):
             shutil.rmtree(self._parts)
 
     def _scan(self, path: Path) -> None:
         """Find the episodes of a file, read them and compare their digests."""
         with damages(self.id, path), h5py.File(files.plain(path), "r") as file:
             for index in map(episodes.index, file):
-                self._where[index] = path, episodes.read(file, index).length
+                self._stored[index] = StoredEpisode(path, episodes.read(file, index).length)
 
 
 def _make_namespace(dataset_id: str) -> None:
-    namespace = parse_dataset_id(dataset_id)[0]
+    namespace, _, _ = parse_dataset_id(dataset_id)
     if namespace is not None and namespace not in list_local_namespaces():
         create_namespace(namespace)
 

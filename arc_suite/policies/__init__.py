@@ -8,10 +8,10 @@ from arc_suite.policies.named import (
     digest,
     function_file,
     is_file,
+    load_network,
     policy,
     preset_names,
     setup_of,
-    trained,
     training_seeds,
 )
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
@@ -20,7 +20,7 @@ __all__ = [
     "policy",
     "POLICIES",
     "preset_names",
-    "trained",
+    "load_network",
     "setup_of",
     "training_seeds",
     "digest",

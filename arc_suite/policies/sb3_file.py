@@ -83,7 +83,7 @@ class Saved:
         if self._size != (task.size,):
             raise ValueError(f"policy {self._path}: expected observations ({task.size},), got {self._size}")
         try:
-            made = Network(traced(self._traced, task.size), setup, task.sizes)
+            made = Network(traced(self._trace, task.size), setup, task.sizes)
         except (KeyError, AttributeError, TypeError) as error:
             raise ValueError(f"policy {self._path}: expected a perceptron, got {checks.quote(error)}") from None
         samples = np.random.default_rng(0).standard_normal((8, *self._size), np.float32)
@@ -91,7 +91,7 @@ class Saved:
             raise ValueError(f"policy {self._path}: expected a perceptron, got another network")
         return made
 
-    def _traced(self, x: Traced) -> Traced:
+    def _trace(self, x: Traced) -> Traced:
         if (known := self._statistics) is not None and known.norm_obs:
             limit = np.float32(known.clip_obs)
             x = ((x - known.obs_rms.mean) * (1.0 / np.sqrt(known.obs_rms.var + known.epsilon))).clip(-limit, limit)

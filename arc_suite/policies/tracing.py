@@ -1,4 +1,4 @@
-"""Functions of arrays as graphs: the text that computes with NumPy also writes the nodes that compute the same."""
+"""Functions of arrays as graphs: a function that computes with NumPy also writes the nodes of a graph."""
 
 import functools
 import math
@@ -9,8 +9,8 @@ import numpy as np
 
 from arc_suite.policies.graph import INPUT, Graph, Node, Shape, shape_of
 
-# Truth values are 1 and 0: the larger one is their "or", the product their "and".
-_UFUNCS = {
+# Truth values are 1 and 0, so that "or" is the maximum, and "and" the product.
+_OPERATORS = {
     np.add: "Add",
     np.bitwise_and: "Mul",
     np.bitwise_or: "Max",
@@ -40,7 +40,7 @@ def traced(function: Callable[["Traced"], "Traced"], size: int) -> Graph:
 
 
 class _Writer:
-    """A graph that grows, and the shapes of all that it holds."""
+    """A graph to which nodes are added, with the shapes of its arrays and nodes."""
 
     def __init__(self, size: int):
         self.nodes: list[Node] = []
@@ -48,20 +48,23 @@ class _Writer:
         self.shapes: dict[str | int, Shape] = {INPUT: (1, size)}
 
     def array(self, name: str | int) -> "Traced":
-        """Return all numbers of an array, of a node or of the observations."""
+        """Return the numbers of an array, of a node or of the observations."""
         shape = self.shapes[name]
         return Traced(self, name, np.arange(math.prod(shape)).reshape(shape))
 
     def constant(self, value: Any) -> "Traced":
         """Add an array."""
-        array, name = np.asarray(value), str(len(self.arrays))
-        self.arrays[name] = array.astype(np.int32 if array.dtype.kind == "i" else np.float32, order="C")
+        array = np.asarray(value)
+        name = str(len(self.arrays))
+        dtype = np.int32 if array.dtype.kind == "i" else np.float32
+        self.arrays[name] = array.astype(dtype, order="C")
         self.shapes[name] = array.shape
         return self.array(name)
 
     def node(self, operator: str, *names: str | int) -> "Traced":
         """Add a node."""
-        node, index = Node(operator, names), len(self.nodes)
+        node = Node(operator, names)
+        index = len(self.nodes)
         self.shapes[index] = shape_of(node, self.shapes)
         self.nodes.append(node)
         return self.array(index)
@@ -70,16 +73,19 @@ class _Writer:
 class Traced(np.lib.mixins.NDArrayOperatorsMixin):
     """Numbers that a graph computes, in place of an array of one environment (1, ...).
 
-    Arithmetic adds nodes. Indexing, reshaping and joining only change `places`, until a node needs the numbers.
+    Arithmetic adds nodes. Indexing, reshaping and joining only change `places`; a node is added once another one takes
+    the numbers.
 
     Attributes:
-        source: what computes them: an array, a node or the observations.
-        places: (1, ...) their indices in it.
+        source: name of the array, index of the node, or `INPUT`, that holds the numbers.
+        places: (1, ...) indices of the numbers in the source.
     """
 
     def __init__(self, writer: _Writer, source: str | int, places: np.ndarray):
         """Refer to numbers of a source."""
-        self._writer, self.source, self.places = writer, source, places
+        self._writer = writer
+        self.source = source
+        self.places = places
 
     shape = property(lambda self: self.places.shape)
     T = property(lambda self: self._at(self.places.T))
@@ -87,14 +93,15 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
     @functools.cached_property
     def name(self) -> str | int:
         """Name of the array, or index of the node, that gives these numbers in this shape."""
-        whole = self._writer.array(self.source).places
-        if np.array_equal(whole, self.places):
+        all_places = self._writer.array(self.source).places
+        if np.array_equal(all_places, self.places):
             return self.source
-        return self._writer.node("Take", self.source, self._writer.constant(self.places[0]).name).source
+        indices = self._writer.constant(self.places[0])
+        return self._writer.node("Take", self.source, indices.name).source
 
-    def node(self, operator: str, *others: Any) -> "Traced":
-        """Return the result of an operator of these numbers and others, of the graph or of NumPy."""
-        return self._node(operator, self, *others)
+    def node(self, operator: str, *operands: Any) -> "Traced":
+        """Return the result of an operator of these numbers and further operands, of the graph or of NumPy."""
+        return self._node(operator, self, *operands)
 
     def clip(self, low, high) -> "Traced":
         """Return the numbers within limits."""
@@ -122,37 +129,40 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         return self._at(self.places[key])
 
     def __array_ufunc__(self, ufunc, method, *inputs, **options):
-        return self._node(_UFUNCS[ufunc], *inputs)
+        return self._node(_OPERATORS[ufunc], *inputs)
 
     def __array_function__(self, function, types, arguments, options):
-        """Do with the places what a function does that moves numbers, such as `np.concatenate` and `np.split`."""
-        first, *others = arguments
-        if isinstance(first, Traced):
-            found = function(first.places, *others, **options)
-            return [first._at(each) for each in found] if isinstance(found, list) else first._at(found)
-        parts = [part if isinstance(part, Traced) else self._writer.constant(part) for part in first]
+        """Apply a function that moves numbers, such as `np.concatenate` or `np.split`, to the places."""
+        operand, *further_arguments = arguments
+        if isinstance(operand, Traced):
+            result = function(operand.places, *further_arguments, **options)
+            if isinstance(result, list):
+                return [operand._at(places) for places in result]
+            return operand._at(result)
+        parts = [part if isinstance(part, Traced) else self._writer.constant(part) for part in operand]
         sources = list(dict.fromkeys(part.source for part in parts))
         sizes = [math.prod(self._writer.shapes[source]) for source in sources]
-        starts = dict(zip(sources, np.cumsum([0, *sizes]).tolist(), strict=False))
-        joined = sources[0] if len(sources) == 1 else self._writer.node("Concat", *sources).source
-        places = [part.places + starts[part.source] for part in parts]
-        return Traced(self._writer, joined, function(places, *others, **options))
+        starts = dict(zip(sources, np.cumsum([0, *sizes]).tolist(), strict=False))  # in the joined source
+        joined_source = sources[0] if len(sources) == 1 else self._writer.node("Concat", *sources).source
+        places_of_parts = [part.places + starts[part.source] for part in parts]
+        return Traced(self._writer, joined_source, function(places_of_parts, *further_arguments, **options))
 
     def _at(self, places: np.ndarray) -> "Traced":
         return Traced(self._writer, self.source, places)
 
     def _node(self, operator: str, *inputs: Any) -> "Traced":
-        given = [each if isinstance(each, Traced) else self._writer.constant(each) for each in inputs]
-        return self._writer.node(operator, *(each.name for each in given))
+        operands = [operand if isinstance(operand, Traced) else self._writer.constant(operand) for operand in inputs]
+        return self._writer.node(operator, *(operand.name for operand in operands))
 
 
-def repeated(graph: Graph, inputs: Traced) -> Traced:
+def apply_graph(graph: Graph, inputs: Traced) -> Traced:
     """Return the results of a graph for inputs (1, size) that another graph computes."""
-    known: dict[str | int, Traced] = {INPUT: inputs}
-    known |= {name: inputs._writer.constant(array) for name, array in graph.arrays.items()}
+    results: dict[str | int, Traced] = {INPUT: inputs}
+    results |= {name: inputs._writer.constant(array) for name, array in graph.arrays.items()}
     for index, (operator, names) in enumerate(graph.nodes):
-        known[index] = inputs._node(operator, *(known[name] for name in names))
-    return known[len(graph.nodes) - 1]
+        results[index] = inputs._node(operator, *(results[name] for name in names))
+    last = len(graph.nodes) - 1
+    return results[last]
 
 
 def perceptron(x: Traced, layers: Sequence[Mapping], activation: str = "relu") -> Traced:
@@ -163,9 +173,10 @@ def perceptron(x: Traced, layers: Sequence[Mapping], activation: str = "relu") -
         layers: mappings to `weight`, `bias`, and `scale` and `offset` where a layer norm follows.
         activation: of hidden layers, relu, elu or tanh.
     """
-    for each in layers[:-1]:
-        x = activated(linear(x, each), each, activation)
-    return linear(x, layers[-1])
+    *hidden_layers, last_layer = layers
+    for layer in hidden_layers:
+        x = activate(linear(x, layer), layer, activation)
+    return linear(x, last_layer)
 
 
 def linear(x: Traced, layer: Mapping) -> Traced:
@@ -173,7 +184,8 @@ def linear(x: Traced, layer: Mapping) -> Traced:
     return x.node("Linear", layer["weight"], layer["bias"])
 
 
-def activated(x: Traced, layer: Mapping, activation: str = "relu") -> Traced:
+def activate(x: Traced, layer: Mapping, activation: str = "relu") -> Traced:
     """Write the nodes of a layer's norm, if it has one, and of an activation."""
-    x = x.node("LayerNorm", layer["scale"], layer["offset"]) if "scale" in layer else x
+    if "scale" in layer:
+        x = x.node("LayerNorm", layer["scale"], layer["offset"])
     return x.node(activation.capitalize())

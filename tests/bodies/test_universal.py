@@ -108,7 +108,7 @@ def test_what_does_not_fit_is_one_line(trained, tmp_path):
     with pytest.raises(ValueError, match=r"^task walk: expected the blocks posture, velocities, contact_forces, "):
         policies.policy(trained, "tick", task=excluded)
     with pytest.raises(ValueError, match=r"expected one of one body, or --robot; got one of random:0-1$"):
-        policies.trained(trained)
+        policies.load_network(trained)
     single = Setup.of("leaper").definition
     graph = traced(lambda x: x.node("Product", np.zeros((single.size, 12))), single.size)
     network.save(tmp_path / "one.npz", network.Network(graph, Setup.of("leaper"), dict(single.sizes)))

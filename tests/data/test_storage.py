@@ -63,7 +63,7 @@ def digests(dataset_id=ID):
 
 def kept_in_parts():
     """Return the indices of the episodes of an unfinished dataset."""
-    with Storage.opened(ID, overwrite=False) as storage:
+    with Storage.open(ID, overwrite=False) as storage:
         return storage.kept
 
 
@@ -193,14 +193,14 @@ def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
 
 def test_two_processes_do_not_collect_into_one_dataset():
     collect(ID, SETTINGS, 2)
-    with Storage.opened(ID, overwrite=False), refused(f"dataset {ID!r} is being collected by another process"):
+    with Storage.open(ID, overwrite=False), refused(f"dataset {ID!r} is being collected by another process"):
         collect(ID, SETTINGS, 3)
 
 
 def test_a_process_that_waits_finds_what_the_other_has_collected():
     collecting = threading.Thread(target=lambda: counts.append(collect(ID, SETTINGS, 2, wait=True)))
     counts = []
-    with Storage.opened(ID, overwrite=False):
+    with Storage.open(ID, overwrite=False):
         collecting.start()
         collecting.join(0.5)
         assert collecting.is_alive()

@@ -134,7 +134,7 @@ def test_as_layers(name, tmp_path):
     envs = sb3.VecEnv(VectorEnv("leaper", "walk", 2, 1, "SameStep"))
     getattr(stable_baselines3, name)("MlpPolicy", envs, device="cpu", seed=0).save(tmp_path / "agent.zip")
     network, policy = (
-        make(str(tmp_path / "agent.zip")) for make in (policies.trained, lambda p: policies.policy(p, "leaper"))
+        make(str(tmp_path / "agent.zip")) for make in (policies.load_network, lambda p: policies.policy(p, "leaper"))
     )
     assert network.setup.body.name == "leaper"
     observation = {name: block[None] for name, block in arc_suite.load("leaper", "walk").reset(0).observation.items()}
@@ -143,7 +143,7 @@ def test_as_layers(name, tmp_path):
 
 def test_statistics_are_the_first_nodes(normalized):
     folder, timestep, expected = normalized
-    network = policies.trained(f"{folder / 'ppo.zip'}+{folder / 'stats.pkl'}")
+    network = policies.load_network(f"{folder / 'ppo.zip'}+{folder / 'stats.pkl'}")
     operators = [node.operator for node in network.graph.nodes]
     assert operators[:3] == ["Sub", "Mul", "Clip"] and operators[-1] == "Clip"
     np.testing.assert_allclose(policies.alone(network)(timestep), expected, atol=1e-4)
@@ -151,4 +151,4 @@ def test_statistics_are_the_first_nodes(normalized):
 
 def test_a_zip_without_a_setup_is_not_exported(saved):
     with pytest.raises(ValueError, match=r"PPO\.zip: does not hold the robot and task that it was trained for; "):
-        policies.trained(str(saved[0] / "PPO.zip"))
+        policies.load_network(str(saved[0] / "PPO.zip"))

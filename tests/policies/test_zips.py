@@ -55,7 +55,7 @@ def test_a_library_is_read_by_the_module_of_its_extension(tmp_path, monkeypatch)
     with pytest.warns(UserWarning, match=f"^policy {path}: says nothing of its robot$"):
         policies.policy(path, "tick")
     with refused(f"policy {path}: says nothing of its robot"):
-        policies.trained(path)
+        policies.load_network(path)
 
 
 def test_the_setup(tmp_path):

@@ -18,7 +18,7 @@ from arc_suite.learning.agents import critic_blocks as blocks_of_critics
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.networks import ACTIVATION
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
-from arc_suite.policies.tracing import activated, linear, perceptron
+from arc_suite.policies.tracing import activate, linear, perceptron
 from arc_suite.tasks import Task
 from arc_suite.tasks.leg_views import LegViews, leg_views
 
@@ -299,7 +299,7 @@ def trace_shared_layers(inputs, layers):
     """
     first_layer, *later_layers = layers
     leg_mask = _trace_full_mask(inputs)
-    units = activated(linear(inputs.node("Pick", leg_mask), first_layer), first_layer).node("Place", leg_mask)
+    units = activate(linear(inputs.node("Pick", leg_mask), first_layer), first_layer).node("Place", leg_mask)
     legs = units.shape[1]
     half = units.shape[-1] // 2
     mean = units[:, :, half:].sum(axis=1) / np.float32(legs)

@@ -55,6 +55,6 @@ def main(run: str | None = None) -> None:
     elif FLAGS["task"].present or FLAGS["set"].present:
         raise ValueError(f"policy {run}: --task and --set go with the body of a policy of many bodies")
     else:
-        policy = policies.trained(name)
+        policy = policies.load_network(name)
     onnx_file.save(output, policy)
     print(f"wrote {output}: {policy.size} observations, {policy.joints} actions, {output.stat().st_size} bytes")
