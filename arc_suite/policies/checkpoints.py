@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from arc_suite import checks, files
 
-FOLDER, AGENT = "checkpoints", "agent.json"
+FOLDER = "checkpoints"
+AGENT = "agent.json"
 QUALITIES = ("random", "medium", "expert", "replay")
 MEDIUM = 1.0 / 3.0  # of the best return, as in D4RL (Fu et al., 2020)
 
@@ -20,10 +21,10 @@ class Agent(NamedTuple):
     """Metadata of a checkpoint.
 
     Attributes:
-        algorithm: name of the algorithm that learned it.
-        steps: environment steps until then.
+        algorithm: name of the algorithm.
+        steps: environment steps of training until the checkpoint.
         seed: seed of the run.
-        mean_return: mean return of its evaluation.
+        mean_return: mean return of the checkpoint's evaluation.
     """
 
     algorithm: str
@@ -49,9 +50,8 @@ def agents(path: Path) -> list[Agent]:
         ValueError: a damaged file.
     """
     try:
-        found = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
-        agents = [Agent(**files.read_json(file)) for file in found]
-        return sorted(agents, key=lambda agent: agent.steps)
+        paths = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
+        return sorted((Agent(**files.read_json(file)) for file in paths), key=lambda agent: agent.steps)
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"{path}: damaged: {checks.quote(error)}") from None
 
@@ -60,33 +60,37 @@ def at(run: Path, step: int) -> Path:
     """Return the checkpoint of a run at a step.
 
     Raises:
-        ValueError: there is none.
+        ValueError: there is no such checkpoint.
     """
-    there = [agent.steps for agent in agents(run / FOLDER)]
-    if step not in there:
-        raise ValueError(f"{run}: keeps no checkpoint at {step} (there are: {', '.join(map(str, there)) or 'none'})")
+    steps = [agent.steps for agent in agents(run / FOLDER)]
+    if step not in steps:
+        names = ", ".join(map(str, steps)) or "none"
+        raise ValueError(f"{run}: keeps no checkpoint at {step} (there are: {names})")
     return run / FOLDER / str(step)
 
 
 def of_quality(run: Path, quality: str) -> str:
     """Return the policy of a quality, named as in D4RL.
 
-    random is uniform; medium the first checkpoint that earns a third of the best one's return; expert the latest;
-    replay all of them in turn.
+    "random" is uniform; "medium" is the first checkpoint with at least a third of the best return; "expert" is the
+    latest; "replay" is all of them in turn.
 
     Raises:
         ValueError: an unknown quality, a run without checkpoints, or medium of a run without a positive return; one
             line.
     """
     checks.name(quality, QUALITIES, "quality")
-    there = agents(run / FOLDER)
-    if not there:
+    checkpoints = agents(run / FOLDER)
+    if not checkpoints:
         raise ValueError(f"{run}: keeps no checkpoints")
-    if quality in ("random", "replay"):
-        return "random" if quality == "random" else str(run / FOLDER)
+    if quality == "random":
+        return "random"
+    if quality == "replay":
+        return str(run / FOLDER)
     if quality == "expert":
-        return str(at(run, there[-1].steps))
-    best = max(agent.mean_return for agent in there)
+        return str(at(run, checkpoints[-1].steps))
+    best = max(agent.mean_return for agent in checkpoints)
     if best <= 0.0:
         raise ValueError(f"{run}: none is medium, as the best earns {best:.1f}; there are random, expert and replay")
-    return str(at(run, next(agent.steps for agent in there if agent.mean_return >= MEDIUM * best)))
+    first_medium = next(agent for agent in checkpoints if agent.mean_return >= MEDIUM * best)
+    return str(at(run, first_medium.steps))

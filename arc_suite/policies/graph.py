@@ -1,7 +1,7 @@
-"""Graphs: what a trained policy computes, as nodes and arrays, and the interpreter that runs them.
+"""Graphs of trained policies, as nodes and arrays, and the interpreter that computes them.
 
-A node applies an operator of a small table to arrays, to observations and to results of nodes before it. All numbers
-are float32; a truth value is 1 or 0. Results have a leading axis for environments.
+A node applies an operator of a table to arrays, to observations and to results of earlier nodes. All numbers are
+float32; a truth value is 1 or 0. Results have a leading axis for environments.
 """
 
 import math
@@ -15,8 +15,8 @@ from arc_suite import checks
 INPUT = "observations"
 EPSILON = 1e-5  # of a layer norm, as in PyTorch
 
-_MOST_NODES = 1 << 10
-_MOST_NUMBERS = 1 << 22  # of all results, for one environment
+_MAX_NODES = 1 << 10
+_MAX_NUMBERS = 1 << 22  # of all results, for one environment
 
 Shape = tuple[int, ...]
 
@@ -34,11 +34,11 @@ class Node(NamedTuple):
 
 
 class Graph(NamedTuple):
-    """What maps observations (num_envs, size) to actions (num_envs, joints).
+    """A function from observations (num_envs, size) to actions (num_envs, joints).
 
     Attributes:
-        nodes: in order; the last one gives the actions.
-        arrays: float32, or int32 for indices.
+        nodes: in order of computation; the result of the last one is the actions.
+        arrays: constants by name, float32, or int32 for indices.
     """
 
     nodes: tuple[Node, ...]
@@ -47,12 +47,13 @@ class Graph(NamedTuple):
     def __call__(self, observations: np.ndarray) -> np.ndarray:
         """Return actions (num_envs, joints) for observations (num_envs, size), float32.
 
-        Actions of each environment are bit-exact as if computed alone.
+        Actions of each environment have the same bits as if they were computed alone.
         """
-        known: dict[Any, np.ndarray] = {**self.arrays, INPUT: observations}
+        values: dict[Any, np.ndarray] = {**self.arrays, INPUT: observations}
         for index, (operator, inputs) in enumerate(self.nodes):
-            known[index] = OPERATORS[operator].function(*(known[name] for name in inputs))
-        return known[len(self.nodes) - 1]
+            values[index] = OPERATORS[operator].function(*(values[name] for name in inputs))
+        last = len(self.nodes) - 1
+        return values[last]
 
 
 class Operator(NamedTuple):
@@ -60,8 +61,8 @@ class Operator(NamedTuple):
 
     Attributes:
         function: of arrays.
-        inputs: their number; 0 for any.
-        shape: of the result, from the shapes of the inputs; axes of environments have length 1.
+        inputs: number of inputs; 0 for any.
+        shape: function from the shapes of the inputs to that of the result; axes of environments have length 1.
     """
 
     function: Callable[..., np.ndarray]
@@ -70,7 +71,7 @@ class Operator(NamedTuple):
 
 
 def _product(x, weight):
-    # Not a product of matrices: BLAS rounds by the number of environments and threads.
+    # In a product of matrices, BLAS would round differently by the number of environments and threads.
     return np.einsum("ri,io->ro", x, weight)
 
 
@@ -81,8 +82,9 @@ def _product_shape(x: Shape, weight: Shape, bias: Shape | None = None) -> Shape:
 
 
 def _layer_norm(x, scale, offset):
-    x = x - x.mean(axis=-1, keepdims=True)
-    return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + np.float32(EPSILON)) * scale + offset
+    centered = x - x.mean(axis=-1, keepdims=True)
+    variance = (centered * centered).mean(axis=-1, keepdims=True)
+    return centered / np.sqrt(variance + np.float32(EPSILON)) * scale + offset
 
 
 def _elu(x):
@@ -90,9 +92,9 @@ def _elu(x):
 
 
 def _place(rows, mask):
-    placed = np.zeros((*mask.shape, rows.shape[-1]), np.float32)
-    placed[mask > 0.0] = rows
-    return placed
+    result = np.zeros((*mask.shape, rows.shape[-1]), np.float32)
+    result[mask > 0.0] = rows
+    return result
 
 
 def _clip_shape(x: Shape, low: Shape, high: Shape) -> Shape:
@@ -111,16 +113,16 @@ def _truth(compare: np.ufunc) -> Operator:
     return Operator(lambda a, b: compare(a, b).astype(np.float32), 2)
 
 
-# Take gives numbers of an environment by their indices, in the shape of the indices. Concat gives all numbers of its
-# inputs. Sum sums over the axis after that of environments.
-# Pick gives the rows (n, size) of an array (num_envs, count, size) where a mask (num_envs, count) is not 0: nodes after
-# it compute these rows alone. Place puts rows back, with 0 elsewhere. Operators between them compute each row for
-# itself, so an export that computes all rows gets the same.
+# Take returns numbers of an environment by their indices, in the shape of the indices. Concat returns all numbers of
+# its inputs. Sum sums over the axis after that of environments.
+# Pick returns the rows (n, size) of an array (num_envs, count, size) where a mask (num_envs, count) is not 0, so that
+# later nodes compute these rows alone. Place puts rows back, with 0 elsewhere. As operators between them compute each
+# row by itself, an export that computes all rows has the same results.
 OPERATORS = {
     "Add": Operator(np.add, 2),
     "Clip": Operator(lambda x, low, high: x.clip(low, high), 3, _clip_shape),
     "Concat": Operator(
-        lambda *parts: _concatenated([part.reshape(len(part), -1) for part in parts]),
+        lambda *parts: _concatenate([part.reshape(len(part), -1) for part in parts]),
         0,
         lambda *shapes: (1, sum(map(math.prod, shapes))),
     ),
@@ -146,21 +148,21 @@ OPERATORS = {
 }
 
 
-def _concatenated(parts: list[np.ndarray]) -> np.ndarray:
-    count = max(map(len, parts))  # arrays are the same in every environment
-    return np.concatenate([np.broadcast_to(part, (count, part.shape[1])) for part in parts], axis=1)
+def _concatenate(parts: list[np.ndarray]) -> np.ndarray:
+    num_envs = max(map(len, parts))  # constants have a length of 1
+    return np.concatenate([np.broadcast_to(part, (num_envs, part.shape[1])) for part in parts], axis=1)
 
 
-def checked(graph: Graph, size: int) -> Graph:
-    """Return a graph that others may have written, once it is known to fit observations of a size.
+def check_graph(graph: Graph, size: int) -> Graph:
+    """Return a graph from a file after a check that it fits observations of a size.
 
     Raises:
         ValueError: too many nodes or numbers, an unknown operator, inputs that do not fit, or no actions at the end.
     """
-    if size > _MOST_NUMBERS:
-        raise ValueError(f"expected at most {_MOST_NUMBERS} numbers of an observation, got {size}")
-    if not 0 < len(graph.nodes) <= _MOST_NODES:
-        raise ValueError(f"expected 1 to {_MOST_NODES} nodes, got {len(graph.nodes)}")
+    if size > _MAX_NUMBERS:
+        raise ValueError(f"expected at most {_MAX_NUMBERS} numbers of an observation, got {size}")
+    if not 0 < len(graph.nodes) <= _MAX_NODES:
+        raise ValueError(f"expected 1 to {_MAX_NODES} nodes, got {len(graph.nodes)}")
     for name, array in graph.arrays.items():
         if array.dtype not in (np.float32, np.int32) or not array.size:
             raise ValueError(f"array {name}: expected float32 or int32, got {array.dtype} {array.shape}")
@@ -168,23 +170,24 @@ def checked(graph: Graph, size: int) -> Graph:
             raise ValueError(f"array {name}: expected indices, got {array.min()}")
         if not np.isfinite(array).all():
             raise ValueError(f"array {name} is not finite")
-    # Environments that observe nothing and anything: what shapes do not show, these do.
+    # Results of samples, zeros and random numbers, show faults that shapes do not.
     sample = np.zeros((3, size), np.float32)
     sample[1:] = np.random.default_rng(0).standard_normal((2, size))
     shapes: dict[Any, Shape] = {name: array.shape for name, array in graph.arrays.items()} | {INPUT: (1, size)}
-    known: dict[Any, np.ndarray] = {**graph.arrays, INPUT: sample}
+    values: dict[Any, np.ndarray] = {**graph.arrays, INPUT: sample}
     for index, node in enumerate(graph.nodes):
         try:
             shapes[index] = shape_of(node, shapes)
-            if (numbers := sum(math.prod(shapes[result]) for result in range(index + 1))) > _MOST_NUMBERS:
-                raise ValueError(f"expected at most {_MOST_NUMBERS} numbers of an environment, got {numbers}")
+            numbers = sum(math.prod(shapes[result]) for result in range(index + 1))
+            if numbers > _MAX_NUMBERS:
+                raise ValueError(f"expected at most {_MAX_NUMBERS} numbers of an environment, got {numbers}")
             with np.errstate(all="ignore"):
-                known[index] = OPERATORS[node.operator].function(*(known[name] for name in node.inputs))
-            if known[index].dtype != np.float32:
-                raise ValueError(f"expected float32, got {known[index].dtype}")
+                values[index] = OPERATORS[node.operator].function(*(values[name] for name in node.inputs))
+            if values[index].dtype != np.float32:
+                raise ValueError(f"expected float32, got {values[index].dtype}")
         except (ValueError, IndexError, TypeError) as error:
             raise ValueError(f"node {index}, {node.operator}: {checks.quote(error)}") from None
-    if len(shapes[index]) != 2 or known[index].shape != (len(sample), shapes[index][1]):
+    if len(shapes[index]) != 2 or values[index].shape != (len(sample), shapes[index][1]):
         raise ValueError(f"node {index}, {node.operator}: expected actions of every environment, got {shapes[index]}")
     return graph
 
@@ -198,8 +201,9 @@ def shape_of(node: Node, shapes: Mapping[str | int, Shape]) -> Shape:
     operator = OPERATORS[checks.name(node.operator, OPERATORS, "operator")]
     if not node.inputs or operator.inputs not in (0, len(node.inputs)):
         raise ValueError(f"expected {operator.inputs or 'one or more'} inputs, got {len(node.inputs)}")
-    if unknown := [name for name in node.inputs if isinstance(name, bool) or name not in shapes]:
-        raise ValueError(f"unknown input {unknown[0]!r}")
+    for name in node.inputs:
+        if isinstance(name, bool) or name not in shapes:  # True would stand for 1
+            raise ValueError(f"unknown input {name!r}")
     shape = operator.shape(*(shapes[name] for name in node.inputs))
     if shape[:1] != (1,):
         raise ValueError(f"expected a leading axis for environments, got {shape}")

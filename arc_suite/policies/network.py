@@ -1,13 +1,13 @@
-"""Policies that are graphs, and the setups that they were trained in, as files.
+"""Policies that are graphs, and the setups in which they were trained, as files.
 
 A policy file is an archive of the graph's arrays with one JSON text:
 
-    robot, task, task_kwargs    the setup that the policy was trained in
+    robot, task, task_kwargs    the setup in which the policy was trained
     blocks                      size of every block of the observation, in the order of the input
     nodes                       [operator, input, ...] for each node of the graph; see `graph`
-    training_seeds              first and last seed of each range of episodes that the policy learned from, or null
+    training_seeds              first and last seed of each range of training episodes, or null
 
-It holds no pickle and no code, so reading a file of others runs nothing.
+It holds no pickle and no code, so that reading a file runs nothing.
 """
 
 import json
@@ -20,7 +20,7 @@ import numpy as np
 
 from arc_suite import archives, checks, files, registry, seed_ranges
 from arc_suite.envs.setup import Setup
-from arc_suite.policies.graph import Graph, Node, checked
+from arc_suite.policies.graph import Graph, Node, check_graph
 
 PACKAGED = Path(__file__).with_name("packaged")  # policy files that come with the package
 
@@ -31,13 +31,13 @@ _MAX_BYTES = 1 << 28  # of a file, unpacked
 
 
 class Network(NamedTuple):
-    """A deterministic policy, and the setup it was trained in.
+    """A deterministic policy, and the setup in which it was trained.
 
     Attributes:
         graph: from the flat observation (num_envs, size) to actions (num_envs, joints).
         setup: body, or bodies, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
-        training_seeds: of the episodes that it learned from; None if they are unknown.
+        training_seeds: of the episodes of its training; None if they are unknown.
     """
 
     graph: Graph
@@ -50,12 +50,12 @@ class Network(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Of a flat observation."""
+        """The size of a flat observation."""
         return sum(self.blocks.values())
 
     @property
     def joints(self) -> int:
-        """Of an action."""
+        """The number of joints of an action."""
         return self.actions(np.zeros((1, self.size), np.float32)).shape[1]
 
     def actions(self, observations: np.ndarray) -> np.ndarray:
@@ -70,21 +70,25 @@ class Network(NamedTuple):
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
 
-        Blocks that its task excluded are left out.
+        Blocks that were excluded in training are left out.
 
         Raises:
-            ValueError: other blocks than those.
+            ValueError: other blocks than those in training.
         """
         excluded = self.setup.excluded_blocks
         sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
             names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
             wrong = ", ".join(f"{name} has {sizes.get(name, 0)}, not {self.blocks.get(name, 0)}" for name in names)
-            further = set(names).isdisjoint(self.blocks)
-            unread = f"exclude_blocks={json.dumps(names)} leaves out what it does not read"
-            remedy = unread if further else "train with this body and task"
-            own = f"{self.setup.name}, {self.setup.kind.name}"
-            raise ValueError(f"policy of {own}: observations differ from those in training: {wrong} numbers; {remedy}")
+            are_all_additional = set(names).isdisjoint(self.blocks)
+            if are_all_additional:
+                cure = f"exclude_blocks={json.dumps(names)} leaves out what it does not read"
+            else:
+                cure = "train with this body and task"
+            setup_text = f"{self.setup.name}, {self.setup.kind.name}"
+            raise ValueError(
+                f"policy of {setup_text}: observations differ from those in training: {wrong} numbers; {cure}"
+            )
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
 
@@ -96,10 +100,10 @@ def save(path: str | os.PathLike, network: Network) -> None:
         OSError: it cannot be written.
     """
     nodes = [[node.operator, *node.inputs] for node in network.graph.nodes]
-    known = network.setup.to_dict() | {"blocks": dict(network.blocks), "nodes": nodes}
-    known["training_seeds"] = seed_ranges.to_json(network.training_seeds)
+    record = network.setup.to_dict() | {"blocks": dict(network.blocks), "nodes": nodes}
+    record["training_seeds"] = seed_ranges.to_json(network.training_seeds)
     with files.writing(path) as temporary:
-        np.savez(temporary, policy=np.array(json.dumps(known)), **network.graph.arrays)  # type: ignore[arg-type]
+        np.savez(temporary, policy=np.array(json.dumps(record)), **network.graph.arrays)  # type: ignore[arg-type]
 
 
 def load(path: str | os.PathLike) -> Network:
@@ -110,28 +114,32 @@ def load(path: str | os.PathLike) -> Network:
         OSError: it cannot be read.
     """
     path = Path(path)
-    path = path / FILE if path.is_dir() else path
+    if path.is_dir():
+        path = path / FILE
     try:
         arrays = archives.read(path, _MAX_BYTES)
-        known = checks.mapping("policy", json.loads(str(arrays.pop("policy"))))
+        record = checks.mapping("policy", json.loads(str(arrays.pop("policy"))))
         blocks = {
             name: checks.integer(f"block {name}", size, 0)
-            for name, size in checks.mapping("blocks", known["blocks"]).items()
+            for name, size in checks.mapping("blocks", record["blocks"]).items()
         }
-        if "layers" in known:
+        if "layers" in record:
             raise ValueError("holds layers, as policies did before they were graphs: train it again")
-        nodes = tuple(Node(operator, tuple(inputs)) for operator, *inputs in known["nodes"])
-        # Packaged policies are stored as float16.
-        arrays = {name: a.astype(np.float32) if a.dtype == np.float16 else a for name, a in arrays.items()}
-        graph = checked(Graph(nodes, arrays), sum(blocks.values()))
-        setup = Setup.from_dict(known)
-        _ = setup.excluded_blocks  # finds out at once whether they are names
-        return Network(graph, setup, blocks, seed_ranges.from_json(known.get("training_seeds")))
+        nodes = tuple(Node(operator, tuple(inputs)) for operator, *inputs in record["nodes"])
+        for name, array in arrays.items():
+            if array.dtype == np.float16:  # as packaged policies are stored
+                arrays[name] = array.astype(np.float32)
+        graph = check_graph(Graph(nodes, arrays), sum(blocks.values()))
+        setup = Setup.from_dict(record)
+        _ = setup.excluded_blocks  # raises an error if they are no names
+        return Network(graph, setup, blocks, seed_ranges.from_json(record.get("training_seeds")))
     except FileNotFoundError:
-        early = path.name == FILE and path.parent.is_dir()
-        near = map(str, path.parent.glob("*"))
-        remedy = "; a run writes it at its first evaluation" if early else checks.hint(str(path), near)
-        raise OSError(f"cannot read {path}: no such file{remedy}") from None
+        is_of_run = path.name == FILE and path.parent.is_dir()
+        if is_of_run:
+            cure = "; a run writes it at its first evaluation"
+        else:
+            cure = checks.hint(str(path), map(str, path.parent.glob("*")))
+        raise OSError(f"cannot read {path}: no such file{cure}") from None
     except registry.NotImported as error:
         raise ValueError(f"policy {path}: {error}") from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
@@ -140,5 +148,5 @@ def load(path: str | os.PathLike) -> Network:
 
 def checkpoint_files(folder: Path) -> list[Path]:
     """Return the policy files of a folder of checkpoints, `FOLDER/<step>/policy.npz`, by their steps."""
-    found = [path for path in folder.glob(f"*/{FILE}") if path.parent.name.isdecimal()]
-    return sorted(found, key=lambda path: int(path.parent.name))
+    paths = [path for path in folder.glob(f"*/{FILE}") if path.parent.name.isdecimal()]
+    return sorted(paths, key=lambda path: int(path.parent.name))

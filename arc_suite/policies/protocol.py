@@ -1,4 +1,4 @@
-"""The protocol of acting, made for a batch of environments; one environment is a batch of one."""
+"""The protocol of policies, which act for a batch of environments; one environment is a batch of one."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
@@ -38,7 +38,7 @@ class Script:
     """An open-loop policy: its actions do not depend on observations."""
 
     def __init__(self, script: Callable[[int], Iterable[np.ndarray]], num_envs: int, joints: int):
-        """Take a function of a seed that gives the actions (joints,) of its episode; past their end, 0."""
+        """Take a function from a seed to the actions (joints,) of its episode; after the last one, actions are 0."""
         self._script = script
         self._scripts: list[Iterator] = [iter(())] * num_envs
         self._zero = np.zeros(joints)
@@ -79,7 +79,8 @@ class Positioned:
 
     def __init__(self, policy, task: Modified):
         """Take a policy of torques, and a task with `actions="position"`."""
-        self._policy, self._task = policy, task
+        self._policy = policy
+        self._task = task
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start the episodes of seeds in some environments."""
@@ -96,11 +97,11 @@ class Positioned:
         return self._task.modifier(Control).positions(torques, angles, speeds)
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return what a demonstrator remembers; see `Demonstrator.snapshot`."""
+        """Return the memory of a demonstrator; see `Demonstrator.snapshot`."""
         return self._policy.snapshot()
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on from a snapshot."""
+        """Continue from a snapshot."""
         self._policy.restore(arrays)
 
 
@@ -108,45 +109,50 @@ class Mixture:
     """Several policies that take turns from seed to seed."""
 
     def __init__(self, policies: Sequence[Policy], num_envs: int):
-        """Take the policies; the episode of seed s is that of the one at s modulo their number."""
+        """Take the policies; policy i acts in episodes whose seed modulo the number of policies is i."""
         self._policies = policies
-        self._chosen = np.zeros(num_envs, int)
+        self._policy_indices = np.zeros(num_envs, int)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start the episodes of seeds in some environments."""
-        self._chosen[indices] = np.asarray(seeds) % len(self._policies)
+        self._policy_indices[indices] = np.asarray(seeds) % len(self._policies)
         for policy in self._policies:
             policy.reset(indices, seeds)
 
     def act(self, observation, rewards) -> np.ndarray:
         """Return the actions (num_envs, joints)."""
         actions = np.stack([policy.act(observation, rewards) for policy in self._policies])
-        return actions[self._chosen, np.arange(len(self._chosen))]
+        return actions[self._policy_indices, np.arange(len(self._policy_indices))]
 
 
 class Individuals:
-    """A policy of plain functions of a dm_env `TimeStep`, one made anew for every episode.
+    """A policy of plain functions of a dm_env `TimeStep`, a new one for every episode.
 
     A function gets the observations of the environment of `arc_suite.load`: named blocks.
     """
 
     def __init__(self, make: Callable[[], Callable], num_envs: int, joints: int, name: str = "policy"):
-        """Take what makes a function of a `TimeStep`.
+        """Take a function that makes functions of a `TimeStep`.
 
         Args:
-            make: takes nothing.
+            make: function without arguments.
             num_envs: number of environments.
-            joints: of an action.
-            name: with which an error begins.
+            joints: number of joints of an action.
+            name: the first words of errors.
         """
-        self._make, self._name, self._joints = make, name, joints
+        self._make = make
+        self._name = name
+        self._joints = joints
         self._functions: list[Callable | None] = [None] * num_envs
-        self._seeds, self._clock = [0] * num_envs, [0] * num_envs
+        self._seeds = [0] * num_envs
+        self._clock = [0] * num_envs  # control steps of the present episodes
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start the episodes of seeds in some environments."""
         for index, seed in zip(indices, seeds, strict=True):
-            self._functions[index], self._seeds[index], self._clock[index] = self._make(), seed, 0
+            self._functions[index] = self._make()
+            self._seeds[index] = seed
+            self._clock[index] = 0
 
     def act(self, observation, rewards) -> np.ndarray:
         """Return the actions (num_envs, joints).
@@ -159,8 +165,10 @@ class Individuals:
             if function is None:
                 continue
             blocks = {name: block[index].astype(float) for name, block in observation.items()}
-            first = self._clock[index] == 0
-            timestep = dm_env.restart(blocks) if first else dm_env.transition(float(rewards[index]), blocks)
+            if self._clock[index] == 0:
+                timestep = dm_env.restart(blocks)
+            else:
+                timestep = dm_env.transition(float(rewards[index]), blocks)
             try:
                 actions[index] = checked_action(function(timestep), (self._joints,))
             except ValueError as error:
@@ -171,7 +179,7 @@ class Individuals:
 
 
 def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarray]:
-    """Return a policy for one environment: a function of a `TimeStep` with named blocks, to an action (joints,).
+    """Return a policy for one environment: a function from a `TimeStep` with named blocks to an action (joints,).
 
     The first `TimeStep` of an episode begins it.
 

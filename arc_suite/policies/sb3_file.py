@@ -17,20 +17,20 @@ from arc_suite.envs.setup import Setup
 from arc_suite.policies.network import Network
 from arc_suite.policies.tracing import Traced, traced
 
-# The node of a module, for its inputs.
+# Module of PyTorch -> function that adds its node to a graph, given the inputs.
 _NODES = {
     torch.nn.Linear: lambda x, module: x.node("Linear", _array(module.weight.T), _array(module.bias)),
     torch.nn.ReLU: lambda x, module: x.node("Relu"),
     torch.nn.Tanh: lambda x, module: x.node("Tanh"),
 }
-_TOLERANCE = 1e-4  # of an action, between the graph and torch
+_TOLERANCE = 1e-4  # of an action, between the graph and PyTorch
 
 
 class Saved:
-    """The deterministic policy of an algorithm of stable-baselines3, whichever it is.
+    """The deterministic policy of any algorithm of stable-baselines3.
 
     Attributes:
-        joints: that it moves.
+        joints: number of joints of an action.
     """
 
     def __init__(self, path: Path, statistics: Path | None = None):
@@ -41,20 +41,23 @@ class Saved:
             statistics: file that `VecNormalize.save` wrote; None for a policy of plain observations.
 
         Raises:
-            ValueError: it is none of stable-baselines3.
+            ValueError: it is no zip of stable-baselines3.
             OSError: it cannot be read.
         """
         self._path = path
         try:
             data, parameters, _ = load_from_zip_file(path, device="cpu")
-            spaces = data["observation_space"], data["action_space"]
-            self._policy = data["policy_class"](*spaces, lambda _: 0.0, **data["policy_kwargs"])
+            observation_space = data["observation_space"]
+            action_space = data["action_space"]
+            learning_rate = lambda _: 0.0  # noqa: E731
+            self._policy = data["policy_class"](observation_space, action_space, learning_rate, **data["policy_kwargs"])
             self._policy.load_state_dict(parameters["policy"])
         except (zipfile.BadZipFile, ValueError, KeyError, TypeError, RuntimeError, AssertionError) as error:
             raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quote(error)}") from None
         self._policy.set_training_mode(False)
-        self._size, (self.joints,) = spaces[0].shape, spaces[1].shape
-        self._statistics = None if statistics is None else _statistics(statistics, self._size)
+        self._size = observation_space.shape
+        (self.joints,) = action_space.shape
+        self._statistics = None if statistics is None else _read_statistics(statistics, self._size)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
@@ -74,7 +77,7 @@ class Saved:
         """Return the policy as a graph, which normalizes observations with the statistics.
 
         Args:
-            setup: that it was trained in.
+            setup: in which it was trained.
 
         Raises:
             ValueError: a policy that is no multilayer perceptron of known layers, or of another size.
@@ -83,18 +86,20 @@ class Saved:
         if self._size != (task.size,):
             raise ValueError(f"policy {self._path}: expected observations ({task.size},), got {self._size}")
         try:
-            made = Network(traced(self._trace, task.size), setup, task.sizes)
+            network = Network(traced(self._trace, task.size), setup, task.sizes)
         except (KeyError, AttributeError, TypeError) as error:
             raise ValueError(f"policy {self._path}: expected a perceptron, got {checks.quote(error)}") from None
         samples = np.random.default_rng(0).standard_normal((8, *self._size), np.float32)
-        if np.abs(made.actions(samples) - self._actions(samples)).max() > _TOLERANCE:
+        if np.abs(network.actions(samples) - self._actions(samples)).max() > _TOLERANCE:
             raise ValueError(f"policy {self._path}: expected a perceptron, got another network")
-        return made
+        return network
 
     def _trace(self, x: Traced) -> Traced:
-        if (known := self._statistics) is not None and known.norm_obs:
-            limit = np.float32(known.clip_obs)
-            x = ((x - known.obs_rms.mean) * (1.0 / np.sqrt(known.obs_rms.var + known.epsilon))).clip(-limit, limit)
+        statistics = self._statistics
+        if statistics is not None and statistics.norm_obs:
+            limit = np.float32(statistics.clip_obs)
+            factor = 1.0 / np.sqrt(statistics.obs_rms.var + statistics.epsilon)
+            x = ((x - statistics.obs_rms.mean) * factor).clip(-limit, limit)
         for module in _modules(self._policy):
             x = _NODES[type(module)](x, module)
         return x.node("Tanh") if self._policy.squash_output else x.clip(-1.0, 1.0)
@@ -103,21 +108,22 @@ class Saved:
         if self._statistics is not None:
             observations = self._statistics.normalize_obs(observations)
         with torch.no_grad():
-            return np.stack([self._policy.predict(each, deterministic=True)[0] for each in observations])
+            actions = [self._policy.predict(observation, deterministic=True)[0] for observation in observations]
+        return np.stack(actions)
 
 
-def _statistics(path: Path, size: tuple[int, ...]) -> VecNormalize:
+def _read_statistics(path: Path, size: tuple[int, ...]) -> VecNormalize:
     try:
-        found = load_from_pkl(path)
+        statistics = load_from_pkl(path)
     except OSError:
         raise
     except Exception as error:  # a pickle may raise anything
         raise ValueError(f"{path}: no statistics of VecNormalize: {checks.quote(error)}") from None
-    if not isinstance(found, VecNormalize):
-        raise ValueError(f"{path}: expected statistics of VecNormalize, got {type(found).__name__}")
-    if found.norm_obs and found.obs_rms.mean.shape != size:
-        raise ValueError(f"{path}: expected statistics of observations {size}, got {found.obs_rms.mean.shape}")
-    return found
+    if not isinstance(statistics, VecNormalize):
+        raise ValueError(f"{path}: expected statistics of VecNormalize, got {type(statistics).__name__}")
+    if statistics.norm_obs and statistics.obs_rms.mean.shape != size:
+        raise ValueError(f"{path}: expected statistics of observations {size}, got {statistics.obs_rms.mean.shape}")
+    return statistics
 
 
 def _modules(policy) -> list[torch.nn.Module]:

@@ -1,8 +1,7 @@
 """Zips of stable-baselines3 and the statistics of `VecNormalize` that belong to them. No pickle is read here.
 
-A name is `ppo.zip`, or `ppo.zip+stats.pkl` with a file of statistics. A zip that was trained in
-`arc_suite.envs.sb3.VecEnv` also holds the setup that it was trained in. The functions are those of
-`other_libraries.Reader`.
+A name is `ppo.zip`, or `ppo.zip+stats.pkl` with a file of statistics. A zip of a policy that was trained in
+`arc_suite.envs.sb3.VecEnv` also holds the setup of the training. The functions are those of `other_libraries.Reader`.
 """
 
 import json
@@ -23,7 +22,7 @@ def content(path: Path) -> dict[str, Any]:
     """Return the JSON that a zip holds in addition to its pickles.
 
     Raises:
-        ValueError: it is none of stable-baselines3.
+        ValueError: it is no zip of stable-baselines3.
         OSError: it cannot be read.
     """
     if not path.is_file():
@@ -36,30 +35,30 @@ def content(path: Path) -> dict[str, Any]:
 
 
 def setup(path: Path) -> Setup | None:
-    """Return the setup that a zip was trained in; None for one that does not hold it.
+    """Return the setup in which the policy of a zip was trained; None for a zip that does not hold it.
 
     Raises:
         ValueError: as `content` and `Setup.from_dict`.
         OSError: as `content`.
     """
     space = content(path).get("observation_space")
-    known = space.get(ATTRIBUTE) if isinstance(space, dict) else None
-    if not isinstance(known, dict):
+    record = space.get(ATTRIBUTE) if isinstance(space, dict) else None
+    if not isinstance(record, dict):
         return None
     try:
-        return Setup.from_dict(known)
+        return Setup.from_dict(record)
     except (ValueError, registry.NotImported) as error:
         raise ValueError(f"policy {path}: {error}") from None
 
 
 def policy_files(path: Path, further: Path | None) -> list[Path]:
-    """Return a zip and the file of the statistics with which it acts, if there are any.
+    """Return a zip and the file of its statistics, if there is one.
 
     Raises:
         ValueError, OSError: as `statistics`.
     """
-    found = statistics(path, further)
-    return [path] if found is None else [path, found]
+    statistics_path = statistics(path, further)
+    return [path] if statistics_path is None else [path, statistics_path]
 
 
 def load(path: Path, further: Path | None) -> Loaded:
@@ -79,33 +78,36 @@ def load(path: Path, further: Path | None) -> Loaded:
 
 
 def statistics(path: Path, given: Path | None = None) -> Path | None:
-    """Return the file of the statistics with which a zip acts; None for one that acts on plain observations.
+    """Return the file of the statistics of a zip; None for a policy of observations that are not normalized.
 
-    Without a given file it lies next to the zip: `<stem>_vecnormalize.pkl`, the name that `CheckpointCallback` gives
-    it, or `vecnormalize.pkl`. Zips of on-policy algorithms tell whether they were trained with statistics; of others
-    those next to the zip are taken if there are any.
+    By default it is a file next to the zip: `<stem>_vecnormalize.pkl`, the name that `CheckpointCallback` writes, or
+    `vecnormalize.pkl`. Zips of on-policy algorithms tell whether they were trained with statistics. For other zips, a
+    file next to it is taken if there is one.
 
     Raises:
         ValueError: as `content`; statistics that are missing, or given for a zip that was trained without any.
         OSError: as `content`, or the given file does not exist.
     """
     data = content(path)
-    normalized = data.get("_last_original_obs") is not None
+    is_normalized = data.get("_last_original_obs") is not None
     if given is not None:
-        if data.get("_last_obs") is not None and not normalized:
+        if data.get("_last_obs") is not None and not is_normalized:
             raise ValueError(f"policy {path}: was trained without VecNormalize: expected no statistics, got {given}")
         if not given.is_file():
             raise OSError(f"cannot read {given}: no such file")
         return given
-    if not normalized:
+    if not is_normalized:
         return None
     numbered = re.sub(r"_(\d+_steps)$", r"_vecnormalize_\1", path.stem)
     names = dict.fromkeys((f"{path.stem}_vecnormalize.pkl", f"{numbered}.pkl", "vecnormalize.pkl"))
     names.pop(f"{path.stem}.pkl", None)
-    found = next((path.with_name(name) for name in names if path.with_name(name).is_file()), None)
-    if found is None and "rollout_buffer_class" in data:
+    for name in names:
+        if path.with_name(name).is_file():
+            return path.with_name(name)
+    is_on_policy = "rollout_buffer_class" in data
+    if is_on_policy:
         raise ValueError(
             f"policy {path}: was trained with VecNormalize, whose statistics are missing: "
             f"expected --vecnormalize FILE, or {' or '.join(names)} next to it"
         )
-    return found
+    return None
