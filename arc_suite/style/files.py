@@ -19,7 +19,7 @@ from arc_suite.tasks.parameters import Parameters
 
 FORMAT = "arc_suite tracks 4"  # another number for every change of what a file holds
 
-_MOST = 1 << 32  # bytes of all arrays
+_MAX_BYTES = 1 << 32  # bytes of all arrays
 
 # Types of single values, and shapes of arrays.
 _FIELDS = {
@@ -47,23 +47,30 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
     if len(setups) != 1:
         raise ValueError(f"tracks: expected those of one setup, got {sorted(map(str, setups))}")
     (setup,) = setups
-    known = {"setup": setup.to_dict(), "versions": versions.dependency_versions()}
-    arrays: dict[str, Any] = {"format": FORMAT, **{name: json.dumps(value) for name, value in known.items()}}
+    arrays: dict[str, Any] = {
+        "format": FORMAT,
+        "setup": json.dumps(setup.to_dict()),
+        "versions": json.dumps(versions.dependency_versions()),
+    }
     for index, track in enumerate(tracks):
         fields = track._asdict()
         del fields["setup"]
-        arrays |= _flat({name: value for name, value in fields.items() if value is not None}, str(index))
+        arrays |= _flatten({name: value for name, value in fields.items() if value is not None}, str(index))
     with open(path, "wb") as file:
         np.savez(file, **arrays)
 
 
-def _flat(fields: Mapping, path: str) -> dict:
+def _flatten(fields: Mapping, path: str) -> dict:
     """Return the values of a mapping and of the mappings and named tuples in it, by path."""
     values = {}
     for name, value in fields.items():
-        value = value._asdict() if hasattr(value, "_asdict") else value
-        below = f"{path}/{name}"
-        values |= _flat(value, below) if isinstance(value, Mapping) else {below: value}
+        value_path = f"{path}/{name}"
+        if hasattr(value, "_asdict"):
+            value = value._asdict()
+        if isinstance(value, Mapping):
+            values |= _flatten(value, value_path)
+        else:
+            values[value_path] = value
     return values
 
 
@@ -76,11 +83,12 @@ def load(path: str | os.PathLike) -> list[Track]:
         OSError: the file cannot be read.
     """
     with files.reading(path), open(path, "rb"):
-        pass  # whatever goes wrong from here on is damage
+        pass  # the file can be read; later errors mean that it is damaged
     try:
-        arrays = archives.read(path, _MOST)
-        if (found := str(arrays.get("format", "no tracks"))[:80]) == FORMAT:
-            setup = Setup.from_dict(json.loads(_value("setup", arrays["setup"], str)))
+        arrays = archives.read(path, _MAX_BYTES)
+        file_format = str(arrays.get("format", "no tracks"))[:80]
+        if file_format == FORMAT:
+            setup = Setup.from_dict(json.loads(_check_value("setup", arrays["setup"], str)))
             count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
             tracks = [_track(setup, arrays, index) for index in range(count)]
             if any(_names(track) != _names(tracks[0]) for track in tracks):
@@ -90,7 +98,7 @@ def load(path: str | os.PathLike) -> list[Track]:
         raise ValueError(f"{path}: {error}") from None
     except Exception as error:  # a damaged archive may raise anything
         raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quote(error)}") from None
-    raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
+    raise ValueError(f"{path}: expected {FORMAT!r}, got {file_format!r}; record them anew")
 
 
 def _names(track: Track) -> tuple:
@@ -101,17 +109,17 @@ def _track(setup: Setup, arrays: Mapping[str, np.ndarray], index: int) -> Track:
     """Return the track of an index; arrays without axes become numbers."""
     fields: dict[str, Any] = {}
     for name, array in arrays.items():
-        top, *path = name.split("/")
-        if top == str(index):
+        first_key, *keys = name.split("/")
+        if first_key == str(index):
             mapping = fields
-            for key in path[:-1]:
+            for key in keys[:-1]:
                 mapping = mapping.setdefault(key, {})
-            mapping[path[-1]] = array if array.ndim else array.item()
+            mapping[keys[-1]] = array if array.ndim > 0 else array.item()
     _check(fields, setup.body)
     if "parameters" in fields:
         fields["parameters"] = Parameters(**fields["parameters"])
-    absent = {**UNTIMED, "parameters": None, "progress": {}}
-    return Track(setup=setup, **absent | fields)
+    defaults = {**UNTIMED, "parameters": None, "progress": {}}
+    return Track(setup=setup, **defaults | fields)
 
 
 def _check(fields: Mapping[str, Any], body: Body) -> None:
@@ -119,35 +127,40 @@ def _check(fields: Mapping[str, Any], body: Body) -> None:
     lengths = {"steps": len(fields["positions"]), "joints": len(body.joint_names), "feet": len(body.legs)}
     if not lengths["steps"]:
         raise ValueError("positions: expected at least one row")
-    given = {name: value for name, value in fields.items() if name not in ("terms", "weights", "progress")}
-    parameters = given.pop("parameters", None)
-    for name, value in given.items():
-        _value(name, value, _FIELDS[name], lengths)
+    values = {name: value for name, value in fields.items() if name not in ("terms", "weights", "progress")}
+    parameters = values.pop("parameters", None)
+    for name, value in values.items():
+        _check_value(name, value, _FIELDS[name], lengths)
     for name, value in fields["terms"].items():
-        _value(f"terms/{name}", value, ("steps",), lengths)
+        _check_value(f"terms/{name}", value, ("steps",), lengths)
     for name, value in (fields["weights"] | fields.get("progress", {})).items():
-        _value(name, value, float)
-    if missing := sorted(fields["weights"].keys() - fields["terms"].keys()):
-        raise ValueError(f"weights: expected those of terms, got {missing}")
+        _check_value(name, value, float)
+    unknown_weights = sorted(fields["weights"].keys() - fields["terms"].keys())
+    if unknown_weights:
+        raise ValueError(f"weights: expected those of terms, got {unknown_weights}")
     if parameters is not None:
         for name, value in parameters.items():
-            joints = name == "default_angles" and np.ndim(value) == 1
-            _value(f"parameters/{name}", value, ("joints",) if joints else _PARAMETERS[name], lengths)
-        if missing := [name for name in UNTIMED if name not in fields]:
-            raise ValueError(f"{missing[0]}: missing, and there are parameters of a gait")
+            is_of_joints = name == "default_angles" and np.ndim(value) == 1
+            expected = ("joints",) if is_of_joints else _PARAMETERS[name]
+            _check_value(f"parameters/{name}", value, expected, lengths)
+        for name in UNTIMED:
+            if name not in fields:
+                raise ValueError(f"{name}: missing, and there are parameters of a gait")
     for name in ("time_step", "mass", "gravity"):
         checks.number(name, fields[name], 1e-12)
     checks.seed(fields["seed"])
 
 
-def _value(name: str, value, wanted, lengths: Mapping[str, int] | None = None):
-    """Return a value if it has the wanted type of Python, or the wanted shape, lengths given by name or number."""
-    if isinstance(wanted, type):
-        value = value.item() if isinstance(value, np.ndarray) and not value.ndim else value
-        if isinstance(value, bool) or not isinstance(value, (int, float) if wanted is float else wanted):
-            raise ValueError(f"{name}: expected one {wanted.__name__}")
+def _check_value(name: str, value, expected, lengths: Mapping[str, int] | None = None):
+    """Return a value if it has the expected type, or the expected shape, a tuple of names of lengths and numbers."""
+    if isinstance(expected, type):
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value.item()
+        types = (int, float) if expected is float else expected
+        if isinstance(value, bool) or not isinstance(value, types):
+            raise ValueError(f"{name}: expected one {expected.__name__}")
         return value
-    shape = tuple(lengths.get(length, length) for length in wanted)
+    shape = tuple(lengths.get(length, length) for length in expected)
     array = np.asarray(value)
     if array.shape != shape or array.dtype.kind not in _KINDS.get(name, "bif"):
         raise ValueError(f"{name}: expected {shape} numbers, got {array.shape} of {array.dtype}")

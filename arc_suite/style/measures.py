@@ -10,18 +10,21 @@ from arc_suite.style import metrics
 from arc_suite.style.tracks import Track
 from arc_suite.tasks.clock import TWO_PI
 
-_EXACT = 1e-4  # of a frequency, to which a clock keeps it
+_TOLERANCE = 1e-4  # relative error of a frequency that is measured from the clock
 
 
 def _stride_frequency(track: Track) -> float:
-    """Return one stride a cycle of the clock while it goes, Hz; NaN where legs shall always stand or never."""
+    """Return the frequency of the clock while it advances, Hz; NaN for a gait whose legs always stand, or never."""
     parameters = track.parameters
     if not 0.0 < parameters.duty_factor < 1.0:
         return np.nan
     advances = np.diff(track.phases) % TWO_PI
-    mean = advances[advances > 0.0].mean() / (TWO_PI * track.time_step) if advances.any() else np.nan
-    own = parameters.gait_frequency
-    return float(mean) if own and abs(mean / own - 1.0) > _EXACT else own  # without rounding where none is by command
+    mean = np.nan
+    if advances.any():
+        mean = advances[advances > 0.0].mean() / (TWO_PI * track.time_step)
+    prescribed = parameters.gait_frequency
+    is_changed_by_command = prescribed and abs(mean / prescribed - 1.0) > _TOLERANCE
+    return float(mean) if is_changed_by_command else prescribed  # the prescribed one is without rounding
 
 
 def _stride_length(track: Track) -> float:
@@ -124,7 +127,7 @@ def report(tracks: Sequence[Track]) -> dict:
         "metrics": {
             name: {
                 "unit": metric.unit,
-                "prescribed": _prescribed(metric, tracks[0]),
+                "prescribed": _prescribed_value(metric, tracks[0]),
                 "robot": evaluation.summary([measurement[name].value for measurement in measured]),
                 "legs": {
                     leg: evaluation.summary([measurement[name].legs[leg] for measurement in measured])
@@ -137,7 +140,7 @@ def report(tracks: Sequence[Track]) -> dict:
     }
 
 
-def _prescribed(metric: Metric, track: Track) -> float | None:
+def _prescribed_value(metric: Metric, track: Track) -> float | None:
     """Return the prescribed value of a metric, or None."""
     value = metric.prescribed(track) if metric.prescribed else None
     return None if value is None or np.isnan(value) else value

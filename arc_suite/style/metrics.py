@@ -43,9 +43,10 @@ def phase_error(track: Track) -> np.ndarray:
     def middle(stance):
         return ((stance - stance.mean(axis=0)) * turns).mean(axis=0)
 
-    actual, wanted = middle(track.stance), middle(track.schedule)
-    locked = (abs(actual) > _UNLOCKED * abs(wanted)) & (abs(wanted) > 1e-9)
-    return np.where(locked, np.angle(actual * wanted.conj()) / TWO_PI, np.nan)
+    actual = middle(track.stance)
+    prescribed = middle(track.schedule)
+    has_phase = (abs(actual) > _UNLOCKED * abs(prescribed)) & (abs(prescribed) > 1e-9)
+    return np.where(has_phase, np.angle(actual * prescribed.conj()) / TWO_PI, np.nan)
 
 
 def phase_scatter(track: Track) -> float:
@@ -137,8 +138,8 @@ def lateral_drift(track: Track) -> float:
     for a robot that gets nowhere.
     """
     sideways = abs(track.positions[-1, 1] - track.positions[0, 1])
-    traveled = _traveled(track)
-    return float(sideways / traveled) if traveled else np.nan
+    displacement = _displacement(track)
+    return float(sideways / displacement) if displacement else np.nan
 
 
 def torso_pitch(track: Track) -> float:
@@ -191,8 +192,8 @@ def asymmetry(track: Track) -> np.ndarray:
         for occupied in np.unique(bins[:, leg]):
             means[leg, occupied] = paths[bins[:, leg] == occupied, leg].mean(axis=0)
     squares = ((means - means[track.mirrors] * (1.0, -1.0, 1.0)) ** 2).sum(axis=-1)
-    both = ~np.isnan(squares) & (track.mirrors >= 0)[:, None]
-    return np.sqrt(_mean_where(squares, both))
+    is_measured = ~np.isnan(squares) & (track.mirrors >= 0)[:, None]
+    return np.sqrt(_mean_where(squares, is_measured))
 
 
 def cost_of_transport(track: Track) -> float:
@@ -214,7 +215,7 @@ def _seconds(track) -> float:
     return track.time_step * (len(track.positions) - 1)
 
 
-def _traveled(track) -> float:
+def _displacement(track) -> float:
     """Return the length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
     displacement = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
     target = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity) * _seconds(track)
@@ -222,8 +223,8 @@ def _traveled(track) -> float:
 
 
 def _per_meter(track, amount):
-    traveled = _traveled(track)
-    return amount / traveled if traveled else np.full_like(amount, np.inf)
+    displacement = _displacement(track)
+    return amount / displacement if displacement else np.full_like(amount, np.inf)
 
 
 def _rms(values) -> float:

@@ -51,21 +51,21 @@ def source(name: str, preset: str | None = "medium") -> Source:
     if preset is not None:
         check_preset_name(preset)
     if policies.is_file(name):
-        return _played(name, preset)
+        return _play_source(name, preset)
     if name.endswith(".npz"):
-        return _saved(name)
+        return _saved_source(name)
     if ":" in name:
-        return _played(name, preset)
+        return _play_source(name, preset)
     if re.search(r"-v\d+$", name):
-        return _replayed(name)
+        return _replay_source(name)
     if "/" not in name:
         checks.name(name, policies.POLICIES, "policy")
     elif not Path(name).exists():
         raise OSError(f"cannot read {name}: no such file; the id of a dataset ends in a version, such as {name}-v0")
-    return _played(name, preset)
+    return _play_source(name, preset)
 
 
-def _played(name: str, preset: str | None) -> Source:
+def _play_source(name: str, preset: str | None) -> Source:
     def recorders(setup, seeds):
         seeds = [checks.seed(seed) for seed in seeds]
         environment = setup.load()
@@ -75,17 +75,17 @@ def _played(name: str, preset: str | None) -> Source:
     return Source(f"cpg {preset}" if name == "cpg" and preset else name, None, recorders)
 
 
-def _saved(path: str) -> Source:
+def _saved_source(path: str) -> Source:
     tracks = load(path)
 
     def recorders(setup, seeds):
-        _check(path, tracks[0].setup, setup)
+        _check_setup(path, tracks[0].setup, setup)
         return [functools.partial(lambda track: track, track) for track in tracks[: len(seeds)]]
 
     return Source(Path(path).name, tracks[0].setup, recorders)
 
 
-def _replayed(dataset_id: str) -> Source:
+def _replay_source(dataset_id: str) -> Source:
     try:
         from arc_suite import data
     except ImportError as error:
@@ -103,7 +103,7 @@ def _replayed(dataset_id: str) -> Source:
         return track
 
     def recorders(setup, seeds):
-        _check(dataset_id, dataset.settings.setup, setup)
+        _check_setup(dataset_id, dataset.settings.setup, setup)
         if not len(dataset):
             raise ValueError(f"dataset {dataset_id!r} has no episodes")
         environment = setup.load()
@@ -112,10 +112,11 @@ def _replayed(dataset_id: str) -> Source:
     return Source(dataset_id, dataset.settings.setup, recorders)
 
 
-def _check(name: str, found: Setup, wanted: Setup) -> None:
-    """Raise a ValueError of one line if tracks have another setup than the wanted one."""
-    if found.body != wanted.body:
-        other = "another body of that name" if found.body.name == wanted.body.name else found.body.name
-        raise ValueError(f"{name}: expected tracks of {wanted.body.name}, got those of {other}")
-    if found != wanted:
-        raise ValueError(f"{name}: expected tracks of {wanted}, got those of {found}")
+def _check_setup(name: str, setup: Setup, expected: Setup) -> None:
+    """Raise a ValueError of one line if tracks have another setup than the expected one."""
+    if setup.body != expected.body:
+        have_same_name = setup.body.name == expected.body.name
+        body_name = "another body of that name" if have_same_name else setup.body.name
+        raise ValueError(f"{name}: expected tracks of {expected.body.name}, got those of {body_name}")
+    if setup != expected:
+        raise ValueError(f"{name}: expected tracks of {expected}, got those of {setup}")

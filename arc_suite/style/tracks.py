@@ -129,13 +129,13 @@ class Track(NamedTuple):
 def record(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Track:
     """Play one episode of the evaluation protocol and record it.
 
-    Foot positions, velocities and contacts stand one substep behind the torso, as in the reward.
+    Foot positions, velocities and contacts are one substep behind the torso, as in the reward.
 
     Args:
         environment: of `arc_suite.load`.
         policy: made for one environment.
         seed: of the episode's start.
-        max_steps: to stop early.
+        max_steps: control steps after which to stop; None for a whole episode.
 
     Returns:
         The track; without phases, duty factors and parameters if the task prescribes no gait.
@@ -143,13 +143,17 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
     Raises:
         ValueError: a setting of the environment's task that JSON cannot hold, such as an `Arena`.
     """
-    run, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
+    run = environment.task
     task = run.definition
-    body, layout = task.scene.body, task.scene.layout
+    model = environment.physics.model.ptr
+    data = environment.physics.data.ptr
+    body = task.scene.body
+    layout = task.scene.layout
     setup = Setup.of(body, task.name, environment.task_kwargs)
     feet = [model.body(name).id for name in body.foot_names]
     radii = np.array([leg.foot.radius for leg in body.legs])
-    rows, terms = [], []
+    rows = []
+    terms = []
     for timestep in evaluation.rollout(environment, policy, seed, max_steps):
         if timestep.first():
             continue
@@ -169,17 +173,19 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
             "foot_velocities": lowest_point_velocities(model, data, feet, radii),
             "contacts": data.cfrc_ext[feet].any(axis=-1),
         }
-        if (gait := task.leg_phases(run.memory)) is not None:
-            row |= {"phases": task.phase(run.memory), "leg_phases": gait[0], "duty_factors": gait[1]}
+        gait = task.leg_phases(run.memory)
+        if gait is not None:
+            leg_phases, duty_factors = gait
+            row |= {"phases": task.phase(run.memory), "leg_phases": leg_phases, "duty_factors": duty_factors}
         rows.append({name: np.array(value) for name, value in row.items()})
         terms.append(run.terms)
-    recorded = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return Track(
         setup=setup,
         seed=int(seed),
         time_step=environment.control_timestep(),
-        **UNTIMED | recorded,
-        terms={name: np.array([row[name] for row in terms]) for name in terms[0]},
+        **UNTIMED | arrays,
+        terms={name: np.array([step_terms[name] for step_terms in terms]) for name in terms[0]},
         weights=dict(task.settings.weights),
         progress={name: float(value) for name, value in run.progress.items()},
         target_velocity=np.nan if task.target_velocity is None else task.target_velocity,
@@ -201,5 +207,7 @@ def lowest_point_velocities(model, data, feet, radii) -> np.ndarray:
     velocities = np.empty((len(feet), 6))
     for foot, velocity in zip(feet, velocities, strict=True):
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, foot, velocity, 0)
-    turning, moving = velocities[:, :3], velocities[:, 3:]
-    return moving + np.cross(turning, radii[:, None] * (0.0, 0.0, -1.0))
+    angular_velocities = velocities[:, :3]
+    linear_velocities = velocities[:, 3:]
+    lowest_points = radii[:, None] * (0.0, 0.0, -1.0)  # from the origins of the feet
+    return linear_velocities + np.cross(angular_velocities, lowest_points)
