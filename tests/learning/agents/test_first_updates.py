@@ -145,7 +145,7 @@ def test_what_an_update_leaves_out_shows(learner, recorded):
         usual = after()
         for other in (
             after(batch=batch._replace(goes_on=0.0 * batch.goes_on)),
-            after(noise=noise._replace(kept=np.ones_like(kept))),
+            after(noise=noise._replace(dropout_masks=np.ones_like(kept))),
             after(state=state._replace(log_alpha=state.log_alpha + 0.01)),
             after(state=state._replace(critics=moved_critics)),
         ):
