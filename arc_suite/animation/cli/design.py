@@ -134,7 +134,7 @@ def open_evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]
         yield lambda jobs: pool.starmap(evaluate, jobs, chunksize=1)
 
 
-def search_settings(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
+def search_settings(trial: Trial, cell_map: Map, around: Body | None) -> dict[str, Any]:
     """Return the settings that determine a search, as JSON holds them: with lists in place of tuples."""
     settings = {
         "task": trial.task,
@@ -142,7 +142,7 @@ def search_settings(trial: Trial, cells: Map, around: Body | None) -> dict[str, 
         "budget": trial.budget._asdict(),
         "first": trial.first._asdict(),
         "second": trial.second._asdict(),
-        "map": cells._asdict(),
+        "map": cell_map._asdict(),
         "around": None if around is None else body_to_json(around),
         "amount": None if around is None else FLAGS.amount,
         "seed": FLAGS.seed,
@@ -195,30 +195,32 @@ def main() -> None:
         space = VariantGenes(around, FLAGS.amount)
         default_axes = ("height", "width")
         stem = around.name[:_MAX_STEM]
-    cells = Map.of(FLAGS.map or default_axes, around, FLAGS.amount)
+    cell_map = Map.of(FLAGS.map or default_axes, around, FLAGS.amount)
     task = FLAGS.task or goal.task
     task_settings = named_values("set", FLAGS["set"].value)
     trial = Trial.of(task, task_settings, FLAGS.goal, budget_from_flags(around), FLAGS.steps)
-    search = Search(space, cells, trial, FLAGS.seed, stem, FLAGS.random)
+    search = Search(space, cell_map, trial, FLAGS.seed, stem, FLAGS.random)
     check_one_step(trial, search.middle_body())
     if FLAGS.pages:
         pages.viewer_script()  # raises an error now if there is no viewer
     folder = files.folder(FLAGS.output)
-    settings = search_settings(trial, cells, around)
+    settings = search_settings(trial, cell_map, around)
     with resumable(folder):
         run_search(folder, search, settings)
-    write_results(folder, search, cells, trial, settings)
+    write_results(folder, search, cell_map, trial, settings)
     print(f"wrote {folder}")
 
 
-def write_results(folder: pathlib.Path, search: Search, cells: Map, trial: Trial, settings: Mapping[str, Any]) -> None:
+def write_results(
+    folder: pathlib.Path, search: Search, cell_map: Map, trial: Trial, settings: Mapping[str, Any]
+) -> None:
     """Write the files of a search and print a row for each cell.
 
     Raises:
         ValueError: no cell has a body.
     """
-    elites = gallery.find_elites(search, cells)
-    gallery.write_table(folder / "bodies.csv", search, cells)
+    elites = gallery.find_elites(search, cell_map)
+    gallery.write_table(folder / "bodies.csv", search, cell_map)
     gallery.write_specs(folder / "bodies", elites)
     with files.writing_json(folder / "design.json") as report:
         report.update(settings, bodies=len(search.candidates), elites=[elite.to_dict() for elite in elites])
@@ -227,11 +229,11 @@ def write_results(folder: pathlib.Path, search: Search, cells: Map, trial: Trial
         [(most_common_reason, _)] = reasons.most_common(1)
         raise ValueError(f"none of {len(search.candidates)} bodies counts; most often: {most_common_reason}")
     print_table(elites, trial)
-    pictures = gallery.draw_pictures(progress(elites, "rendering", unit="body", leave=False), cells, trial)
+    pictures = gallery.draw_pictures(progress(elites, "rendering", unit="body", leave=False), cell_map, trial)
     gallery.write_picture(folder / "gallery.png", pictures)
     if FLAGS.pages:
-        gallery.write_walks(folder / "walks", progress(elites, "walking", unit="body", leave=False), cells, trial)
-        gallery.write_page(folder / "gallery.html", pictures, cells, f"{trial.goal} in {trial.task}")
+        gallery.write_walks(folder / "walks", progress(elites, "walking", unit="body", leave=False), cell_map, trial)
+        gallery.write_page(folder / "gallery.html", pictures, cell_map, f"{trial.goal} in {trial.task}")
 
 
 def check_one_step(trial: Trial, body: Body | str) -> None:

@@ -72,18 +72,18 @@ class Layout(NamedTuple):
     columns: int
 
 
-def find_elites(search: Search, cells: Map) -> list[Elite]:
+def find_elites(search: Search, cell_map: Map) -> list[Elite]:
     """Return the elites of a search, in the order of their cells."""
     elites = []
     for cell, number in sorted(search.elites.items()):
         candidate = search.candidates[number]
         body = cast(Body, search.body(candidate.genes, number))  # genes of an elite make a body
         outcome = candidate.outcome
-        elites.append(Elite(cells.label(cell), cell, number, body, outcome.first, outcome.second))
+        elites.append(Elite(cell_map.label(cell), cell, number, body, outcome.first, outcome.second))
     return elites
 
 
-def write_table(path: Path, search: Search, cells: Map) -> None:
+def write_table(path: Path, search: Search, cell_map: Map) -> None:
     """Write a row for every evaluated body, as CSV.
 
     A row holds the body's cell, why the body is excluded, the metrics of both evaluations, and the genes.
@@ -94,7 +94,7 @@ def write_table(path: Path, search: Search, cells: Map) -> None:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([*_COLUMNS, *search.genes])
         for number, candidate in enumerate(search.candidates):
-            label = "" if candidate.cell is None else cells.label(candidate.cell)
+            label = "" if candidate.cell is None else cell_map.label(candidate.cell)
             is_elite = int(number in elite_numbers)
             reason, first, second = candidate.outcome
             walks = [*(first or no_walk), *(second or no_walk)]
@@ -108,14 +108,14 @@ def write_specs(folder: Path, elites: Iterable[Elite]) -> None:
         files.write(folder / f"{elite.label}.json", body_to_json(elite.body))
 
 
-def caption(elite: Elite, cells: Map, goal: str) -> str:
+def caption(elite: Elite, cell_map: Map, goal: str) -> str:
     """Return the cell of an elite, and its metric in its second evaluation."""
-    bins = ", ".join(f"{number} {name}" for name, number in zip(cells.names, elite.cell, strict=True))
+    bins = ", ".join(f"{number} {name}" for name, number in zip(cell_map.names, elite.cell, strict=True))
     metric = getattr(elite.second, GOALS[goal].metric)
     return f"{bins}: {metric:.3g}{GOALS[goal].unit}"
 
 
-def draw_pictures(elites: Iterable[Elite], cells: Map, trial: Trial) -> dict[Cell, np.ndarray]:
+def draw_pictures(elites: Iterable[Elite], cell_map: Map, trial: Trial) -> dict[Cell, np.ndarray]:
     """Return a captioned picture (height, width, 3) of every elite in its walk, by its cell.
 
     Raises:
@@ -129,7 +129,7 @@ def draw_pictures(elites: Iterable[Elite], cells: Map, trial: Trial) -> dict[Cel
         footage = films.Footage(elite.label, environment, act, "portrait", size)
         for _ in range(_PICTURE_STEP):
             footage.step()
-        pictures[elite.cell] = films.add_caption(footage.view(), caption(elite, cells, trial.goal))
+        pictures[elite.cell] = films.captioned(footage.view(), caption(elite, cell_map, trial.goal))
         footage.close()
     return pictures
 
@@ -143,7 +143,7 @@ def write_picture(path: Path, pictures: Mapping[Cell, np.ndarray]) -> None:
         films.write_png(temporary, [films.grid(all_pictures, layout.columns)], seconds=0.0)
 
 
-def write_walks(folder: Path, elites: Iterable[Elite], cells: Map, trial: Trial) -> None:
+def write_walks(folder: Path, elites: Iterable[Elite], cell_map: Map, trial: Trial) -> None:
     """Write a page for each elite, on which it walks.
 
     Raises:
@@ -154,14 +154,14 @@ def write_walks(folder: Path, elites: Iterable[Elite], cells: Map, trial: Trial)
         environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
         track = style.record(environment, policy, seed=trial.first.seeds[0], max_steps=WALK_STEPS)
         environment.close()
-        page = pages.page({caption(elite, cells, trial.goal): track})
+        page = pages.page({caption(elite, cell_map, trial.goal): track})
         files.write(folder / f"{elite.label}.html", page)
 
 
-def write_page(path: Path, pictures: Mapping[Cell, np.ndarray], cells: Map, title: str) -> None:
+def write_page(path: Path, pictures: Mapping[Cell, np.ndarray], cell_map: Map, title: str) -> None:
     """Write a page of all pictures, with links to the walks and to the specs."""
     layout = _arrange_cells(pictures)
-    items = "\n".join(_figure_html(cells.label(cell), pictures.get(cell)) for cell in layout.cells)
+    items = "\n".join(_figure_html(cell_map.label(cell), pictures.get(cell)) for cell in layout.cells)
     template = pages.template("design/gallery.html")
     files.write(path, template.substitute(title=html.escape(title), columns=layout.columns, items=items))
 

@@ -78,24 +78,26 @@ class Search:
         elites: by cell, the index of the best body in `candidates`.
     """
 
-    def __init__(self, space: Genes, cells: Map, trial: Trial, seed: int, stem: str, random: int = RANDOM_BODIES):
+    def __init__(
+        self, space: Genes, cell_map: Map, trial: Trial, seed: int, stem: str, random_bodies: int = RANDOM_BODIES
+    ):
         """Start a search.
 
         Args:
             space: of genes.
-            cells: that are to be filled.
+            cell_map: with the cells to fill.
             trial: by which bodies are evaluated.
             seed: of the genes.
             stem: of the names of bodies, `<stem>_<index>`.
-            random: number of bodies of random genes, with which the search begins.
+            random_bodies: number of bodies of random genes, with which the search begins.
         """
         self.genes = space.names
         self._space = space
-        self._cells = cells
+        self._cell_map = cell_map
         self._trial = trial
         self._seed = seed
         self._stem = stem
-        self._random = random
+        self._random_bodies = random_bodies
         self.candidates: list[Candidate] = []
         self.elites: dict[tuple[int, ...], int] = {}
 
@@ -110,7 +112,7 @@ class Search:
         cells = []
         for index, body_genes in enumerate(genes):
             body = self.body(body_genes, len(self.candidates) + index)
-            cell = None if isinstance(body, str) else self._cells.cell(body)
+            cell = None if isinstance(body, str) else self._cell_map.cell(body)
             cells.append(cell)
             jobs.append((self._trial, body, self._elite_value(cell)))
         outcomes = evaluate_all(jobs)
@@ -127,8 +129,8 @@ class Search:
         """Add evaluated bodies: a body whose second evaluation exceeds that of its cell's elite becomes the elite."""
         goal = GOALS[self._trial.goal]
         for candidate in batch.candidates:
-            counts = not candidate.outcome.reason and candidate.outcome.second is not None
-            if counts and goal.value(candidate.outcome.second) > self._elite_value(candidate.cell):
+            may_be_elite = not candidate.outcome.reason and candidate.outcome.second is not None
+            if may_be_elite and goal.value(candidate.outcome.second) > self._elite_value(candidate.cell):
                 self.elites[candidate.cell] = len(self.candidates)
             self.candidates.append(candidate)
 
@@ -145,18 +147,18 @@ class Search:
 
     def _next_genes(self) -> np.ndarray:
         """Return the genes (BATCH_SIZE, n) of the next batch, rounded as files hold them."""
-        random = np.random.default_rng((self._seed, len(self.candidates)))
-        random_genes = random.uniform(size=(BATCH_SIZE, len(self._space.names)))
+        rng = np.random.default_rng((self._seed, len(self.candidates)))
+        random_genes = rng.uniform(size=(BATCH_SIZE, len(self._space.names)))
         best_cells = sorted(self.elites, key=self._elite_value, reverse=True)
         parents = np.array([self.candidates[self.elites[cell]].genes for cell in best_cells])  # the best first
-        if len(self.candidates) < self._random or not len(parents):
+        if len(self.candidates) < self._random_bodies or not len(parents):
             return random_genes.round(6)
-        parent_ranks = len(parents) * random.uniform(size=(2, BATCH_SIZE)) ** PARENT_BIAS
+        parent_ranks = len(parents) * rng.uniform(size=(2, BATCH_SIZE)) ** PARENT_BIAS
         first_parents, second_parents = parents[parent_ranks.astype(int)]
-        genes = first_parents + ISOTROPIC_DEVIATION * random.standard_normal(random_genes.shape)
-        line_moves = LINE_DEVIATION * random.standard_normal((BATCH_SIZE, 1))
+        genes = first_parents + ISOTROPIC_DEVIATION * rng.standard_normal(random_genes.shape)
+        line_moves = LINE_DEVIATION * rng.standard_normal((BATCH_SIZE, 1))
         genes += line_moves * (second_parents - first_parents)
-        is_redrawn = random.uniform(size=genes.shape) < REDRAW_PROBABILITY
+        is_redrawn = rng.uniform(size=genes.shape) < REDRAW_PROBABILITY
         return np.where(is_redrawn, random_genes, genes.clip(0.0, 1.0)).round(6)
 
     def _elite_value(self, cell: tuple[int, ...] | None) -> float:

@@ -135,13 +135,13 @@ class Outcome(NamedTuple):
     second: WalkMeans | None = None
 
 
-def evaluate(trial: Trial, body: Body | str, elite: float) -> Outcome:
+def evaluate(trial: Trial, body: Body | str, elite_value: float) -> Outcome:
     """Evaluate a body, and a second time if the first value is above that of the elite of its cell.
 
     Args:
         trial: how to evaluate.
         body: to evaluate, or the reason why there is no body.
-        elite: value of the elite's metric; see `Goal.value`.
+        elite_value: of the metric; see `Goal.value`.
     """
     if isinstance(body, str):
         return Outcome(body)
@@ -152,7 +152,7 @@ def evaluate(trial: Trial, body: Body | str, elite: float) -> Outcome:
     try:
         first = measure_walk(body, trial.task, trial.first, goal)
         first_reason = exclusion_reason(goal, trial.budget, first)
-        if first_reason or goal.value(first) <= elite:
+        if first_reason or goal.value(first) <= elite_value:
             return Outcome(first_reason, first)
         second = measure_walk(body, trial.task, trial.second, goal)
     except ValueError as error:
