@@ -129,7 +129,7 @@ def draw_pictures(elites: Iterable[Elite], cell_map: Map, trial: Trial) -> dict[
         footage = films.Footage(elite.label, environment, act, "portrait", size)
         for _ in range(_PICTURE_STEP):
             footage.step()
-        pictures[elite.cell] = films.captioned(footage.view(), caption(elite, cell_map, trial.goal))
+        pictures[elite.cell] = films.add_caption(footage.view(), caption(elite, cell_map, trial.goal))
         footage.close()
     return pictures
 
