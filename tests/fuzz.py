@@ -163,8 +163,8 @@ def _act_by_run() -> None:
 
 
 def _read_study() -> None:
-    results.results(tables.study(STUDY).runs, pathlib.Path("studies", STUDY))
-    results.demonstrators(pathlib.Path("studies", STUDY))
+    results.read_results(tables.study(STUDY).runs, pathlib.Path("studies", STUDY))
+    results.read_demonstrators(pathlib.Path("studies", STUDY))
 
 
 def _read_scores() -> None:

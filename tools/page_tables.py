@@ -33,7 +33,7 @@ def main() -> None:
 
 def returns_next_to_the_papers() -> str:
     """Return the table of our returns and those of the paper's curves, of all its algorithms and robots."""
-    results_of_studies = [results.results(catalog.study(name).runs, STUDIES / name) for name in COMPARED_STUDIES]
+    results_of_studies = [results.read_results(catalog.study(name).runs, STUDIES / name) for name in COMPARED_STUDIES]
     return claims.next_to_the_papers(results_of_studies, STEPS)
 
 

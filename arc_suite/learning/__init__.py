@@ -42,8 +42,8 @@ def train(
         robot, task, task_kwargs: see `arc_suite.load`.
         algorithm, hyperparameters, seed, steps, evaluate_every, prior, training: see
             `agents.configuration.Configuration.of`.
-        minutes: of CPU time of the run to stop after, yet not before its first evaluation; None to train to the end.
-        folder: of the run; None for one that is deleted at the end.
+        minutes: CPU time of the run to stop after, but not before its first evaluation; None to train to the end.
+        folder: folder of the run; None for one that is deleted at the end.
         progress, on_metrics: see `agents.training.train`.
 
     Returns:
@@ -58,11 +58,11 @@ def train(
     from arc_suite.learning.agents import training as trainer  # not before: programs without learners are light
     from arc_suite.learning.agents.configuration import Configuration
 
-    own = (algorithm, hyperparameters, seed, steps, evaluate_every, prior, training)
-    run = Configuration.of(setup, *own)
+    run = Configuration.of(setup, algorithm, hyperparameters, seed, steps, evaluate_every, prior, training)
     with contextlib.ExitStack() as stack:
-        place = Path(folder or Path(stack.enter_context(tempfile.TemporaryDirectory()), run.name))
-        trainer.train(run, place, minutes, progress=progress, on_metrics=on_metrics)
-        if not (policy := place / network.FILE).exists():
-            trainer.train(run, place, progress=progress, on_metrics=on_metrics, stop=policy.exists)
+        output = Path(folder) if folder else Path(stack.enter_context(tempfile.TemporaryDirectory()), run.name)
+        trainer.train(run, output, minutes, progress=progress, on_metrics=on_metrics)
+        policy = output / network.FILE
+        if not policy.exists():  # the minutes ended before the first evaluation
+            trainer.train(run, output, progress=progress, on_metrics=on_metrics, stop=policy.exists)
         return network.load(policy)

@@ -1,14 +1,16 @@
-"""Policies as ONNX, which game engines and onnxruntime run: the whole graph, its normalization among it.
+"""Policies as ONNX files, which game engines and onnxruntime run.
 
-The input `observations` is (num_envs, size) float32, flat: the task's blocks one after the other. The output
-`actions` is (num_envs, joints) in [-1, 1]. The metadata hold what else a game needs, JSON by name; see `metadata`.
+The graph includes the normalization of observations. The input `observations` is (num_envs, size) float32, flat: the
+task's blocks one after the other. The output `actions` is (num_envs, joints) in [-1, 1]. The metadata, JSON by name,
+hold the rest that a game needs; see `metadata`.
 """
 
 import dataclasses
 import json
 import os
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,60 +22,54 @@ from arc_suite.robots.spec import Body
 
 OUTPUT = "actions"
 OPSET = 17  # the first with LayerNormalization
-IR_VERSION = 8  # of the same time, so that older runtimes read it
+IR_VERSION = 8  # the format of the same release, so that older runtimes read it
 
 
 def metadata(network: Network) -> dict:
     """Return the metadata of a policy's file, by name.
 
-    robot, task, task_kwargs    the setup it was trained in, or that of the body it was exported for
+    robot, task, task_kwargs    setup of the training, or the setup that the policy was exported for
     blocks                      size of every block of the observation by name, in order
     control_timestep            s between two actions
-    substeps                    of the simulation between them
-    joints                      names, in the order of the actions
-    gears                       N m that an action of 1 is, by joint; only of motors
-    servos                      by joint: its name in the file that it comes from, its angle in the standing pose and
-                                how far from it an action of 1 is, rad, stiffness, N m/rad, damping, N m s/rad, limit,
-                                N m; only of servos
-    file_joints                 names of the joints in the order of that file
-    gait_clock                  how the block of that name follows from time; only where there is one
+    substeps                    simulation steps between two actions
+    joints                      names of the joints, in the order of the actions
+    gears                       torques of an action of 1 by joint, N m; only for motors
+    servos                      only for servos, by joint: alias, its name in the imported file; home, its angle in the
+                                standing pose, rad; reach, change of the angle by an action of 1, rad; stiffness,
+                                N m/rad; damping, N m s/rad; limit, N m
+    file_joints                 names of the joints in the order of the imported file
+    gait_clock                  frequency, Hz, and rule of the block of that name; only if the task has this block
 
     Raises:
         ValueError: a policy of many bodies.
     """
     if network.setup.several:
         raise ValueError(f"policy of {network.setup.robot}: expected one of one body; see universal.for_body")
-    setup, blocks = network.setup, network.blocks
-    task, model = setup.prepare()
-    step = task.scene.control_timestep
-    known = (
-        setup.to_dict()
-        | {
-            "blocks": dict(blocks),
-            "control_timestep": step,
-            "substeps": round(step / model.opt.timestep),
-            "joints": list(task.scene.body.joint_names),
-        }
-        | _driven(task.scene.body, model)
-    )
-    if "gait_clock" in blocks and task.parameters is not None:
-        frequency = task.parameters.gait_frequency
-        known["gait_clock"] = {
-            "frequency": frequency,
+    task, model = network.setup.prepare()
+    body = task.scene.body
+    control_timestep = task.scene.control_timestep
+    values = network.setup.to_dict()
+    values["blocks"] = dict(network.blocks)
+    values["control_timestep"] = control_timestep
+    values["substeps"] = round(control_timestep / model.opt.timestep)
+    values["joints"] = list(body.joint_names)
+    values |= _servo_metadata(body) if body.source else {"gears": model.actuator_gear[:, 0].tolist()}
+    if "gait_clock" in network.blocks and task.parameters is not None:
+        values["gait_clock"] = {
+            "frequency": task.parameters.gait_frequency,
             "rule": "sine and cosine of 2 pi frequency t, t = control_timestep x control steps since the start",
         }
-    return known
+    return values
 
 
-def _driven(body: Body, model: Any) -> dict:
-    """Return what actions ask of the joints of a body."""
-    if not body.source:
-        return {"gears": model.actuator_gear[:, 0].tolist()}
-    home = source.angles_at_home(body)
-    servos = {
-        name: {"alias": joint.alias, "home": home[name], "reach": reach} | dataclasses.asdict(joint.servo)
-        for name, joint, reach in zip(body.joint_names, body.joints, sizing.action_reaches(body).tolist(), strict=True)
-    }
+def _servo_metadata(body: Body) -> dict:
+    """Return the metadata of the servos of an imported body."""
+    home_angles = source.angles_at_home(body)
+    reaches = sizing.action_reaches(body).tolist()
+    servos = {}
+    for name, joint, reach in zip(body.joint_names, body.joints, reaches, strict=True):
+        position = {"alias": joint.alias, "home": home_angles[name], "reach": reach}
+        servos[name] = position | dataclasses.asdict(joint.servo)
     return {"servos": servos, "file_joints": list(body.file_joints)}
 
 
@@ -84,77 +80,126 @@ def save(path: str | os.PathLike, network: Network) -> None:
         ValueError: the package onnx is not installed, or a policy of many bodies.
         OSError: the file cannot be written.
     """
-    known = metadata(network)
+    metadata_texts = {}
+    for name, value in metadata(network).items():
+        metadata_texts[name] = value if isinstance(value, str) else json.dumps(value)
     with versions.require_extra("ONNX needs the package onnx", "learn"):
         import onnx
         from onnx import TensorProto, helper, numpy_helper
-    nodes, arrays = _standard(network.graph)
-    made = helper.make_graph(
-        [helper.make_node(operator, names, [result], **attributes) for operator, names, result, attributes in nodes],
+    nodes, arrays = _convert_graph(network.graph)
+    onnx_nodes = [helper.make_node(node.operator, node.inputs, [node.output], **node.attributes) for node in nodes]
+    graph = helper.make_graph(
+        onnx_nodes,
         "policy",
         [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["num_envs", network.size])],
         [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["num_envs", network.joints])],
         [numpy_helper.from_array(array, name) for name, array in arrays.items()],
     )
-    model = helper.make_model(made, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "arc_suite"
-    texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in known.items()}
-    helper.set_model_props(model, texts)
+    helper.set_model_props(model, metadata_texts)
     onnx.checker.check_model(model)
     with files.writing(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
 
 
-# Arrays that nodes of ONNX take where ours have none.
-_ARRAYS = {name: np.array(values, np.int64) for name, values in {"flat": (0, -1), "one": (1,), "two": (2,)}.items()}
+class _Node(NamedTuple):
+    """A node of an ONNX graph.
 
-# The nodes of ONNX that each of ours is: operator, inputs, attributes. An input is one of ours by its number, an array
-# by its name, or the result before, BEFORE. Operators that are missing are the same.
-BEFORE = -1
-_TRUTH = ("Cast", (BEFORE,), {"to": 1})
-_STANDARD: dict[str, tuple] = {
-    "Equal": (("Equal", (0, 1), {}), _TRUTH),
-    "Greater": (("Greater", (0, 1), {}), _TRUTH),
-    "GreaterOrEqual": (("GreaterOrEqual", (0, 1), {}), _TRUTH),
-    "LayerNorm": (("LayerNormalization", (0, 1, 2), {"axis": -1, "epsilon": EPSILON}),),
-    "Linear": (("MatMul", (0, 1), {}), ("Add", (BEFORE, 2), {})),
-    # Every row is computed, and those that are not there become 0.
-    "Pick": (("Identity", (0,), {}),),
-    "Place": (("Unsqueeze", (1, "two"), {}), ("Mul", (0, BEFORE), {})),
-    "Product": (("MatMul", (0, 1), {}),),
-    "Sum": (("ReduceSum", (0, "one"), {"keepdims": 0}),),
-    "Take": (("Reshape", (0, "flat"), {}), ("Gather", (BEFORE, 1), {"axis": 1})),
+    Attributes:
+        operator: name of the operator in ONNX.
+        inputs: names of the inputs.
+        output: name of the output.
+        attributes: attributes of the operator.
+    """
+
+    operator: str
+    inputs: list[str]
+    output: str
+    attributes: Mapping[str, Any]
+
+
+class _Step(NamedTuple):
+    """A node of ONNX that one of the suite's operators becomes.
+
+    Attributes:
+        operator: name of the operator in ONNX.
+        inputs: index of an input of the suite's node, name of an array of `_CONSTANTS`, or `PREVIOUS`.
+        attributes: attributes of the operator.
+    """
+
+    operator: str
+    inputs: Sequence[int | str]
+    attributes: Mapping[str, Any] = MappingProxyType({})
+
+
+# Arrays that nodes of ONNX take and the suite's nodes do not.
+_CONSTANTS = {
+    "flat": np.array((0, -1), np.int64),
+    "one": np.array((1,), np.int64),
+    "two": np.array((2,), np.int64),
+}
+
+PREVIOUS = -1  # input: the output of the previous step
+_BOOLEAN_TO_FLOAT = _Step("Cast", (PREVIOUS,), {"to": 1})
+
+# Steps by operator of the suite. An operator that is not listed has the same name in ONNX.
+_STEPS: dict[str, tuple[_Step, ...]] = {
+    "Equal": (_Step("Equal", (0, 1)), _BOOLEAN_TO_FLOAT),
+    "Greater": (_Step("Greater", (0, 1)), _BOOLEAN_TO_FLOAT),
+    "GreaterOrEqual": (_Step("GreaterOrEqual", (0, 1)), _BOOLEAN_TO_FLOAT),
+    "LayerNorm": (_Step("LayerNormalization", (0, 1, 2), {"axis": -1, "epsilon": EPSILON}),),
+    "Linear": (_Step("MatMul", (0, 1)), _Step("Add", (PREVIOUS, 2))),
+    # The suite computes the rows of a mask alone; here all rows are computed, and those outside the mask become 0.
+    "Pick": (_Step("Identity", (0,)),),
+    "Place": (_Step("Unsqueeze", (1, "two")), _Step("Mul", (0, PREVIOUS))),
+    "Product": (_Step("MatMul", (0, 1)),),
+    "Sum": (_Step("ReduceSum", (0, "one"), {"keepdims": 0}),),
+    "Take": (_Step("Reshape", (0, "flat")), _Step("Gather", (PREVIOUS, 1), {"axis": 1})),
 }
 
 
-def _standard(graph: Graph) -> tuple[list[tuple], dict[str, np.ndarray]]:
-    """Return nodes (operator, inputs, result, attributes) of ONNX, and their arrays by name."""
-    arrays = _ARRAYS | {f"array_{name}": array for name, array in graph.arrays.items()}
-    nodes: list[tuple] = [("Shape", [INPUT], "num_envs", {"end": 1})]
-    nodes.append(("Concat", ["num_envs", "one"], "rows", {"axis": 0}))
-    known: dict[Any, str] = {INPUT: INPUT} | {name: f"array_{name}" for name in graph.arrays}
+def _convert_graph(graph: Graph) -> tuple[list[_Node], dict[str, np.ndarray]]:
+    """Return the nodes of ONNX, and their arrays by name."""
+    arrays = _CONSTANTS | {f"array_{name}": array for name, array in graph.arrays.items()}
+    nodes = [
+        _Node("Shape", [INPUT], "num_envs", {"end": 1}),
+        _Node("Concat", ["num_envs", "one"], "rows", {"axis": 0}),
+    ]
+    # Names in ONNX by what nodes of the suite name: the input, an array, or the index of a node.
+    onnx_names: dict[Any, str] = {INPUT: INPUT} | {name: f"array_{name}" for name in graph.arrays}
+    last = len(graph.nodes) - 1
     for index, node in enumerate(graph.nodes):
-        known[index] = OUTPUT if index == len(graph.nodes) - 1 else f"node_{index}"
-        inputs = [known[name] for name in node.inputs]
+        output = OUTPUT if index == last else f"node_{index}"
+        inputs = [onnx_names[name] for name in node.inputs]
         if node.operator == "Concat":
-            nodes += _joined(inputs, known[index])
+            nodes += _concatenate(inputs, output)
         else:
-            steps = _STANDARD.get(node.operator, ((node.operator, range(len(inputs)), {}),))
-            nodes += _steps(steps, inputs, known[index])
+            same_operator = _Step(node.operator, range(len(inputs)))
+            nodes += _apply_steps(_STEPS.get(node.operator, (same_operator,)), inputs, output)
+        onnx_names[index] = output
     return nodes, arrays
 
 
-def _steps(steps: tuple, inputs: list[str], result: str) -> Iterator[tuple]:
-    results = [f"{result}_{place}" for place in range(len(steps) - 1)] + [result]
-    for place, (operator, own, attributes) in enumerate(steps):
-        given = [each if isinstance(each, str) else [*inputs, results[place - 1]][each] for each in own]
-        yield operator, given, results[place], attributes
+def _apply_steps(steps: Sequence[_Step], inputs: list[str], output: str) -> Iterator[_Node]:
+    """Yield the nodes of steps; the last one has the name of the output."""
+    outputs = [f"{output}_{number}" for number in range(len(steps) - 1)] + [output]
+    for number, step in enumerate(steps):
+        names = []
+        for step_input in step.inputs:
+            if isinstance(step_input, str):
+                names.append(step_input)
+            elif step_input == PREVIOUS:
+                names.append(outputs[number - 1])
+            else:
+                names.append(inputs[step_input])
+        yield _Node(step.operator, names, outputs[number], step.attributes)
 
 
-def _joined(inputs: list[str], result: str) -> Iterator[tuple]:
-    """All numbers of inputs, one after the other; arrays are the same in every environment."""
-    flat = [f"{result}_{place}" for place in range(len(inputs))]
-    for name, part in zip(inputs, flat, strict=True):
-        yield "Reshape", [name, "flat"], f"{part}_flat", {}
-        yield "Expand", [f"{part}_flat", "rows"], part, {}
-    yield "Concat", flat, result, {"axis": 1}
+def _concatenate(inputs: list[str], output: str) -> Iterator[_Node]:
+    """Yield the nodes that concatenate flat inputs; arrays are repeated for every environment."""
+    parts = [f"{output}_{number}" for number in range(len(inputs))]
+    for name, part in zip(inputs, parts, strict=True):
+        yield _Node("Reshape", [name, "flat"], f"{part}_flat", {})
+        yield _Node("Expand", [f"{part}_flat", "rows"], part, {})
+    yield _Node("Concat", parts, output, {"axis": 1})

@@ -1,4 +1,4 @@
-"""What has become of runs, for people: their returns and scores, and when they reached one."""
+"""Outcomes of runs as text: returns and scores, and when a run reached a score."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,56 +11,63 @@ from arc_suite.learning.agents import run_folder
 from arc_suite.learning.agents.configuration import Configuration
 
 
-def level(run: Configuration, score: float) -> float:
-    """Return the return that has a score in the evaluations of a run.
+def return_of_score(run: Configuration, score: float) -> float:
+    """Return the mean return that has a score in the evaluations of a run.
 
     Raises:
-        ValueError: no number, or no demonstrator to score by.
+        ValueError: a score that is no number, or a task without a demonstrator that earns more than standing still.
     """
     checks.number("score", score)
-    found = anchors.anchors(run.validation).at(score)
-    if not np.isfinite(found):
+    mean_return = anchors.anchors(run.validation).at(score)
+    if not np.isfinite(mean_return):
         what = "expected a task with a demonstrator that earns more than standing still"
         raise ValueError(f"score {score:g}: {what}, got {run.validation}")
-    return found
+    return mean_return
 
 
-def reached(folder: Path, level: float) -> int | None:
-    """Return the step of the first evaluation of a run whose mean return is at least `level`; None without one."""
+def first_step_above(folder: Path, threshold: float) -> int | None:
+    """Return the step of the first evaluation of a run with a mean return of at least `threshold`; None without one."""
     table = run_folder.table(folder, "evaluations")
-    means = ((step, table["return"][table["step"] == step].mean()) for step in np.unique(table.get("step", ())))
-    return next((int(step) for step, mean in means if mean >= level), None)
+    for step in np.unique(table.get("step", ())):
+        if table["return"][table["step"] == step].mean() >= threshold:
+            return int(step)
+    return None
 
 
 def when(folder: Path, step: int) -> str:
-    """Return the step of an evaluation, and the seconds that the run had taken by then."""
+    """Return the step of an evaluation and the time that the run had taken before it, as text."""
     times = run_folder.table(folder, "times")
-    wall, cpu = (times[f"{name}_seconds"][times["step"] == step][-1] for name in ("wall", "cpu"))
+    is_at_step = times["step"] == step
+    wall = times["wall_seconds"][is_at_step][-1]
+    cpu = times["cpu_seconds"][is_at_step][-1]
     return f"at step {step}, after {wall:.0f} s ({cpu:.0f} s of CPU time)"
 
 
-def earned(run: Configuration, folder: Path) -> str:
-    """Return the return and the score of a run's latest evaluation."""
+def latest_result(run: Configuration, folder: Path) -> str:
+    """Return the return and the score of a run's latest evaluation as text."""
     table = run_folder.table(folder, "evaluations")
-    return _rated(run, run_folder.latest_returns(table)) if table else "no evaluation yet"
+    return _describe_returns(run, run_folder.latest_returns(table)) if table else "no evaluation yet"
 
 
 def mean(runs: Sequence[Configuration], folder: Path) -> str:
-    """Return the mean and the standard deviation over runs of several seeds, by the latest evaluations of each.
+    """Return the mean and the standard deviation of the latest returns of several seeds as text.
 
     Args:
-        runs: of one setup; those without an evaluation are left out.
-        folder: that theirs lie in.
+        runs: runs of one setup; those without an evaluation are left out.
+        folder: folder that holds the folders of the runs.
     """
     tables = [run_folder.table(folder / run.name, "evaluations") for run in runs]
     means = np.array([run_folder.latest_returns(table).mean() for table in tables if table])
     heading = f"mean of {len(means)} seeds"
-    return f"{heading}, {_rated(runs[0], means)}" if means.size else heading
+    return f"{heading}, {_describe_returns(runs[0], means)}" if means.size else heading
 
 
-def _rated(run: Configuration, returns: np.ndarray) -> str:
-    average, scale = returns.mean(), anchors.anchors(run.validation)
+def _describe_returns(run: Configuration, returns: np.ndarray) -> str:
+    """Return mean, standard deviation and score of returns as text, with the anchors of the score."""
+    mean_return = returns.mean()
+    scale = anchors.anchors(run.validation)
     levels = f"standing still {scale.zero:.1f}"
     if scale.demonstrator is not None:
-        levels = f"score {scale.score(average):z.2f} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
-    return f"return {average:.1f} +- {returns.std():.1f}, {levels}"
+        score = f"score {scale.score(mean_return):z.2f}"
+        levels = f"{score} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
+    return f"return {mean_return:.1f} +- {returns.std():.1f}, {levels}"

@@ -1,6 +1,6 @@
-"""Runs programs of the suite on this machine: some at a time, each a process with a log of its own.
+"""Runs programs of the suite on this machine: a few at a time, each a process with its own log.
 
-Submitit serves clusters alone, see `studies.cluster`: its local executor starts all jobs at once, and its jobs ignore
+Submitit serves clusters only, see `studies.cluster`. Its local executor starts all jobs at once, and its jobs ignore
 SIGTERM.
 """
 
@@ -14,7 +14,8 @@ from tqdm import tqdm
 
 from arc_suite.cli.program import say
 
-_PAUSE, _WATCH = 0.2, 1.0  # s between two looks at the processes, and between two calls of `watch`
+_POLL_INTERVAL = 0.2  # s between two looks at the processes
+_WATCH_INTERVAL = 1.0  # s between two calls of `watch`
 
 
 def run(
@@ -24,45 +25,51 @@ def run(
     result: Callable[[str], str] = "{}: finished".format,
     watch: Callable[[], None] = lambda: None,
 ) -> list[str]:
-    """Run commands, print what becomes of each, and return the names of those that failed.
+    """Run commands, print the outcome of each, and return the names of those that failed.
 
-    A failure does not stop the others. An interruption ends all, by SIGTERM, and waits for them.
+    A failure does not stop the others. An interruption ends all processes by SIGTERM, and waits for them.
 
     Args:
-        commands: functions by name, called when their process begins, that return the arguments of `arc-suite`.
-        logs: folder of NAME.log, which output is added to.
-        jobs: processes at a time.
-        result: returns the line of a name whose process has succeeded.
-        watch: called once a second.
+        commands: functions by name that return the arguments of `arc-suite`; each is called when its process begins.
+        logs: folder of the logs NAME.log; output is appended.
+        jobs: number of processes at a time.
+        result: function of a name that returns the line to print when its process has succeeded.
+        watch: function that is called once a second.
 
     Raises:
-        OSError: a log cannot be written, or what a command raises.
+        OSError: a log cannot be written, or a command raises it.
     """
-    waiting, running, failed, due = list(commands), {}, [], 0.0
+    names_to_start = list(commands)
+    processes: dict[str, subprocess.Popen] = {}  # running ones by name
+    failed_names = []
+    next_watch = 0.0  # s of the monotonic clock
     try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                name = waiting.pop(0)
-                running[name] = _process(commands[name](), log(logs, name))
+        while names_to_start or processes:
+            while names_to_start and len(processes) < jobs:
+                name = names_to_start.pop(0)
+                processes[name] = _start_process(commands[name](), log(logs, name))
                 say(f"{name}: running")
-            for name, process in list(running.items()):
-                if process.poll() is not None:
-                    del running[name]
-                    if process.returncode:
-                        failed.append(name)
-                        say(f"{name}: failed")
-                        tqdm.write(f"{log(logs, name)}: {last_line(log(logs, name))}", file=sys.stderr)
-                    else:
-                        say(result(name))
-            if time.monotonic() >= due:
+            for name, process in list(processes.items()):
+                if process.poll() is None:
+                    continue
+                del processes[name]
+                if process.returncode:
+                    failed_names.append(name)
+                    say(f"{name}: failed")
+                    path = log(logs, name)
+                    tqdm.write(f"{path}: {last_line(path)}", file=sys.stderr)
+                else:
+                    say(result(name))
+            if time.monotonic() >= next_watch:
                 watch()
-                due = time.monotonic() + _WATCH
-            time.sleep(_PAUSE)
+                next_watch = time.monotonic() + _WATCH_INTERVAL
+            time.sleep(_POLL_INTERVAL)
     finally:
-        for end in (subprocess.Popen.terminate, subprocess.Popen.wait):
-            for process in running.values():
-                end(process)
-    return failed
+        for process in processes.values():
+            process.terminate()
+        for process in processes.values():
+            process.wait()
+    return failed_names
 
 
 def log(logs: Path, name: str) -> Path:
@@ -71,12 +78,13 @@ def log(logs: Path, name: str) -> Path:
 
 
 def last_line(path: Path) -> str:
-    """Return the last line of a log."""
+    """Return the last line of a log; `says nothing` for an empty log."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     return lines[-1] if lines else "says nothing"
 
 
-def _process(arguments: Sequence[str], path: Path) -> subprocess.Popen:
+def _start_process(arguments: Sequence[str], path: Path) -> subprocess.Popen:
+    """Start `arc-suite` with arguments, whose output is appended to a log."""
     command = [sys.executable, "-m", "arc_suite", *arguments]
     with path.open("ab") as output:
         return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT)

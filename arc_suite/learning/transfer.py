@@ -1,14 +1,14 @@
-"""How a policy of many bodies does on bodies that it has not seen, by family.
+"""Results of a policy of many bodies on bodies that it was not trained with, by family.
 
-Each body plays one episode by the policy, by its own demonstrator, and standing still, from the same start. A raw
-return says nothing across bodies, as costs are sums over feet and joints: scores are shares of the way from standing
-still, 0, to the body's own demonstrator, 1.
+Each body has three episodes from the same start: by the policy, by its own demonstrator, and standing still. Returns
+of different bodies are not comparable, as costs are sums over feet and joints. A score is 0 for standing still, and 1
+for the body's own demonstrator.
 """
 
 import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -23,33 +23,34 @@ from arc_suite.policies.network import Network
 from arc_suite.robots import bastion, leaper, queen, tick
 from arc_suite.robots.spec import Body
 
-TEST = 200_000  # first seed of the bodies of a family that test a policy; nobody trains or validates with them
+FIRST_TEST_SEED = 200_000  # of the bodies that test a policy; seeds of training and validation are lower
 STEPS = 400  # control steps of an episode
-_WORST = 0.1  # share of the bodies whose mean is told too
-_ROBOTS = (queen.BODY, bastion.BODY, tick.BODY, leaper.BODY)  # never more, as an index stands for a body
+_WORST_SHARE = 0.1  # share of the bodies that count in the worst score
+_ROBOTS = (queen.BODY, bastion.BODY, tick.BODY, leaper.BODY)  # stays as it is, as results name a body by its index
 
 
-def _robot(index: int) -> Body:
-    """A robot of the suite with motors sized anew."""
+def _resized_robot(index: int) -> Body:
+    """Return a robot of the suite whose motors and standing height are computed anew."""
     body = generator.scaled(_ROBOTS[index % len(_ROBOTS)], 1.0)
     return body.replace(torso=body.torso.replace(standing_height=None))
 
 
 def _mutant(index: int) -> Body:
-    body = generator.mutated(_robot(index), index, 0.2)
+    """Return a mutant of a robot of the suite."""
+    body = generator.mutated(_resized_robot(index), index, 0.2)
     return body.replace(torso=body.torso.replace(standing_height=None))
 
 
-# Bodies that test a policy: what makes one of an index from 0 on, and how many there are.
+# Bodies that test a policy by family: a function of an index from 0 on, and the number of bodies.
 FAMILIES: dict[str, tuple[Callable[[int], Body], int]] = {
-    "random": (lambda index: sound_body(TEST + index), 50),
-    "varied": (lambda index: varied_body(TEST + index), 50),
-    "robots": (_robot, 4),
+    "random": (lambda index: sound_body(FIRST_TEST_SEED + index), 50),
+    "varied": (lambda index: varied_body(FIRST_TEST_SEED + index), 50),
+    "robots": (_resized_robot, 4),
     "mutants": (_mutant, 20),
-    "many_legs": (lambda index: sound_body(TEST + index, legs=9 + index % 4), 20),
-    "four_links": (lambda index: sound_body(TEST + index, links=4), 20),
-    "small": (lambda index: generator.scaled(sound_body(TEST + index), 0.25), 10),
-    "large": (lambda index: generator.scaled(sound_body(TEST + index), 10.0), 10),
+    "many_legs": (lambda index: sound_body(FIRST_TEST_SEED + index, legs=9 + index % 4), 20),
+    "four_links": (lambda index: sound_body(FIRST_TEST_SEED + index, links=4), 20),
+    "small": (lambda index: generator.scaled(sound_body(FIRST_TEST_SEED + index), 0.25), 10),
+    "large": (lambda index: generator.scaled(sound_body(FIRST_TEST_SEED + index), 10.0), 10),
 }
 
 
@@ -57,10 +58,10 @@ class Judged(NamedTuple):
     """One episode of a body.
 
     Attributes:
-        total: its return.
-        walked: whether the body walked: no fall, speed, torso off the ground; see `walking.failures`.
-        speed: as a share of the target speed; see `walking.shares`.
-        tracking: how well it followed the command, 1 at best; NaN in tasks without this metric.
+        total: return.
+        walked: whether the body walked: no fall, enough speed, torso off the ground; see `walking.failures`.
+        speed: share of the target speed; see `walking.shares`.
+        tracking: share of the command that the body followed, 1 at best; NaN in tasks without this metric.
     """
 
     total: float
@@ -74,9 +75,9 @@ class Comparison(NamedTuple):
 
     Attributes:
         body: name of the body.
-        policy: its episode by the policy.
-        demonstrator: by its own demonstrator.
-        zero: standing still.
+        policy: episode by the policy.
+        demonstrator: episode by the body's demonstrator.
+        zero: episode of standing still.
     """
 
     body: str
@@ -86,22 +87,31 @@ class Comparison(NamedTuple):
 
     @property
     def score(self) -> float:
-        """(policy - standing still) / (demonstrator - standing still); NaN where that one earns no more."""
-        gain = self.demonstrator.total - self.zero.total
-        return (self.policy.total - self.zero.total) / gain if gain > 0.0 else math.nan
+        """Gain of the policy over standing still by that of the demonstrator; NaN if the demonstrator gains nothing."""
+        return self.policy_gain / self.demonstrator_gain if self.demonstrator_gain > 0.0 else math.nan
+
+    @property
+    def policy_gain(self) -> float:
+        """Return of the policy minus that of standing still."""
+        return self.policy.total - self.zero.total
+
+    @property
+    def demonstrator_gain(self) -> float:
+        """Return of the demonstrator minus that of standing still."""
+        return self.demonstrator.total - self.zero.total
 
 
 class TransferResult(NamedTuple):
     """The results of a family.
 
     Attributes:
-        count: of the bodies.
-        walk: share of the bodies that walk.
-        demonstrated: share of the bodies that their demonstrators walk.
-        speed: mean of the policy's speeds, as shares of the target speed.
-        score: gain of the policy over standing still, as a share of the demonstrators': sums over bodies.
-        worst: the same of the tenth of the bodies with the lowest scores.
-        tracking: mean tracking as a share of the demonstrators' mean; NaN in tasks without this metric.
+        count: number of bodies.
+        walk: share of the bodies that walk by the policy.
+        demonstrated: share of the bodies that walk by their demonstrators.
+        speed: mean over bodies of the policy's share of the target speed.
+        score: summed gains of the policy over standing still by summed gains of the demonstrators.
+        worst: the same for the tenth of the bodies with the lowest scores.
+        tracking: mean tracking of the policy by that of the demonstrators; NaN in tasks without this metric.
     """
 
     count: int  # type: ignore[assignment]  # hides the method of tuples
@@ -114,86 +124,109 @@ class TransferResult(NamedTuple):
 
 
 def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mapping | None = None) -> list[Comparison]:
-    """Play the episodes of bodies, body i from seed i.
+    """Play the episodes of bodies; the seed of a body is its index.
 
     Args:
-        network: a policy of many bodies.
-        bodies: to play with.
+        network: policy of many bodies.
+        bodies: bodies to play with.
         task: name of the task.
-        settings: of the task.
+        settings: settings of the task.
 
     Raises:
         ValueError: a task or a body that does not fit.
     """
     bodies = list(bodies)
-    options: dict[str, Any] = {"num_threads": 1, "autoreset_mode": AutoresetMode.DISABLED, "task_kwargs": settings}
-    environment = BodiesEnv(task, len(bodies), bodies, max_episode_steps=STEPS, flat=True, **options)
+    environment = BodiesEnv(
+        task,
+        len(bodies),
+        bodies,
+        max_episode_steps=STEPS,
+        flat=True,
+        num_threads=1,
+        autoreset_mode=AutoresetMode.DISABLED,
+        task_kwargs=settings,
+    )
     with contextlib.closing(environment):
-        zero = Script(lambda seed: (), *environment.action_space.shape)
-        played = [_episodes(environment, policy) for policy in (network, Teacher(environment), zero)]
-    return [Comparison(*each) for each in zip([body.name for body in bodies], *played, strict=True)]
+        standing_still = Script(lambda seed: (), *environment.action_space.shape)
+        policy_episodes = _play_episodes(environment, network)
+        demonstrator_episodes = _play_episodes(environment, Teacher(environment))
+        zero_episodes = _play_episodes(environment, standing_still)
+    names = [body.name for body in bodies]
+    episodes = zip(names, policy_episodes, demonstrator_episodes, zero_episodes, strict=True)
+    return [Comparison(*body_episodes) for body_episodes in episodes]
 
 
-def of_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Comparison]:
+def compare_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Comparison]:
     """Play the episodes of a family of `FAMILIES`; see `compare`."""
-    made, count = FAMILIES[name]
-    bodies = [made(index) for index in range(count)]
+    make_body, count = FAMILIES[name]
+    bodies = [make_body(index) for index in range(count)]
     return compare(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
 
 
-def result(played: list[Comparison]) -> TransferResult:
+def result(comparisons: list[Comparison]) -> TransferResult:
     """Return the results of comparisons; bodies whose demonstrators gain nothing count in no score."""
-    scored = sorted((each for each in played if not math.isnan(each.score)), key=lambda each: each.score)
-    worst = scored[: max(1, round(_WORST * len(scored)))]
-    tracking = [[episode.tracking for episode in (each.policy, each.demonstrator)] for each in played]
-    policy, demonstrator = np.mean(tracking, axis=0)
+    with_score = [comparison for comparison in comparisons if not math.isnan(comparison.score)]
+    with_score.sort(key=lambda comparison: comparison.score)
+    worst = with_score[: max(1, round(_WORST_SHARE * len(with_score)))]
+    tracking = [[comparison.policy.tracking, comparison.demonstrator.tracking] for comparison in comparisons]
+    policy_tracking, demonstrator_tracking = np.mean(tracking, axis=0)
     return TransferResult(
-        count=len(played),
-        walk=float(np.mean([each.policy.walked for each in played])),
-        demonstrated=float(np.mean([each.demonstrator.walked for each in played])),
-        speed=float(np.mean([each.policy.speed for each in played])),
-        score=_gain(scored),
-        worst=_gain(worst),
-        tracking=float(policy / demonstrator),
+        count=len(comparisons),
+        walk=float(np.mean([comparison.policy.walked for comparison in comparisons])),
+        demonstrated=float(np.mean([comparison.demonstrator.walked for comparison in comparisons])),
+        speed=float(np.mean([comparison.policy.speed for comparison in comparisons])),
+        score=_summed_score(with_score),
+        worst=_summed_score(worst),
+        tracking=float(policy_tracking / demonstrator_tracking),
     )
 
 
-def _gain(played: list[Comparison]) -> float:
-    """The policy's gain over standing still as a share of the demonstrators'; NaN without comparisons.
+def _summed_score(comparisons: list[Comparison]) -> float:
+    """Return the summed gains of the policy by those of the demonstrators; NaN without comparisons.
 
-    Sums, as the gain of a single demonstrator may be small.
+    Gains are summed before the division, as the gain of a single demonstrator may be small.
     """
-    gains = [[each.policy.total - each.zero.total, each.demonstrator.total - each.zero.total] for each in played]
-    return float(np.divide(*np.sum(gains, axis=0))) if gains else math.nan
+    if not comparisons:
+        return math.nan
+    gains = [[comparison.policy_gain, comparison.demonstrator_gain] for comparison in comparisons]
+    policy_gain, demonstrator_gain = np.sum(gains, axis=0)
+    return float(policy_gain / demonstrator_gain)
 
 
-def _episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
+def _play_episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
     """Play an episode in every environment, from the seed of its index, and judge the walks."""
-    places, targets, touching, fallen = [], [], [], []  # at the start, and after every control step
+    # Lists of arrays (num_envs, ...) at the start and after every control step.
+    step_positions = []
+    step_targets = []
+    step_touching = []
+    step_fallen = []
 
     def watch(playing, terminated):
-        own = zip(environment.tasks, environment.own_observations(), strict=True)
-        blocks = [task.split(vector) for task, vector in own]
-        places.append(environment.places())
-        targets.append([walking.target(*each) for each in zip(environment.tasks, blocks, places[-1], strict=True)])
+        observations = environment.own_observations()
+        blocks = [task.split(vector) for task, vector in zip(environment.tasks, observations, strict=True)]
+        positions = environment.places()
+        step_positions.append(positions)
+        step_targets.append(list(map(walking.target, environment.tasks, blocks, positions)))
         # A batch has no list of its contacts; the observed forces on the torso are those of the ground.
-        touching.append(playing & [block["contact_forces"][:6].any() for block in blocks])
-        fallen.append(playing & walking.has_fallen(terminated, environment.quaternions()))
+        step_touching.append(playing & [block["contact_forces"][:6].any() for block in blocks])
+        step_fallen.append(playing & walking.has_fallen(terminated, environment.quaternions()))
 
-    played = protocol.episodes_in_batch(environment, policy, range(environment.num_envs), watch)
-    moved = np.diff(np.array(places)[..., :2], axis=0)
-    targets, touching, fallen = map(np.array, (targets, touching, fallen))
-    episodes = []
-    for index, episode in enumerate(played):
+    episodes = protocol.episodes_in_batch(environment, policy, range(environment.num_envs), watch)
+    displacements = np.diff(np.array(step_positions)[..., :2], axis=0)  # (steps, num_envs, 2), m
+    targets = np.array(step_targets)
+    touching = np.array(step_touching)
+    fallen = np.array(step_fallen)
+    judged_episodes = []
+    for index, episode in enumerate(episodes):
         fell = fallen[:, index].any()
         length = fallen[:, index].argmax() if fell else episode.length
         verdict = walking.assess(
             targets[:length, index],
-            moved[:length, index],
+            displacements[:length, index],
             touching[: length + 1, index],
             STEPS,
             walking.FALL if fell else walking.TIME,
         )
         tracking = episode.progress.get("tracking", math.nan)
-        episodes.append(Judged(episode.total, verdict.walks, verdict.speed, tracking))
-    return episodes
+        judged_episodes.append(Judged(episode.total, verdict.walks, verdict.speed, tracking))
+    return judged_episodes

@@ -13,20 +13,21 @@ from arc_suite.learning.agents.configuration import Configuration
 def test_the_return_of_a_score():
     run = Configuration.of(Setup.of("tick", "walk"))
     scale = anchors.anchors(run.setup)
-    assert outcomes.level(run, 0.5) == pytest.approx((scale.zero + scale.demonstrator) / 2.0)
+    assert outcomes.return_of_score(run, 0.5) == pytest.approx((scale.zero + scale.demonstrator) / 2.0)
 
 
 def test_a_task_without_a_demonstrator_has_no_scores(monkeypatch):
     monkeypatch.setattr(anchors, "anchors", lambda setup: anchors.Anchors(1628.0))
     what = "expected a task with a demonstrator that earns more than standing still"
     with refused(f"score 0.9: {what}, got tick, walk"):
-        outcomes.level(Configuration.of(Setup.of("tick", "walk")), 0.9)
+        outcomes.return_of_score(Configuration.of(Setup.of("tick", "walk")), 0.9)
 
 
 def test_when_a_return_was_reached(tmp_path):
     lines = [f"{step},{step + noise}" for step in (100, 200, 300) for noise in (-10, 10)]
     (tmp_path / "evaluations.csv").write_text("\n".join(["step,return", *lines, ""]))
     (tmp_path / "times.csv").write_text("step,wall_seconds,cpu_seconds\n100,3.2,3.0\n200,7.6,5.4\n300,9.0,8.0\n")
-    assert [outcomes.reached(tmp_path, level) for level in (-np.inf, 200.0, 200.5, 301.0)] == [100, 200, 300, None]
+    steps = [outcomes.first_step_above(tmp_path, level) for level in (-np.inf, 200.0, 200.5, 301.0)]
+    assert steps == [100, 200, 300, None]
     assert outcomes.when(tmp_path, 200) == "at step 200, after 8 s (5 s of CPU time)"
-    assert outcomes.reached(tmp_path / "none", 0.0) is None
+    assert outcomes.first_step_above(tmp_path / "none", 0.0) is None

@@ -38,7 +38,7 @@ class Claim(NamedTuple):
 
 def _style_metric(name: str) -> Callable[[RunResult], float]:
     """Return a function: the mean size of a metric of style over episodes in which it is finite, or else NaN."""
-    return lambda result: results.size(result.style.get(name, np.empty(0)))
+    return lambda result: results.mean_size(result.style.get(name, np.empty(0)))
 
 
 def _initial_return(result: RunResult) -> float:

@@ -70,12 +70,12 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
         ValueError: an unknown study, or a damaged table.
         OSError: a table cannot be read.
     """
-    groups = results.grouped(results.results(catalog.study(name).runs, published))
-    demonstrators = results.demonstrators(published)
+    groups = results.group_by_place(results.read_results(catalog.study(name).runs, published))
+    demonstrators = results.read_demonstrators(published)
     rows = []
     for _, _, seeds in report.by_kind(groups):
         run = seeds[0].run
-        scores = results.scores(seeds)
+        scores = results.final_returns(seeds)
         phase_updates = getattr(run.configuration.hyperparameters, "phase_updates", 0)
         metric = next(iter(seeds[0].progress))
         cells = {
@@ -91,7 +91,7 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
             **{head: report.style_text(name, seeds) for head, name in STYLE_METRICS.items()},
             "steps": f"{min(result.steps[-1] for result in seeds):,} of {run.configuration.steps:,}",
             "CPU min": f"{np.mean([result.cpu[-1] for result in seeds]) / 60.0:.1f}",
-            "notes": results.notes(seeds),
+            "notes": results.join_notes(seeds),
             "study": name,
             "command of seed 0": f"`{run.configuration.command}`",
             "configuration": _hash_without_seed(run),

@@ -22,6 +22,6 @@ def write(name: str, study: Study, published: Path) -> Path:
         ValueError: nothing is published, a table is damaged, or a folder next to it has the name of no study.
         OSError: a file cannot be read or written.
     """
-    path = report.write(name, study, published, claims.sections(results.results(study.runs, published)))
+    path = report.write(name, study, published, claims.sections(results.read_results(study.runs, published)))
     leaderboard.write(published.parent)
     return path

@@ -22,10 +22,12 @@ from arc_suite.learning.studies import benchmark, publication, report, results, 
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.simulation.cores import usable_cores
 
+_PLACE_NAMES = [f"{robot}-{task}" for robot, task in PLACES]
+
 FLAGS = flags.FLAGS
 flags.DEFINE_string("algorithm", "ppo", "As in arc-suite train.")
 flags.DEFINE_integer("seeds", SEEDS, "Seeds of each place.", 1, SEEDS)
-flags.DEFINE_list("places", ["-".join(each) for each in PLACES], "Places to run, ROBOT-TASK. [default: all ten]")
+flags.DEFINE_list("places", _PLACE_NAMES, "Places to run, ROBOT-TASK. [default: all ten]")
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_string("policies", None, "Folder of policies to score in place of runs.")
 flags.DEFINE_string("name", None, "Of these policies in the table. [default: the name of the folder]")
@@ -35,49 +37,61 @@ flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
 
 def main(division: str | None = None) -> int:
     """Run a division, and print the table; the exit status is 0 if no run has failed."""
-    places = [checks.name(each, ["-".join(each) for each in PLACES], "place") for each in FLAGS.places]
+    places = [checks.name(place, _PLACE_NAMES, "place") for place in FLAGS.places]
     status = 0
     if division is not None:
         checks.name(division, DIVISIONS, "division")
-        status = scored(division) if FLAGS.policies else learned(division, places)
+        if FLAGS.policies:
+            score_policies(division)
+        else:
+            status = run_division(division, places)
     print(benchmark.text(Path(FLAGS.results)))
     return status
 
 
-def learned(division: str, places: list[str]) -> int:
-    """Make the runs of the algorithm, and write their report and scores.
+def run_division(division: str, places: list[str]) -> int:
+    """Make the runs of the algorithm, write their report and scores, and return the exit status.
+
+    Args:
+        division: name of the division.
+        places: places to run, ROBOT-TASK.
 
     Raises:
         ValueError: an algorithm that the division does not take.
     """
-    study, learner = tables.benchmark(division, FLAGS.algorithm), tables.folder_name(FLAGS.algorithm)
+    study = tables.benchmark(division, FLAGS.algorithm)
+    learner = tables.folder_name(FLAGS.algorithm)
     name = f"{division}-{learner}"
-    runs = [each for each in study.runs if _is_asked(each, places)]
-    folder, published = Path(FLAGS.runs, name), Path(FLAGS.results, name)
+    folder = Path(FLAGS.runs, name)
+    published = Path(FLAGS.results, name)
+    runs = [run for run in study.runs if _is_selected(run, places)]
     with resumable(folder):
         status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
     publication.publish(study.runs, folder, published)
-    if found := results.results(study.runs, published):
+    run_results = results.read_results(study.runs, published)
+    if run_results:
         print(report.write(name, study, published))
-        benchmark.write(published.parent, division, learner, benchmark.of_results(found))
+        benchmark.write(published.parent, division, learner, benchmark.score_results(run_results))
     return status
 
 
-def scored(division: str) -> int:
-    """Score the policies of a folder.
+def score_policies(division: str) -> None:
+    """Score the policies of a folder, and write their scores.
 
     Raises:
         ValueError: a name of other characters than letters, digits, `_`, `-` and `.`, or a folder that
-            `benchmark.of_policies` refuses.
+            `benchmark.score_policies` refuses.
         OSError: a file cannot be read.
     """
-    policies = Path(FLAGS.policies)
-    name = benchmark.checked_name(FLAGS.name or policies.resolve().name)
-    scores = benchmark.of_policies(policies, progress)
+    folder = Path(FLAGS.policies)
+    name = FLAGS.name or folder.resolve().name
+    benchmark.check_name(name)
+    scores = benchmark.score_policies(folder, progress)
     benchmark.write(Path(FLAGS.results), division, name, scores)
-    return 0
 
 
-def _is_asked(run: tables.Run, places: list[str]) -> bool:
-    setup, seed = run.configuration.setup, run.configuration.seed
-    return seed < FLAGS.seeds and f"{setup.body.name}-{setup.kind.name}" in places
+def _is_selected(run: tables.Run, places: list[str]) -> bool:
+    """Return whether the flags select the seed and the place of a run."""
+    setup = run.configuration.setup
+    place = f"{setup.body.name}-{setup.kind.name}"
+    return run.configuration.seed < FLAGS.seeds and place in places

@@ -44,11 +44,14 @@ def main(run: str | None = None) -> None:
     """Write the file, and print what it is."""
     if run is None:
         raise ValueError("expected the folder of a run, a policy file or a zip of stable-baselines3; see --help")
-    source, name = Path(run), policy_name(run)
-    output = Path(FLAGS.output or (source if source.is_dir() else source.parent) / "policy.onnx")
+    path = Path(run)
+    name = policy_name(run)
+    folder = path if path.is_dir() else path.parent
+    output = Path(FLAGS.output or folder / "policy.onnx")
     checks.extension(output, [".onnx"])
     if FLAGS["robot"].present or custom_body() is not None:
-        setup = Setup.of(only_body(), *complete_task(policy_setup(run), *task_from_flags()))
+        task, settings = complete_task(policy_setup(run), *task_from_flags())
+        setup = Setup.of(only_body(), task, settings)
         policy = universal.for_body(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")

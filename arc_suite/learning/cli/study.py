@@ -53,10 +53,10 @@ def make_or_report(
     """Make the runs of a study or write its report, as the flags say, and return the exit status.
 
     Args:
-        name: of the study.
-        study: its title and runs.
-        command: that does the same on a machine of a cluster.
-        write_report: takes the name, the study and the folder of its tables; returns the file of the report.
+        name: name of the study.
+        study: study.
+        command: command that does the same on a machine of a cluster.
+        write_report: function of the name, the study and the folder of its tables that returns the report's path.
 
     Raises:
         ValueError: flags that do not fit each other or the study.
@@ -84,7 +84,7 @@ def make_or_report(
 
 
 def submit(command: Sequence[str], jobs: int, folder: Path, results: Path) -> int:
-    """Submit a command that makes a study to a cluster in so many jobs, and print them.
+    """Submit a command that makes a study to a cluster, split into a number of jobs, and print them.
 
     Raises:
         ValueError: submitit is not installed.

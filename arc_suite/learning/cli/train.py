@@ -41,24 +41,27 @@ from arc_suite.policies import network
 from arc_suite.simulation.cores import usable_cores, use_one_thread
 
 
-def algorithms_by(value: Callable[[algorithms.Algorithm], Any]) -> dict[Any, list[str]]:
-    """Return the names of algorithms by what they have."""
-    found = {}
+def group_algorithms(value: Callable[[algorithms.Algorithm], Any]) -> dict[Any, list[str]]:
+    """Return the names of algorithms by a value of theirs."""
+    names_by_value = {}
     for name, algorithm in algorithms.ALGORITHMS.items():
-        found.setdefault(value(algorithm), []).append(name)
-    return found
+        names_by_value.setdefault(value(algorithm), []).append(name)
+    return names_by_value
 
 
-def defaults(field: str) -> str:
-    """Return a default number of the algorithms, as text: that of the most, then those of others."""
-    (usual, _), *others = sorted(algorithms_by(operator.attrgetter(field)).items(), key=lambda item: -len(item[1]))
-    return "; ".join([str(usual), *(f"{number} for {', '.join(names)}" for number, names in others)])
+def describe_defaults(field: str) -> str:
+    """Return a default of the algorithms as text: the most common value, then others with their algorithms."""
+    names_by_default = group_algorithms(operator.attrgetter(field))
+    most_common, *exceptions = sorted(names_by_default, key=lambda default: -len(names_by_default[default]))
+    texts = [f"{default} for {', '.join(names_by_default[default])}" for default in exceptions]
+    return "; ".join([str(most_common), *texts])
 
 
-def hyperparameters() -> str:
-    """Return the names of the hyperparameters of all algorithms, as text."""
-    fields = algorithms_by(lambda algorithm: tuple(dataclasses.asdict(algorithm.hyperparameters)))
-    return "; ".join(f"of {', '.join(names)}: {', '.join(every)}" for every, names in fields.items())
+def describe_hyperparameters() -> str:
+    """Return the names of the hyperparameters of all algorithms as text."""
+    names_by_fields = group_algorithms(lambda algorithm: tuple(dataclasses.asdict(algorithm.hyperparameters)))
+    texts = [f"of {', '.join(names)}: {', '.join(fields)}" for fields, names in names_by_fields.items()]
+    return "; ".join(texts)
 
 
 FLAGS = flags.FLAGS
@@ -72,18 +75,21 @@ flags.DEFINE_string(
 flags.DEFINE_multi_string(
     "train_set", [], "Setting of the task in training alone, name=value, in place of that of --set."
 )
-flags.DEFINE_multi_string("hp", [], f"Hyperparameter, name=value, {hyperparameters()}.")
+flags.DEFINE_multi_string("hp", [], f"Hyperparameter, name=value, {describe_hyperparameters()}.")
 flags.DEFINE_list("seed", ["0"], "Seed of the run; several with commas are as many runs, each a process.")
 flags.DEFINE_integer(
     "steps",
     None,
     f"Environment steps; of bc, updates. ppo takes {algorithms.ALGORITHMS['ppo'].terrain_steps} on uneven ground. "
-    f"[default: {defaults('steps')}]",
+    f"[default: {describe_defaults('steps')}]",
     lower_bound=1,
 )
 flags.DEFINE_string("prior", None, "Id of a dataset of prior data, for algorithms that take any.")
 flags.DEFINE_integer(
-    "evaluate_every", None, f"Steps between evaluations. [default: {defaults('evaluate_every')}]", lower_bound=1
+    "evaluate_every",
+    None,
+    f"Steps between evaluations. [default: {describe_defaults('evaluate_every')}]",
+    lower_bound=1,
 )
 flags.DEFINE_string(
     "config",
@@ -113,8 +119,8 @@ flags.DEFINE_string(
     short_name="o",
 )
 
-# Flags that make up the configuration.
-_OF_THE_RUN = (
+# Flags that make up the configuration, with --evaluate_every.
+_CONFIGURATION_FLAGS = (
     "robot",
     "spec",
     "legs",
@@ -133,27 +139,28 @@ _OF_THE_RUN = (
 def main() -> int:
     """Train, print the return at the end, and return the exit status."""
     use_one_thread()
-    runs = configured()
-    level = None if FLAGS.until_score is None else outcomes.level(runs[0], FLAGS.until_score)
-    return several(runs) if len(runs) > 1 else only(runs[0], level)
+    runs = configurations_from_flags()
+    # Before the first step, as a score may be unreachable.
+    threshold = None if FLAGS.until_score is None else outcomes.return_of_score(runs[0], FLAGS.until_score)
+    return train_seeds(runs) if len(runs) > 1 else train_run(runs[0], threshold)
 
 
-def only(run: Configuration, level: float | None) -> int:
+def train_run(run: Configuration, threshold: float | None) -> int:
     """Train a run, print its result, and return the exit status.
 
     Args:
-        run: to train.
-        level: mean return of an evaluation to stop after; None to train to the end.
+        run: configuration of the run.
+        threshold: mean return of an evaluation after which the run stops; None to train to the end.
     """
     folder = Path(FLAGS.output or Path("runs", run.name))
 
-    def reached():
-        return None if level is None else outcomes.reached(folder, level)
+    def success_step() -> int | None:
+        return None if threshold is None else outcomes.first_step_above(folder, threshold)
 
     with contextlib.ExitStack() as stack:
-        listeners = [functools.partial(draw, run, folder)]
+        listeners = [functools.partial(plot_returns, run, folder)]
         if FLAGS.tensorboard:
-            listeners.append(stack.enter_context(events(folder)))
+            listeners.append(stack.enter_context(open_event_writer(folder)))
 
         def on_metrics(step, metrics):
             if "return" in metrics:
@@ -161,43 +168,54 @@ def only(run: Configuration, level: float | None) -> int:
             for listener in listeners:
                 listener(step, metrics)
 
-        def begun(*args, **kwargs):
+        def start_progress(*args, **kwargs):
             say(f"{folder}: {run.setup}, {run.algorithm}, {run.steps} steps")
             return progress(*args, **kwargs)
 
-        limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
-        with resumable(folder), watch_for_termination() as terminated:
+        with resumable(folder), watch_for_termination() as is_terminated:
 
             def stop():
-                return terminated() or reached() is not None
+                return is_terminated() or success_step() is not None
 
-            finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics, stop=stop)
-            step, killed = reached(), terminated()
-    done = finished or step is not None
-    if done and importlib.util.find_spec("onnx") and not run.setup.several:
+            finished = train(
+                run,
+                folder,
+                minutes=FLAGS.minutes,
+                threads=FLAGS.threads,
+                progress=start_progress,
+                on_metrics=on_metrics,
+                stop=stop,
+            )
+            step = success_step()
+            terminated = is_terminated()
+    is_complete = finished or step is not None
+    if is_complete and importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
-    print(f"{folder}: {end(folder, step, finished, killed)}, {outcomes.earned(run, folder)}")
-    return TERMINATED if killed and not done else 0
+    print(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
+    return TERMINATED if terminated and not is_complete else 0
 
 
-def end(folder: Path, step: int | None, finished: bool, killed: bool) -> str:
+def describe_end(folder: Path, step: int | None, finished: bool, terminated: bool) -> str:
     """Return why a run has ended: at a score, after its last step, by SIGTERM, or after minutes."""
     if step is not None:
         return f"score {FLAGS.until_score:g} reached {outcomes.when(folder, step)}"
     if finished:
         return "finished"
-    if killed:
+    if terminated:
         return "stopped; the same command resumes it"
     return f"stopped at --minutes={FLAGS.minutes:g} of CPU time; more minutes resume it"
 
 
-def several(runs: Sequence[Configuration]) -> int:
-    """Train runs of several seeds, each by this command with one of them, and print their results and their mean."""
+def train_seeds(runs: Sequence[Configuration]) -> int:
+    """Train runs of several seeds, print their results and their mean, and return the exit status.
+
+    Each run is a process of this command with one seed.
+    """
     folder = files.folder(FLAGS.output or "runs")
-    given = sys.argv[sys.argv.index("train") + 1 :]
+    arguments = sys.argv[sys.argv.index("train") + 1 :]
 
     def command(run):
-        return ["train", *given, f"--seed={run.seed}", f"--output={folder / run.name}"]
+        return ["train", *arguments, f"--seed={run.seed}", f"--output={folder / run.name}"]  # the last of a flag holds
 
     def result(name):
         return processes.last_line(processes.log(folder, name))
@@ -208,23 +226,26 @@ def several(runs: Sequence[Configuration]) -> int:
         for position, run in enumerate(runs):
             bar = progress(total=run.steps, desc=run.name, position=position, unit="step", unit_scale=True)
             bars[run.name] = stack.enter_context(bar)
-        jobs, watch = FLAGS.jobs or usable_cores(), functools.partial(watched, folder, bars)
-        failed = processes.run(commands, folder, jobs, result, watch)
-    print(f"{folder}: {outcomes.mean([run for run in runs if run.name not in failed], folder)}")
-    return int(bool(failed))
+        watch = functools.partial(update_bars, folder, bars)
+        failed_names = processes.run(commands, folder, FLAGS.jobs or usable_cores(), result, watch)
+    successful_runs = [run for run in runs if run.name not in failed_names]
+    print(f"{folder}: {outcomes.mean(successful_runs, folder)}")
+    return int(bool(failed_names))
 
 
-def watched(folder: Path, bars: Mapping[str, Any]) -> None:
-    """Bring progress bars, by name of a run, to what the folders of the runs hold."""
+def update_bars(folder: Path, bars: Mapping[str, Any]) -> None:
+    """Update progress bars, by name of a run, from the folders of the runs."""
     for name, bar in bars.items():
-        with contextlib.suppress(ValueError, OSError):  # it is for its process to say what is damaged
-            if lines := run_folder.lines(folder / name, "times", ("step",)):
+        with contextlib.suppress(ValueError, OSError):  # the process of the run reports a damaged file
+            lines = run_folder.lines(folder / name, "times", ("step",))
+            if lines:
                 bar.update(int(lines[-1]["step"]) - bar.n)
-            if "return" in (state := run_folder.read_progress(folder / name)):
+            state = run_folder.read_progress(folder / name)
+            if "return" in state:
                 bar.set_postfix_str(f"return {state['return']:.4g}", refresh=False)
 
 
-def configured() -> list[Configuration]:
+def configurations_from_flags() -> list[Configuration]:
     """Return the configurations that the flags give, one for each seed.
 
     Raises:
@@ -234,7 +255,7 @@ def configured() -> list[Configuration]:
     for module in FLAGS.modules:
         registry.import_module(module, "--modules")
     if FLAGS.config is not None:
-        for name in (*_OF_THE_RUN, "evaluate_every"):
+        for name in (*_CONFIGURATION_FLAGS, "evaluate_every"):
             if FLAGS[name].present:
                 raise ValueError(f"--{name}: expected none with --config, which has the whole configuration")
         try:
@@ -242,41 +263,54 @@ def configured() -> list[Configuration]:
         except registry.NotImported as error:
             raise ValueError(f"{error}, by --modules") from None
     hyperparameters = named_values("hp", FLAGS.hp)
-    run = FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior, named_values("train_set", FLAGS.train_set)
-    several = registry.names_several_bodies(FLAGS.robot) and custom_body() is None
-    setup = Setup.of(FLAGS.robot if several else only_body(), *task_from_flags())
-    return [Configuration.of(setup, FLAGS.algorithm, hyperparameters, seed, *run) for seed in seeds(FLAGS.seed)]
+    training = named_values("train_set", FLAGS.train_set)
+    several_bodies = registry.names_several_bodies(FLAGS.robot) and custom_body() is None
+    setup = Setup.of(FLAGS.robot if several_bodies else only_body(), *task_from_flags())
+    return [
+        Configuration.of(
+            setup,
+            FLAGS.algorithm,
+            hyperparameters,
+            seed,
+            steps=FLAGS.steps,
+            evaluate_every=FLAGS.evaluate_every,
+            prior=FLAGS.prior,
+            training=training,
+        )
+        for seed in parse_seeds(FLAGS.seed)
+    ]
 
 
-def seeds(texts: Sequence[str]) -> list[int]:
+def parse_seeds(texts: Sequence[str]) -> list[int]:
     """Return the seeds of --seed.
 
     Raises:
-        ValueError: something else, or one twice.
+        ValueError: a text that is no integer, or a seed twice.
     """
-    found = [int(text) for text in texts if text.isdecimal()]
-    if not texts or len(set(found)) < len(texts):
+    seeds = [int(text) for text in texts if text.isdecimal()]
+    if not texts or len(set(seeds)) < len(texts):
         raise ValueError(f"--seed={checks.quote(','.join(texts))}: expected different integers, such as 0,1,2")
-    return found
+    return seeds
 
 
-def draw(run: Configuration, folder: Path, step: int, metrics: Mapping[str, float]) -> None:
-    """Draw the returns anew after an evaluation."""
+def plot_returns(run: Configuration, folder: Path, step: int, metrics: Mapping[str, float]) -> None:
+    """Write the picture of a run's returns, if metrics are those of an evaluation."""
     from arc_suite.learning.agents import plots  # needs matplotlib
 
     if "return" in metrics:
         scale = anchors.anchors(run.validation)
-        lines = {"standing still": scale.zero}
+        levels = {"standing still": scale.zero}
         if scale.demonstrator is not None:
-            lines[f"demonstrator {scale.preset}"] = scale.demonstrator
-        finals = evaluation.published_returns(run.setup, [run.algorithm], run.steps)
-        figure = plots.plot_run(run_folder.table(folder, "evaluations"), run.algorithm, folder.name, lines, finals)
+            levels[f"demonstrator {scale.preset}"] = scale.demonstrator
+        paper_returns = evaluation.published_returns(run.setup, [run.algorithm], run.steps)
+        evaluations = run_folder.table(folder, "evaluations")
+        figure = plots.plot_run(evaluations, run.algorithm, folder.name, levels, paper_returns)
         with files.writing(folder / "curve.png") as temporary:
             figure.savefig(temporary)
 
 
 @contextlib.contextmanager
-def events(folder: Path) -> Iterator[Callable]:
+def open_event_writer(folder: Path) -> Iterator[Callable]:
     """Yield a listener that writes metrics for TensorBoard.
 
     Raises:
@@ -287,7 +321,7 @@ def events(folder: Path) -> Iterator[Callable]:
     writers = []
 
     def write(step, metrics):
-        if not writers:  # purges what was written after the checkpoint
+        if not writers:  # purges events after the checkpoint that the run resumes from
             writers.append(SummaryWriter(str(folder / "tensorboard"), purge_step=step))
         for name, value in metrics.items():
             writers[0].add_scalar(name, value, step)

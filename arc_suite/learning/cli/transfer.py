@@ -34,16 +34,19 @@ flags.DEFINE_string("name", None, "Of the policy in this table. [default: the st
 
 def main() -> None:
     """Play, print the table and write the episodes."""
-    name, settings = complete_task(policies.setup_of(FLAGS.policy), *task_from_flags())
+    task, settings = complete_task(policies.setup_of(FLAGS.policy), *task_from_flags())
     for family in FLAGS.families:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
-    network, every = universal.load(FLAGS.policy, Setup.of("queen", name, settings).definition), {}
+    # A policy of many bodies is the same in the task of any body; Queen's stands for all.
+    network = universal.load(FLAGS.policy, Setup.of("queen", task, settings).definition)
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.TransferResult._fields))
+    comparisons_by_family = {}
     for family in FLAGS.families:
-        played = transfer.of_family(family, network, name, settings)
-        print(f"{family:<10}" + "".join(f"{number:>13.4g}" for number in transfer.result(played)), flush=True)
-        every[family] = played
+        comparisons = transfer.compare_family(family, network, task, settings)
+        numbers = transfer.result(comparisons)
+        print(f"{family:<10}" + "".join(f"{number:>13.4g}" for number in numbers), flush=True)
+        comparisons_by_family[family] = comparisons
     if FLAGS.output:
-        bodies.write(Path(FLAGS.output), FLAGS.name or Path(FLAGS.policy).stem, name, every)
+        bodies.write(Path(FLAGS.output), FLAGS.name or Path(FLAGS.policy).stem, task, comparisons_by_family)

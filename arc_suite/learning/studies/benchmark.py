@@ -23,14 +23,15 @@ from arc_suite.learning.studies.text_tables import table
 from arc_suite.policies import named, network, other_libraries
 
 SCORES = "scores.csv"
-CLIP = (-0.5, 1.2)  # of the score of a run
-HALF = 0.5  # score up to which minutes of the processor are counted
-STYLE, STYLE_HEADS = ("gait_compliance", "heading_error"), ("gait compliance", "heading error, rad")
+CLIP = (-0.5, 1.2)  # bounds of the score of a run
+HALF = 0.5  # score until which CPU time is counted
+STYLE = ("gait_compliance", "heading_error")
+STYLE_HEADS = ("gait compliance", "heading error, rad")
 NOT_RUN = "not run"
-_LEARNER = re.compile(r"[\w.-]+")  # names of learners
+_LEARNER_PATTERN = re.compile(r"[\w.-]+")
 MAKE = "make"  # function of a module that makes a policy
-ENDINGS = (*other_libraries.READERS, network.EXTENSION, named.MODULE)
-# Robot, task and seed by the names that policies of a folder can have.
+ENDINGS = (*other_libraries.READERS, network.EXTENSION, named.PYTHON_EXTENSION)
+# Robot, task and seed by the name of a policy in a folder.
 NAMES = {
     f"{robot}-{task}-{seed}{ending}": (robot, task, seed)
     for (robot, task), seed, ending in itertools.product(PLACES, range(SEEDS), ("", *ENDINGS))
@@ -41,13 +42,14 @@ class RunScore(NamedTuple):
     """Result of a run; a line of `SCORES`.
 
     Attributes:
-        robot, task, seed: of the run.
+        robot, task: names of the robot and the task.
+        seed: seed of the run.
         result: mean return of the protocol's episodes.
-        score: of it, clipped to `CLIP`.
-        minutes: of the processor until an evaluation had the score `HALF`; infinite if none had, NaN if unknown.
+        score: score of the result, clipped to `CLIP`.
+        minutes: CPU time until an evaluation had the score `HALF`; infinite if none had, NaN if unknown.
         gait_compliance: mean over ten episodes.
         heading_error: mean size over ten episodes, rad; NaN for tasks of `TURNING`.
-        notes: what the score must not be compared with others for; empty for nothing.
+        notes: reasons why the score is not comparable with others; empty without any.
     """
 
     robot: str
@@ -61,114 +63,141 @@ class RunScore(NamedTuple):
     notes: str = ""
 
 
-COLUMNS = ("division", "learner", *RunScore._fields)  # of `SCORES`
+COLUMNS = ("division", "learner", *RunScore._fields)  # columns of `SCORES`
 Groups = Mapping[tuple[str, str], Sequence[RunScore]]  # scores by robot and task
 
 
-def of_results(found: Iterable[RunResult]) -> list[RunScore]:
+def score_results(run_results: Iterable[RunResult]) -> list[RunScore]:
     """Return the scores of the runs that are finished."""
-    return [_of_result(each) for each in found if each.steps[-1] >= each.run.configuration.steps]
+    return [_score_result(result) for result in run_results if result.steps[-1] >= result.run.configuration.steps]
 
 
-def _of_result(found: RunResult) -> RunScore:
-    setup = found.run.configuration.setup
-    scale = anchors.anchors(setup)
-    enough = np.flatnonzero(scale.score(found.returns.mean(axis=1)) >= HALF)
-    minutes = found.cpu[enough[0]] / 60.0 if enough.size else np.inf
-    notes = "; ".join(found.notes)
-    return _score(setup, found.run.configuration.seed, found.final, minutes, found.style, scale, notes)
+def _score_result(result: RunResult) -> RunScore:
+    setup = result.run.configuration.setup
+    curve_scores = anchors.anchors(setup).score(result.returns.mean(axis=1))
+    reaching = np.flatnonzero(curve_scores >= HALF)
+    minutes = result.cpu[reaching[0]] / 60.0 if reaching.size else np.inf
+    notes = "; ".join(result.notes)
+    return _run_score(setup, result.run.configuration.seed, result.final, minutes, result.style, notes)
 
 
-def _score(setup: Setup, seed: int, result: float, minutes: float, measured, scale, notes: str) -> RunScore:
-    clipped = float(np.clip(scale.score(result), *CLIP))
-    compliance, error = (results.size(measured[each]) for each in STYLE)
-    if setup.kind.name in TURNING:
-        error = np.nan
-    where = setup.body.name, setup.kind.name, seed
-    return RunScore(*where, float(result), clipped, float(minutes), compliance, error, notes)
-
-
-def of_policies(folder: Path, progress: Callable) -> list[RunScore]:
-    """Play the protocol's episodes by the policies of a folder, and return their scores.
-
-    What has an ending of `ENDINGS` or a name of `NAMES` is a policy, and the folder of a run. Weights, statistics and
-    notes are none, nor are names that begin with `.` or `_`.
+def _run_score(
+    setup: Setup, seed: int, mean_return: float, minutes: float, metrics: Mapping[str, np.ndarray], notes: str
+) -> RunScore:
+    """Return the score of a run.
 
     Args:
-        folder: of policies named `ROBOT-TASK-SEED`: a zip of stable-baselines3, a policy file (.npz), a module with a
-            function `MAKE`, see `policies.policy`, or the folder of a run.
+        setup: setup of the run.
+        seed: seed of the run.
+        mean_return: mean return of the protocol's episodes.
+        minutes: CPU time until the score `HALF`.
+        metrics: metrics of style by name, each (episodes,).
+        notes: notes on the score.
+    """
+    score = anchors.anchors(setup).score(mean_return)
+    return RunScore(
+        robot=setup.body.name,
+        task=setup.kind.name,
+        seed=seed,
+        result=float(mean_return),
+        score=float(np.clip(score, *CLIP)),
+        minutes=float(minutes),
+        gait_compliance=results.mean_size(metrics["gait_compliance"]),
+        heading_error=np.nan if setup.kind.name in TURNING else results.mean_size(metrics["heading_error"]),
+        notes=notes,
+    )
+
+
+def score_policies(folder: Path, progress: Callable) -> list[RunScore]:
+    """Play the protocol's episodes by the policies of a folder, and return their scores.
+
+    An entry of the folder is a policy if it has an ending of `ENDINGS` or a name of `NAMES`, or is the folder of a
+    run. Weights, statistics, notes, and names that begin with `.` or `_` are skipped.
+
+    Args:
+        folder: folder of policies named `ROBOT-TASK-SEED`. A policy is a zip of stable-baselines3, a policy file
+            (.npz), a module with a function `MAKE` (see `policies.policy`), or the folder of a run.
         progress: makes a progress bar as `tqdm` does.
 
     Raises:
         ValueError: no policy in the folder, another name, two policies of a place and seed, or one that does not fit.
         OSError: a file cannot be read.
     """
-    found = _by_name(folder)
-    return [
-        _of_policy(path, Setup.of(robot, task), seed)
-        for (robot, task, seed), path in progress(found.items(), desc=str(folder), unit="policy", leave=False)
-    ]
+    bar = progress(_find_policies(folder).items(), desc=str(folder), unit="policy", leave=False)
+    return [_score_policy(path, Setup.of(robot, task), seed) for (robot, task, seed), path in bar]
 
 
-def _by_name(folder: Path) -> dict[tuple[str, str, int], Path]:
-    """Return the policies of a folder by robot, task and seed, in the order of their names."""
-    found: dict[tuple[str, str, int], Path] = {}
+def _find_policies(folder: Path) -> dict[tuple[str, str, int], Path]:
+    """Return the paths of the policies in a folder by robot, task and seed, in the order of their names."""
+    paths_by_run: dict[tuple[str, str, int], Path] = {}
     with files.reading(folder):
         paths = sorted(filter(_is_policy, folder.iterdir()))
     for path in paths:
         if path.name not in NAMES:
-            (near,) = difflib.get_close_matches(path.name, NAMES, n=1, cutoff=0.0)
+            (nearest_name,) = difflib.get_close_matches(path.name, NAMES, n=1, cutoff=0.0)
             expected = f"ROBOT-TASK-SEED of a place and a seed from 0 to {SEEDS - 1}"
-            raise ValueError(f"{path}: expected {expected}, such as {near}")
-        if other := found.get(NAMES[path.name]):
-            raise ValueError(f"{path}: expected one policy of this place and seed, got {other.name}, too")
-        found[NAMES[path.name]] = path
-    if not found:
+            raise ValueError(f"{path}: expected {expected}, such as {nearest_name}")
+        run = NAMES[path.name]
+        if run in paths_by_run:
+            raise ValueError(f"{path}: expected one policy of this place and seed, got {paths_by_run[run].name}, too")
+        paths_by_run[run] = path
+    if not paths_by_run:
         raise ValueError(f"{folder}: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none")
-    return found
+    return paths_by_run
 
 
 def _is_policy(path: Path) -> bool:
-    return path.name[0] not in "._" and (
-        path.suffix in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path))
-    )
+    is_skipped = path.name[0] in "._"
+    return not is_skipped and (path.suffix in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path)))
 
 
-def _of_policy(path: Path, setup: Setup, seed: int) -> RunScore:
+def _score_policy(path: Path, setup: Setup, seed: int) -> RunScore:
+    """Play the protocol's episodes by a policy, and return its score; the seed is that of its training."""
     environment = setup.load()
-    name = f"{path}:{MAKE}" if path.suffix == named.MODULE else path
-    known = provenance.training_seeds(str(name), range(evaluation.EPISODES)) is not None
+    name = f"{path}:{MAKE}" if path.suffix == named.PYTHON_EXTENSION else path
+    training_seeds = provenance.training_seeds(str(name), range(evaluation.EPISODES))
+    notes = provenance.UNKNOWN if training_seeds is None else ""
     policy = policies.policy(name, setup.body, task=environment.task.definition)
-    tracks = [style.record(environment, policy, seed) for seed in range(evaluation.CURVE_EPISODES)]
-    others = evaluation.episodes(environment, policy, range(evaluation.CURVE_EPISODES, evaluation.EPISODES))
-    every = [style.measure(track) for track in tracks]
-    measured = {each: np.array([metrics[each].value for metrics in every]) for each in STYLE}
-    result = np.mean([*(track.rewards.sum() for track in tracks), *(each.total for each in others)])
-    notes = "" if known else provenance.UNKNOWN
-    return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup), notes)
+
+    # The first episodes are recorded, as their style is measured.
+    tracks = [style.record(environment, policy, episode_seed) for episode_seed in range(evaluation.CURVE_EPISODES)]
+    further_seeds = range(evaluation.CURVE_EPISODES, evaluation.EPISODES)
+    further_episodes = evaluation.episodes(environment, policy, further_seeds)
+    returns = [track.rewards.sum() for track in tracks] + [episode.total for episode in further_episodes]
+
+    episode_metrics = [style.measure(track) for track in tracks]
+    metrics = {metric: np.array([values[metric].value for values in episode_metrics]) for metric in STYLE}
+    return _run_score(setup, seed, float(np.mean(returns)), np.nan, metrics, notes)
 
 
-def checked_name(name: str) -> str:
-    """Return the name of a learner.
+def check_name(name: str) -> None:
+    """Check the name of a learner.
 
     Raises:
         ValueError: it has other characters than letters, digits, `_`, `-` and `.`.
     """
-    if not _LEARNER.fullmatch(name):
+    if not _LEARNER_PATTERN.fullmatch(name):
         raise ValueError(f"--name={name}: expected letters, digits, _, - and .")
-    return name
 
 
 def write(studies: Path, division: str, learner: str, scores: Iterable[RunScore]) -> None:
     """Replace the scores of a learner in a division.
 
+    Args:
+        studies: folder of the table of scores.
+        division: name of the division.
+        learner: name of the learner.
+        scores: scores of its runs.
+
     Raises:
         ValueError: a damaged table of scores.
-        OSError: it cannot be written.
+        OSError: the table cannot be written.
     """
-    owner = {"division": division, "learner": learner}
-    others = [row for row in csv_files.read(studies / SCORES, COLUMNS) if not owner.items() <= row.items()]
-    csv_files.write(studies / SCORES, COLUMNS, [*others, *(owner | each._asdict() for each in scores)])
+    path = studies / SCORES
+    key = {"division": division, "learner": learner}
+    rows: list[Mapping[str, object]] = [row for row in csv_files.read(path, COLUMNS) if not key.items() <= row.items()]
+    rows += [key | score._asdict() for score in scores]
+    csv_files.write(path, COLUMNS, rows)
 
 
 def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
@@ -176,14 +205,15 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
 
     Raises:
         ValueError: a damaged table.
-        OSError: it cannot be read.
+        OSError: the table cannot be read.
     """
-    found: dict[tuple[str, str], list[RunScore]] = {}
+    scores_by_learner: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
         division, learner, robot, task, seed, *numbers, notes = row.values()
         checks.name(division, DIVISIONS, "division")
-        found.setdefault((division, learner), []).append(RunScore(robot, task, int(seed), *map(float, numbers), notes))
-    return found
+        score = RunScore(robot, task, int(seed), *map(float, numbers), notes)
+        scores_by_learner.setdefault((division, learner), []).append(score)
+    return scores_by_learner
 
 
 def text(studies: Path) -> str:
@@ -195,58 +225,87 @@ def text(studies: Path) -> str:
     """
     lines = []
     for (division, learner), scores in read(studies).items():
-        groups = by_place(scores)
-        order = tuple(DIVISIONS).index(division), not all(groups.values()), -total(groups)[0]
-        lines.append((*order, division, learner, *_cells(groups)))
+        groups = group_by_place(scores)
+        has_all_places = all(groups.values())
+        mean, _ = total(groups)
+        # By division, then complete learners first, then by falling total.
+        sort_key = (tuple(DIVISIONS).index(division), not has_all_places, -mean)
+        lines.append((sort_key, [division, learner, *_result_cells(groups)]))
     if not lines:
         raise ValueError(f"{studies}: no scores of the benchmark; run a division, or name another folder by --results")
+    lines.sort()
     heads = ["division", "learner", "seeds", "total [95 %]", "lowest place", "CPU min to .5", *STYLE_HEADS]
-    return table([*heads, *map(" ".join, PLACES), "notes"], [line[3:] for line in sorted(lines)])
+    place_heads = [f"{robot} {task}" for robot, task in PLACES]
+    return table([*heads, *place_heads, "notes"], [cells for _, cells in lines])
 
 
 def total(groups: Groups) -> tuple[float, tuple[float, float]]:
-    """Return the mean over places of the mean score within a place, of those that have any, and its interval."""
-    return evaluation.mean_and_interval([[each.score for each in group] for group in groups.values() if group])
+    """Return the mean over places with scores of the mean score within a place, and its interval."""
+    return evaluation.mean_and_interval([[score.score for score in scores] for scores in groups.values() if scores])
 
 
-def by_place(scores: Sequence[RunScore]) -> Groups:
-    """Scores by place, of all `PLACES`; empty where there are none."""
-    return {where: [each for each in scores if (each.robot, each.task) == where] for where in PLACES}
+def group_by_place(scores: Sequence[RunScore]) -> Groups:
+    """Return scores by place, for all `PLACES`; empty where there are none."""
+    groups: dict[tuple[str, str], list[RunScore]] = {place: [] for place in PLACES}
+    for score in scores:
+        place = (score.robot, score.task)
+        if place in groups:
+            groups[place].append(score)
+    return groups
 
 
-def _cells(groups: Groups) -> list[str]:
-    """Cells of a learner. Every place weighs the same, however many seeds it has."""
-    run = {where: group for where, group in groups.items() if group}
-    seeds = [len(group) for group in run.values()]
-    few, many = min(seeds), max(seeds)
-    means = {where: float(np.mean([each.score for each in group])) for where, group in run.items()}
-    lowest = min(means, key=means.__getitem__)
-    minutes = float(np.median([np.median([each.minutes for each in group]) for group in run.values()]))
+def _result_cells(groups: Groups) -> list[str]:
+    """Return the cells of a learner. Every place weighs the same, however many seeds it has."""
+    nonempty_groups = {place: scores for place, scores in groups.items() if scores}
+    seed_counts = [len(scores) for scores in nonempty_groups.values()]
+    fewest_seeds = min(seed_counts)
+    most_seeds = max(seed_counts)
+    seeds = f"{fewest_seeds}" if fewest_seeds == most_seeds else f"{fewest_seeds} to {most_seeds}"
+    if len(nonempty_groups) == len(groups):
+        total_cell = _total_text(groups, fewest_seeds)
+    else:
+        total_cell = f"{len(nonempty_groups)} of {len(groups)} places"
+
+    mean_scores = {}
+    median_minutes = []
+    for place, scores in nonempty_groups.items():
+        mean_scores[place] = float(np.mean([score.score for score in scores]))
+        median_minutes.append(np.median([score.minutes for score in scores]))
+    lowest_place = min(mean_scores, key=mean_scores.__getitem__)
+    minutes = float(np.median(median_minutes))
     return [
-        f"{few}" if few == many else f"{few} to {many}",
-        _total(groups, few) if len(run) == len(groups) else f"{len(run)} of {len(groups)} places",
-        f"{' '.join(lowest)} {means[lowest]:z.2f}",
+        seeds,
+        total_cell,
+        f"{' '.join(lowest_place)} {mean_scores[lowest_place]:z.2f}",
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
-        *(f"{_mean_size(name, run):.3f}" for name in STYLE),
-        *(f"{means[where]:z.2f}" if where in means else NOT_RUN for where in groups),
-        _notes(groups),
+        *(f"{_mean_style(name, nonempty_groups):.3f}" for name in STYLE),
+        *(f"{mean_scores[place]:z.2f}" if place in mean_scores else NOT_RUN for place in groups),
+        _notes_text(groups),
     ]
 
 
-def _total(groups: Groups, seeds: int) -> str:
-    """The total, and its interval over two seeds or more."""
+def _total_text(groups: Groups, seeds: int) -> str:
+    """Return the total as text, and its interval if there are two seeds or more."""
     mean, (low, high) = total(groups)
-    return f"{mean:.3f}" + (f" [{low:.3f}, {high:.3f}]" if seeds > 1 else "")
+    return f"{mean:.3f} [{low:.3f}, {high:.3f}]" if seeds > 1 else f"{mean:.3f}"
 
 
-def _mean_size(name: str, run: Groups) -> float:
-    """Mean over places of the mean size of a metric of style."""
-    return results.size(np.array([results.size(np.array([getattr(e, name) for e in group])) for group in run.values()]))
+def _mean_style(name: str, groups: Groups) -> float:
+    """Return the mean over places of the mean size of a metric of style."""
+    sizes = []
+    for scores in groups.values():
+        values = np.array([getattr(score, name) for score in scores])
+        sizes.append(results.mean_size(values))
+    return results.mean_size(np.array(sizes))
 
 
-def _notes(groups: Groups) -> str:
-    """What the total must not be compared with others for; a dash for nothing."""
-    short = sum(len(group) < SEEDS for group in groups.values())
-    found = [f"{short} of {len(groups)} places have fewer than {SEEDS} seeds"] * bool(short)
-    found += [note for group in groups.values() for each in group for note in each.notes.split("; ") if note]
-    return "; ".join(dict.fromkeys(found)) or "-"
+def _notes_text(groups: Groups) -> str:
+    """Return the reasons why the total is not comparable with others; a dash without any."""
+    notes = []
+    places_with_few_seeds = sum(len(scores) < SEEDS for scores in groups.values())
+    if places_with_few_seeds:
+        notes.append(f"{places_with_few_seeds} of {len(groups)} places have fewer than {SEEDS} seeds")
+    for scores in groups.values():
+        for score in scores:
+            notes += [note for note in score.notes.split("; ") if note]
+    return "; ".join(dict.fromkeys(notes)) or "-"

@@ -7,23 +7,36 @@ from arc_suite.learning.studies import csv_files
 from arc_suite.learning.transfer import Comparison
 
 COLUMNS = ("policy", "task", "family", "body", "who", "return", "walked", "speed", "tracking")
-WHO = ("policy", "demonstrator", "zero")
+WHO = ("policy", "demonstrator", "zero")  # fields of a comparison with an episode
 
 
-def write(path: Path, policy: str, task: str, played: Mapping[str, Sequence[Comparison]]) -> None:
-    """Replace the episodes of a policy in a task, given by family.
+def write(path: Path, policy: str, task: str, comparisons: Mapping[str, Sequence[Comparison]]) -> None:
+    """Replace the episodes of a policy in a task.
+
+    Args:
+        path: path of the table.
+        policy: name of the policy.
+        task: name of the task.
+        comparisons: episodes of each body by family.
 
     Raises:
-        ValueError: another table.
-        OSError: it cannot be written.
+        ValueError: the file holds another table.
+        OSError: the file cannot be written.
     """
-    owner = {"policy": policy, "task": task}
-    rows = [row for row in csv_files.read(path, COLUMNS) if not owner.items() <= row.items()]
-    for family, compared in played.items():
-        for each in compared:
+    policy_and_task = {"policy": policy, "task": task}
+    rows = [row for row in csv_files.read(path, COLUMNS) if not policy_and_task.items() <= row.items()]
+    for family, family_comparisons in comparisons.items():
+        for comparison in family_comparisons:
             for who in WHO:
-                total, walked, speed, tracking = getattr(each, who)
-                numbers = {"return": round(total, 3), "walked": int(walked)}
-                numbers |= {"speed": round(speed, 4), "tracking": round(tracking, 4)}
-                rows.append(owner | {"family": family, "body": each.body, "who": who} | numbers)
+                episode = getattr(comparison, who)
+                row = {
+                    "family": family,
+                    "body": comparison.body,
+                    "who": who,
+                    "return": round(episode.total, 3),
+                    "walked": int(episode.walked),
+                    "speed": round(episode.speed, 4),
+                    "tracking": round(episode.tracking, 4),
+                }
+                rows.append(policy_and_task | row)
     csv_files.write(path, COLUMNS, rows)

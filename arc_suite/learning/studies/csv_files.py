@@ -11,8 +11,8 @@ def read(path: Path, columns: Sequence[str] | None = None) -> list[dict[str, str
     """Return the lines of a table; none where there is no file.
 
     Args:
-        path: of the file.
-        columns: that the table must have; None for any.
+        path: path of the file.
+        columns: names of the columns that the table must have; None for any.
 
     Raises:
         ValueError: other columns, or a line with more or fewer cells.
@@ -22,14 +22,18 @@ def read(path: Path, columns: Sequence[str] | None = None) -> list[dict[str, str
         return []
     with files.reading(path), path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
-        lines, found = list(reader), reader.fieldnames or []
-    if found != list(columns or found) or any(None in line or None in line.values() for line in lines):
-        raise ValueError(f"{path}: expected lines of {', '.join(columns or found)}")
+        lines = list(reader)
+        columns_in_file = reader.fieldnames or []
+    expected_columns = list(columns or columns_in_file)
+    # `DictReader` puts surplus cells under the key None, and fills missing cells with the value None.
+    has_uneven_line = any(None in line or None in line.values() for line in lines)
+    if columns_in_file != expected_columns or has_uneven_line:
+        raise ValueError(f"{path}: expected lines of {', '.join(expected_columns)}")
     return lines
 
 
 def write(path: Path, columns: Sequence[str], lines: Iterable[Mapping[str, object]]) -> None:
-    """Write a table as a whole; a cell that a line lacks stays empty.
+    """Replace a table; a cell that a line lacks stays empty.
 
     Raises:
         OSError: the file cannot be written.

@@ -22,13 +22,16 @@ from arc_suite.policies import checkpoints, network
 # Metrics of `arc_suite.style` by which the final policies are compared.
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 
-# Presets of demonstrators whose returns are published, in `walk`, and in tasks with a command; and the best one.
-PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
+# Presets of demonstrators whose returns are published in `walk` and its like.
+PRESETS = ("medium", "refined")
+# The same in tasks with a command.
+COMMAND_PRESETS = ("steered", "surefooted")
 
-_FURTHER = range(evaluation.CURVE_EPISODES, evaluation.EPISODES)  # seeds that complete the latest evaluation
+_CURVE_SEEDS = range(evaluation.CURVE_EPISODES)
+_FINAL_SEEDS = range(evaluation.CURVE_EPISODES, evaluation.EPISODES)  # seeds that complete the latest evaluation
 
-_EPISODE = ("run", "step", "seed", "return", "length")  # first columns of an episode
-_STYLE = tuple(STYLE + name for name in METRICS)
+_EPISODE_COLUMNS = ("run", "step", "seed", "return", "length")  # first columns of an episode
+_STYLE_COLUMNS = tuple(STYLE + name for name in METRICS)
 
 
 def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
@@ -37,132 +40,161 @@ def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
     Rows of runs that have no folder stay.
 
     Args:
-        runs: of the study.
-        folder: of the study, with a folder for each run.
+        runs: runs of the study.
+        folder: folder of the study, with a folder for each run.
         published: folder of the tables.
 
     Raises:
         ValueError: a damaged table.
         OSError: a file cannot be written.
     """
-    configurations = {row["run"]: row for row in csv_files.read(published / results.RUNS, RUN_COLUMNS)}
-    episodes = results.episodes_of(published)
+    run_rows = {row["run"]: row for row in csv_files.read(published / results.RUNS, RUN_COLUMNS)}
+    episodes = results.read_episodes(published)
     for run in runs:
-        if found := _evaluated(folder / run.name):
-            configurations[run.name] = _configuration(run, folder / run.name)
-            episodes[run.name] = _judged(run, folder / run.name, _with_style(run, folder / run.name, found))
+        output = folder / run.name
+        rows = _complete_evaluations(output)
+        if rows:
+            run_rows[run.name] = _run_row(run, output)
+            rows = _add_style(run, output, rows)
+            episodes[run.name] = _add_final_episodes(run, output, rows)
     names = [run.name for run in runs if run.name in episodes]
     if not names:
         return
-    fixed = {*_EPISODE, *TIMES, *_STYLE}
-    progress = _merged([name for name in episodes[each][0] if name not in fixed] for each in names)
-    rows = [row for name in names for row in episodes[name]]
-    csv_files.write(published / results.EVALUATIONS, (*_EPISODE, *progress, *TIMES, *_STYLE), rows)
-    csv_files.write(published / results.RUNS, RUN_COLUMNS, [configurations[name] for name in names])
+    other_columns = {*_EPISODE_COLUMNS, *TIMES, *_STYLE_COLUMNS}
+    metrics_by_run = []
+    for name in names:
+        first_row = episodes[name][0]
+        metrics_by_run.append([column for column in first_row if column not in other_columns])
+    columns = (*_EPISODE_COLUMNS, *_merge_orders(metrics_by_run), *TIMES, *_STYLE_COLUMNS)
+    all_rows = [row for name in names for row in episodes[name]]
+    csv_files.write(published / results.EVALUATIONS, columns, all_rows)
+    csv_files.write(published / results.RUNS, RUN_COLUMNS, [run_rows[name] for name in names])
     _publish_demonstrators(runs, published)
 
 
-def _evaluated(folder: Path) -> list[dict[str, str]]:
-    """Return the rows of the whole evaluations in the folder of a run, with their times."""
-    rows = run_folder.lines(folder, "evaluations", _EPISODE[1:])
+def _complete_evaluations(folder: Path) -> list[dict[str, str]]:
+    """Return the episodes of the complete evaluations in the folder of a run, with their times."""
+    rows = run_folder.lines(folder, "evaluations", _EPISODE_COLUMNS[1:])
     times = {row.pop("step"): row for row in run_folder.lines(folder, "times", ("step", *TIMES))}
     counts = Counter(row["step"] for row in rows)
-    whole = {step for step, count in counts.items() if count == evaluation.CURVE_EPISODES and step in times}
-    return [{"run": folder.name, **row, **times[row["step"]]} for row in rows if row["step"] in whole]
+    complete_steps = {step for step, count in counts.items() if count == evaluation.CURVE_EPISODES and step in times}
+    return [{"run": folder.name, **row, **times[row["step"]]} for row in rows if row["step"] in complete_steps]
 
 
-def _configuration(run: Run, folder: Path) -> dict[str, str]:
+def _run_row(run: Run, folder: Path) -> dict[str, str]:
     """Return the row of a run in the table of runs."""
-    training = run_folder.lines(folder, "training", ("step",))
-    phases = {row["step"]: int(float(row["phase_updates"])) for row in training if float(row.get("phase_updates", 0))}
+    phases = {}
+    for row in run_folder.lines(folder, "training", ("step",)):
+        updates = int(float(row.get("phase_updates", 0)))
+        if updates:
+            phases[row["step"]] = updates
     fields = {"run": run.name, "kind": run.kind, **run_folder.read_config(folder), "phases": phases or None}
     return {name: cell(value) for name, value in fields.items()}
 
 
 def cell(value: Any) -> str:
-    """Return a field of a configuration as a table holds it: text as it is, nothing for None, else JSON."""
-    return "" if value is None else value if isinstance(value, str) else json.dumps(value)
+    """Return the cell of a value in a table: text unchanged, an empty cell for None, else JSON."""
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else json.dumps(value)
 
 
-def _merged(orders: Iterable[Sequence[str]]) -> list[str]:
-    """Return the names of all sequences, each before those that follow it in its sequence."""
-    found: list[str] = []
+def _merge_orders(orders: Iterable[Sequence[str]]) -> list[str]:
+    """Return the names of all sequences without repetitions; names keep their order within each sequence."""
+    merged_names: list[str] = []
     for names in orders:
-        place = len(found)
+        # From the last name to the first: a new name goes before the one that follows it in its sequence.
+        position = len(merged_names)
         for name in reversed(names):
-            if name in found:
-                place = found.index(name)
+            if name in merged_names:
+                position = merged_names.index(name)
             else:
-                found.insert(place, name)
-    return found
+                merged_names.insert(position, name)
+    return merged_names
 
 
-def _with_style(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
-    """Return rows of episodes, those of the latest evaluation with metrics of style, which the folder keeps."""
-    latest = rows[-1]["step"]
-    measured = run_folder.lines(folder, "style", ("step", "seed"))
-    if not _are_of(measured, latest, range(evaluation.CURVE_EPISODES)):
-        measured = _measured(run, folder, latest)
-    metrics = {row.pop("seed"): {STYLE + name: row[name] for name in row if name != "step"} for row in measured}
-    return [row | metrics[row["seed"]] if row["step"] == latest else row for row in rows]
+def _add_style(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Return rows of episodes with metrics of style in the latest evaluation.
+
+    The metrics come from the table of style in the folder; they are measured if it has another step.
+    """
+    latest_step = rows[-1]["step"]
+    style_rows = run_folder.lines(folder, "style", ("step", "seed"))
+    if not _has_episodes(style_rows, latest_step, _CURVE_SEEDS):
+        style_rows = _measure_style(run, folder, latest_step)
+    metrics_by_seed = {}
+    for style_row in style_rows:
+        metrics = {STYLE + name: text for name, text in style_row.items() if name not in ("step", "seed")}
+        metrics_by_seed[style_row["seed"]] = metrics
+    return [row | metrics_by_seed[row["seed"]] if row["step"] == latest_step else row for row in rows]
 
 
-def _are_of(rows: Sequence[Mapping[str, str]], step: str, seeds: range) -> bool:
-    """Return whether rows are those of a step, one for each seed."""
+def _has_episodes(rows: Sequence[Mapping[str, str]], step: str, seeds: range) -> bool:
+    """Return whether rows are the episodes of a step, one for each seed."""
     return [(row["step"], row["seed"]) for row in rows] == [(step, str(seed)) for seed in seeds]
 
 
-def _measured(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
-    """Measure the style of the policy at a step, as a later one may exist already, and write its table; slow."""
-    path, setup = folder / checkpoints.FOLDER / step / network.FILE, run.configuration.validation
-    lines = []
+def _measure_style(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
+    """Measure the style of the checkpoint of a step, write its table, and return its rows; slow.
+
+    The policy in the folder itself may be a later one.
+    """
+    path = folder / checkpoints.FOLDER / step / network.FILE
+    setup = run.configuration.validation
+    rows = []
     with contextlib.closing(setup.load()) as environment:
         policy = policies.policy(path, setup.body, task=environment.task.definition)
-        for seed in range(evaluation.CURVE_EPISODES):
-            measured = style.measure(style.record(environment, policy, seed))
-            metrics = {name: repr(measured[name].value) for name in METRICS if name in measured}
-            lines.append({"step": step, "seed": str(seed)} | metrics)
-    csv_files.write(folder / "style.csv", list(lines[0]), lines)
-    return lines
+        for seed in _CURVE_SEEDS:
+            metrics = style.measure(style.record(environment, policy, seed))
+            texts = {name: repr(metrics[name].value) for name in METRICS if name in metrics}
+            rows.append({"step": step, "seed": str(seed)} | texts)
+    csv_files.write(folder / "style.csv", list(rows[0]), rows)
+    return rows
 
 
-def _judged(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
-    """Return rows of episodes, and those that complete the latest evaluation, which the folder keeps."""
+def _add_final_episodes(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Return rows of episodes, and further episodes of the latest evaluation.
+
+    The further episodes come from their table in the folder; they are played if it has another step.
+    """
     latest = rows[-1]
-    kept = run_folder.lines(folder, "final", _EPISODE[1:])
-    if not _are_of(kept, latest["step"], _FURTHER):
-        _judge(run, folder, latest["step"])
-        kept = run_folder.lines(folder, "final")
-    shared = {name: latest[name] for name in ("run", *TIMES)}
-    return [*rows, *(shared | row for row in kept)]
+    final_rows = run_folder.lines(folder, "final", _EPISODE_COLUMNS[1:])
+    if not _has_episodes(final_rows, latest["step"], _FINAL_SEEDS):
+        _play_final_episodes(run, folder, latest["step"])
+        final_rows = run_folder.lines(folder, "final")
+    run_and_times = {name: latest[name] for name in ("run", *TIMES)}
+    return [*rows, *(run_and_times | row for row in final_rows)]
 
 
-def _judge(run: Run, folder: Path, step: str) -> None:
-    """Write a table of the episodes that judge the policy at a step, after those of its curve."""
+def _play_final_episodes(run: Run, folder: Path, step: str) -> None:
+    """Play the episodes that complete the evaluation of a step, and write their table."""
     setup = run.configuration.validation
     policy = network.load(folder / checkpoints.FOLDER / step)
-    environment = setup.make_vec(len(_FURTHER), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
+    environment = setup.make_vec(len(_FINAL_SEEDS), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
     with contextlib.closing(environment):
-        played = evaluation.episodes_in_batch(environment, policy, _FURTHER)
-    lines = [
-        {"step": step, "seed": seed, "return": each.total, "length": each.length, **each.progress}
-        for seed, each in zip(_FURTHER, played, strict=True)
+        episodes = evaluation.episodes_in_batch(environment, policy, _FINAL_SEEDS)
+    rows = [
+        {"step": step, "seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
+        for seed, episode in zip(_FINAL_SEEDS, episodes, strict=True)
     ]
-    csv_files.write(folder / "final.csv", list(lines[0]), lines)
+    csv_files.write(folder / "final.csv", list(rows[0]), rows)
 
 
 def _publish_demonstrators(runs: Sequence[Run], published: Path) -> None:
-    known = results.demonstrators(published)
+    """Add the returns of standing still and of demonstrators in the places that the table lacks."""
+    published_returns = results.read_demonstrators(published)
     setups = {run.place: run.configuration.validation for run in runs}
-    measured = {place: _demonstrated(setup) for place, setup in setups.items() if place not in known}
-    if measured:
+    new_returns = {place: _anchor_returns(setup) for place, setup in setups.items() if place not in published_returns}
+    if new_returns:
         with files.writing(published / results.DEMONSTRATORS) as temporary:
-            anchors.write(temporary, known | measured)
+            anchors.write(temporary, published_returns | new_returns)
 
 
-def _demonstrated(setup: Setup) -> anchors.Returns:
+def _anchor_returns(setup: Setup) -> anchors.Returns:
     """Return the returns of the evaluation protocol of standing still and of demonstrators of a body, by policy."""
-    found = dict(anchors.committed_returns(setup) or anchors.measure_returns(setup, evaluation.EPISODES))
-    usual = COMMANDED if "command" in setup.definition.blocks else PRESETS
-    missing = [preset for preset in usual if preset in presets_of(setup.body) and preset not in found]
-    return found | {preset: anchors.play_returns(setup, preset, range(evaluation.EPISODES)) for preset in missing}
+    returns = dict(anchors.committed_returns(setup) or anchors.measure_returns(setup, evaluation.EPISODES))
+    presets = COMMAND_PRESETS if "command" in setup.definition.blocks else PRESETS
+    for preset in presets:
+        if preset in presets_of(setup.body) and preset not in returns:
+            returns[preset] = anchors.play_returns(setup, preset, range(evaluation.EPISODES))
+    return returns

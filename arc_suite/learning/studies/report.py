@@ -12,7 +12,8 @@ from arc_suite.learning.studies.results import Groups, RunResult
 from arc_suite.learning.studies.tables import Study
 from arc_suite.learning.studies.text_tables import table
 
-REPORT, CURVES = "README.md", "curves.png"
+REPORT = "README.md"
+CURVES = "curves.png"
 Sections = Mapping[str, Sequence[str]]  # paragraphs of each section of a report, by its title
 
 
@@ -20,109 +21,137 @@ def write(name: str, study: Study, published: Path, further: Sections | None = N
     """Write the report of a study into the folder of its tables.
 
     Args:
-        name: of the study.
-        study: its title and runs.
+        name: name of the study.
+        study: study.
         published: folder of its tables.
-        further: sections that follow the report's own; None for none.
+        further: sections to append; None for none.
 
     Returns:
-        The file of the report.
+        The path of the report.
 
     Raises:
         ValueError: nothing is published, or a table is damaged.
         OSError: a file cannot be written.
     """
-    found = results.results(study.runs, published)
-    if not found:
+    study_results = results.read_results(study.runs, published)
+    if not study_results:
         raise ValueError(f"{published}: holds no results of the study {name}")
-    groups, demonstrators = results.grouped(found), results.demonstrators(published)
-    sections = {
-        f"Study {name}": [_title(study, found), _reached(found)],
-        "Curves": [_CURVES, f"![Returns over environment steps]({CURVES})"],
-        "Final returns": [_FINALS, _finals(groups, demonstrators)],
-        "Sample efficiency": [_EFFICIENCY, _efficiency(groups, demonstrators)],
-        **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
-        "Style": [_STYLE, _style(groups)],
-        **(further or {}),
+    groups = results.group_by_place(study_results)
+    demonstrators = results.read_demonstrators(published)
+    sections: dict[str, Sequence[str]] = {
+        f"Study {name}": [_title(study, study_results), _progress_table(study_results)],
+        "Curves": [_ABOUT_CURVES, f"![Returns over environment steps]({CURVES})"],
+        "Final returns": [_ABOUT_FINALS, _finals_table(groups, demonstrators)],
+        "Sample efficiency": [_ABOUT_EFFICIENCY, _efficiency_table(groups, demonstrators)],
     }
+    if any(len(result.phases) for result in study_results):
+        sections["Phases"] = [_ABOUT_PHASES, _phases_table(groups)]
+    sections["Style"] = [_ABOUT_STYLE, _style_table(groups)]
+    sections.update(further or {})
     with files.writing(published / CURVES) as temporary:
-        _curves(groups, demonstrators).savefig(temporary)
-    files.write(published / REPORT, _page(sections))
+        _plot_curves(groups, demonstrators).savefig(temporary)
+    files.write(published / REPORT, _join_sections(sections))
     return published / REPORT
 
 
-_CURVES = (
+# First paragraphs of the sections.
+_ABOUT_CURVES = (
     "Interquartile mean over seeds with its 95 % bootstrap interval; of a single seed the mean. Dashed: standing "
     "still and demonstrators. Dotted: the paper's returns at the last step, from 50,000 on."
 )
-_FINALS = (
+_ABOUT_FINALS = (
     "Mean over 100 seeded episodes of the latest policy, unless noted, and standard deviation over seeds; "
     "interquartile mean with 95 % bootstrap interval over seeds. A single seed has neither. Score: (return - standing "
     "still) / (best demonstrator - standing still). The paper's returns are at equal steps, read off its curves "
     "within about 30. Then come standing still and the demonstrators, with the standard deviation over episodes."
 )
-_EFFICIENCY = (
+_ABOUT_EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
     "it has not. Area is the mean return over all evaluations so far."
 )
-_PHASES = (
+_ABOUT_PHASES = (
     "Updates of the critics alone in a stabilization phase, for runs with published phases: those of `speq` and "
     "`speq_o2o` have the full length, the others may end early."
 )
-_STYLE = (
+_ABOUT_STYLE = (
     "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` explains each. "
     "Heading and drift are relative to the x axis, which is not the direction of a command that turns."
 )
 
 
-def _page(sections: Sections) -> str:
-    text = "\n\n".join("\n\n".join([f"## {title}", *body]) for title, body in sections.items())
-    return text[1:] + "\n"  # the first heading is that of the page
+def _join_sections(sections: Sections) -> str:
+    """Return the text of a page of sections; the first title is that of the page."""
+    paragraphs = []
+    for title, section_paragraphs in sections.items():
+        heading = f"## {title}" if paragraphs else f"# {title}"
+        paragraphs += [heading, *section_paragraphs]
+    return "\n\n".join(paragraphs) + "\n"
 
 
-def _title(study: Study, found: Sequence[RunResult]) -> str:
+def _title(study: Study, study_results: Sequence[RunResult]) -> str:
+    """Return the title of a study as a sentence, and how many of its runs have begun unless all have."""
     title = study.title[0].upper() + study.title[1:] + "."
-    return title if len(found) == len(study.runs) else f"{title} Begun: {len(found)} of {len(study.runs)} runs."
+    if len(study_results) == len(study.runs):
+        return title
+    return f"{title} Begun: {len(study_results)} of {len(study.runs)} runs."
 
 
-def _reached(found: Sequence[RunResult]) -> str:
+def _progress_table(study_results: Sequence[RunResult]) -> str:
+    """Return the table of runs with their steps and CPU time."""
     lines = []
-    for each in found:
-        run, configuration = each.run, each.run.configuration
-        reached = f"{each.steps[-1]:,} of {configuration.steps:,}"
-        minutes, command = f"{each.cpu[-1] / 60.0:.1f}", f"`{configuration.command}`"
-        lines.append((run.place, run.kind, str(configuration.seed), reached, minutes, command))
+    for result in study_results:
+        configuration = result.run.configuration
+        cells = (
+            result.run.place,
+            result.run.kind,
+            str(configuration.seed),
+            f"{result.steps[-1]:,} of {configuration.steps:,}",
+            f"{result.cpu[-1] / 60.0:.1f}",
+            f"`{configuration.command}`",
+        )
+        lines.append(cells)
     return table(("robot, task", "algorithm", "seed", "steps", "CPU min", "command"), lines)
 
 
-def _curves(groups: Groups, demonstrators):
+def _plot_curves(groups: Groups, demonstrators):
+    """Return the figure of the learning curves, a panel for each place."""
     from arc_suite.learning.agents import plots  # needs matplotlib
 
-    drawn, finals = {}, {}
+    curves_by_place = {}
+    paper_returns_by_place = {}
     for place, kinds in groups.items():
-        algorithms = {kind: seeds[0].run.configuration.algorithm for kind, seeds in kinds.items()}
-        curves = {kind: plots.Curve(algorithms[kind], *results.curve(seeds)) for kind, seeds in kinds.items()}
-        setup = next(iter(kinds.values()))[0].run.configuration.setup
-        end = max(each.steps[-1] for each in curves.values())
-        drawn[place], finals[place] = curves, evaluation.published_returns(setup, [*algorithms.values()], end)
-    lines = {p: {_policy(n): v.mean() for n, v in every.items()} for p, every in demonstrators.items()}
-    return plots.plot_study(drawn, lines, finals)
+        curves = {}
+        for kind, seeds in kinds.items():
+            steps, mean_returns = results.curve(seeds)
+            curves[kind] = plots.Curve(seeds[0].run.configuration.algorithm, steps, mean_returns)
+        curves_by_place[place] = curves
+        first_kind = next(iter(kinds.values()))
+        setup = first_kind[0].run.configuration.setup
+        algorithms = [curve.algorithm for curve in curves.values()]
+        last_step = max(curve.steps[-1] for curve in curves.values())
+        paper_returns_by_place[place] = evaluation.published_returns(setup, algorithms, last_step)
+    levels_by_place = {}
+    for place, returns_by_policy in demonstrators.items():
+        levels_by_place[place] = {_policy_label(name): returns.mean() for name, returns in returns_by_policy.items()}
+    return plots.plot_study(curves_by_place, levels_by_place, paper_returns_by_place)
 
 
 def by_kind(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:
-    """Yield the place, the kind and the results of each kind of run."""
+    """Yield place, kind and results of each kind of run."""
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
             yield place, kind, seeds
 
 
-def _policy(name: str) -> str:
-    """The name of an anchor for people."""
+def _policy_label(name: str) -> str:
+    """Return the label of standing still or of a demonstrator by the name of its policy."""
     return "standing still" if name == anchors.ZERO else f"demonstrator {name}"
 
 
-def _mean(values: np.ndarray) -> str:
-    return f"{values.mean():.1f}" + (f" +- {values.std():.1f}" if len(values) > 1 else "")
+def _mean_text(values: np.ndarray) -> str:
+    """Return the mean of values as text, and the standard deviation of two or more."""
+    mean = f"{values.mean():.1f}"
+    return f"{mean} +- {values.std():.1f}" if len(values) > 1 else mean
 
 
 def iqm_text(values: np.ndarray) -> str:
@@ -134,72 +163,103 @@ def iqm_text(values: np.ndarray) -> str:
 
 
 def score_text(values: np.ndarray, place: str, demonstrators) -> str:
-    """Return the score of the mean of returns in a place as text; a dash without anchors.
+    """Return the score of the mean return as text; a dash without anchors.
 
     Args:
-        values: returns.
-        place: see `Run.place`.
-        demonstrators: of the study; see `results.demonstrators`.
+        values: returns in a place.
+        place: place, see `Run.place`.
+        demonstrators: anchors of the study, see `results.read_demonstrators`.
     """
-    found = anchors.of_returns(demonstrators[place]).score(values.mean()) if place in demonstrators else np.nan
-    return f"{found:z.2f}" if np.isfinite(found) else "-"
+    if place not in demonstrators:
+        return "-"
+    score = anchors.of_returns(demonstrators[place]).score(values.mean())
+    return f"{score:z.2f}" if np.isfinite(score) else "-"
 
 
-def _paper(result: RunResult, steps: int) -> str:
-    """The paper's return after as many steps; a dash where its curves have none."""
-    run = result.run.configuration
-    found = published.at(run.setup.body.name, run.algorithm, steps) if results.is_in_paper(result) else None
-    return "-" if found is None else f"{found:.0f}"
+def _paper_return(result: RunResult, steps: int) -> str:
+    """Return the paper's return after a number of steps as text; a dash where its curves have none."""
+    if not results.is_in_paper(result):
+        return "-"
+    configuration = result.run.configuration
+    paper_return = published.at(configuration.setup.body.name, configuration.algorithm, steps)
+    return "-" if paper_return is None else f"{paper_return:.0f}"
 
 
-def _finals(groups: Groups, demonstrators) -> str:
+def _finals_table(groups: Groups, demonstrators) -> str:
+    """Return the table of final returns: the runs of a place, then its anchors."""
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
-            steps, values = min(each.steps[-1] for each in seeds), results.scores(seeds)
-            score = score_text(values, place, demonstrators)
-            cells = (place, kind, f"{steps:,}", str(len(seeds)), _mean(values), score, iqm_text(values))
-            lines.append((*cells, _paper(seeds[0], steps), results.notes(seeds)))
-        expert = evaluation.expert_return(seeds[0].run.configuration.setup)
-        for name, totals in demonstrators.get(place, {}).items():
-            own = f"{expert:.0f}" if name == "medium" and expert else "-"
-            score = score_text(totals, place, demonstrators)
-            note = "".join(results.few_episodes(totals)) or "-"
-            lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own, note))
+            steps = min(result.steps[-1] for result in seeds)
+            final_returns = results.final_returns(seeds)
+            run_cells = (
+                place,
+                kind,
+                f"{steps:,}",
+                str(len(seeds)),
+                _mean_text(final_returns),
+                score_text(final_returns, place, demonstrators),
+                iqm_text(final_returns),
+                _paper_return(seeds[0], steps),
+                results.join_notes(seeds),
+            )
+            lines.append(run_cells)
+        expert_return = evaluation.expert_return(seeds[0].run.configuration.setup)
+        for name, episode_returns in demonstrators.get(place, {}).items():
+            is_paper_expert = name == "medium" and expert_return
+            anchor_cells = (
+                place,
+                _policy_label(name),
+                "-",
+                "-",
+                _mean_text(episode_returns),
+                score_text(episode_returns, place, demonstrators),
+                "-",
+                f"{expert_return:.0f}" if is_paper_expert else "-",
+                "".join(results.note_few_episodes(episode_returns)) or "-",
+            )
+            lines.append(anchor_cells)
     heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]")
     return table((*heads, "paper, equal steps", "notes"), lines)
 
 
-def _efficiency(groups: Groups, demonstrators) -> str:
+def _efficiency_table(groups: Groups, demonstrators) -> str:
+    """Return the table of steps and CPU time until two returns."""
     lines = []
     for place, kind, seeds in by_kind(groups):
-        half, cells = anchors.of_returns(demonstrators[place]).at(0.5) if place in demonstrators else np.inf, []
-        for threshold in (half, 3500.0):
-            steps, seconds = results.until(seeds, threshold)
+        half_score = anchors.of_returns(demonstrators[place]).at(0.5) if place in demonstrators else np.inf
+        cells = []
+        for threshold in (half_score, 3500.0):
+            steps, seconds = results.cost_of_return(seeds, threshold)
             cells += [f"{steps:,.0f}", f"{seconds / 60.0:.1f}"] if np.isfinite(steps) else ["-", "-"]
-        area = np.mean([each.returns.mean() for each in seeds])
+        area = np.mean([result.returns.mean() for result in seeds])
         lines.append((place, kind, *cells, f"{area:.1f}"))
     heads = ("robot, task", "algorithm", "steps to score .5", "CPU min", "steps to 3,500", "CPU min", "area")
     return table(heads, lines)
 
 
-def _phases(groups: Groups) -> str:
+def _phases_table(groups: Groups) -> str:
+    """Return the table of stabilization phases and their updates."""
     lines = []
     for place, kind, seeds in by_kind(groups):
-        updates = np.concatenate([each.phases for each in seeds])
+        updates = np.concatenate([result.phases for result in seeds])
         if len(updates):
             numbers = (len(updates), updates.mean(), updates.min(), updates.max())
             lines.append((place, kind, *(f"{number:,.0f}" for number in numbers)))
     return table(("robot, task", "algorithm", "phases", "mean", "least", "most"), lines)
 
 
-def _style(groups: Groups) -> str:
+def _style_table(groups: Groups) -> str:
+    """Return the table of metrics of style."""
     names = list(dict.fromkeys(name for _, _, seeds in by_kind(groups) for name in seeds[0].style))
-    lines = [(place, kind, *(style_text(name, seeds) for name in names)) for place, kind, seeds in by_kind(groups)]
+    lines = []
+    for place, kind, seeds in by_kind(groups):
+        lines.append((place, kind, *(style_text(name, seeds) for name in names)))
     return table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
 
 
 def style_text(name: str, seeds: Sequence[RunResult]) -> str:
     """Return the mean size of a metric of style over seeds as text; a dash where none has it."""
-    size = np.mean([results.size(each.style.get(name, np.empty(0))) for each in seeds])
+    missing = np.empty(0)
+    size = np.mean([results.mean_size(result.style.get(name, missing)) for result in seeds])
     return "-" if np.isnan(size) else f"{size:.3f}"

@@ -15,30 +15,35 @@ from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
 from arc_suite.seed_ranges import EVALUATION, Ranges, common_seeds, from_json
 
-RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators.csv"
+# Files of a study's tables.
+RUNS = "runs.csv"
+EVALUATIONS = "evaluations.csv"  # a line for each episode
+DEMONSTRATORS = "demonstrators.csv"
 
 # Columns of the table of runs: the configuration, then the updates of stabilization phases by environment step.
 RUN_COLUMNS = ("run", "kind", *CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, "phases")
-TIMES = ("wall_seconds", "cpu_seconds")  # until the end of an evaluation
-SHARED, TEN = "data share seeds with evaluation", "ten episodes"
-_FEW = evaluation.CURVE_EPISODES
+TIMES = ("wall_seconds", "cpu_seconds")  # from the start of the run to the end of an evaluation
 STYLE = "style_"  # prefix of the columns with metrics of style, which the latest evaluation has
-_OTHERS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode that are not the task's metrics
+_NOT_METRICS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode without a metric
+
+# Notes on a final return.
+SHARED_SEEDS = "data share seeds with evaluation"
+TEN_EPISODES = "ten episodes"
 
 
 class RunResult(NamedTuple):
     """Result of a run.
 
     Attributes:
-        run: of the study.
-        steps: (evaluations,) environment steps.
-        returns: (evaluations, episodes) of the curve.
+        run: the run.
+        steps: (evaluations,) environment steps before each evaluation.
+        returns: (evaluations, episodes) returns of the learning curve.
         finals: (episodes,) returns of the latest policy.
-        progress: the task's progress in the latest evaluation by name, each (episodes,).
-        cpu: (evaluations,) s of the processor until then.
+        progress: metrics of the task in the latest evaluation by name, each (episodes,).
+        cpu: (evaluations,) s of CPU time before the end of each evaluation.
         style: metrics of style of the latest policy by name, each (episodes,).
         phases: (phases,) updates of each stabilization phase; empty if they are not published.
-        training_seeds: of the episodes that it learned from; None if they are unknown.
+        training_seeds: seeds of the episodes that the run learned from; None if they are unknown.
     """
 
     run: Run
@@ -58,122 +63,158 @@ class RunResult(NamedTuple):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What its final return must not be compared with others for."""
-        few = few_episodes(self.finals)
+        """Reasons why the final return is not comparable with others."""
+        reasons = list(note_few_episodes(self.finals))
         if self.training_seeds is None:
-            return (*few, provenance.UNKNOWN)
-        return few + (SHARED,) * bool(common_seeds(self.training_seeds, EVALUATION))
+            reasons.append(provenance.UNKNOWN)
+        elif common_seeds(self.training_seeds, EVALUATION):
+            reasons.append(SHARED_SEEDS)
+        return tuple(reasons)
 
 
 Groups = Mapping[str, Mapping[str, Sequence[RunResult]]]  # results by place and kind
 
 
-def results(runs: Sequence[Run], published: Path) -> list[RunResult]:
-    """Return the results of those runs of a study that are published.
+def read_results(runs: Sequence[Run], published: Path) -> list[RunResult]:
+    """Return the results of the published runs among the runs of a study.
+
+    Args:
+        runs: runs of the study.
+        published: folder of the study's tables.
 
     Raises:
         ValueError: a damaged table.
         OSError: a table cannot be read.
     """
-    episodes = episodes_of(published)
-    rows = {row["run"]: row for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
+    episodes_by_run = read_episodes(published)
+    row_by_run = {row["run"]: row for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
+    published_runs = [run for run in runs if run.name in episodes_by_run]
     try:
-        return [_result(run, episodes[run.name], rows[run.name]) for run in runs if run.name in episodes]
+        return [_result(run, episodes_by_run[run.name], row_by_run[run.name]) for run in published_runs]
     except (KeyError, ValueError) as error:
         raise ValueError(f"{published / EVALUATIONS}: damaged: {checks.quote(error)}") from None
 
 
-def episodes_of(published: Path) -> dict[str, list[dict[str, str]]]:
+def read_episodes(published: Path) -> dict[str, list[dict[str, str]]]:
     """Return the rows of the table of episodes by run, without the columns that a row leaves empty."""
-    found: dict[str, list[dict[str, str]]] = {}
+    rows_by_run: dict[str, list[dict[str, str]]] = {}
     for row in csv_files.read(published / EVALUATIONS):
-        found.setdefault(row["run"], []).append({name: text for name, text in row.items() if text})
-    return found
+        cells = {column: text for column, text in row.items() if text}
+        rows_by_run.setdefault(row["run"], []).append(cells)
+    return rows_by_run
 
 
-def _result(run: Run, rows: Sequence[Mapping[str, str]], known: Mapping[str, str]) -> RunResult:
-    by_step: dict[str, list[Mapping[str, str]]] = {}
-    for row in rows:
-        by_step.setdefault(row["step"], []).append(row)
-    *_, latest = by_step.values()
-    counts = [len(each) for each in by_step.values()]
-    if set(counts[:-1]) - {_FEW} or counts[-1] not in (_FEW, evaluation.EPISODES):
-        raise ValueError(f"{run.name}: expected {_FEW} episodes of a step, got {counts}")
+def _result(run: Run, episodes: Sequence[Mapping[str, str]], run_row: Mapping[str, str]) -> RunResult:
+    """Return the result of a run from its rows in the table of episodes, and its row in the table of runs."""
+    episodes_by_step: dict[str, list[Mapping[str, str]]] = {}
+    for episode in episodes:
+        episodes_by_step.setdefault(episode["step"], []).append(episode)
+    evaluations = list(episodes_by_step.values())
+    _check_counts(run.name, [len(evaluation_rows) for evaluation_rows in evaluations])
 
-    def curve(name):
-        return np.array([[row[name] for row in each[:_FEW]] for each in by_step.values()], float)
+    def curve_column(name: str) -> np.ndarray:
+        """Return a column of the episodes of the curve, (evaluations, episodes)."""
+        first_episodes = [evaluation_rows[: evaluation.CURVE_EPISODES] for evaluation_rows in evaluations]
+        return np.array([[row[name] for row in rows] for rows in first_episodes], float)
 
-    metrics = {n: np.array([row[n] for row in latest if n in row], float) for n in latest[0] if n not in _OTHERS}
+    latest = evaluations[-1]
+    progress = {}
+    style = {}
+    for name in latest[0]:
+        if name in _NOT_METRICS:
+            continue
+        values = np.array([row[name] for row in latest if name in row], float)
+        if name.startswith(STYLE):
+            style[name.removeprefix(STYLE)] = values
+        else:
+            progress[name] = values
+    updates_by_step = json.loads(run_row["phases"] or "{}")
     return RunResult(
         run=run,
-        steps=curve("step")[:, 0].astype(int),
-        returns=curve("return"),
+        steps=curve_column("step")[:, 0].astype(int),
+        returns=curve_column("return"),
         finals=np.array([row["return"] for row in latest], float),
-        progress={name: values for name, values in metrics.items() if not name.startswith(STYLE)},
-        cpu=curve("cpu_seconds")[:, 0],
-        style={name.removeprefix(STYLE): values for name, values in metrics.items() if name.startswith(STYLE)},
-        phases=np.array(list(json.loads(known["phases"] or "{}").values())),
-        training_seeds=from_json(json.loads(known[TRAINING_SEEDS] or "null")),
+        progress=progress,
+        cpu=curve_column("cpu_seconds")[:, 0],
+        style=style,
+        phases=np.array(list(updates_by_step.values())),
+        training_seeds=from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
     )
 
 
-def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
+def _check_counts(name: str, counts: Sequence[int]) -> None:
+    """Check how many episodes each evaluation of a run has: those of the curve, and in the latest maybe all."""
+    few = evaluation.CURVE_EPISODES
+    earlier_are_right = all(count == few for count in counts[:-1])
+    if not earlier_are_right or counts[-1] not in (few, evaluation.EPISODES):
+        raise ValueError(f"{name}: expected {few} episodes of a step, got {counts}")
+
+
+def read_demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
     """Return the returns of standing still and of demonstrators, (episodes,), by place (`Run.place`) and policy."""
     path = published / DEMONSTRATORS
     return anchors.read(path) if path.exists() else {}
 
 
-def grouped(found: Sequence[RunResult]) -> Groups:
-    """Return results by place and kind, each with all its seeds."""
+def group_by_place(results: Sequence[RunResult]) -> Groups:
+    """Return results by place and kind, with the results of all seeds in each."""
     groups: dict[str, dict[str, list[RunResult]]] = {}
-    for each in found:
-        groups.setdefault(each.run.place, {}).setdefault(each.run.kind, []).append(each)
+    for result in results:
+        kinds = groups.setdefault(result.run.place, {})
+        kinds.setdefault(result.run.kind, []).append(result)
     return groups
 
 
 def is_in_paper(result: RunResult) -> bool:
     """Return whether the paper's curves have a run."""
-    setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
-    plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
-    return plain and algorithm in CURVES.get(setup.body.name, {})
+    setup = result.run.configuration.setup
+    algorithm = result.run.configuration.algorithm
+    is_default_walk = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
+    return is_default_walk and algorithm in CURVES.get(setup.body.name, {})
 
 
-def few_episodes(returns: np.ndarray) -> tuple[str, ...]:
-    """Return the note of returns (episodes,) that are fewer than those of a final policy; none otherwise."""
-    return (TEN,) * (len(returns) < evaluation.EPISODES)
+def note_few_episodes(returns: np.ndarray) -> tuple[str, ...]:
+    """Return a note if there are fewer returns (episodes,) than a final policy has; none otherwise."""
+    return (TEN_EPISODES,) if len(returns) < evaluation.EPISODES else ()
 
 
-def notes(seeds: Iterable[RunResult]) -> str:
-    """Return the notes of all results, each once; a dash without any."""
-    return "; ".join(dict.fromkeys(note for each in seeds for note in each.notes)) or "-"
+def join_notes(seeds: Iterable[RunResult]) -> str:
+    """Return the notes of all results without repetitions; a dash without any."""
+    notes = [note for result in seeds for note in result.notes]
+    return "; ".join(dict.fromkeys(notes)) or "-"
 
 
-def scores(seeds: Sequence[RunResult]) -> np.ndarray:
-    """Return the mean return of each seed, (seeds,)."""
-    return np.array([each.final for each in seeds])
+def final_returns(seeds: Sequence[RunResult]) -> np.ndarray:
+    """Return the mean return of the latest policy of each seed, (seeds,)."""
+    return np.array([result.final for result in seeds])
 
 
 def curve(seeds: Sequence[RunResult]) -> tuple[np.ndarray, np.ndarray]:
     """Return the steps (points,) of the evaluations that all seeds have, and the mean returns (seeds, points)."""
-    count = min(len(each.steps) for each in seeds)
-    return seeds[0].steps[:count], np.array([each.returns.mean(axis=1)[:count] for each in seeds])
+    count = min(len(result.steps) for result in seeds)
+    steps = seeds[0].steps[:count]
+    return steps, np.array([result.returns.mean(axis=1)[:count] for result in seeds])
 
 
-def size(values: np.ndarray) -> float:
-    """Return the mean size of the values that are finite; NaN where none are."""
+def mean_size(values: np.ndarray) -> float:
+    """Return the mean absolute value of the finite values; NaN without any."""
     sizes = np.abs(values[np.isfinite(values)])
     return float(sizes.mean()) if sizes.size else np.nan
 
 
-def until(seeds: Sequence[RunResult], threshold: float) -> tuple[float, float]:
-    """Return environment steps and s of the processor up to a mean return of `threshold`.
+def cost_of_return(seeds: Sequence[RunResult], threshold: float) -> tuple[float, float]:
+    """Return the environment steps and the s of CPU time until an evaluation has a mean return of `threshold`.
 
     Returns:
         Means over the seeds; infinite if a seed has not reached it.
     """
-    found = []
-    for each in seeds:
-        enough = np.flatnonzero(each.returns.mean(axis=1) >= threshold)
-        found.append((each.steps[enough[0]], each.cpu[enough[0]]) if enough.size else (np.inf, np.inf))
-    steps, seconds = np.mean(found, axis=0)
+    costs = []
+    for result in seeds:
+        reaching = np.flatnonzero(result.returns.mean(axis=1) >= threshold)
+        if reaching.size:
+            first = reaching[0]
+            costs.append((result.steps[first], result.cpu[first]))
+        else:
+            costs.append((np.inf, np.inf))
+    steps, seconds = np.mean(costs, axis=0)
     return float(steps), float(seconds)

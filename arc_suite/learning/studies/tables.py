@@ -20,7 +20,7 @@ class Prior(NamedTuple):
     """Prior data: episodes of the body's demonstrator in the task of the run.
 
     Attributes:
-        preset: of the demonstrator.
+        preset: preset of the demonstrator.
         episodes: number of episodes.
     """
 
@@ -33,17 +33,18 @@ class Prior(NamedTuple):
 
     def dataset_id(self, setup: Setup) -> str:
         """Return the id of the dataset."""
-        whole = self.settings(setup).dataset_id()
-        few = f"-{self.episodes}episodes-v0"
-        return whole if self.episodes == _EPISODES else whole.removesuffix("-v0") + few
+        default_id = self.settings(setup).dataset_id()
+        if self.episodes == _EPISODES:
+            return default_id
+        return default_id.removesuffix("-v0") + f"-{self.episodes}episodes-v0"
 
 
 class Run(NamedTuple):
     """A run of a study; `run` makes it.
 
     Attributes:
-        configuration: of the training.
-        label: name of its kind in the report; empty for the algorithm.
+        configuration: configuration of the training.
+        label: name of its kind in the report; empty for the name of the algorithm.
         prior: data that are collected before the run; None for none.
     """
 
@@ -53,14 +54,14 @@ class Run(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Name of this run and its other seeds."""
+        """Name that the runs of all seeds share."""
         return self.label or self.configuration.algorithm
 
     @property
     def name(self) -> str:
         """Name of its folder."""
-        setup, seed = self.configuration.setup, self.configuration.seed
-        return folder_name(f"{setup.body.name}-{setup.kind.name}-{self.kind}-{seed}")
+        setup = self.configuration.setup
+        return folder_name(f"{setup.body.name}-{setup.kind.name}-{self.kind}-{self.configuration.seed}")
 
     @property
     def place(self) -> str:
@@ -87,9 +88,9 @@ def run(
         robot: name of a robot, or `module:name`.
         algorithm, steps, seed, hyperparameters, evaluate_every, training: see `Configuration.of`.
         task: name of the task.
-        task_kwargs: its settings, as in `arc_suite.load`.
+        task_kwargs: settings of the task, as in `arc_suite.load`.
         prior: prior data; None for none.
-        label: name of its kind in the report; empty for the algorithm.
+        label: name of its kind in the report; empty for the name of the algorithm.
 
     Raises:
         ValueError: an unknown robot, task, algorithm or hyperparameter.
@@ -104,8 +105,8 @@ class Study(NamedTuple):
     """A study.
 
     Attributes:
-        title: of its report; names what is not as in the paper.
-        runs: the most urgent first.
+        title: title of its report; it names what differs from the paper.
+        runs: runs, the most urgent first.
     """
 
     title: str
@@ -113,25 +114,28 @@ class Study(NamedTuple):
 
 
 def benchmark(division: str, algorithm: str) -> Study:
-    """Return the study of an algorithm on a division of the benchmark: all places with the first seed, then the others.
+    """Return the study of an algorithm on a division of the benchmark.
+
+    All places with the first seed come first, then those with the second, and so on.
 
     Raises:
         ValueError: an unknown division or algorithm, or one that learns from something else than the division gives.
     """
     rule = DIVISIONS[checks.name(division, DIVISIONS, "division")]
-    if (source := algorithms.algorithm(algorithm).source) != rule.source:
-        fit = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.source == rule.source)
+    source = algorithms.algorithm(algorithm).source
+    if source != rule.source:
+        fitting_names = [name for name, entry in algorithms.ALGORITHMS.items() if entry.source == rule.source]
         what = f"algorithm {algorithm} learns from {source}, and the division {division} takes those that learn from"
-        raise ValueError(f"{what} {rule.source}: {fit}")
+        raise ValueError(f"{what} {rule.source}: {', '.join(fitting_names)}")
     runs = []
     for seed, (robot, task) in itertools.product(range(SEEDS), PLACES):
-        prior = Prior(_collects(robot, task), rule.episodes) if rule.episodes else None
+        prior = Prior(_collecting_preset(robot, task), rule.episodes) if rule.episodes else None
         runs.append(run(robot, algorithm, rule.steps_in(task), seed, task, prior=prior))
     return Study(f"division {division} of the benchmark: {algorithm}", tuple(runs))
 
 
-def _collects(robot: str, task: str) -> str:
-    """The preset that collects prior data of a place: on `walk` that of the paper, elsewhere the one that suits."""
+def _collecting_preset(robot: str, task: str) -> str:
+    """Return the preset that collects prior data: that of the paper on `walk`, elsewhere the one that suits."""
     return "medium" if task == "walk" else suited_preset(Setup.of(robot, task).definition)
 
 
@@ -152,10 +156,12 @@ def study(name: str) -> Study:
     if ":" not in name:
         expected = "expected module:attribute, a Study on Python's path, or <division>-<algorithm> of the benchmark"
         raise ValueError(f"study {checks.preview(name)}: {expected}, such as {next(iter(DIVISIONS))}-ppo")
-    found = checks.import_object(name, "study")
-    if not isinstance(found, Study):
-        raise ValueError(f"study {checks.preview(name)}: expected a Study, got {type(found).__name__}")
-    for each, count in collections.Counter(each.name for each in found.runs).items():
+    imported = checks.import_object(name, "study")
+    if not isinstance(imported, Study):
+        raise ValueError(f"study {checks.preview(name)}: expected a Study, got {type(imported).__name__}")
+    run_names = collections.Counter(run.name for run in imported.runs)
+    for run_name, count in run_names.items():
         if count > 1:
-            raise ValueError(f"study {checks.preview(name)}: {count} runs are named {each}; a label tells them apart")
-    return found
+            what = f"{count} runs are named {run_name}; a label tells them apart"
+            raise ValueError(f"study {checks.preview(name)}: {what}")
+    return imported

@@ -82,23 +82,23 @@ def result(levels, steps=(50_000, 100_000), **fields):
 
 
 def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
-    (score,) = benchmark.of_results([result([0.6, 0.4])])
+    (score,) = benchmark.score_results([result([0.6, 0.4])])
     assert (score.robot, score.task, score.seed) == ("tick", "walk", 0)
     assert score.result == pytest.approx(scale().at(0.4)) and score.score == pytest.approx(0.4)
     assert score.minutes == 1.0
     assert (score.gait_compliance, score.heading_error) == (pytest.approx(0.9), pytest.approx(0.2))
-    (slow,) = benchmark.of_results([result([0.1, 0.4], seed=1)])
+    (slow,) = benchmark.score_results([result([0.1, 0.4], seed=1)])
     assert slow.minutes == np.inf and slow.seed == 1
 
 
 def test_scores_are_clipped_and_unfinished_runs_have_none():
-    low, high = benchmark.of_results([result([0.0, -3.0]), result([0.0, 9.0])])
+    low, high = benchmark.score_results([result([0.0, -3.0]), result([0.0, 9.0])])
     assert (low.score, high.score) == (-0.5, 1.2)
-    assert benchmark.of_results([result([0.0, 0.5], steps=(50_000, 90_000))]) == []
+    assert benchmark.score_results([result([0.0, 0.5], steps=(50_000, 90_000))]) == []
 
 
 def test_headings_are_not_judged_where_commands_turn():
-    (score,) = benchmark.of_results([result([0.1, 0.2], task="steer")])
+    (score,) = benchmark.score_results([result([0.1, 0.2], task="steer")])
     assert np.isnan(score.heading_error) and score.gait_compliance == pytest.approx(0.9)
 
 
@@ -154,7 +154,7 @@ def test_weak_places_lower_the_total(tmp_path):
 def test_the_committed_total_sees_its_weakest_places():
     scores = benchmark.read(COMMITTED)["samples", "sac_parallel"]
     weak = [each._replace(score=-1.0) if each.task == "steer" and each.robot != "leaper" else each for each in scores]
-    (before, _), (after, _) = (benchmark.total(benchmark.by_place(each)) for each in (scores, weak))
+    (before, _), (after, _) = (benchmark.total(benchmark.group_by_place(each)) for each in (scores, weak))
     assert after < before - 0.15
 
 
@@ -222,7 +222,7 @@ def test_policies_of_other_names_are_refused_before_any_plays(tmp_path, name, li
     for each in (path, tmp_path / "tick-walk-0.npz"):
         each.write_bytes(b"")
     with refused(f"{tmp_path / name.partition('/')[0]}: {line}"):
-        benchmark.of_policies(tmp_path, progress=None)
+        benchmark.score_policies(tmp_path, progress=None)
 
 
 MODULE = """
@@ -244,7 +244,7 @@ def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypa
     for name in ("README.md", ".hidden.py", "_helpers.py", "tick-walk-2_vecnormalize.pkl", "studies/other.zip"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(b"")
-    (found,) = benchmark.of_policies(tmp_path, lambda each, **_: each)
+    (found,) = benchmark.score_policies(tmp_path, lambda each, **_: each)
     assert found[:3] == ("tick", "walk", 2) and found.score == pytest.approx(0.0, abs=0.05)
 
 
@@ -303,6 +303,6 @@ def test_a_track_is_run_and_resumed(tmp_path):
 
 @pytest.mark.parametrize("name", [f"{division}-{learner}" for division, learner in benchmark.read(COMMITTED)])
 def test_committed_scores_are_those_of_committed_results(name):
-    expected = benchmark.of_results(results.results(tables.study(name).runs, COMMITTED / name))
+    expected = benchmark.score_results(results.read_results(tables.study(name).runs, COMMITTED / name))
     for one, other in zip(benchmark.read(COMMITTED)[tuple(name.split("-", 1))], expected, strict=True):
         assert one[:3] == other[:3] and one[3:] == pytest.approx(other[3:], nan_ok=True)

@@ -133,7 +133,7 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     tables_before = tables_of()
     publication.publish(tiny_studies.WITH_NUMPY.runs, folder, tmp_path / "results")
     assert tables_of() == tables_before
-    published = results.results(tiny_studies.WITH_NUMPY.runs, tmp_path / "results")
+    published = results.read_results(tiny_studies.WITH_NUMPY.runs, tmp_path / "results")
     assert [each.run.name for each in published] == [names[0], names[1], names[7]]
     environment = load("tick", "walk", tiny_studies.SHORT)
     policy = policies.policy(folder / first.name, "tick")
@@ -163,7 +163,7 @@ def test_the_style_is_that_of_the_latest_whole_evaluation(tmp_path):
     (folder / "style.csv").unlink()
     publication.publish([each], tmp_path / "runs", tmp_path / "results")
     assert (tmp_path / "results" / "evaluations.csv").read_text() == before
-    (found,) = results.results([each], tmp_path / "results")
+    (found,) = results.read_results([each], tmp_path / "results")
     assert found.steps.tolist() == [20]
 
 
@@ -204,11 +204,11 @@ def test_a_run_is_judged_without_its_settings_of_training(tmp_path):
     assert {name: json.loads(row[name]) for name in own} == own
     table = run_folder.table(folder / each.name, "evaluations")
     assert "distance" in table and "level" not in table
-    assert results.demonstrators(published).keys() == {each.place}
+    assert results.read_demonstrators(published).keys() == {each.place}
     with contextlib.closing(load("tick", "gaps", tiny_studies.SHORT)) as environment:
         policy = policies.policy(folder / each.name, "tick", task=environment.task.definition)
         assert evaluation.run(environment, policy, 4).total == table["return"][4]
-        (found,) = results.results([each], published)
+        (found,) = results.read_results([each], published)
         assert found.finals[:10].tolist() == found.returns[-1].tolist() == table["return"].tolist()
         assert len(found.finals) == evaluation.EPISODES and found.notes == ()
         assert evaluation.run(environment, policy, 57).total == found.finals[57], "the first ten are the curve's"
@@ -231,14 +231,14 @@ def test_phases_are_published(tmp_path):
     (tmp_path / "training.csv").write_text("\n".join(lines) + "\n")
     each = run("tick", "speq", 5000)
     (tmp_path / "config.json").write_text(json.dumps(each.configuration.to_dict()))
-    row = publication._configuration(each, tmp_path)
+    row = publication._run_row(each, tmp_path)
     assert row["phases"] == '{"2000": 300, "4000": 75000}'
     assert row["robot"] == "tick" and row["prior"] == "" and row["seed"] == "0"
 
 
 def test_columns_stay_in_the_order_of_each_task():
     tasks = ["tracking", "fell"], ["distance", "tracking", "sank"], ["goals", "tracking", "fell", "hits"]
-    assert publication._merged(tasks) == ["distance", "goals", "tracking", "fell", "sank", "hits"]
+    assert publication._merge_orders(tasks) == ["distance", "goals", "tracking", "fell", "sank", "hits"]
 
 
 @pytest.mark.parametrize(
@@ -304,5 +304,5 @@ def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_pat
     monkeypatch.setattr(evaluation, "EPISODES", 10)
     each = run("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
     publication._publish_demonstrators([each], tmp_path)
-    found = results.demonstrators(tmp_path)[each.place]
+    found = results.read_demonstrators(tmp_path)[each.place]
     assert set(found) == presets and all(len(totals) == 10 for totals in found.values())

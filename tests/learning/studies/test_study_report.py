@@ -66,7 +66,7 @@ def test_unfinished_evaluations_do_not_count(tmp_path):
     (tmp_path / "times.csv").write_text(
         "step,wall_seconds,cpu_seconds\n1000,1,1.0\n1500,2,2.0\n2000,3,3.0\n3000,4,4.0\n"
     )
-    found = publication._evaluated(tmp_path)
+    found = publication._complete_evaluations(tmp_path)
     rows = [(row["step"], row["seed"], row["cpu_seconds"]) for row in found]
     assert len(rows) == 20 and rows[9:11] == [("1000", "9", "1.0"), ("2000", "0", "3.0")]
 
@@ -77,7 +77,7 @@ def test_damaged_tables_are_one_line(tmp_path):
     path = tmp_path / results.EVALUATIONS
     path.write_text(path.read_text() + f"{each.name},1000000,0,1.0,1000,0.3,0.9,1.0,1.0" + 6 * "," + "\n")
     with pytest.raises(ValueError, match=r"evaluations.csv: damaged: "):
-        results.results([each], tmp_path)
+        results.read_results([each], tmp_path)
 
 
 @pytest.mark.slow
@@ -114,9 +114,9 @@ def test_until(tmp_path):
     runs = run("tick", "sac", 1_000_000), run("tick", "sac", 1_000_000, 1)
     publish(tmp_path, runs[0], constant(100.0, 900.0))
     publish(tmp_path, runs[1], constant(500.0, 600.0))
-    found = results.results(runs, tmp_path)
-    assert results.until(found, 500.0) == (750_000.0, 120.0)
-    assert results.until(found, 700.0) == (np.inf, np.inf)
+    found = results.read_results(runs, tmp_path)
+    assert results.cost_of_return(found, 500.0) == (750_000.0, 120.0)
+    assert results.cost_of_return(found, 700.0) == (np.inf, np.inf)
 
 
 def test_nothing_published_is_one_line(tmp_path):

@@ -38,7 +38,7 @@ from arc_suite.learning.cli import train
 for command in json.loads(sys.argv[1]):
     with flagsaver.flagsaver():
         train.FLAGS(shlex.split(command)[1:])
-        print(json.dumps(train.configured()[0].to_dict()))
+        print(json.dumps(train.configurations_from_flags()[0].to_dict()))
 """
 
 
