@@ -26,18 +26,18 @@ class BalancingParameters(NamedTuple):
     """How a demonstrator that keeps its balance walks.
 
     Attributes:
-        feet: places of the soles at ease, for each rank of legs from the front: forward, outward and
+        feet: positions of the soles at rest, for each rank of legs from the front: forward, outward and
             up from the torso, in standing heights; None for those of the standing pose.
-        lift: of a foot in mid-swing, in standing heights.
-        gain: of the motion's error, forward, left and turning.
-        integral: of the same, a cycle of the gait.
+        lift: height of a foot in mid-swing, in standing heights.
+        gain: of the feedback on the motion's error: forward, left and turning.
+        integral: gain of the same error, added up over a cycle of the gait.
         most: largest request, in units of the command.
-        shorter: stance than the gait prescribes, cycles.
+        shorter: by which the stance is shorter than in the task's gait, cycles.
         lead: of all legs over the gait's clock, cycles.
-        attitude: how far a foot is pushed down, as a share of how far the torso's tilt sinks its place.
-        lean: share of the distance by which the torso's weight falls aside of the feet, by which they follow.
-        capture: share of the distance that an unwanted velocity carries an inverted pendulum, by which
-            feet follow.
+        attitude: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
+        lean: shift of footholds, as a share of the distance by which the torso's weight falls aside of the feet.
+        capture: shift of footholds, as a share of the distance that an unwanted velocity carries an inverted
+            pendulum.
     """
 
     feet: tuple[tuple[float, float, float], ...] | None = None
@@ -52,8 +52,8 @@ class BalancingParameters(NamedTuple):
     capture: float = 0.45
 
 
-_STEEP = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops
-_KEPT = 0.6  # share of the shift for balance that is left when a foot takes off
+_SLOWING_TILT = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops
+_TAKE_OFF_SHARE = 0.6  # share of the shift for balance that is left when a foot takes off
 
 
 class Balanced(Stepping):
@@ -65,31 +65,43 @@ class Balanced(Stepping):
         Raises:
             ValueError: `feet` is for another number of ranks of legs.
         """
-        body, feet = task.scene.body, parameters.feet
-        if feet is not None and len(feet) != (ranks := max(body.ranks) + 1):
-            raise ValueError(f"preset: {body.name} has {ranks} ranks of legs, and feet is for {len(feet)}")
+        body = task.scene.body
+        rank_count = max(body.ranks) + 1
+        if parameters.feet is not None and len(parameters.feet) != rank_count:
+            raise ValueError(
+                f"preset: {body.name} has {rank_count} ranks of legs, and feet is for {len(parameters.feet)}"
+            )
         super().__init__(task, parameters)
-        self.shorter, self.attitude, self.most = parameters.shorter, parameters.attitude, parameters.most
+        self.stance_reduction = parameters.shorter
+        self.tilt_share = parameters.attitude
+        self.max_request = parameters.most
         self.duty_factor -= parameters.shorter
         self.stance_duration = self.duty_factor / gait_of(task).frequency
-        self._ride = -self.rest_soles[:, 2].mean()
-        self._fall = math.sqrt(self._ride / GRAVITY)  # s, of an inverted pendulum as high
+        self._ride_height = -self.rest_soles[:, 2].mean()  # m
+        self._pendulum_time = math.sqrt(self._ride_height / GRAVITY)  # s, of an inverted pendulum of this height
 
-    def _eased(self, task: Task) -> tuple:
-        body, feet, places = task.scene.body, self.parameters.feet, self.pose.soles.copy()
-        if feet is not None:
-            places = np.array([feet[rank] for rank in body.ranks]) * self.pose.height
-            places[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
+    def _find_rest(self, task: Task) -> tuple[Legs, np.ndarray, np.ndarray]:
+        body = task.scene.body
+        feet_by_rank = self.parameters.feet
+        if feet_by_rank is None:
+            rest_soles = self.mechanics.soles.copy()
+        else:
+            rest_soles = np.array([feet_by_rank[rank] for rank in body.ranks]) * self.mechanics.height
+            rest_soles[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
         legs = Legs.of(self.body, posture.JOINT_RANGE_SHARE)
-        return legs, places, legs.relaxed_joint_angles(places, np.eye(3), self._damping)
+        return legs, rest_soles, legs.relaxed_joint_angles(rest_soles, np.eye(3), self._ik_damping)
 
     def balance(self, motion, vertical, observation: Mapping) -> tuple:
-        """Return the velocity that feet give, and shifts of footholds; see `Stepping`."""
-        numpy, p = motion.__array_namespace__(), self.parameters
-        motion, _ = super().balance(motion, vertical, observation)
-        motion = motion * (2.0 - numpy.hypot(vertical[:, :1], vertical[:, 1:2]) / _STEEP).clip(0.0, 1.0)
-        surplus = observation["velocities"][:, :2] - observation["command"][:, :2] * self.units[:2]
-        return motion, p.capture * self._fall * surplus - p.lean * self._ride * vertical[:, :2]
+        """Return the velocity that feet give the torso, and shifts of footholds; see `Stepping`."""
+        xp = motion.__array_namespace__()
+        full_velocity, _ = super().balance(motion, vertical, observation)
+        tilt = xp.hypot(vertical[:, :1], vertical[:, 1:2])  # sine of its angle
+        velocity = full_velocity * (2.0 - tilt / _SLOWING_TILT).clip(0.0, 1.0)
+        commanded_velocity = observation["command"][:, :2] * self.units[:2]  # m/s
+        unwanted_velocity = observation["velocities"][:, :2] - commanded_velocity
+        capture_shift = self.parameters.capture * self._pendulum_time * unwanted_velocity
+        lean_shift = self.parameters.lean * self._ride_height * vertical[:, :2]
+        return velocity, capture_shift - lean_shift
 
-    def _kept(self, along):
-        return _KEPT + (1.0 - _KEPT) * 0.5 * (1.0 + along)
+    def _shift_share(self, path_position):
+        return _TAKE_OFF_SHARE + (1.0 - _TAKE_OFF_SHARE) * 0.5 * (1.0 + path_position)

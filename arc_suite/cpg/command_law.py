@@ -14,8 +14,8 @@ from arc_suite.models.standing import pose_mechanics
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import velocity_units
 
-_SMOOTHING = 0.25  # cycles over which a new command takes hold
-_ONSET = 1.0  # cycles over which the gait grows to its full size
+_SMOOTHING_CYCLES = 0.25  # cycles over which a new command takes hold
+_ONSET_CYCLES = 1.0  # cycles over which the gait grows to its full size
 
 
 class CommandLawState(NamedTuple):
@@ -27,7 +27,7 @@ class CommandLawState(NamedTuple):
         motion: (environments, 3) requested of the feet, in the same units; held while the command rests.
         size: (environments, 1) of the gait, from 0 to 1.
         phase: (environments,) of the gait in the next control step, cycles; held while the command rests.
-        paths: a law's own, an array or a NamedTuple of arrays.
+        paths: state of a law derived from this one, an array or a NamedTuple of arrays.
     """
 
     command: np.ndarray
@@ -60,16 +60,16 @@ class CommandLaw(ABC):
     Attributes:
         parameters: of the law; a NamedTuple with fields `gain`, `integral` and `lead`, at least.
         body: with motors and armatures.
-        pose: in which it stands.
-        step: s between two actions.
-        cycles: of the gait in a control step.
+        mechanics: of the pose about which joints are controlled.
+        control_timestep: s between two actions.
+        cycles_per_step: of the gait in a control step.
         smoothing: share of a new command that takes hold in a control step.
         onset: share of its full size by which the gait grows in a control step.
-        duty_factor: of the gait.
-        stance: that it lasts, s.
-        offsets: (legs,) over the task's clock, cycles.
+        duty_factor: share of a cycle that a foot stands.
+        stance_duration: s.
+        phase_offsets: (legs,) over the task's clock, cycles.
         units: (3,) of the command, m/s and rad/s.
-        drive: of the joints.
+        drive: moves the joints to their targets.
     """
 
     reads: tuple[str, ...] = ("posture", "velocities", "command", "gait_clock")
@@ -85,51 +85,82 @@ class CommandLaw(ABC):
         Raises:
             ValueError: a gait without a cycle, or without stance or swing.
         """
-        gait, self.parameters, self.body = gait_of(task), parameters, size_body(task.scene.body)
-        self.pose, self.control_timestep = pose_mechanics(self.body, angles), task.scene.control_timestep
-        self.cycles_per_step, self.duty_factor = gait.frequency * self.control_timestep, gait.duty_factor
-        self.smoothing, self.onset = min(1.0, self.cycles_per_step / _SMOOTHING), self.cycles_per_step / _ONSET
-        self.stance_duration, self.offsets = gait.duty_factor / gait.frequency, gait.offsets + parameters.lead
+        gait = gait_of(task)
+        self.parameters = parameters
+        self.body = size_body(task.scene.body)
+        self.mechanics = pose_mechanics(self.body, angles)
+        self.control_timestep = task.scene.control_timestep
+        self.cycles_per_step = gait.frequency * self.control_timestep
+        self.smoothing = min(1.0, self.cycles_per_step / _SMOOTHING_CYCLES)
+        self.onset = self.cycles_per_step / _ONSET_CYCLES
+        self.duty_factor = gait.duty_factor
+        self.stance_duration = gait.duty_factor / gait.frequency
+        self.phase_offsets = gait.offsets + parameters.lead
         self.units = velocity_units(self.body, gait.target_velocity)
-        self.drive = drive(self.body, self.pose.inertias)
+        self.drive = drive(self.body, self.mechanics.inertias)
 
     def initial(self, count: int) -> CommandLawState:
         """Return the state at the start of episodes in a number of environments."""
         zeros = np.zeros((count, 3))
-        return CommandLawState(zeros, zeros, zeros, zeros[:, :1], zeros[:, 0], self.initial_paths(count))
+        return CommandLawState(
+            command=zeros,
+            integral=zeros,
+            motion=zeros,
+            size=zeros[:, :1],
+            phase=zeros[:, 0],
+            paths=self.initial_paths(count),
+        )
 
     def __call__(self, state: CommandLawState, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints); see `law`."""
-        _, angles, velocities = proprioception(observation)
-        state, targets, speeds = self.targets(state, observation)
-        return state, self.drive.actions(targets, speeds, angles, velocities)
+        _, joint_angles, joint_velocities = proprioception(observation)
+        next_state, target_angles, target_velocities = self.targets(state, observation)
+        actions = self.drive.actions(target_angles, target_velocities, joint_angles, joint_velocities)
+        return next_state, actions
 
     def targets(self, state: CommandLawState, observation: Mapping) -> tuple:
-        """Return the next state, and the joints' target angles, rad, and velocities, rad/s, (environments, joints)."""
-        state, request = self._requested(state, observation["command"], observation["gait_clock"])
-        paths, targets, change = self.planned(state.paths, request, observation)
-        return state._replace(paths=paths), targets, change / self.control_timestep
+        """Return the next state, and target angles, rad, and velocities, rad/s, of joints: (environments, joints)."""
+        next_state, request = self._make_request(state, observation["command"], observation["gait_clock"])
+        paths, target_angles, angle_changes = self.planned(state.paths, request, observation)
+        return next_state._replace(paths=paths), target_angles, angle_changes / self.control_timestep
 
-    def _requested(self, state: CommandLawState, command, clock) -> tuple[CommandLawState, Request]:
-        """The next state, and what feet are to do, by proportional and integral feedback on the command."""
-        numpy, wanted, motion = clock.__array_namespace__(), command[:, :3], command[:, 3:]
-        going = clock.any(axis=-1, keepdims=True)
-        smooth = state.command + self.smoothing * (wanted - state.command)
-        integral = state.integral + self.parameters.integral * self.cycles_per_step * (wanted - motion)
-        integral = integral.clip(-1.0, 1.0) * going
-        size = (state.size + numpy.where(going, 1.0, -1.0) * self.onset).clip(0.0, 1.0)
-        # At rest the clock reads (0, 0), which is no phase.
-        phase = numpy.where(going[:, 0], numpy.arctan2(clock[:, 0], clock[:, 1]) / (2.0 * np.pi), state.phase)
-        advance = self.cycles_per_step * going[:, 0]
-        requested = smooth + integral + np.array(self.parameters.gain) * (smooth - motion)
-        requested = numpy.where(going, requested, state.motion)
-        state = CommandLawState(smooth, integral, requested, size, phase + advance, state.paths)
-        return state, Request(requested, size, phase, advance)
+    def _make_request(self, state: CommandLawState, command, clock) -> tuple[CommandLawState, Request]:
+        """Return the next state, and what feet are to do, by proportional and integral feedback on the command.
+
+        Args:
+            state: before the control step.
+            command: (environments, 6) desired and measured motion, in units of the command.
+            clock: (environments, 2) sine and cosine of the gait's phase; (0, 0) while the command rests.
+        """
+        xp = clock.__array_namespace__()
+        desired = command[:, :3]
+        measured = command[:, 3:]
+        is_walking = clock.any(axis=-1, keepdims=True)  # (environments, 1)
+
+        smooth = state.command + self.smoothing * (desired - state.command)
+        integral = state.integral + self.parameters.integral * self.cycles_per_step * (desired - measured)
+        integral = integral.clip(-1.0, 1.0) * is_walking
+        feedback = np.array(self.parameters.gain) * (smooth - measured)
+        motion = xp.where(is_walking, smooth + integral + feedback, state.motion)
+
+        size_change = xp.where(is_walking, 1.0, -1.0) * self.onset
+        size = (state.size + size_change).clip(0.0, 1.0)
+        clock_phase = xp.arctan2(clock[:, 0], clock[:, 1]) / (2.0 * np.pi)
+        phase = xp.where(is_walking[:, 0], clock_phase, state.phase)  # a clock at rest has no phase
+        advance = self.cycles_per_step * is_walking[:, 0]
+        next_state = CommandLawState(smooth, integral, motion, size, phase + advance, state.paths)
+        return next_state, Request(motion, size, phase, advance)
 
     @abstractmethod
     def initial_paths(self, count: int) -> Any:
-        """Return the law's own state at the start of episodes in a number of environments."""
+        """Return the state of a derived law at the start of episodes in a number of environments."""
 
     @abstractmethod
-    def planned(self, paths, request: Request, observation: Mapping) -> tuple:
-        """Return the law's own next state, target angles (environments, joints), rad, and their change in a step."""
+    def planned(self, state, request: Request, observation: Mapping) -> tuple:
+        """Return a derived law's next state, target angles (environments, joints), rad, and their change in a step.
+
+        Args:
+            state: of the derived law, before the control step.
+            request: what feet are to do.
+            observation: blocks by name, (environments, size) each.
+        """

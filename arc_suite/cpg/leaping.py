@@ -126,7 +126,7 @@ class Leaping(Sighted):
 
     def _landings(self, view: footholds.View, moved) -> tuple:
         """Shifts (environments, legs) of where feet land, m, and whether there is ground, given the way so far, m."""
-        numpy, height = moved.__array_namespace__(), self.pose.height
+        numpy, height = moved.__array_namespace__(), self.mechanics.height
         left = (self.flight.distance * height - moved).clip(0.0)
         landing = self.rest_soles[:, :2] + numpy.stack([left, 0.0 * left], axis=-1)[:, None]
         along = numpy.broadcast_to(np.array((1.0, 0.0)), landing.shape)
@@ -135,7 +135,7 @@ class Leaping(Sighted):
 
     def _close(self, view: footholds.View, observation: Mapping):
         """Whether (environments,) all feet stand, and one is close to what it cannot step over."""
-        numpy, height, p = observation["posture"].__array_namespace__(), self.pose.height, self._leaping
+        numpy, height, p = observation["posture"].__array_namespace__(), self.mechanics.height, self._leaping
         soles = self.legs.soles(self.legs.by_leg(observation["posture"][:, 5:]))[0]
         high = (soles * rotations.matrix(observation["posture"][:, 1:5])[:, None, 2]).sum(axis=-1)
         stands = (high > numpy.median(high, axis=-1)[:, None] - _SUNK * height).all(axis=-1)
@@ -156,7 +156,7 @@ class Leaping(Sighted):
             step: (environments,) of the leap.
             shifts: (environments, legs) of where feet land, m.
         """
-        numpy, made, height = step.__array_namespace__(), self._movement, self.pose.height
+        numpy, made, height = step.__array_namespace__(), self._movement, self.mechanics.height
         offsets = numpy.concatenate([np.zeros((1, 3)), made.sole_offsets])
         now = step.clip(0, self._last)
         level = numpy.broadcast_to(self.rest_soles[:, 2:], walk.feet[..., 2:].shape)

@@ -88,8 +88,8 @@ class Sighted(CommandLaw):
         """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
         self.duty_factor -= parameters.longer
-        self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.pose.height
-        soles = np.where((True, True, False), self.pose.soles, -ride)
+        self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.mechanics.height
+        soles = np.where((True, True, False), self.mechanics.soles, -ride)
         angles = self.legs.relaxed_joint_angles(soles, np.diag((0.2, 0.2, 1.0)), posture.IK_DAMPING * ride)
         self.rest_soles = self.legs.soles(angles)[0]
         scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
@@ -101,10 +101,10 @@ class Sighted(CommandLaw):
 
     def planned(self, paths: SightedState, request: Request, observation: Mapping) -> tuple:
         """Return the next paths of the feet, target angles (environments, joints), rad, and their change."""
-        p, height = self.parameters, self.pose.height
+        p, height = self.parameters, self.mechanics.height
         paths = self._looked(paths, observation["scan"], observation["velocities"][:, :2])
         motion = request.size * request.motion.clip(-p.most, p.most) * self.units
-        cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0  # in the next control step
+        cycle = (request.phase[:, None] + self.phase_offsets + request.advance[:, None]) % 1.0  # in the next control step
         predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
         feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
         aims = path_weights(point_velocities(motion, feet), _ACROSS)
@@ -163,7 +163,7 @@ class Sighted(CommandLaw):
             rotations.matrix(quaternion)[:, 2], self.rest_soles
         )  # by the world's vertical in the torso's frame
         progress = ((cycle - duty) / (1.0 - duty)).clip(0.0)
-        lift = size * self.parameters.lift * self.pose.height * numpy.sin(np.pi * progress)
+        lift = size * self.parameters.lift * self.mechanics.height * numpy.sin(np.pi * progress)
         heights = self.rest_soles[:, 2] + lift + self.parameters.attitude * tilt
         ground = numpy.where(stands[..., None], stood, swung)
         return numpy.concatenate([ground, heights[..., None]], axis=-1), shifts
@@ -181,7 +181,7 @@ class Sighted(CommandLaw):
         half = 0.5 * self.stance_duration * point_velocities(motion, self.rest_soles)
         along = half / numpy.maximum(numpy.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
         landing, view = self.rest_soles[:, :2] + half, footholds.View(paths.heights, paths.moved, self._reach)
-        near, height = self.rest_soles[:, :2], self.pose.height
+        near, height = self.rest_soles[:, :2], self.mechanics.height
         found, _ = footholds.find_landings(view, landing + moved, along, near, height, self.around)
         shifts = numpy.where(held, paths.shifts, found)
         return landing + shifts[..., None] * along, shifts

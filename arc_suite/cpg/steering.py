@@ -83,7 +83,7 @@ class Steered(CommandLaw):
         self.neutral = _neutral(body, parameters.share)
         super().__init__(task, parameters, tuple(self.neutral))
         self.legs = list(self._legs())
-        self.feet = (self.pose.soles - self.pose.center)[:, :2]
+        self.feet = (self.mechanics.soles - self.mechanics.center)[:, :2]
         self.extent = float(max(np.hypot(*self.feet.T) + [leg.foot.radius for leg in body.legs]))
 
     def initial_paths(self, count: int) -> tuple:
@@ -95,7 +95,7 @@ class Steered(CommandLaw):
         numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
         paths = 0.5 * self.stance_duration * point_velocities(request.motion * self.units, self.feet)
         # The low side of the torso is pushed up: its feet go down.
-        lows = -tilt_heights(rotations.matrix(quaternion)[:, 2], self.feet) / self.pose.height
+        lows = -tilt_heights(rotations.matrix(quaternion)[:, 2], self.feet) / self.mechanics.height
         unload = self.parameters.unload / self.parameters.lift
         now, later = [], []
         for index, leg in enumerate(self.legs):
@@ -103,7 +103,7 @@ class Steered(CommandLaw):
             low = lows[:, index : index + 1]
             raised = ((1.0 - able) * unload - self.parameters.attitude * low) * leg.lift
             for targets, phase in ((now, request.phase), (later, request.phase + request.advance)):
-                cycle = (phase + self.offsets[index]) % 1.0
+                cycle = (phase + self.phase_offsets[index]) % 1.0
                 targets.append(raised + cycle_angles(cycle[:, None], self.duty_factor, sweep, leg.lift))
         now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
         return none, self.neutral + now, later - now
@@ -111,12 +111,12 @@ class Steered(CommandLaw):
     def _legs(self):
         low, high = _ranges(self.body) - self.neutral
         first = 0
-        for leg, jacobian in zip(self.body.legs, self.pose.jacobians, strict=True):
+        for leg, jacobian in zip(self.body.legs, self.mechanics.jacobians, strict=True):
             joints = slice(first, first + len(leg.joints))
             first = joints.stop
             below, above = -0.95 * low[joints], 0.95 * high[joints]
             room = np.minimum(np.minimum(below, above), self.parameters.sweep).clip(1e-3)
-            yield _Leg(jacobian, room, lift_angles(jacobian, self.parameters.lift * self.pose.height, below, above))
+            yield _Leg(jacobian, room, lift_angles(jacobian, self.parameters.lift * self.mechanics.height, below, above))
 
 
 def _sweep(leg: _Leg, path, level: float):

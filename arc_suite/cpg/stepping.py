@@ -19,11 +19,10 @@ from arc_suite.models.kinematics import Legs, path_weights, point_velocities, ti
 from arc_suite.models.standing import GRAVITY
 from arc_suite.tasks.contract import Task
 
-_STEPS = 3  # of inverse kinematics in a control step
-_MOST_OFF = 0.2  # standing heights or rad, by which feedback changes a pose
-_LARGEST = 0.05  # standing heights or rad, of the error that feedback adds up
-_OF_LEGS = ("mount", "turn", "axes", "ends", "radius", "joints", "moves", "low", "high")  # fields of `Legs`, of one leg
-_FEEDBACK = np.array((0, 3, 4))  # numbers of a pose that the torso shows: height, roll and pitch
+_IK_ITERATIONS = 3  # of inverse kinematics in a control step
+_MAX_POSE_INTEGRAL = 0.2  # standing heights or rad
+_MAX_POSE_ERROR = 0.05  # standing heights or rad; larger errors count as this one
+_MEASURED_NUMBERS = np.array((0, 3, 4))  # indices of height, roll and pitch among the six numbers of a pose
 
 
 def observes_gait_and_pose(task: Task) -> bool:
@@ -32,15 +31,15 @@ def observes_gait_and_pose(task: Task) -> bool:
 
 
 class SteppingState(NamedTuple):
-    """The own state of a law that steps.
+    """What a law that steps adds to the state of a `CommandLaw`.
 
     Attributes:
-        angles: (environments, legs, links) planned, rad.
-        off: (environments, 3) integral of the error of height, standing heights, roll and pitch, rad.
+        joint_angles: (environments, legs, links) planned, rad.
+        pose_integral: (environments, 3) of the errors of height, standing heights, roll and pitch, rad.
     """
 
-    angles: np.ndarray
-    off: np.ndarray
+    joint_angles: np.ndarray
+    pose_integral: np.ndarray
 
 
 class Stepping(CommandLaw):
@@ -48,153 +47,217 @@ class Stepping(CommandLaw):
 
     Attributes:
         directed: whether pose and gait are by command.
-        proportional: feedback on the error of a pose.
+        proportional_gain: of the feedback on the error of a pose.
         legs: their kinematics.
-        places: (legs, 3) of the soles at ease, m.
-        angles: (legs, links) of the joints then, rad.
-        shorter: stance than the gait prescribes, cycles.
-        across: weight of a foot's slip across its path against its motion along it.
-        lift: of a foot in mid-swing, m.
-        attitude: how far a foot is pushed down, as a share of how far the torso's tilt sinks its place.
-        damping: of inverse kinematics, in standing heights.
-        most: largest request, in units of the command.
+        rest_soles: (legs, 3) positions of the soles at rest, in the torso's frame, m.
+        rest_angles: (legs, links) of the joints at rest, rad.
+        foot_lift: height of a foot in mid-swing, m.
+        slip_weight: weight of a foot's slip across its path against its motion along it.
+        stance_reduction: by which the stance is shorter than in the commanded gait, cycles.
+        tilt_share: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
+        relative_ik_damping: of inverse kinematics, standing heights.
+        max_request: the largest request, in units of the command.
     """
 
-    across, shorter, attitude, damping, most = 1.0, 0.0, 0.0, posture.IK_DAMPING, np.inf
+    slip_weight = 1.0
+    stance_reduction = 0.0
+    tilt_share = 0.0
+    relative_ik_damping = posture.IK_DAMPING
+    max_request = np.inf
 
     def __init__(self, task: Task, parameters):
         """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
+        standing_height = self.mechanics.height
+        self._rate_unit = (GRAVITY / standing_height) ** 0.5  # Hz, in which commands give the gait's frequency
+        self._ik_damping = self.relative_ik_damping * standing_height  # m
+        self.foot_lift = parameters.lift * standing_height
+        # Proportional feedback replaces an integral: with both, gaits are disturbed.
+        if parameters.integral:
+            self.proportional_gain = 0.0
+        else:
+            self.proportional_gain = min(1.0, parameters.gain[0])
         self.directed = observes_gait_and_pose(task)
-        # In place of an integral; with both, gaits are disturbed.
-        self.proportional = 0.0 if parameters.integral else min(1.0, parameters.gain[0])
         if self.directed:
-            self.reads, self._rest = (
-                (*self.reads, *task.gait_and_pose.observed),
-                posture.find_rest_pose(task.scene.body),
-            )
-        self._damping, self.lift = self.damping * self.pose.height, parameters.lift * self.pose.height
-        self.legs, self.rest_soles, self.rest_angles = self._eased(task)
+            self.reads = (*self.reads, *task.gait_and_pose.observed)
+            self._rest_pose = posture.find_rest_pose(task.scene.body)
+        self.legs, self.rest_soles, self.rest_angles = self._find_rest(task)
 
     @abstractmethod
-    def _eased(self, task: Task) -> tuple[Legs, np.ndarray, np.ndarray]:
-        """The legs, the places (legs, 3) of their soles at ease, m, and the angles (legs, links) then, rad."""
+    def _find_rest(self, task: Task) -> tuple[Legs, np.ndarray, np.ndarray]:
+        """Return the legs, positions (legs, 3) of their soles at rest, m, and angles (legs, links) at rest, rad."""
 
     def initial_paths(self, count: int) -> SteppingState:
-        """Return the angles at ease, and no error."""
+        """Return the angles at rest and an integral of 0, for a number of environments."""
         return SteppingState(np.tile(self.rest_angles, (count, 1, 1)), np.zeros((count, 3)))
 
-    def planned(self, paths: SteppingState, request: Request, observation: Mapping) -> tuple:
-        """Return the next paths, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
-        vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
-        cycle, duty, stance = self._timing(request, observation)
-        pose = observation["pose"] if self.directed else None
-        # Balance is about the attitude that is asked for.
-        tilted = vertical if pose is None else (posture.rotation_of(pose[:, 3:]) @ vertical[..., None])[..., 0]
-        motion, shift = self.balance(request.motion, tilted, observation)
-        feet = self.next_feet(cycle, motion, shift, request.size, tilted, duty, stance)
-        off = paths.off
-        if pose is not None:
-            off, pose = self._corrected(off, pose, observation["posture"][:, 0], vertical)
-            feet = posture.move_ground_points(feet, pose, self.pose.height)
-        aims = path_weights(point_velocities(motion, self.rest_soles), self.across)
-        angles = self.legs.solve_joint_angles(paths.angles, feet, aims, self._damping, _STEPS)
-        targets = self.legs.by_joint(paths.angles)
-        return SteppingState(angles, off), targets, self.legs.by_joint(angles) - targets
+    def planned(self, state: SteppingState, request: Request, observation: Mapping) -> tuple:
+        """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
+        torso_height = observation["posture"][:, 0]  # m
+        torso_quaternion = observation["posture"][:, 1:5]
+        vertical = rotations.matrix(torso_quaternion)[:, 2]  # the world's, in the torso's frame
+        balance_vertical = vertical
+        if self.directed:
+            # Balance is about the commanded attitude: it must not work against it.
+            pose = observation["pose"]
+            balance_vertical = (posture.rotation_of(pose[:, 3:]) @ vertical[..., None])[..., 0]
 
-    def _timing(self, request: Request, observation: Mapping) -> tuple:
-        """Phases (environments, legs) in the next control step, cycles, the duty factor, and the stance, s."""
+        leg_phases, duty_factor, stance_duration = self._gait_timing(request, observation)
+        velocity, foothold_shift = self.balance(request.motion, balance_vertical, observation)
+        soles = self.next_feet(
+            leg_phases, velocity, foothold_shift, request.size, balance_vertical, duty_factor, stance_duration
+        )
+        pose_integral = state.pose_integral
+        if self.directed:
+            pose_integral, corrected_pose = self._correct_pose(pose_integral, pose, torso_height, vertical)
+            soles = posture.move_ground_points(soles, corrected_pose, self.mechanics.height)
+
+        weights = path_weights(point_velocities(velocity, self.rest_soles), self.slip_weight)
+        joint_angles = self.legs.solve_joint_angles(
+            state.joint_angles, soles, weights, self._ik_damping, _IK_ITERATIONS
+        )
+        target_angles = self.legs.by_joint(state.joint_angles)
+        angle_changes = self.legs.by_joint(joint_angles) - target_angles
+        return SteppingState(joint_angles, pose_integral), target_angles, angle_changes
+
+    def _gait_timing(self, request: Request, observation: Mapping) -> tuple:
+        """Return when feet stand, by the command where there is one, else by the task.
+
+        Returns:
+            The phases (environments, legs) of the legs in the next control step, cycles; the duty factor; and the
+            duration of a stance, s. Both are numbers, or arrays (environments, 1) and (environments, 1, 1).
+        """
         if not self.directed:
-            cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0
-            return cycle, self.duty_factor, self.stance_duration
-        legs, gait = len(self.offsets), observation["gait"]
-        phase = gait.__array_namespace__().arctan2(gait[:, :legs], gait[:, legs : 2 * legs]) / (2.0 * np.pi)
-        duty, frequency = gait[:, -2:-1] - self.shorter, gait[:, -1:] * (GRAVITY / self.pose.height) ** 0.5
-        going = request.advance[:, None] > 0.0
-        cycle = (phase + self.parameters.lead + frequency * self.control_timestep * going) % 1.0
-        return cycle, duty, (duty / frequency)[..., None]
+            leg_phases = (request.phase[:, None] + self.phase_offsets + request.advance[:, None]) % 1.0
+            return leg_phases, self.duty_factor, self.stance_duration
+        gait = observation["gait"]  # sines and cosines of the phases of all legs, the duty factor and the frequency
+        xp = gait.__array_namespace__()
+        leg_count = len(self.phase_offsets)
+        sines = gait[:, :leg_count]
+        cosines = gait[:, leg_count : 2 * leg_count]
+        commanded_phases = xp.arctan2(sines, cosines) / (2.0 * np.pi)
+        duty_factor = gait[:, -2:-1] - self.stance_reduction
+        frequency = gait[:, -1:] * self._rate_unit  # Hz
+        is_walking = request.advance[:, None] > 0.0
+        advance = frequency * self.control_timestep * is_walking
+        leg_phases = (commanded_phases + self.parameters.lead + advance) % 1.0
+        return leg_phases, duty_factor, (duty_factor / frequency)[..., None]
 
     def balance(self, motion, vertical, observation: Mapping) -> tuple:
-        """Return the velocity (environments, 3) that feet give, m/s and rad/s, and shifts (environments, 2) of them, m.
+        """Return the velocity (environments, 3) that feet give the torso, m/s and rad/s, and shifts of footholds.
 
         Args:
             motion: (environments, 3) requested, in units of the command.
-            vertical: (environments, 3) in the torso's frame, less the attitude that is asked for.
+            vertical: (environments, 3) the world's, in the frame of a torso in the commanded attitude.
             observation: blocks by name.
+
+        Returns:
+            The velocity, and shifts (environments, 2) of all footholds, forward and left, m.
         """
-        return motion.clip(-self.most, self.most) * self.units, motion[:, :2] * 0.0
+        velocity = motion.clip(-self.max_request, self.max_request) * self.units
+        no_shift = motion[:, :2] * 0.0
+        return velocity, no_shift
 
-    def _corrected(self, off, pose, height, vertical) -> tuple:
-        """The integral of the error of a pose (environments, 6), and the pose that makes up for both."""
-        numpy, p = pose.__array_namespace__(), self.parameters
-        shown = numpy.concatenate(
-            [(height / self.pose.height - self._rest.ride_height)[:, None], posture.roll_and_pitch_of(vertical)],
-            axis=-1,
-        )
-        error = (pose[:, _FEEDBACK] - shown).clip(-_LARGEST, _LARGEST)
-        off = (off + p.integral * self.cycles_per_step * error).clip(-_MOST_OFF, _MOST_OFF)
-        added, zero = off + self.proportional * error, numpy.zeros_like(off[:, :1])
-        return off, pose + numpy.concatenate([added[:, :1], zero, zero, added[:, 1:], zero], axis=-1)
-
-    def next_feet(self, cycle, motion, shift, size, vertical, duty, stance):
-        """Return places (environments, legs, 3) of the soles in the next control step, m, under a level torso.
+    def _correct_pose(self, pose_integral, pose, torso_height, vertical) -> tuple:
+        """Return the next integral of the error of a pose, and a pose (environments, 6) that makes up for the error.
 
         Args:
-            cycle: (environments, legs) phases of the legs then.
-            motion: (environments, 3) requested velocity, m/s and rad/s.
-            shift: (environments, 2) of footholds for balance, m.
-            size: (environments, 1) of the gait.
+            pose_integral: (environments, 3); see `SteppingState`.
+            pose: (environments, 6) commanded.
+            torso_height: (environments,) m.
             vertical: (environments, 3) the world's, in the torso's frame.
-            duty: factor, a number or (environments, 1).
-            stance: that it lasts, s, a number or (environments, 1, 1).
         """
-        numpy = cycle.__array_namespace__()
-        stands, swung = cycle < duty, ((cycle - duty) / (1.0 - duty)).clip(0.0)
-        along = numpy.where(stands, 1.0 - 2.0 * cycle / duty, 2.0 * swung - 1.0)[..., None]  # from 1 to -1 in stance
-        half = 0.5 * stance * point_velocities(motion, self.rest_soles)
-        ground = self.rest_soles[:, :2] + size[..., None] * (along * half + self._kept(along) * shift[:, None])
-        lift = self.lift * numpy.sin(np.pi * swung)
-        heights = self.rest_soles[:, 2] + size * (lift + self.attitude * tilt_heights(vertical, self.rest_soles))
-        return numpy.concatenate([ground, heights[..., None]], axis=-1)
+        xp = pose.__array_namespace__()
+        height_above_rest = (torso_height / self.mechanics.height - self._rest_pose.ride_height)[:, None]
+        measured = xp.concatenate([height_above_rest, posture.roll_and_pitch_of(vertical)], axis=-1)
+        error = (pose[:, _MEASURED_NUMBERS] - measured).clip(-_MAX_POSE_ERROR, _MAX_POSE_ERROR)
+        pose_integral = pose_integral + self.parameters.integral * self.cycles_per_step * error
+        pose_integral = pose_integral.clip(-_MAX_POSE_INTEGRAL, _MAX_POSE_INTEGRAL)
+        correction = pose_integral + self.proportional_gain * error
+        height = correction[:, :1]
+        roll_and_pitch = correction[:, 1:]
+        zero = xp.zeros_like(height)  # of the numbers without feedback: forward, left and yaw
+        return pose_integral, pose + xp.concatenate([height, zero, zero, roll_and_pitch, zero], axis=-1)
 
-    def _kept(self, along):
-        """The share of the shift for balance that a foot keeps, from 1 to -1 along its path."""
+    def next_feet(self, leg_phases, velocity, foothold_shift, gait_size, vertical, duty_factor, stance_duration):
+        """Return positions (environments, legs, 3) of the soles in the next control step, m, under a level torso.
+
+        Args:
+            leg_phases: (environments, legs) in the next control step, cycles.
+            velocity: (environments, 3) requested of the torso, m/s and rad/s.
+            foothold_shift: (environments, 2) of all footholds for balance, m.
+            gait_size: (environments, 1) from 0 to 1.
+            vertical: (environments, 3) the world's, in the torso's frame.
+            duty_factor: a number or (environments, 1).
+            stance_duration: s, a number or (environments, 1, 1).
+        """
+        xp = leg_phases.__array_namespace__()
+        is_stance = leg_phases < duty_factor
+        swing_progress = ((leg_phases - duty_factor) / (1.0 - duty_factor)).clip(0.0)
+        stance_position = 1.0 - 2.0 * leg_phases / duty_factor
+        swing_position = 2.0 * swing_progress - 1.0
+        # Along the path of a foot, from 1 in front to -1 at its end.
+        path_position = xp.where(is_stance, stance_position, swing_position)[..., None]
+        half_path = 0.5 * stance_duration * point_velocities(velocity, self.rest_soles)
+        shift = self._shift_share(path_position) * foothold_shift[:, None]
+        ground = self.rest_soles[:, :2] + gait_size[..., None] * (path_position * half_path + shift)
+        lift = self.foot_lift * xp.sin(np.pi * swing_progress)
+        tilt_push = self.tilt_share * tilt_heights(vertical, self.rest_soles)
+        heights = self.rest_soles[:, 2] + gait_size * (lift + tilt_push)
+        return xp.concatenate([ground, heights[..., None]], axis=-1)
+
+    def _shift_share(self, path_position):
+        """Return the share of the shift for balance that applies at a position along a foot's path, from 1 to -1."""
         return 1.0
 
 
 class Directed(Stepping):
     """Follows a velocity in a pose and a gait by command, on level ground, without sight."""
 
-    across = 0.3
-    damping = 0.1  # with less of it, legs that are stretched out jump
-    most = 2.0  # of a request, in units of the command: feedback on a body that cannot go on would throw it
+    slip_weight = 0.3
+    relative_ik_damping = 0.1  # standing heights; with less of it, legs that are stretched out jump
+    max_request = 2.0  # units of the command; feedback on a body that cannot go on would throw it
 
-    def _eased(self, task: Task) -> tuple:
-        return self._rest.legs, self._rest.sole_positions, self._rest.joint_angles
+    def _find_rest(self, task: Task) -> tuple[Legs, np.ndarray, np.ndarray]:
+        return self._rest_pose.legs, self._rest_pose.sole_positions, self._rest_pose.joint_angles
 
     def constants(self) -> dict:
         """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
-        p, cycles = self.parameters, self.cycles_per_step
-        legs = zip(*self.legs, self.rest_soles, self.rest_angles, strict=True)
+        arrays_of_legs = {
+            "mount": self.legs.mounts,
+            "turn": self.legs.turns,
+            "axes": self.legs.axes,
+            "ends": self.legs.ends,
+            "radius": self.legs.radii,
+            "joints": self.legs.joints,
+            "moves": self.legs.moves,
+            "low": self.legs.low,
+            "high": self.legs.high,
+            "place": self.rest_soles,
+            "angles": self.rest_angles,
+        }
+        leg_count = len(self.rest_soles)
         return {
-            "legs": [dict(zip((*_OF_LEGS, "place", "angles"), leg, strict=True)) for leg in legs],
-            **self.drive._asdict(),
+            "legs": [{name: array[leg] for name, array in arrays_of_legs.items()} for leg in range(leg_count)],
+            "stiffness": self.drive.stiffness,
+            "damping": self.drive.damping,
+            "reach": self.drive.reach,
             "units": self.units,
-            "most": self.most,
-            "gain": p.gain,
+            "most": self.max_request,
+            "gain": self.parameters.gain,
             "smoothing": self.smoothing,
-            "integral": p.integral * cycles,
-            "proportional": self.proportional,
+            "integral": self.parameters.integral * self.cycles_per_step,
+            "proportional": self.proportional_gain,
             "onset": self.onset,
-            "lead": p.lead,
-            "height": self.pose.height,
-            "ride": self._rest.ride_height,
-            "lift": self.lift,
-            "across": self.across,
-            "damping_of_feet": self._damping,
-            "steps": _STEPS,
-            "largest": _LARGEST,
-            "most_off": _MOST_OFF,
-            "rate": (GRAVITY / self.pose.height) ** 0.5,
+            "lead": self.parameters.lead,
+            "height": self.mechanics.height,
+            "ride": self._rest_pose.ride_height,
+            "lift": self.foot_lift,
+            "across": self.slip_weight,
+            "damping_of_feet": self._ik_damping,
+            "steps": _IK_ITERATIONS,
+            "largest": _MAX_POSE_ERROR,
+            "most_off": _MAX_POSE_INTEGRAL,
+            "rate": self._rate_unit,
             "step": self.control_timestep,
         }
