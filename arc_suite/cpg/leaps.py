@@ -1,7 +1,8 @@
-"""Jumps and leaps: keyframes of joints by inverse kinematics, and how a body flies by them, measured by trial.
+"""Jumps and leaps: targets of joints by inverse kinematics, and what they do to a body, measured by trial.
 
 A body crouches, draws back, stretches with all that its motors give, draws its feet up in the air, and
 lands on feet that reach ahead. Lengths are multiples of the standing height h, durations of sqrt(h / g).
+Control steps of a leap count from 1.
 """
 
 import functools
@@ -28,12 +29,12 @@ class Leap(NamedTuple):
 
     Attributes:
         crouch: by which the torso sinks.
-        back: by which it is drawn back meanwhile.
-        forward: by which legs stretch it ahead of its feet.
+        back: by which the torso is drawn back while it sinks.
+        forward: by which legs stretch the torso ahead of its feet.
         drive: how far joints are driven, by the way from the crouch to the stretch: motors of position control
             give the more, the further the target is.
         tuck: by which feet are drawn up in the air.
-        ahead: by which they land ahead of their places.
+        ahead: by which feet land ahead of their positions at rest.
         stretch: duration of the stretch.
         fly: duration from the stretch to the landing.
     """
@@ -49,27 +50,34 @@ class Leap(NamedTuple):
 
 
 _JUMP = Leap(back=0.0, forward=0.0, ahead=0.0)
-MIN_BY_MEASURE = {"clearance": 0.1, "distance": 0.8}  # standing heights: of feet in a jump and in a leap
 JUMPS = tuple(_JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.35, 0.5) for drive in (1.5, 2.5, 4.0))
+# The clearance of feet in a jump, and the distance of feet in a leap, that are enough: standing heights.
+MIN_BY_MEASURE = {"clearance": 0.1, "distance": 0.8}
 
-_SINK, _HOLD, _SETTLE = 2.0, 0.5, 3.0  # durations of the crouch, of the wait in it, and of the landing
-_UP = 0.6  # by which legs are to stretch, which none can
-_PLANE = 0.45  # weight of a sole's place in the plane against its height: feet may slide rather than stay behind
-_ROUNDS = 40  # of it, for a pose
-_OFF = 0.03  # of the standing height: soles that are higher have left the ground
-_UPRIGHT = 0.7  # least cosine of the torso's tilt in a leap that lands
-_HIGH = 0.6  # least height of the torso, by that at rest, at its end
+# Durations of a leap's parts that do not differ between leaps.
+_SINKING_TIME = 2.0  # of the crouch
+_WAITING_TIME = 0.5  # in the crouch
+_SETTLING_TIME = 3.0  # after the landing
+
+_STRETCH_GOAL = 0.6  # standing heights that the torso is to rise in the stretch: more than any legs can
+_IK_ITERATIONS = 40  # of inverse kinematics, for each pose
+_HORIZONTAL_WEIGHT = 0.45  # of a sole's position, against 1 for its height: feet may slide rather than stay behind
+
+# What counts as a flight.
+_AIRBORNE_HEIGHT = 0.03  # standing heights; soles that are higher have left the ground
+_MIN_UPRIGHTNESS = 0.7  # cosine of the torso's tilt in a leap that lands
+_MIN_FINAL_HEIGHT = 0.6  # of the torso, as a share of its height before the leap
 
 
 class Movement(NamedTuple):
     """A leap of one body. Control steps count from 1.
 
     Attributes:
-        offsets: (steps, 3) m, of soles from where they were at rest, as the torso sees them.
-        driven: (legs, links) rad, added to the angles of the crouch while legs stretch.
-        crouched: control step at which the crouch ends.
-        stretched: at which the stretch ends.
-        landed: at which feet are to be on the ground.
+        sole_offsets: (steps, 3) of soles from their positions at rest, in the torso's frame, m.
+        joint_drive: (legs, links) added to the angles of the crouch while legs stretch, rad.
+        crouch_end: control step at which the crouch ends.
+        stretch_end: control step at which the stretch ends.
+        landing_step: control step at which feet are to be on the ground.
     """
 
     sole_offsets: np.ndarray
@@ -79,45 +87,74 @@ class Movement(NamedTuple):
     landing_step: int
 
 
-def plan_movement(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> Movement:
+def plan_movement(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap) -> Movement:
     """Return the plan of a leap from a pose (legs, links), rad, in which soles are level."""
-    height = body.torso.standing_height
-    unit = math.sqrt(height / GRAVITY) / control_timestep(body)
-    sink, hold, stretch, fly, settle = (
-        max(1, round(unit * part)) for part in (_SINK, _HOLD, leap.stretch, leap.fly, _SETTLE)
+    standing_height = body.torso.standing_height
+    steps_per_time_unit = math.sqrt(standing_height / GRAVITY) / control_timestep(body)
+
+    def count_steps(duration: float) -> int:
+        return max(1, round(steps_per_time_unit * duration))
+
+    sinking_steps = count_steps(_SINKING_TIME)
+    waiting_steps = count_steps(_WAITING_TIME)
+    stretch_steps = count_steps(leap.stretch)
+    flight_steps = count_steps(leap.fly)
+    settling_steps = count_steps(_SETTLING_TIME)
+
+    # Soles move against the torso: they come up to a torso that sinks, and are ahead of one that is drawn back.
+    crouch_offset = np.array((leap.back, 0.0, leap.crouch))  # standing heights, as the next ones
+    landing_offset = np.array((leap.ahead, 0.0, 0.0))
+    stretch_offset = np.array((-leap.forward, 0.0, -_STRETCH_GOAL))
+    sinking = _ease_in_and_out(sinking_steps) * crouch_offset
+    crouching = np.tile(crouch_offset, (waiting_steps + stretch_steps, 1))
+    flying = np.sin(np.pi * np.arange(1, flight_steps + 1) / flight_steps)[:, None] * (0.0, 0.0, leap.tuck)
+    settling = (1.0 - _ease_in_and_out(settling_steps)) * landing_offset
+    sole_offsets = np.concatenate([sinking, crouching, flying + landing_offset, settling])
+
+    rest_soles, _ = legs.soles(rest_angles)
+
+    def solve(start_angles: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        return _solve_leg_angles(legs, start_angles, rest_soles + offset * standing_height, standing_height)
+
+    crouch_angles = solve(rest_angles, crouch_offset)
+    stretch_angles = solve(crouch_angles, stretch_offset)
+    crouch_end = sinking_steps + waiting_steps
+    stretch_end = crouch_end + stretch_steps
+    return Movement(
+        sole_offsets=standing_height * sole_offsets,
+        joint_drive=leap.drive * (stretch_angles - crouch_angles),
+        crouch_end=crouch_end,
+        stretch_end=stretch_end,
+        landing_step=stretch_end + flight_steps,
     )
-    low, reach = np.array((leap.back, 0.0, leap.crouch)), np.array((leap.ahead, 0.0, 0.0))
-    air = np.sin(np.pi * np.arange(1, fly + 1) / fly)[:, None] * (0.0, 0.0, leap.tuck)
-    parts = [_eased(sink) * low, np.tile(low, (hold + stretch, 1)), air + reach, (1.0 - _eased(settle)) * reach]
-    soles, weights = legs.soles(rest)[0], sole_weights(len(rest))
-
-    def reached(angles, offset):
-        return legs.solve_joint_angles(angles, soles + offset * height, weights, posture.IK_DAMPING * height, _ROUNDS)
-
-    crouched = reached(rest, low)
-    stretched = reached(crouched, np.array((-leap.forward, 0.0, -_UP)))
-    ends = np.cumsum([sink + hold, stretch, fly]).tolist()
-    return Movement(height * np.concatenate(parts), leap.drive * (stretched - crouched), *ends)
 
 
-def sole_weights(legs: int) -> np.ndarray:
-    """Return the weights (legs, 3, 3) of the soles' places in inverse kinematics."""
-    return np.tile(np.diag((_PLANE, _PLANE, 1.0)), (legs, 1, 1))
+def sole_weights(leg_count: int) -> np.ndarray:
+    """Return the weights (legs, 3, 3) of the errors of soles in inverse kinematics."""
+    return np.tile(np.diag((_HORIZONTAL_WEIGHT, _HORIZONTAL_WEIGHT, 1.0)), (leg_count, 1, 1))
 
 
-def _eased(steps: int) -> np.ndarray:
+def _ease_in_and_out(steps: int) -> np.ndarray:
+    """Return shares (steps, 1) of a motion that begins and ends slowly, the last of them 1."""
     return 0.5 - 0.5 * np.cos(np.pi * np.arange(1, steps + 1) / steps)[:, None]
 
 
-def leap_targets(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> np.ndarray:
-    """Return the targets (steps, joints) of joints in the control steps of a leap from a pose (legs, links), rad."""
-    made, soles, height = plan_movement(body, legs, rest, leap), legs.soles(rest)[0], body.torso.standing_height
-    goals = soles + made.sole_offsets[:, None]
-    angles = legs.solve_joint_angles(
-        np.tile(rest, (len(goals), 1, 1)), goals, sole_weights(len(rest)), posture.IK_DAMPING * height, _ROUNDS
+def _solve_leg_angles(legs: Legs, start_angles, sole_goals, standing_height: float) -> np.ndarray:
+    """Return the angles (..., legs, links), rad, that bring soles near goals (..., legs, 3), m."""
+    weights = sole_weights(len(legs.mounts))
+    return legs.solve_joint_angles(
+        start_angles, sole_goals, weights, posture.IK_DAMPING * standing_height, _IK_ITERATIONS
     )
-    stretch = slice(made.crouch_end, made.stretch_end)
-    angles[stretch] += made.joint_drive
+
+
+def leap_targets(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap) -> np.ndarray:
+    """Return the targets (steps, joints) of joints in the control steps of a leap from a pose (legs, links), rad."""
+    movement = plan_movement(body, legs, rest_angles, leap)
+    rest_soles, _ = legs.soles(rest_angles)
+    sole_goals = rest_soles + movement.sole_offsets[:, None]
+    start_angles = np.tile(rest_angles, (len(sole_goals), 1, 1))
+    angles = _solve_leg_angles(legs, start_angles, sole_goals, body.torso.standing_height)
+    angles[movement.crouch_end : movement.stretch_end] += movement.joint_drive
     return legs.by_joint(angles)
 
 
@@ -125,12 +162,12 @@ class Flight(NamedTuple):
     """What a leap does to a body on level ground; lengths in standing heights.
 
     Attributes:
-        distance: by which feet stand ahead of where they took off.
-        moved: of the torso while no foot is on the ground.
-        seconds: for which none is.
-        clearance: the most that the lowest foot is over the ground.
+        distance: between the mean position of the feet before the leap and after it; 0 if they do not leave the ground.
+        torso_distance: that the torso moves while no foot is on the ground.
+        air_time: for which no foot is on the ground, s.
+        clearance: the largest height of the lowest foot.
         rise: of the torso.
-        landed: whether the torso stays upright and stands at the end.
+        landed: whether the torso stays upright, and is high enough at the end.
     """
 
     distance: float
@@ -141,88 +178,144 @@ class Flight(NamedTuple):
     landed: bool
 
 
-def simulate_flights(body: Body, rest: np.ndarray, angles: np.ndarray, crouched: Sequence[int]) -> list[Flight]:
+def simulate_flights(
+    body: Body, rest_angles: np.ndarray, targets: np.ndarray, crouch_ends: Sequence[int]
+) -> list[Flight]:
     """Return what leaps do to a body, by simulation.
 
     Args:
         body: any.
-        rest: (joints,) pose from which they start, rad.
-        angles: (leaps, steps, joints) targets by control step, rad; the last one is held.
-        crouched: control step of each at which its crouch ends.
+        rest_angles: (joints,) from which leaps start, rad.
+        targets: (leaps, steps, joints) of joints by control step, rad; the last one is held.
+        crouch_ends: control step of each leap at which its crouch ends.
     """
-    body = size_body(body)
-    places, tilts, soles = _simulated(body, rest, angles)
-    return [_measured(body, *each, control_timestep(body)) for each in zip(places, tilts, soles, crouched, strict=True)]
+    sized_body = size_body(body)
+    track = _simulate_leaps(sized_body, rest_angles, targets)
+    return [_measure_flight(sized_body, track, leap, crouch_end) for leap, crouch_end in enumerate(crouch_ends)]
 
 
-def _simulated(body: Body, rest: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places of torsos (leaps, steps, 3) and of soles (leaps, steps, legs, 3), m, and cosines of tilts between."""
-    model, pose, count = compile_model(body), pose_mechanics(body, rest), len(rest)
-    layout, driven = readings.layout(model, body), drive(body, pose.inertias)
-    batch = Batch(model, len(angles), 1)
-    data, every = batch.data, np.ones(len(angles), bool)
-    start = np.concatenate([(0.0, 0.0, -pose.soles[:, 2].min(), 1.0, 0.0, 0.0, 0.0), rest])
-    qpos = np.tile(readings.positions(start, layout, standing_qpos(model)), (len(angles), 1))
-    batch.reset(every, qpos, np.zeros_like(data.qvel))
-    radii, found = np.array([leg.foot.radius for leg in body.legs])[:, None] * (0.0, 0.0, 1.0), []
-    for target, later in zip(angles.swapaxes(0, 1)[:-1], angles.swapaxes(0, 1)[1:], strict=True):
-        now, velocities = readings.pose(data.qpos, layout)[:, 7:], data.qvel[:, layout.joint_velocities]
-        speeds = (later - target) / control_timestep(body)
-        data.ctrl[:, :count] = driven.actions(target, speeds, now, velocities)
-        batch.step(simulation(body).substeps, every)
+class _Track(NamedTuple):
+    """How bodies move in leaps.
+
+    Attributes:
+        torsos: (leaps, steps, 3) positions, m.
+        uprightness: (leaps, steps) cosines of the torso's tilt.
+        soles: (leaps, steps, legs, 3) positions, m.
+    """
+
+    torsos: np.ndarray
+    uprightness: np.ndarray
+    soles: np.ndarray
+
+
+def _simulate_leaps(body: Body, rest_angles: np.ndarray, targets: np.ndarray) -> _Track:
+    model = compile_model(body)
+    layout = readings.layout(model, body)
+    rest_pose = pose_mechanics(body, rest_angles)
+    joint_drive = drive(body, rest_pose.inertias)
+    timestep = control_timestep(body)
+    leap_count = len(targets)
+    actuator_count = len(rest_angles)
+
+    batch = Batch(model, leap_count, 1)
+    data = batch.data
+    every_leap = np.ones(leap_count, bool)
+    start_height = -rest_pose.soles[:, 2].min()
+    start_torso = (0.0, 0.0, start_height, 1.0, 0.0, 0.0, 0.0)  # position, m, and quaternion
+    start_qpos = readings.positions(np.concatenate([start_torso, rest_angles]), layout, standing_qpos(model))
+    batch.reset(every_leap, np.tile(start_qpos, (leap_count, 1)), np.zeros_like(data.qvel))
+
+    foot_radii = np.array([leg.foot.radius for leg in body.legs])
+    soles_below_feet = foot_radii[:, None] * (0.0, 0.0, 1.0)
+    torsos = []
+    uprightness = []
+    soles = []
+    for step in range(targets.shape[1] - 1):
+        target_angles = targets[:, step]
+        target_velocities = (targets[:, step + 1] - target_angles) / timestep
+        joint_angles = readings.pose(data.qpos, layout)[:, 7:]
+        joint_velocities = data.qvel[:, layout.joint_velocities]
+        actions = joint_drive.actions(target_angles, target_velocities, joint_angles, joint_velocities)
+        data.ctrl[:, :actuator_count] = actions
+        batch.step(simulation(body).substeps, every_leap)
         torso = readings.pose(data.qpos, layout)[:, :7].copy()
-        found.append((torso[:, :3], rotations.upright(torso[:, 3:]), data.xpos[:, layout.feet] - radii))
-    return tuple(np.stack(each, axis=1) for each in zip(*found, strict=True))
+        torsos.append(torso[:, :3])
+        uprightness.append(rotations.upright(torso[:, 3:]))
+        soles.append(data.xpos[:, layout.feet] - soles_below_feet)
+    return _Track(np.stack(torsos, axis=1), np.stack(uprightness, axis=1), np.stack(soles, axis=1))
 
 
-def _measured(body: Body, places, tilts, soles, crouched: int, step: float) -> Flight:
-    height = body.torso.standing_height
-    off = (soles[crouched:, :, 2] > _OFF * height).all(axis=-1)
-    first = crouched + int(off.argmax())
-    last = first + int(np.append(~off, True)[first - crouched :].argmax())
-    landed = (tilts[crouched:] >= _UPRIGHT).all() and places[-1, 2] >= _HIGH * places[0, 2]
-    ahead = (soles[-1] - soles[crouched - 1])[:, 0].mean()
+def _measure_flight(body: Body, track: _Track, leap: int, crouch_end: int) -> Flight:
+    """Return the flight of a leap, by its index in a track."""
+    standing_height = body.torso.standing_height
+    torso = track.torsos[leap]
+    soles = track.soles[leap]
+    sole_heights = soles[crouch_end:, :, 2]  # from the end of the crouch on
+    is_airborne = (sole_heights > _AIRBORNE_HEIGHT * standing_height).all(axis=-1)
+    take_off = int(is_airborne.argmax())  # steps after the crouch, as the next one; 0 if feet stay on the ground
+    steps_in_air = int(np.append(~is_airborne, True)[take_off:].argmax())
+    first_step = crouch_end + take_off
+    last_step = max(first_step + steps_in_air - 1, first_step)
+
+    stays_upright = (track.uprightness[leap][crouch_end:] >= _MIN_UPRIGHTNESS).all()
+    stands = torso[-1, 2] >= _MIN_FINAL_HEIGHT * torso[0, 2]
+    distance = 0.0
+    if is_airborne.any():
+        foot_displacement = (soles[-1] - soles[crouch_end - 1])[:, 0].mean()
+        distance = float(foot_displacement / standing_height)
     return Flight(
-        distance=float(ahead / height) if off.any() else 0.0,
-        torso_distance=float((places[max(last - 1, first), 0] - places[first, 0]) / height),
-        air_time=step * (last - first),
-        clearance=float((soles[crouched:, :, 2].min(axis=-1)).max() / height),
-        rise=float((places[:, 2].max() - places[0, 2]) / height),
-        landed=bool(landed),
+        distance=distance,
+        torso_distance=float((torso[last_step, 0] - torso[first_step, 0]) / standing_height),
+        air_time=control_timestep(body) * steps_in_air,
+        clearance=float(sole_heights.min(axis=-1).max() / standing_height),
+        rise=float((torso[:, 2].max() - torso[0, 2]) / standing_height),
+        landed=bool(stays_upright and stands),
     )
 
 
 @functools.lru_cache(maxsize=64)
-def find_best_leap(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure: str = "distance"):
+def find_best_leap(
+    body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, ...], measure: str = "distance"
+) -> tuple[Leap, Flight]:
     """Return the leap of a choice by which a body lands and gets farthest or highest, and its flight.
 
     Args:
         body: any.
-        rest: (joints,) pose in which soles are level, rad.
+        rest_angles: (joints,) of a pose in which soles are level, rad.
         choice: leaps to try.
         measure: `distance` or `clearance`.
     """
     legs = Legs.of(size_body(body))
-    angles = legs.by_leg(np.array(rest))
-    made = [leap_targets(body, legs, angles, leap) for leap in choice]
-    longest = max(map(len, made))
-    targets = np.stack([np.concatenate([each, np.tile(each[-1], (longest - len(each), 1))]) for each in made])
-    crouched = [plan_movement(body, legs, angles, leap).crouch_end for leap in choice]
-    found = simulate_flights(body, np.array(rest), targets, crouched)
-    return max(zip(choice, found, strict=True), key=lambda pair: pair[1].landed * getattr(pair[1], measure))
+    leg_angles = legs.by_leg(np.array(rest_angles))
+    targets_of_leaps = [leap_targets(body, legs, leg_angles, leap) for leap in choice]
+    crouch_ends = [plan_movement(body, legs, leg_angles, leap).crouch_end for leap in choice]
+    flights = simulate_flights(body, np.array(rest_angles), _stack_padded(targets_of_leaps), crouch_ends)
+    scores = [getattr(flight, measure) if flight.landed else 0.0 for flight in flights]
+    best = scores.index(max(scores))
+    return choice[best], flights[best]
 
 
-def choose_leap(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure: str) -> Leap:
-    """Return the leap of a choice by which a body gets farthest or highest; see `best`.
+def _stack_padded(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Return arrays (steps, ...) as one; shorter ones repeat their last step."""
+    step_count = max(len(array) for array in arrays)
+    padded = []
+    for array in arrays:
+        missing_steps = np.tile(array[-1], (step_count - len(array), 1))
+        padded.append(np.concatenate([array, missing_steps]))
+    return np.stack(padded)
+
+
+def choose_leap(body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, ...], measure: str) -> Leap:
+    """Return the leap of a choice by which a body gets farthest or highest; see `find_best_leap`.
 
     Raises:
         ValueError: the body hardly leaves the ground, or does not land on its feet.
     """
-    leap, flight = find_best_leap(body, rest, choice, measure)
+    leap, flight = find_best_leap(body, rest_angles, choice, measure)
     if not flight.landed:
         raise ValueError("it does not land on its feet")
-    if (reached := getattr(flight, measure)) < MIN_BY_MEASURE[measure]:
-        raise ValueError(
-            f"the {measure} of its feet is {reached:.2f} standing heights, less than {MIN_BY_MEASURE[measure]}"
-        )
+    size = getattr(flight, measure)
+    required_size = MIN_BY_MEASURE[measure]
+    if size < required_size:
+        raise ValueError(f"the {measure} of its feet is {size:.2f} standing heights, less than {required_size}")
     return leap

@@ -1,9 +1,9 @@
 """The demonstrator `planned`: it finds its way among pillars by what it sees, and steers along the plan.
 
-Circles of known radius are fitted to the ranges, a shortest path around them is found by A* over points
-about them, and the law of `steering` follows the command that leads along its first stretch. The path is
-found anew in every step. Lengths are in R, the mean distance of the feet from their center. The search
-runs under NumPy alone, and not under `jax.jit`.
+Pillars are circles of known radius. They are fitted to the ranges that the torso measures. A* finds a
+shortest path around them, over points about them. The law of `steering` follows the command that leads
+along the beginning of this path. The path is searched anew in every step. Lengths are in R, the mean
+distance of the feet from their center. The search runs under NumPy alone, and not under `jax.jit`.
 """
 
 import heapq
@@ -20,10 +20,16 @@ from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.sensors import FAR, RAYS, SIGHT
 
-_SEEN = 0.95  # share of their farthest at which ranges are taken for pillars
-_POINTS = 12  # about a pillar, through which paths lead
-_OUTSIDE = 1.06 / math.cos(math.pi / _POINTS)  # of a pillar's room, at which these are: sides clear it too
-_ANGLES = 2.0 * np.pi * np.arange(_POINTS) / _POINTS
+_MAX_PILLAR_RANGE = 0.95  # share of the sensor's range; a ray that measures more has met no pillar
+_POINTS_PER_PILLAR = 12  # through which paths lead around it
+_POINT_ANGLES = 2.0 * np.pi * np.arange(_POINTS_PER_PILLAR) / _POINTS_PER_PILLAR  # rad
+# The points are the corners of a polygon about a pillar. This factor of a distance from the pillar's middle keeps the
+# polygon's sides at the distance, too, with 6 % to spare.
+_CORNER_FACTOR = 1.06 / math.cos(math.pi / _POINTS_PER_PILLAR)
+_MAX_SHARE_OF_START = 0.99  # of the torso's distance from a pillar, so that the torso itself is never too close
+_MAX_TURN = 1.0  # of the command, in target velocities
+_START = 0  # index of the torso among the points of a search
+_GOAL = 1  # index of the goal
 
 
 class PlanningParameters(NamedTuple):
@@ -31,7 +37,7 @@ class PlanningParameters(NamedTuple):
 
     Attributes:
         steering: parameters of the law that follows it.
-        room: between feet and pillars, where there is room, R.
+        room: between feet and pillars, where there is enough space, R.
         least: that the torso keeps from pillars, as a share of the extent of the feet.
         nearness: cost of a unit of missing room, in units of path.
         aim: how far along the path the point is that is steered for, R.
@@ -57,126 +63,183 @@ class Planned:
 
     def __init__(self, task: Task, parameters: PlanningParameters):
         """Fit the law that steers to a task; see `CommandLaw`."""
-        self._parameters, self._steered = parameters, Steered(task, parameters.steering)
-        self._extent = self._steered.extent / reach(self._steered.body)
+        self._parameters = parameters
+        self._steering_law = Steered(task, parameters.steering)
+        self._extent = self._steering_law.extent / reach(self._steering_law.body)  # of the feet, R
 
     def initial(self, count: int) -> CommandLawState:
         """Return the state of the law that steers."""
-        return self._steered.initial(count)
+        return self._steering_law.initial(count)
 
     def __call__(self, state: CommandLawState, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints); see `law`."""
-        p, command = self._parameters, observation["command"].copy()
-        for index, (goal, ranges) in enumerate(zip(observation["goal"], observation["ranges"], strict=True)):
-            goal = FAR * float(goal[2]) * goal[:2]
-            x, y = point_along_path(shortest_path(goal, locate_pillars(ranges), self._extent, p) or [goal], p.aim)
-            command[index, :3] = command_toward(math.atan2(y, x), p)
-        return self._steered(state, {**observation, "command": command})
+        command = observation["command"].copy()
+        for index, goal_block in enumerate(observation["goal"]):
+            # The block shows the direction of the goal (2,) and its distance, as a share of the largest one.
+            goal = FAR * float(goal_block[2]) * goal_block[:2]
+            pillars = locate_pillars(observation["ranges"][index])
+            corners = shortest_path(goal, pillars, self._extent, self._parameters)
+            if not corners:
+                corners = [goal]
+            forward, left = point_along_path(corners, self._parameters.aim)
+            command[index, :3] = command_toward(math.atan2(left, forward), self._parameters)
+        return self._steering_law(state, {**observation, "command": command})
 
 
 def command_toward(bearing: float, parameters: PlanningParameters) -> tuple[float, float, float]:
-    """Return the command that leads to a bearing, rad: a turn to it, and a walk there meanwhile."""
+    """Return the command that leads to a bearing, rad: it turns to the bearing, and walks there meanwhile.
+
+    Returns:
+        The velocities forward, left and turning, in target velocities.
+    """
     forward = max(parameters.forward * math.cos(bearing), -parameters.back)
-    return forward, parameters.aside * math.sin(bearing), min(max(bearing, -1.0), 1.0)
+    left = parameters.aside * math.sin(bearing)
+    turning = min(max(bearing, -_MAX_TURN), _MAX_TURN)
+    return forward, left, turning
 
 
 def locate_pillars(ranges: np.ndarray) -> np.ndarray:
-    """Return the middles (n, 2) of pillars, forward and left of the torso, that the ranges (24,) tell of.
+    """Return the middles (n, 2) of pillars, forward and left of the torso, R, from the ranges (24,) of all rays.
 
-    Two neighboring rays that meet one pillar tell exactly where it is; a ray alone, that it is about
-    as far behind as its radius.
+    The points where two neighboring rays meet one pillar give its exact middle. The middle of a pillar that only one
+    ray meets is about a radius behind the point, along the ray.
+
+    Args:
+        ranges: (24,) as shares of the sensor's range.
     """
-    points, met = (SIGHT * ranges * RAYS).T, ranges < _SEEN
-    exact, rough = [], []
-    for ray in np.flatnonzero(met):
-        rough.append(points[ray] + RADIUS * RAYS[:, ray])
-        across = points[(ray + 1) % len(ranges)] - points[ray]
-        half = 0.5 * math.hypot(*across)
-        if met[(ray + 1) % len(ranges)] and half < RADIUS:
-            normal = np.array((across[1], -across[0])) / (2.0 * half)
-            exact.append(points[ray] + 0.5 * across + math.sqrt(RADIUS**2 - half**2) * normal)
-    middles = []
-    for middle in exact + rough:
-        if all(math.hypot(*(middle - other)) > 2.0 * RADIUS for other in middles):
-            middles.append(middle)
+    points = (SIGHT * ranges * RAYS).T  # (24, 2) the ends of the rays
+    meets_pillar = ranges < _MAX_PILLAR_RANGE
+    exact_middles = []
+    rough_middles = []
+    for ray in np.flatnonzero(meets_pillar):
+        rough_middles.append(points[ray] + RADIUS * RAYS[:, ray])
+        next_ray = (ray + 1) % len(ranges)
+        chord = points[next_ray] - points[ray]
+        half_chord = 0.5 * math.hypot(*chord)
+        if meets_pillar[next_ray] and half_chord < RADIUS:
+            normal = np.array((chord[1], -chord[0])) / (2.0 * half_chord)  # away from the torso
+            depth = math.sqrt(RADIUS**2 - half_chord**2)  # of the middle behind the chord
+            exact_middles.append(points[ray] + 0.5 * chord + depth * normal)
+    middles: list[np.ndarray] = []
+    for candidate in exact_middles + rough_middles:
+        # Pillars do not overlap: a candidate that overlaps with an earlier one belongs to the same pillar.
+        if all(math.hypot(*(candidate - middle)) > 2.0 * RADIUS for middle in middles):
+            middles.append(candidate)
     return np.array(middles).reshape(-1, 2)
 
 
 def shortest_path(
     goal: np.ndarray, circles: np.ndarray, extent: float, parameters: PlanningParameters
 ) -> list[np.ndarray]:
-    """Return the corners of a shortest path from the torso to a goal around circles, by A*; none if there is none.
+    """Return the corners of a shortest path from the torso to a goal around circles, by A*; empty if there is none.
 
     Args:
         goal: (2,) forward and left of the torso.
         circles: (n, 2) their middles.
         extent: of the feet about the torso.
-        parameters: how near it may lead to them.
+        parameters: how near the path may lead to circles.
 
     Returns:
         Points (2,), the goal the last of them.
     """
-    distances = np.hypot(*circles.T)
-    least, wanted = np.minimum(RADIUS + parameters.least * extent, 0.99 * distances), RADIUS + extent + parameters.room
-    points = np.concatenate([np.zeros((1, 2)), goal[None], _between(circles, wanted), _around(circles, wanted)])
-    apart = np.hypot(*np.moveaxis(points[:, None] - circles, -1, 0))
-    points = points[(apart >= least).all(axis=-1) | (np.arange(len(points)) < 2)]
-    left = np.hypot(*(points - goal).T)  # the least that is left from each
-    costs, before = np.where(np.arange(len(points)), np.inf, 0.0), np.zeros(len(points), int)
-    done = np.zeros(len(points), bool)
-    queue: list[tuple] = [(left[0], 0)]  # least cost of the whole path, through a point
+    min_distance, desired_distance = _distances_to_keep(circles, extent, parameters)
+    points = _search_points(goal, circles, min_distance, desired_distance)
+    goal_distances = np.hypot(*(points - goal).T)  # lower bounds of the path that is left
+    costs = np.full(len(points), np.inf)  # of the cheapest known path from the start to each point
+    costs[_START] = 0.0
+    previous_points = np.zeros(len(points), int)
+    is_visited = np.zeros(len(points), bool)
+    queue = [(goal_distances[_START], _START)]  # lower bounds of the costs of paths through points, and the points
     while queue:
         _, point = heapq.heappop(queue)
-        if point == 1:
-            corners = [1]
-            while before[corners[-1]]:
-                corners.append(before[corners[-1]])
-            return list(points[corners[::-1]])
-        if done[point]:
+        if point == _GOAL:
+            return _trace_back(points, previous_points)
+        if is_visited[point]:
             continue
-        done[point] = True
-        cost = costs[point] + np.hypot(*(points - points[point]).T)
-        nearest = _nearest(points[point], points, circles)
-        cost += parameters.nearness * (wanted - nearest).clip(0.0).sum(axis=-1)
-        cost[(nearest < least).any(axis=-1)] = np.inf
-        better = np.flatnonzero(cost < costs)
-        costs[better], before[better] = cost[better], point
-        for index in better:
-            heapq.heappush(queue, (cost[index] + left[index], index))
+        is_visited[point] = True
+        distances = _path_distances(points[point], points, circles)
+        missing_room = (desired_distance - distances).clip(0.0).sum(axis=-1)
+        costs_through_point = costs[point] + np.hypot(*(points - points[point]).T)
+        costs_through_point += parameters.nearness * missing_room
+        costs_through_point[(distances < min_distance).any(axis=-1)] = np.inf
+        for neighbor in np.flatnonzero(costs_through_point < costs):
+            costs[neighbor] = costs_through_point[neighbor]
+            previous_points[neighbor] = point
+            heapq.heappush(queue, (costs[neighbor] + goal_distances[neighbor], neighbor))
     return []
 
 
-def _around(circles: np.ndarray, distance: float) -> np.ndarray:
-    """Points (n, 2) about circles at a distance from their middles, which sides between them keep, too.
+def _distances_to_keep(circles: np.ndarray, extent: float, parameters: PlanningParameters) -> tuple[np.ndarray, float]:
+    """Return the distance (n,) from each circle's middle that a path must keep, and the distance that it should."""
+    min_distance = RADIUS + parameters.least * extent
+    start_distances = np.hypot(*circles.T)
+    desired_distance = RADIUS + extent + parameters.room
+    return np.minimum(min_distance, _MAX_SHARE_OF_START * start_distances), desired_distance
 
-    One about each lies toward the torso, so that they stay where they are while it turns.
+
+def _search_points(
+    goal: np.ndarray, circles: np.ndarray, min_distance: np.ndarray, desired_distance: float
+) -> np.ndarray:
+    """Return the points (n, 2) of a search: the torso, the goal, and points between and about circles.
+
+    Points that are too close to a circle are left out.
     """
-    angles = np.arctan2(*-circles.T[::-1])[:, None] + _ANGLES
-    return (circles[:, None] + distance * _OUTSIDE * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2)
+    endpoints = np.stack([np.zeros(2), goal])
+    between = _points_between(circles, desired_distance)
+    around = _points_around(circles, desired_distance)
+    points = np.concatenate([endpoints, between, around])
+    circle_distances = np.hypot(*np.moveaxis(points[:, None] - circles, -1, 0))  # (points, circles)
+    is_kept = (circle_distances >= min_distance).all(axis=-1)
+    is_kept[: len(endpoints)] = True
+    return points[is_kept]
 
 
-def _between(circles: np.ndarray, distance: float) -> np.ndarray:
-    """Points (n, 2) in the middle between any two circles that are nearer than both should be kept from."""
+def _points_between(circles: np.ndarray, distance: float) -> np.ndarray:
+    """Return the points (n, 2) in the middle between any two circles that are less than twice a distance apart."""
     first, second = np.triu_indices(len(circles), 1)
-    near = np.hypot(*(circles[first] - circles[second]).T) < 2.0 * distance
-    return 0.5 * (circles[first] + circles[second])[near]
+    is_near = np.hypot(*(circles[first] - circles[second]).T) < 2.0 * distance
+    return 0.5 * (circles[first] + circles[second])[is_near]
 
 
-def _nearest(start: np.ndarray, ends: np.ndarray, circles: np.ndarray) -> np.ndarray:
-    """How near straight paths from a point (2,) to others (n, 2) lead to circles' middles: (n, circles)."""
-    paths, apart = ends - start, circles - start
-    share = (paths @ apart.T / np.maximum((paths**2).sum(axis=-1), 1e-12)[:, None]).clip(0.0, 1.0)
-    between = share[..., None] * paths[:, None] - apart
-    return np.hypot(between[..., 0], between[..., 1])
+def _points_around(circles: np.ndarray, distance: float) -> np.ndarray:
+    """Return points (n, 2) about circles, the corners of polygons whose sides keep a distance from circles' middles.
+
+    One corner of each polygon lies toward the torso. So corners stay where they are while the torso turns.
+    """
+    bearings_of_torso = np.arctan2(-circles[:, 1], -circles[:, 0])
+    angles = bearings_of_torso[:, None] + _POINT_ANGLES
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return (circles[:, None] + distance * _CORNER_FACTOR * directions).reshape(-1, 2)
+
+
+def _path_distances(start: np.ndarray, ends: np.ndarray, circles: np.ndarray) -> np.ndarray:
+    """Return how near straight paths from a point (2,) to ends (n, 2) come to circles' middles: (n, circles)."""
+    paths = ends - start
+    to_circles = circles - start
+    squared_lengths = np.maximum((paths**2).sum(axis=-1), 1e-12)
+    # Where each path is nearest to a circle, as a share of the path.
+    shares = (paths @ to_circles.T / squared_lengths[:, None]).clip(0.0, 1.0)
+    nearest = shares[..., None] * paths[:, None] - to_circles
+    return np.hypot(nearest[..., 0], nearest[..., 1])
+
+
+def _trace_back(points: np.ndarray, previous_points: np.ndarray) -> list[np.ndarray]:
+    """Return the points of the path that a search has found, from the first after the start to the goal."""
+    path = [_GOAL]
+    while previous_points[path[-1]] != _START:
+        path.append(previous_points[path[-1]])
+    path.reverse()
+    return list(points[path])
 
 
 def point_along_path(corners: Sequence[np.ndarray], distance: float) -> np.ndarray:
-    """Return the point (2,) at a distance along a path from the torso; its end, if it is shorter."""
-    place = np.zeros(2)
+    """Return the point (2,) at a distance along a path from the torso; the end of the path, if it is shorter."""
+    position = np.zeros(2)
+    remaining = distance
     for corner in corners:
-        length = math.hypot(*(corner - place))
-        if length > distance:
-            return place + distance / length * (corner - place)
-        distance -= length
-        place = corner
-    return place
+        length = math.hypot(*(corner - position))
+        if length > remaining:
+            return position + remaining / length * (corner - position)
+        remaining -= length
+        position = corner
+    return position

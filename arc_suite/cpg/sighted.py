@@ -104,7 +104,9 @@ class Sighted(CommandLaw):
         p, height = self.parameters, self.mechanics.height
         paths = self._looked(paths, observation["scan"], observation["velocities"][:, :2])
         motion = request.size * request.motion.clip(-p.most, p.most) * self.units
-        cycle = (request.phase[:, None] + self.phase_offsets + request.advance[:, None]) % 1.0  # in the next control step
+        cycle = (
+            request.phase[:, None] + self.phase_offsets + request.advance[:, None]
+        ) % 1.0  # in the next control step
         predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
         feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
         aims = path_weights(point_velocities(motion, feet), _ACROSS)

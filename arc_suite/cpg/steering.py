@@ -116,7 +116,9 @@ class Steered(CommandLaw):
             first = joints.stop
             below, above = -0.95 * low[joints], 0.95 * high[joints]
             room = np.minimum(np.minimum(below, above), self.parameters.sweep).clip(1e-3)
-            yield _Leg(jacobian, room, lift_angles(jacobian, self.parameters.lift * self.mechanics.height, below, above))
+            yield _Leg(
+                jacobian, room, lift_angles(jacobian, self.parameters.lift * self.mechanics.height, below, above)
+            )
 
 
 def _sweep(leg: _Leg, path, level: float):
