@@ -6,11 +6,21 @@ import numpy as np
 
 from arc_suite.tasks.sensors import FORWARD, LEFT
 
-# By how much feet may land further ahead, in standing heights. Those ahead count half as much again as those behind,
-# since a foot that has far to go comes late.
-LANDING_SHIFTS = np.array(sorted(0.08 * np.arange(-8, 9), key=lambda shift: 1.5 * shift if shift > 0.0 else -shift))
-SUPPORT_POINTS = np.array((-0.12, 0.0, 0.12))  # standing heights along the path: ground that a foot needs
-MAX_FOOTHOLD_DROP = 0.25  # standing heights below the ground about the feet, at which ground is no foothold
+_SHIFT_SPACING = 0.08  # standing heights
+_SHIFTS_EACH_WAY = 8
+_FORWARD_COST = 1.5  # of a shift forward, against 1 backward: a foot that has far to go comes late
+
+
+def _shift_cost(shift: float) -> float:
+    return _FORWARD_COST * shift if shift > 0.0 else -shift
+
+
+# By how much feet may land further ahead along their paths, standing heights, the cheapest first.
+LANDING_SHIFTS = np.array(sorted(_SHIFT_SPACING * np.arange(-_SHIFTS_EACH_WAY, _SHIFTS_EACH_WAY + 1), key=_shift_cost))
+# Points along a foot's path, from its foothold, that must have ground, standing heights.
+SUPPORT_POINTS = np.array((-0.12, 0.0, 0.12))
+# Ground that is further below the ground about the feet is no foothold, standing heights.
+MAX_FOOTHOLD_DROP = 0.25
 
 
 class View(NamedTuple):
@@ -19,7 +29,7 @@ class View(NamedTuple):
     Attributes:
         heights: (environments, scans, points) of the ground, in standing heights, as a task's block `scan` gives them.
         moved: (environments, scans, 2) displacement of the torso since each scan, m, forward and left.
-        reach: R, by which the points lie apart, m.
+        reach: R, the mean distance of the feet from their center, m: the points of a scan are multiples of it.
     """
 
     heights: np.ndarray
@@ -29,21 +39,29 @@ class View(NamedTuple):
     def ground(self, x, y):
         """Return lower bounds (environments, ...) of the heights of the ground at points, in standing heights.
 
-        Of a scan it is the lower of the two points before and behind, which meets every trench that is
-        wider than their distance; of several scans it is the highest.
+        The bound of a scan is the lower of its two nearest points, before and behind. So it meets every trench that
+        is wider than their distance. The bound of several scans is the highest of theirs.
 
         Args:
             x: (environments, ...) forward of the torso, m.
             y: (environments, ...) to its left, m.
         """
-        numpy, axes = x.__array_namespace__(), [1] * (x.ndim - 1)
-        environments, found = np.arange(len(x)).reshape(-1, *axes), numpy.full_like(x, -np.inf)
-        for heights, moved in zip(self.heights.swapaxes(0, 1), self.moved.swapaxes(0, 1), strict=True):
-            ahead, aside = (moved[:, i].reshape(-1, *axes) for i in (0, 1))
-            column, row = _index((x + ahead) / self.reach, FORWARD), numpy.rint(_index((y + aside) / self.reach, LEFT))
-            points = ((end * len(LEFT) + row).astype(int) for end in (numpy.floor(column), numpy.ceil(column)))
-            found = numpy.maximum(found, numpy.minimum(*(heights[environments, point] for point in points)))
-        return found
+        xp = x.__array_namespace__()
+        extra_axes = [1] * (x.ndim - 1)
+        environments = np.arange(len(x)).reshape(-1, *extra_axes)
+        ground = xp.full_like(x, -np.inf)
+        for scan in range(self.heights.shape[1]):
+            heights = self.heights[:, scan]
+            moved_forward = self.moved[:, scan, 0].reshape(-1, *extra_axes)
+            moved_left = self.moved[:, scan, 1].reshape(-1, *extra_axes)
+            # The points of a scan lie on a grid, in rows by FORWARD and columns by LEFT, as one list.
+            row = _grid_index((x + moved_forward) / self.reach, FORWARD)
+            column = xp.rint(_grid_index((y + moved_left) / self.reach, LEFT))
+            point_before = (xp.floor(row) * len(LEFT) + column).astype(int)
+            point_behind = (xp.ceil(row) * len(LEFT) + column).astype(int)
+            bound = xp.minimum(heights[environments, point_before], heights[environments, point_behind])
+            ground = xp.maximum(ground, bound)
+        return ground
 
 
 def find_shifts(view: View, landing, along, places, height: float):
@@ -53,25 +71,40 @@ def find_shifts(view: View, landing, along, places, height: float):
         view: of the ground.
         landing: (environments, feet, 2) where feet would land, m, forward and left of the torso.
         along: (environments, feet, 2) directions of their paths, unit vectors.
-        places: (feet, 2) where feet stand at ease, m.
+        places: (feet, 2) positions of the feet at rest, m.
         height: the standing height, m.
     """
-    return find_landings(view, landing, along, places, height)[0]
+    shifts, _ = find_landings(view, landing, along, places, height)
+    return shifts
 
 
-def find_landings(view: View, landing, along, places, height: float, around=SUPPORT_POINTS) -> tuple:
-    """Return `shifts`, and whether there is ground to land on, (environments, feet), with ground around, in h."""
-    numpy = landing.__array_namespace__()
-    at_ease = numpy.broadcast_to(numpy.asarray(places), landing.shape)
-    level = numpy.median(view.ground(at_ease[..., 0], at_ease[..., 1]), axis=-1)
-    tried = (LANDING_SHIFTS[:, None] + around).ravel() * height
-    points = landing[..., None, :] + along[..., None, :] * tried[:, None]
-    ground = view.ground(points[..., 0], points[..., 1]).reshape(*landing.shape[:2], len(LANDING_SHIFTS), len(around))
-    safe = (ground > level[:, None, None, None] - MAX_FOOTHOLD_DROP).all(axis=-1)
-    found = safe.any(axis=-1)
-    return height * numpy.where(found, numpy.asarray(LANDING_SHIFTS)[safe.argmax(axis=-1)], 0.0), found
+def find_landings(view: View, landing, along, places, height: float, support_points=SUPPORT_POINTS) -> tuple:
+    """Return the shifts of `find_shifts`, m, and whether they find ground, both (environments, feet).
+
+    Args:
+        view: of the ground.
+        landing: (environments, feet, 2) where feet would land, m, forward and left of the torso.
+        along: (environments, feet, 2) directions of their paths, unit vectors.
+        places: (feet, 2) positions of the feet at rest, m.
+        height: the standing height, m.
+        support_points: (n,) along a foot's path, from its foothold, that must have ground, standing heights.
+    """
+    xp = landing.__array_namespace__()
+    rest_positions = xp.broadcast_to(xp.asarray(places), landing.shape)
+    level = xp.median(view.ground(rest_positions[..., 0], rest_positions[..., 1]), axis=-1)
+
+    # Distances of all support points of all shifts from the landing, along the path, m.
+    distances = (LANDING_SHIFTS[:, None] + support_points).ravel() * height
+    points = landing[..., None, :] + along[..., None, :] * distances[:, None]
+    ground = view.ground(points[..., 0], points[..., 1])
+    ground = ground.reshape(*landing.shape[:2], len(LANDING_SHIFTS), len(support_points))
+    is_safe = (ground > level[:, None, None, None] - MAX_FOOTHOLD_DROP).all(axis=-1)  # (environments, feet, shifts)
+    has_ground = is_safe.any(axis=-1)
+    first_safe = is_safe.argmax(axis=-1)
+    shifts = height * xp.where(has_ground, xp.asarray(LANDING_SHIFTS)[first_safe], 0.0)
+    return shifts, has_ground
 
 
-def _index(place, places):
-    """Where a place lies among evenly spaced ones, counted from the first."""
-    return ((place - places[0]) / (places[1] - places[0])).clip(0.0, len(places) - 1)
+def _grid_index(coordinate, grid):
+    """Return where a coordinate lies among evenly spaced ones, as a number of steps from the first."""
+    return ((coordinate - grid[0]) / (grid[1] - grid[0])).clip(0.0, len(grid) - 1)

@@ -1,8 +1,8 @@
 """The demonstrator `sighted`: feet step along paths in space, and land where the scanned ground carries them.
 
 In stance a foot moves against the requested velocity; in swing it goes to its foothold, shifted along
-its path to the nearest ground. Joint angles follow by inverse kinematics of the legs, since the shifts
-are too long for the directions of joints by which the law of `steering` walks.
+its path to the nearest ground. Joint angles follow by inverse kinematics of the legs: the shifts are
+too long for the directions of joints by which the law of `steering` walks.
 """
 
 from collections.abc import Mapping
@@ -24,16 +24,16 @@ class SightedParameters(NamedTuple):
     """How a demonstrator that sees walks.
 
     Attributes:
-        lift: of a foot in mid-swing, in standing heights.
+        lift: height of a foot in mid-swing, in standing heights.
         ride: height of the torso, in standing heights: lower than one, for feet to reach further.
-        gain: of the motion's error, forward, left and turning.
-        integral: of the same, a cycle of the gait.
+        gain: of the feedback on the motion's error: forward, left and turning.
+        integral: gain of the same error, added up over a cycle of the gait.
         most: largest request, in units of the command.
-        attitude: how far a foot is pushed down, as a share of how far the torso's tilt sinks its place.
+        attitude: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
         lead: of all legs over the gait's clock, cycles.
-        longer: swing than the gait prescribes, cycles, since feet follow late.
-        trust: from 0 to 1, in the requested velocity against the measured one, whose mean comes late,
-            in the prediction of where the torso is when a foot lands.
+        longer: by which the swing is longer than in the task's gait, cycles, since feet follow late.
+        trust: weight of the requested velocity against the measured one, from 0 to 1, in the prediction of
+            where the torso is when a foot lands. The mean of the measured velocity comes late.
     """
 
     lift: float = 0.3
@@ -47,22 +47,23 @@ class SightedParameters(NamedTuple):
     trust: float = 1.0
 
 
-_SCANS = 6  # that are remembered
-_EARLY = 1.0  # control steps before landing, at which a foot is to be over its foothold
-_HELD = 0.1  # cycles before landing, in which its foothold is no longer changed
-_ACROSS = 0.3  # weight of a foot's slip across its path against its motion along it
-_STEPS = 2  # of it in a control step
+_SCAN_COUNT = 6  # scans that are remembered
+_ARRIVAL_STEPS = 1.0  # control steps before landing at which a foot is to be over its foothold
+_FIXED_CYCLES = 0.1  # cycles before landing in which a foothold is no longer changed
+_SLIP_WEIGHT = 0.3  # of a foot's slip across its path against its motion along it
+_REST_WEIGHTS = np.diag((0.2, 0.2, 1.0))  # of errors of soles forward, left and up, in the search for angles at rest
+_IK_ITERATIONS = 2  # of inverse kinematics in a control step
 
 
 class SightedState(NamedTuple):
-    """The law's own state.
+    """What this law adds to the state of a `CommandLaw`.
 
     Attributes:
-        feet: (environments, legs, 3) planned places of the soles, m.
+        feet: (environments, legs, 3) planned positions of the soles, m.
         angles: (environments, legs, links) planned for them, rad.
         shifts: (environments, legs) of where feet land, m.
         heights: (environments, scans, points) the latest scans, in standing heights; -inf before there were any.
-        moved: (environments, scans, 2) displacement of the torso since, m.
+        moved: (environments, scans, 2) displacement of the torso since each scan, m.
     """
 
     feet: np.ndarray
@@ -77,113 +78,149 @@ class Sighted(CommandLaw):
 
     Attributes:
         legs: their kinematics.
-        places: (legs, 3) of the soles at ease, m.
-        around: ground that a foot needs, standing heights along its path.
+        rest_soles: (legs, 3) positions of the soles at rest, m.
+        support_points: (n,) along a foot's path, from its foothold, standing heights: all must have ground.
     """
 
-    around = footholds.SUPPORT_POINTS
+    support_points = footholds.SUPPORT_POINTS
     reads = (*CommandLaw.reads, "scan")
 
     def __init__(self, task: Task, parameters: SightedParameters):
         """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
         self.duty_factor -= parameters.longer
-        self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.mechanics.height
-        soles = np.where((True, True, False), self.mechanics.soles, -ride)
-        angles = self.legs.relaxed_joint_angles(soles, np.diag((0.2, 0.2, 1.0)), posture.IK_DAMPING * ride)
-        self.rest_soles = self.legs.soles(angles)[0]
-        scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
-        self._first = SightedState(self.rest_soles, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
+        self.legs = Legs.of(self.body)
+        self._reach = reach(self.body)
+        ride_height = parameters.ride * self.mechanics.height  # m
+        sole_goals = np.where((True, True, False), self.mechanics.soles, -ride_height)
+        rest_angles = self.legs.relaxed_joint_angles(sole_goals, _REST_WEIGHTS, posture.IK_DAMPING * ride_height)
+        self.rest_soles, _ = self.legs.soles(rest_angles)
+        self._first_state = SightedState(
+            feet=self.rest_soles,
+            angles=rest_angles,
+            shifts=np.zeros(len(rest_angles)),
+            heights=np.full((_SCAN_COUNT, SCAN.shape[1]), -np.inf),
+            moved=np.zeros((_SCAN_COUNT, 2)),
+        )
 
     def initial_paths(self, count: int) -> SightedState:
-        """Return feet at ease, and nothing seen."""
-        return SightedState(*(np.tile(first, (count, *[1] * first.ndim)) for first in self._first))
+        """Return feet at rest and no scans, for a number of environments."""
+        return SightedState(*(np.tile(array, (count, *[1] * array.ndim)) for array in self._first_state))
 
-    def planned(self, paths: SightedState, request: Request, observation: Mapping) -> tuple:
-        """Return the next paths of the feet, target angles (environments, joints), rad, and their change."""
-        p, height = self.parameters, self.mechanics.height
-        paths = self._looked(paths, observation["scan"], observation["velocities"][:, :2])
-        motion = request.size * request.motion.clip(-p.most, p.most) * self.units
-        cycle = (
-            request.phase[:, None] + self.phase_offsets + request.advance[:, None]
-        ) % 1.0  # in the next control step
-        predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
-        feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
-        aims = path_weights(point_velocities(motion, feet), _ACROSS)
-        angles = self.correct_bends(
-            self.legs.solve_joint_angles(paths.angles, feet, aims, posture.IK_DAMPING * height, _STEPS)
-        )
-        targets = self.legs.by_joint(paths.angles)
-        change = self.legs.by_joint(angles) - targets
-        return paths._replace(feet=feet, angles=angles, shifts=shifts), targets, change
+    def planned(self, state: SightedState, request: Request, observation: Mapping) -> tuple:
+        """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
+        parameters = self.parameters
+        torso_quaternion = observation["posture"][:, 1:5]
+        state = self._add_scan(state, observation["scan"], observation["velocities"][:, :2])
+        velocity = request.size * request.motion.clip(-parameters.most, parameters.most) * self.units
+        measured_motion = observation["command"][:, 3:]  # units of the command
+        trust = parameters.trust
+        predicted_velocity = trust * velocity + (1.0 - trust) * measured_motion * self.units
+        leg_phases = (request.phase[:, None] + self.phase_offsets + request.advance[:, None]) % 1.0
+        feet, shifts = self._next_feet(state, leg_phases, velocity, predicted_velocity, request.size, torso_quaternion)
+        weights = path_weights(point_velocities(velocity, feet), _SLIP_WEIGHT)
+        damping = posture.IK_DAMPING * self.mechanics.height
+        angles = self.legs.solve_joint_angles(state.angles, feet, weights, damping, _IK_ITERATIONS)
+        angles = self.correct_bends(angles)
+        targets = self.legs.by_joint(state.angles)
+        changes = self.legs.by_joint(angles) - targets
+        return state._replace(feet=feet, angles=angles, shifts=shifts), targets, changes
 
     def correct_bends(self, angles):
-        """Return angles (environments, legs, links), with those at ease of legs that bend the other way.
+        """Return angles (environments, legs, links), with the angles at rest for legs that bend the other way.
 
-        Legs of three links, stretched out to a place that they do not reach, may bend either way next, and stay so.
+        Legs of three links that are stretched out may bend either way next, and stay so.
         """
         if angles.shape[-1] != 3:
             return angles
-        numpy = angles.__array_namespace__()
-        bent, at_ease = (numpy.linalg.det(self.legs.soles(each)[1]) for each in (angles, self._first.angles))
-        return numpy.where((bent * at_ease < 0.0)[..., None], self._first.angles, angles)
+        xp = angles.__array_namespace__()
+        rest_angles = self._first_state.angles
+        # The sign of a Jacobian's determinant changes where a leg is stretched out.
+        bend = xp.linalg.det(self.legs.soles(angles)[1])
+        rest_bend = xp.linalg.det(self.legs.soles(rest_angles)[1])
+        bends_other_way = bend * rest_bend < 0.0
+        return xp.where(bends_other_way[..., None], rest_angles, angles)
 
-    def _looked(self, paths: SightedState, scan, velocity) -> SightedState:
-        """The paths with one more scan (environments, points), given the torso's velocity (environments, 2), m/s."""
-        numpy = scan.__array_namespace__()
-        moved = paths.moved[:, :-1] + velocity[:, None] * self.control_timestep
-        return paths._replace(
-            heights=numpy.concatenate([scan[:, None], paths.heights[:, :-1]], axis=1),
-            moved=numpy.concatenate([numpy.zeros_like(moved[:, :1]), moved], axis=1),
+    def _add_scan(self, state: SightedState, scan, velocity) -> SightedState:
+        """Return the state with one more scan (environments, points), in place of the oldest one.
+
+        Args:
+            state: with the scans before.
+            scan: (environments, points) heights, in standing heights.
+            velocity: (environments, 2) of the torso, forward and left, m/s.
+        """
+        xp = scan.__array_namespace__()
+        moved = state.moved[:, :-1] + velocity[:, None] * self.control_timestep
+        return state._replace(
+            heights=xp.concatenate([scan[:, None], state.heights[:, :-1]], axis=1),
+            moved=xp.concatenate([xp.zeros_like(moved[:, :1]), moved], axis=1),
         )
 
-    def _next_feet(self, paths: SightedState, cycle, motion, predicted, size, quaternion) -> tuple:
-        """Places (environments, legs, 3) of the soles in the next control step, m, and shifts of where they land.
+    def _next_feet(self, state: SightedState, leg_phases, velocity, predicted_velocity, gait_size, quaternion) -> tuple:
+        """Return positions (environments, legs, 3) of the soles in the next control step, m, and shifts of footholds.
 
         Args:
-            paths: with the latest scan.
-            cycle: (environments, legs) phases of the legs then.
-            motion: (environments, 3) requested velocity, m/s and rad/s.
-            predicted: (environments, 3) velocity until feet land.
-            size: (environments, 1) of the gait.
+            state: with the latest scan.
+            leg_phases: (environments, legs) in the next control step, cycles.
+            velocity: (environments, 3) requested, m/s and rad/s.
+            predicted_velocity: (environments, 3) until feet land, m/s and rad/s.
+            gait_size: (environments, 1) from 0 to 1.
             quaternion: (environments, 4) of the torso.
         """
-        numpy, duty = cycle.__array_namespace__(), self.duty_factor
-        feet, stands = paths.feet, cycle < duty
-        left = numpy.where(stands, 0.0, (1.0 - cycle) / self.cycles_per_step)  # control steps from then to landing
-        early = numpy.minimum(left, _EARLY)
-        drift = (
-            point_velocities(predicted, self.rest_soles) * self.control_timestep
-        )  # of the torso over the ground, a control step
-        held = stands | (left + 1.0 < _HELD / self.cycles_per_step)
-        goal, shifts = self._landing(paths, motion, drift * (left + 1.0)[..., None], held)
-        goal = goal + drift * early[..., None]
-        swung = feet[..., :2] + (goal - feet[..., :2]) / (numpy.floor(left - early) + 1.0)[..., None]
-        stood = (cycle / self.cycles_per_step).clip(max=1.0)[..., None]  # control steps, at most the latest
-        stood = feet[..., :2] - point_velocities(motion, feet) * self.control_timestep * stood
-        tilt = tilt_heights(
-            rotations.matrix(quaternion)[:, 2], self.rest_soles
-        )  # by the world's vertical in the torso's frame
-        progress = ((cycle - duty) / (1.0 - duty)).clip(0.0)
-        lift = size * self.parameters.lift * self.mechanics.height * numpy.sin(np.pi * progress)
-        heights = self.rest_soles[:, 2] + lift + self.parameters.attitude * tilt
-        ground = numpy.where(stands[..., None], stood, swung)
-        return numpy.concatenate([ground, heights[..., None]], axis=-1), shifts
+        xp = leg_phases.__array_namespace__()
+        duty_factor = self.duty_factor
+        is_stance = leg_phases < duty_factor
 
-    def _landing(self, paths: SightedState, motion, moved, held) -> tuple:
-        """Where feet land (environments, legs, 2), m from where the torso is then, and shifts (environments, legs).
+        # A foot in swing covers, in each control step, an equal part of the way that is left to its foothold.
+        steps_to_landing = xp.where(is_stance, 0.0, (1.0 - leg_phases) / self.cycles_per_step)  # from the next step
+        arrival_steps = xp.minimum(steps_to_landing, _ARRIVAL_STEPS)
+        # How far the torso moves over the ground in a control step, at each foot, m.
+        torso_drift = point_velocities(predicted_velocity, self.rest_soles) * self.control_timestep
+        is_fixed = is_stance | (steps_to_landing + 1.0 < _FIXED_CYCLES / self.cycles_per_step)
+        torso_displacement = torso_drift * (steps_to_landing + 1.0)[..., None]
+        footholds_at_landing, shifts = self._find_footholds(state, velocity, torso_displacement, is_fixed)
+        swing_goals = footholds_at_landing + torso_drift * arrival_steps[..., None]
+        remaining_steps = (xp.floor(steps_to_landing - arrival_steps) + 1.0)[..., None]
+        swing_ground = state.feet[..., :2] + (swing_goals - state.feet[..., :2]) / remaining_steps
+
+        # A foot in stance moves against the velocity, in its first step only since it landed.
+        stance_steps = (leg_phases / self.cycles_per_step).clip(max=1.0)[..., None]
+        foot_travel = point_velocities(velocity, state.feet) * self.control_timestep * stance_steps
+        stance_ground = state.feet[..., :2] - foot_travel
+        ground = xp.where(is_stance[..., None], stance_ground, swing_ground)
+
+        vertical = rotations.matrix(quaternion)[:, 2]  # the world's, in the torso's frame
+        tilt = tilt_heights(vertical, self.rest_soles)
+        swing_progress = ((leg_phases - duty_factor) / (1.0 - duty_factor)).clip(0.0)
+        lift = gait_size * self.parameters.lift * self.mechanics.height * xp.sin(np.pi * swing_progress)
+        heights = self.rest_soles[:, 2] + lift + self.parameters.attitude * tilt
+        return xp.concatenate([ground, heights[..., None]], axis=-1), shifts
+
+    def _find_footholds(self, state: SightedState, velocity, torso_displacement, is_fixed) -> tuple:
+        """Return footholds (environments, legs, 2), m from the torso when feet land, and their shifts, m.
 
         Args:
-            paths: with the latest scan.
-            motion: (environments, 3) requested velocity, m/s and rad/s.
-            moved: (environments, legs, 2) displacement of the torso until then, at the feet, m.
-            held: (environments, legs) whether the last choice stays.
+            state: with the latest scan.
+            velocity: (environments, 3) requested, m/s and rad/s.
+            torso_displacement: (environments, legs, 2) until feet land, at the feet, m.
+            is_fixed: (environments, legs) whether the last shift stays.
+
+        Returns:
+            The footholds, and shifts (environments, legs) along paths, forward positive.
         """
-        numpy = motion.__array_namespace__()
-        half = 0.5 * self.stance_duration * point_velocities(motion, self.rest_soles)
-        along = half / numpy.maximum(numpy.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
-        landing, view = self.rest_soles[:, :2] + half, footholds.View(paths.heights, paths.moved, self._reach)
-        near, height = self.rest_soles[:, :2], self.mechanics.height
-        found, _ = footholds.find_landings(view, landing + moved, along, near, height, self.around)
-        shifts = numpy.where(held, paths.shifts, found)
-        return landing + shifts[..., None] * along, shifts
+        xp = velocity.__array_namespace__()
+        half_path = 0.5 * self.stance_duration * point_velocities(velocity, self.rest_soles)
+        length = xp.maximum(xp.hypot(half_path[..., 0], half_path[..., 1]), 1e-9)
+        direction = half_path / length[..., None]
+        landing = self.rest_soles[:, :2] + half_path
+        view = footholds.View(state.heights, state.moved, self._reach)
+        found_shifts, _ = footholds.find_landings(
+            view,
+            landing + torso_displacement,
+            direction,
+            self.rest_soles[:, :2],
+            self.mechanics.height,
+            self.support_points,
+        )
+        shifts = xp.where(is_fixed, state.shifts, found_shifts)
+        return landing + shifts[..., None] * direction, shifts

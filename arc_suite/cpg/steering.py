@@ -26,9 +26,9 @@ class SteeringParameters(NamedTuple):
     """How a steering demonstrator walks.
 
     Attributes:
-        lift: of a foot in mid-swing, in standing heights.
-        gain: of the motion's error, forward, left and turning.
-        integral: of the same, a cycle of the gait.
+        lift: height of a foot in mid-swing, in standing heights.
+        gain: of the feedback on the motion's error: forward, left and turning.
+        integral: gain of the same error, added up over a cycle of the gait.
         attitude: how far the low side of the torso is pushed up, rad of lift per rad of tilt.
         share: of a joint's range that the neutral pose leaves to either side.
         level: weight of a foot's vertical motion in stance against its motion along its path.
@@ -48,16 +48,21 @@ class SteeringParameters(NamedTuple):
     lead: float = 0.0
 
 
-_ACROSS = 0.1  # weight of a foot's slip across its path against its motion along it
-_DAMPING = 0.1  # of the leg's largest Jacobian entry, for a joint with room for _ROOM
-_ROOM = 0.5  # rad
+_SLIP_WEIGHT = 0.1  # of a foot's slip across its path against its motion along it
+_DAMPING_SHARE = 0.1  # of the leg's largest Jacobian entry, for a joint with room for _DAMPING_ROOM
+_DAMPING_ROOM = 0.5  # rad
+_USABLE_RANGE = 0.95  # share of the way from the neutral pose to a joint's bound
+_MIN_SWEEP_ROOM = 1e-3  # rad
+_LEVELING_ITERATIONS = 50  # of the search for the neutral pose
+_LEVELING_STEP = 0.5  # share of a sole's error in height that an iteration takes away
+_MIN_LENGTH = 1e-9  # m, of a path that has a direction
 
 
 class _Leg(NamedTuple):
     """A leg in the neutral pose.
 
     Attributes:
-        jacobian: (3, n) of the sole.
+        jacobian: (3, n) of the sole, m/rad.
         room: (n,) to either side for sweeping, rad.
         lift: (n,) angles in mid-swing, rad.
     """
@@ -73,94 +78,124 @@ class Steered(CommandLaw):
     Attributes:
         neutral: (joints,) pose, rad.
         legs: in that pose.
-        feet: (legs, 2) places of the soles, from the center of mass, m.
+        feet: (legs, 2) positions of the soles, from the center of mass, m.
         extent: of the feet from the center of mass, m.
     """
 
     def __init__(self, task: Task, parameters: SteeringParameters):
         """Fit the law to a task; see `CommandLaw`."""
         body = size_body(task.scene.body)
-        self.neutral = _neutral(body, parameters.share)
+        self.neutral = _find_neutral_pose(body, parameters.share)
         super().__init__(task, parameters, tuple(self.neutral))
-        self.legs = list(self._legs())
+        self.legs = self._make_legs()
         self.feet = (self.mechanics.soles - self.mechanics.center)[:, :2]
-        self.extent = float(max(np.hypot(*self.feet.T) + [leg.foot.radius for leg in body.legs]))
+        foot_radii = [leg.foot.radius for leg in body.legs]
+        self.extent = float(max(np.hypot(*self.feet.T) + foot_radii))
 
     def initial_paths(self, count: int) -> tuple:
         """Return nothing: the law remembers no more than `CommandLawState` does."""
         return ()
 
-    def planned(self, none: tuple, request: Request, observation: Mapping) -> tuple:
-        """Return the target angles (environments, joints), rad, and their change in a step; see `CommandLaw`."""
-        numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
-        paths = 0.5 * self.stance_duration * point_velocities(request.motion * self.units, self.feet)
+    def planned(self, state: tuple, request: Request, observation: Mapping) -> tuple:
+        """Return the state, target angles (environments, joints), rad, and their change in a step; see `CommandLaw`."""
+        xp = request.motion.__array_namespace__()
+        parameters = self.parameters
+        velocity = request.motion * self.units
+        half_paths = 0.5 * self.stance_duration * point_velocities(velocity, self.feet)
         # The low side of the torso is pushed up: its feet go down.
-        lows = -tilt_heights(rotations.matrix(quaternion)[:, 2], self.feet) / self.mechanics.height
-        unload = self.parameters.unload / self.parameters.lift
-        now, later = [], []
+        vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
+        depths = -tilt_heights(vertical, self.feet) / self.mechanics.height  # standing heights, by which feet are low
+        unload_share = parameters.unload / parameters.lift
+        next_phase = request.phase + request.advance
+        targets = []
+        next_targets = []
         for index, leg in enumerate(self.legs):
-            sweep, able = _sweep(leg, paths[:, index], self.parameters.level)
-            low = lows[:, index : index + 1]
-            raised = ((1.0 - able) * unload - self.parameters.attitude * low) * leg.lift
-            for targets, phase in ((now, request.phase), (later, request.phase + request.advance)):
-                cycle = (phase + self.phase_offsets[index]) % 1.0
-                targets.append(raised + cycle_angles(cycle[:, None], self.duty_factor, sweep, leg.lift))
-        now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
-        return none, self.neutral + now, later - now
+            sweep, able_share = _solve_sweep(leg, half_paths[:, index], parameters.level)
+            depth = depths[:, index : index + 1]
+            lift_share = (1.0 - able_share) * unload_share - parameters.attitude * depth
+            raised = lift_share * leg.lift
+            leg_phase = (request.phase + self.phase_offsets[index]) % 1.0
+            next_leg_phase = (next_phase + self.phase_offsets[index]) % 1.0
+            targets.append(raised + cycle_angles(leg_phase[:, None], self.duty_factor, sweep, leg.lift))
+            next_targets.append(raised + cycle_angles(next_leg_phase[:, None], self.duty_factor, sweep, leg.lift))
+        departure = request.size * xp.concatenate(targets, axis=-1)  # from the neutral pose
+        next_departure = request.size * xp.concatenate(next_targets, axis=-1)
+        return state, self.neutral + departure, next_departure - departure
 
-    def _legs(self):
-        low, high = _ranges(self.body) - self.neutral
+    def _make_legs(self) -> list[_Leg]:
+        low, high = _joint_bounds(self.body) - self.neutral
+        lift_height = self.parameters.lift * self.mechanics.height  # m
+        legs = []
         first = 0
         for leg, jacobian in zip(self.body.legs, self.mechanics.jacobians, strict=True):
             joints = slice(first, first + len(leg.joints))
             first = joints.stop
-            below, above = -0.95 * low[joints], 0.95 * high[joints]
-            room = np.minimum(np.minimum(below, above), self.parameters.sweep).clip(1e-3)
-            yield _Leg(
-                jacobian, room, lift_angles(jacobian, self.parameters.lift * self.mechanics.height, below, above)
-            )
+            room_below = -_USABLE_RANGE * low[joints]
+            room_above = _USABLE_RANGE * high[joints]
+            room = np.minimum(np.minimum(room_below, room_above), self.parameters.sweep).clip(_MIN_SWEEP_ROOM)
+            lift = lift_angles(jacobian, lift_height, room_below, room_above)
+            legs.append(_Leg(jacobian, room, lift))
+        return legs
 
 
-def _sweep(leg: _Leg, path, level: float):
-    """Joint angles (environments, n) that move a foot along a path (environments, 2), and the share (environments, 1)
-    of it that they manage."""
-    numpy = path.__array_namespace__()
-    length = numpy.hypot(path[:, 0], path[:, 1])[:, None]
-    along = path / numpy.maximum(length, 1e-9)
-    weighted = path_weights(path, _ACROSS, level) @ leg.jacobian
-    damping = np.diag(_damping(leg))
-    turned = weighted.swapaxes(-1, -2)
-    angles = damped_changes(weighted, turned[..., :1] * length[..., None], damping)[..., 0]
-    moved = (weighted @ angles[..., None])[..., 0]
-    angles = angles * (moved[:, :1] * length / numpy.maximum((moved**2).sum(axis=-1, keepdims=True), 1e-12))
-    angles = angles * numpy.minimum(1.0, (leg.room / numpy.maximum(abs(angles), 1e-12)).min(axis=-1, keepdims=True))
+def _solve_sweep(leg: _Leg, path, level: float) -> tuple:
+    """Return joint angles that move a foot along a path, and the share of the path that they manage.
+
+    Args:
+        leg: in the neutral pose.
+        path: (environments, 2) of the foot, forward and left, m.
+        level: weight of the vertical motion.
+
+    Returns:
+        Angles (environments, n), rad, and shares (environments, 1) from 0 to 1.
+    """
+    xp = path.__array_namespace__()
+    length = xp.hypot(path[:, 0], path[:, 1])[:, None]
+    direction = path / xp.maximum(length, _MIN_LENGTH)
+    # Motion of the foot along the path, across it and up, with their weights, per joint angle: (environments, 3, n).
+    weighted_jacobian = path_weights(path, _SLIP_WEIGHT, level) @ leg.jacobian
+    transposed = weighted_jacobian.swapaxes(-1, -2)
+    pull = transposed[..., :1] * length[..., None]
+    angles = damped_changes(weighted_jacobian, pull, np.diag(_squared_damping(leg)))[..., 0]
+    # Damping shortens the motion. It is scaled by least squares to the length of the path, then to the joints' room.
+    motion = (weighted_jacobian @ angles[..., None])[..., 0]
+    squared_motion = xp.maximum((motion**2).sum(axis=-1, keepdims=True), 1e-12)
+    angles = angles * (motion[:, :1] * length / squared_motion)
+    room_shares = leg.room / xp.maximum(abs(angles), 1e-12)
+    angles = angles * xp.minimum(1.0, room_shares.min(axis=-1, keepdims=True))
     # A product for each environment by itself: one of all would round differently with their number.
-    reached = (along * (leg.jacobian[:2] @ angles[..., None])[..., 0]).sum(axis=-1, keepdims=True)
-    return angles, numpy.where(length > 1e-9, reached / numpy.maximum(length, 1e-9), 1.0).clip(0.0, 1.0)
+    ground_motion = (leg.jacobian[:2] @ angles[..., None])[..., 0]
+    length_managed = (direction * ground_motion).sum(axis=-1, keepdims=True)
+    share = xp.where(length > _MIN_LENGTH, length_managed / xp.maximum(length, _MIN_LENGTH), 1.0)
+    return angles, share.clip(0.0, 1.0)
 
 
-def _damping(leg: _Leg) -> np.ndarray:
-    """Squared damping (n,) of the least squares, m^2."""
-    return (_DAMPING * abs(leg.jacobian).max() * _ROOM / leg.room) ** 2
+def _squared_damping(leg: _Leg) -> np.ndarray:
+    """Return the squared damping (n,) of the least squares, m^2; joints with little room have more."""
+    return (_DAMPING_SHARE * abs(leg.jacobian).max() * _DAMPING_ROOM / leg.room) ** 2
 
 
-def _ranges(body: Body) -> np.ndarray:
-    """Bounds (2, joints) of the joints, rad."""
+def _joint_bounds(body: Body) -> np.ndarray:
+    """Return the lowest and the highest angles of the joints, (2, joints), rad."""
     return np.radians([joint.range_deg for joint in body.joints]).T
 
 
 @functools.lru_cache(maxsize=64)
-def _neutral(body: Body, share: float) -> np.ndarray:
-    """A pose (joints,) whose feet are level and whose joints have a share of their range to either side, rad."""
-    low, high = _ranges(body)
-    low, high = low + share * (high - low), high - share * (high - low)
+def _find_neutral_pose(body: Body, share: float) -> np.ndarray:
+    """Return angles (joints,), rad, at which feet are level and joints have a share of their range to either side."""
+    lowest, highest = _joint_bounds(body)
+    low = lowest + share * (highest - lowest)
+    high = highest - share * (highest - lowest)
     angles = np.zeros_like(low).clip(low, high)
-    for _ in range(50):
-        pose, first = pose_mechanics(body, angles), 0
-        aim = np.median(pose.soles[:, 2])
-        for leg, jacobian, sole in zip(body.legs, pose.jacobians, pose.soles, strict=True):
-            last, rise = first + len(leg.joints), jacobian[2]
-            angles[first:last] += 0.5 * (aim - sole[2]) * rise / max(rise @ rise, 1e-6 * pose.height**2)
-            first = last
+    for _ in range(_LEVELING_ITERATIONS):
+        mechanics = pose_mechanics(body, angles)
+        level = np.median(mechanics.soles[:, 2])
+        min_square = 1e-6 * mechanics.height**2
+        first = 0
+        for leg, jacobian, sole in zip(body.legs, mechanics.jacobians, mechanics.soles, strict=True):
+            joints = slice(first, first + len(leg.joints))
+            first = joints.stop
+            rise = jacobian[2]  # of the sole by each joint, m/rad
+            angles[joints] += _LEVELING_STEP * (level - sole[2]) * rise / max(rise @ rise, min_square)
         angles = angles.clip(low, high)
     return angles
