@@ -33,7 +33,7 @@ class Law(Protocol):
             preset: parameters, such as `preset` of the class.
 
         Raises:
-            ValueError: the parameters do not fit.
+            ValueError: the parameters do not fit the task.
         """
 
     def initial(self, count: int) -> Any:
@@ -43,7 +43,7 @@ class Law(Protocol):
         """Return the next state and the actions (environments, joints) in [-1, 1].
 
         Args:
-            state: before.
+            state: state before the control step.
             observation: blocks by name, (environments, size) each, float64.
         """
 
@@ -52,11 +52,11 @@ class Pattern(NamedTuple):
     """One preset on one body, per joint: angles in rad, arrays (joints,).
 
     Attributes:
-        frequency: of the cycle, Hz.
-        duty_factor: share of the cycle spent in stance.
-        offset: of the joint's leg, cycles.
-        sweep: hips: half of the sweep, signed so that the foot moves back in stance; else 0.
-        center: about which the joint bends; for a hip 0.
+        frequency: frequency of the cycle, Hz.
+        duty_factor: share of the cycle in stance.
+        offset: phase offset of the joint's leg, cycles.
+        sweep: half of a hip's sweep, signed so that the foot moves back in stance; 0 for other joints.
+        center: angle about which the joint moves.
         stance: departure from the center in mid-stance.
         swing: departure from the center in mid-swing.
     """
@@ -72,23 +72,23 @@ class Pattern(NamedTuple):
 
 def joint_targets(pattern: Pattern, time):
     """Return the target angles (..., joints) at a time (...) in s, in rad."""
-    numpy = time.__array_namespace__()
-    cycle = (pattern.frequency * time[..., None] + pattern.offset) % 1.0
+    xp = time.__array_namespace__()
+    phase = (pattern.frequency * time[..., None] + pattern.offset) % 1.0  # cycles
     duty = pattern.duty_factor
-    in_stance = cycle < duty
-    progress = numpy.where(in_stance, cycle / duty, (cycle - duty) / (1.0 - duty))
-    sweep = numpy.where(in_stance, 1.0 - 2.0 * progress, 2.0 * progress - 1.0)
-    bend = numpy.where(in_stance, pattern.stance, pattern.swing)
-    return pattern.center + pattern.sweep * sweep + bend * numpy.sin(np.pi * progress)
+    in_stance = phase < duty
+    progress = xp.where(in_stance, phase / duty, (phase - duty) / (1.0 - duty))  # of stance or swing, from 0 to 1
+    sweep_share = xp.where(in_stance, 1.0 - 2.0 * progress, 2.0 * progress - 1.0)  # back in stance, forth in swing
+    bend = xp.where(in_stance, pattern.stance, pattern.swing)
+    return pattern.center + pattern.sweep * sweep_share + bend * xp.sin(np.pi * progress)
 
 
 class Drive(NamedTuple):
-    """How actions move the joints of a body: by torques of motors, or by angles that servos hold.
+    """Actuators of a body: motors, whose actions are torques, or servos, whose actions are angles.
 
     Attributes:
-        stiffness: (joints,) action of a motor per rad, or torque of a servo per rad by its largest.
+        stiffness: (joints,) action of a motor per rad, or share of a servo's largest torque per rad.
         damping: (joints,) the same per rad/s.
-        reach: (joints,) angles that actions of 1 ask of servos, rad; None for motors.
+        reach: (joints,) target angles of servos for actions of 1, rad; None for motors.
     """
 
     stiffness: np.ndarray
@@ -99,40 +99,41 @@ class Drive(NamedTuple):
         """Return the actions (..., joints) in [-1, 1] by which joints follow targets.
 
         Args:
-            targets: (..., joints) rad.
-            speeds: (..., joints) of the targets, rad/s.
-            angles: (..., joints) of the joints, rad.
-            velocities: (..., joints) of the joints, rad/s.
+            targets: (..., joints) target angles, rad.
+            speeds: (..., joints) velocities of the targets, rad/s.
+            angles: (..., joints) angles of the joints, rad.
+            velocities: (..., joints) velocities of the joints, rad/s.
             feedforward: (..., joints) torques that are added, shares of the largest.
         """
         if self.reach is None:
             return torques(targets, angles, velocities - speeds, self.stiffness, self.damping, feedforward)
-        # The servo damps the joint's own velocity: its angle is further on by what the target's velocity lacks.
-        ahead = (self.damping * speeds + feedforward) / self.stiffness
-        return ((targets + ahead) / self.reach).clip(-1.0, 1.0)
+        # A servo damps the joint's velocity, not the difference from the target's. An angle further ahead makes up
+        # for that, and for the feedforward, which a servo does not take.
+        compensation = (self.damping * speeds + feedforward) / self.stiffness
+        return ((targets + compensation) / self.reach).clip(-1.0, 1.0)
 
 
 def torques(targets, angles, velocities, stiffness, damping, feedforward=0.0):
-    """Return actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s).
+    """Return the actions (..., joints) in [-1, 1] of proportional and derivative (PD) control.
 
     Args:
-        targets: (..., joints) rad.
+        targets: (..., joints) target angles, rad.
         angles: (..., joints) rad.
-        velocities: (..., joints) rad/s.
+        velocities: (..., joints) rad/s; the control damps them.
         stiffness: action per rad.
         damping: action per rad/s.
-        feedforward: (..., joints) actions that are added, whatever the error is.
+        feedforward: (..., joints) actions that are added.
     """
     return (stiffness * (targets - angles) - damping * velocities + feedforward).clip(-1.0, 1.0)
 
 
 class Feedforward(NamedTuple):
-    """Actions that a preset adds whatever the error is, per joint.
+    """Actions of joints that a preset adds to those of the PD control.
 
     Attributes:
-        cosines: (joints, harmonics) of the leg's phase and its multiples.
-        sines: the same.
-        steering: (joints,) per rad of yaw, times the cosine of the leg's phase.
+        cosines: (joints, harmonics) amplitudes of the cosines of the leg's phase and its multiples.
+        sines: (joints, harmonics) amplitudes of the sines.
+        steering: (joints,) action per rad of yaw, times the cosine of the leg's phase.
     """
 
     cosines: np.ndarray
@@ -141,15 +142,16 @@ class Feedforward(NamedTuple):
 
     def __call__(self, pattern: Pattern, time, yaw):
         """Return the actions (..., joints) at a time (...) in s, with the torso turned by a yaw (...), rad."""
-        numpy = yaw.__array_namespace__()
-        phase = 2.0 * np.pi * (pattern.frequency * time[..., None] + pattern.offset)
-        multiples = phase[..., None] * np.arange(1, 1 + self.cosines.shape[-1])
-        waves = (self.cosines * numpy.cos(multiples) + self.sines * numpy.sin(multiples)).sum(axis=-1)
-        return waves + self.steering * yaw[..., None] * numpy.cos(phase)
+        xp = yaw.__array_namespace__()
+        phase = 2.0 * np.pi * (pattern.frequency * time[..., None] + pattern.offset)  # rad
+        harmonics = np.arange(1, 1 + self.cosines.shape[-1])
+        multiples = phase[..., None] * harmonics  # (..., joints, harmonics)
+        waves = (self.cosines * xp.cos(multiples) + self.sines * xp.sin(multiples)).sum(axis=-1)
+        return waves + self.steering * yaw[..., None] * xp.cos(phase)
 
 
 class Clock(NamedTuple):
-    """The state of a law with a clock of its own.
+    """The state of a `Clocked` law.
 
     Attributes:
         steps: (environments,) control steps since the start of the episode.
@@ -159,12 +161,17 @@ class Clock(NamedTuple):
 
 
 class Clocked:
-    """A law with a clock of its own."""
+    """A law with its own clock: it counts control steps."""
 
     reads: tuple[str, ...] = ("posture", "velocities")
 
     def __init__(self, control):
-        """Take a function of control steps (...), quaternion (..., 4), joint angles and velocities (..., joints)."""
+        """Set the function that returns actions (..., joints).
+
+        Args:
+            control: function of the number of control steps (...), the torso's quaternion (..., 4), and the angles and
+                velocities of joints (..., joints).
+        """
         self.control = control
 
     def initial(self, count: int) -> Clock:
@@ -173,23 +180,34 @@ class Clocked:
 
     def __call__(self, state: Clock, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints)."""
-        return Clock(state.steps + 1), self.control(state.steps, *proprioception(observation))
+        quaternion, angles, velocities = proprioception(observation)
+        return Clock(state.steps + 1), self.control(state.steps, quaternion, angles, velocities)
 
 
 def restart_where(state, initial, mask):
-    """Return a state, an array or a NamedTuple of states, that is `initial` where a mask (environments,) holds."""
+    """Return a state with the environments of a mask replaced by those of an initial state.
+
+    Args:
+        state: an array (environments, ...), or a NamedTuple of states.
+        initial: state of the same structure.
+        mask: (environments,).
+    """
     if isinstance(state, tuple):
-        return type(state)(*(restart_where(*fields, mask) for fields in zip(state, initial, strict=True)))
-    return mask.__array_namespace__().where(mask.reshape(-1, *[1] * (state.ndim - 1)), initial, state)
+        fields = [restart_where(field, start, mask) for field, start in zip(state, initial, strict=True)]
+        return type(state)(*fields)
+    xp = mask.__array_namespace__()
+    extra_axes = [1] * (state.ndim - 1)
+    return xp.where(mask.reshape(-1, *extra_axes), initial, state)
 
 
 def proprioception(observation: Mapping) -> tuple:
     """Return the torso's quaternion (..., 4), joint angles and joint velocities (..., joints) of named blocks."""
-    posture, velocities = observation["posture"], observation["velocities"]
+    posture = observation["posture"]
+    velocities = observation["velocities"]
     return posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
 
 
-# A task that has a block, which an error names.
+# By block, a task that has it; errors name it.
 _EXAMPLES = {"scan": "rough", "goal": "navigate", "ranges": "navigate"}
 
 
@@ -198,27 +216,28 @@ def read_blocks(observation, names: Iterable[str], joints: int, parts: int | Non
 
     Args:
         observation: blocks by name, each (..., size).
-        names: of the blocks; `posture` and `velocities` among them.
-        joints: of the body.
-        parts: rigid bodies of the body, to compare with contact forces where those are observed; None to
-            compare nothing.
+        names: names of the blocks; they include `posture` and `velocities`.
+        joints: number of the body's joints.
+        parts: number of the body's rigid bodies, to compare with observed contact forces; None for no comparison.
 
     Raises:
-        ValueError: not named blocks, one is missing, or those of a body with another number of joints or
-            parts.
+        ValueError: an observation without named blocks, without one of `names`, or of a body with another number of
+            joints or parts.
     """
     if not (isinstance(observation, Mapping) and {"posture", "velocities"} <= observation.keys()):
         raise ValueError(
             "observation: expected blocks posture and velocities by name, as `split` of a task gives them, "
             f"got {type(observation).__name__}"
         )
-    sizes = np.shape(observation["posture"])[-1] - 5, np.shape(observation["velocities"])[-1] - 6
-    if sizes != (joints, joints):
-        found = f"{sizes[0]} angles and {sizes[1]} velocities"
-        raise ValueError(f"observation: expected those of {joints} joints, got {found}")
-    forces = np.shape(observation.get("contact_forces"))
-    if parts is not None and forces and forces[-1] != 6 * parts:
-        raise ValueError(f"observation: expected contact forces of {parts} rigid bodies, got {forces[-1] / 6:g}")
+    angle_count = np.shape(observation["posture"])[-1] - 5
+    velocity_count = np.shape(observation["velocities"])[-1] - 6
+    if angle_count != joints or velocity_count != joints:
+        sizes = f"{angle_count} angles and {velocity_count} velocities"
+        raise ValueError(f"observation: expected those of {joints} joints, got {sizes}")
+    forces_shape = np.shape(observation.get("contact_forces"))
+    if parts is not None and forces_shape and forces_shape[-1] != 6 * parts:
+        forces = f"{forces_shape[-1] / 6:g}"
+        raise ValueError(f"observation: expected contact forces of {parts} rigid bodies, got {forces}")
     for name in names:
         if name not in observation:
             raise ValueError(f"observation: expected a block {name}, as the task {_EXAMPLES.get(name, 'steer')} has")

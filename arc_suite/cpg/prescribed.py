@@ -1,4 +1,4 @@
-"""The published law by a preset: joints bend and sweep by angles in degrees, about a cycle of the preset's own."""
+"""The published law by a preset: joints sweep and bend by angles in degrees, in the preset's own cycle."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -30,23 +30,22 @@ class Preset(NamedTuple):
     Attributes:
         stiffness: action per rad of error (kp).
         damping: action per rad/s (kd).
-        settle: first control steps, in which the robot crouches.
+        settle: number of control steps at the start in which the robot crouches.
         ramp: control steps over which the stiffness grows linearly to its full value.
         ramp_start: share of the stiffness at the first step.
-        frequency: of the cycle, Hz.
-        duty_factor: share of the cycle spent in stance.
-        phase_offsets: of the legs, cycles.
+        frequency: frequency of the cycle, Hz.
+        duty_factor: share of the cycle in stance.
+        phase_offsets: phase offsets of the legs, cycles.
         sweep: half of the hip's sweep, degrees.
-        center: angles about which joints move, degrees, by joint; a hip's is positive forwards and
-            0 if it is not there.
-        bends: of the other joints, by name.
-        crouch: angles held while settling, as `center`; None for the center. Legs drawn up catch a
-            robot that a reset with its feet in the ground has thrown.
-        torques: actions that are added whatever the error is, by joint and for each rank: amplitudes of
-            the cosines of the leg's phase and its multiples, then of their sines; a hip's positive
-            forwards. None for none.
-        steering: action of the hips per rad of yaw, times the cosine of the leg's phase; the same sign
-            left and right, so that a negative one turns back to where the robot started.
+        center: angles about which joints move, degrees, by joint; a hip's is positive forwards, and 0 by default.
+        bends: bends of the other joints, by name.
+        crouch: angles of the crouch, as `center`; None for the center. Legs drawn up catch a robot that a reset
+            with its feet in the ground has thrown.
+        torques: actions that are added to those of the PD control, by joint and for each rank: amplitudes of the
+            cosines of the leg's phase and its multiples, then of their sines; a hip's are positive forwards. None for
+            no such actions.
+        steering: action of the hips per rad of yaw, times the cosine of the leg's phase. It has the same sign left
+            and right: a negative value turns the robot back to its first heading.
     """
 
     stiffness: float
@@ -69,9 +68,9 @@ class Prescribed(NamedTuple):
     """Control by a preset's numbers: of one simulation, or with leading axes (environments, 1) of a batch.
 
     Attributes:
-        pattern: of the joints.
-        feedforward: added to the PD loop's actions; None for nothing.
-        crouch: (joints,) angles held while settling, rad.
+        pattern: pattern of the joints.
+        feedforward: actions that are added to those of the PD control; None for none.
+        crouch: (joints,) angles of the crouch, rad.
         control_timestep: s.
         stiffness, damping, settle, ramp, ramp_start: as in `Preset`.
     """
@@ -88,58 +87,75 @@ class Prescribed(NamedTuple):
 
     @classmethod
     def fit(cls, body: Body, preset: Preset) -> Self:
-        """Return a preset, laid out over a body's joints.
+        """Return the control of a body by a preset.
 
         Raises:
-            ValueError: it does not fit the body.
+            ValueError: the preset does not fit the body.
         """
         if body.source:
             raise ValueError(
                 f"preset: gives torques, and {body.name} has servos, expected one such as medium or steered"
             )
-        legs, offsets = len(body.legs), len(preset.phase_offsets)
+        legs = len(body.legs)
+        offsets = len(preset.phase_offsets)
         if legs != offsets:
             raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
         try:
-            laid, added = lay_out_pattern(body, preset), lay_out_feedforward(body, preset)
-            crouch = (
-                lay_out_pattern(body, preset._replace(center=preset.crouch)).center if preset.crouch else laid.center
-            )
+            pattern = lay_out_pattern(body, preset)
+            feedforward = lay_out_feedforward(body, preset)
+            crouch = pattern.center
+            if preset.crouch:
+                crouch = lay_out_pattern(body, preset._replace(center=preset.crouch)).center
         except (AttributeError, LookupError, TypeError, ValueError) as error:
             raise ValueError(f"preset: does not fit {body.name}: {type(error).__name__}: {error}") from None
-        return cls(laid, added, crouch, control_timestep(body), *(getattr(preset, name) for name in cls._fields[4:]))
+        return cls(
+            pattern=pattern,
+            feedforward=feedforward,
+            crouch=crouch,
+            control_timestep=control_timestep(body),
+            stiffness=preset.stiffness,
+            damping=preset.damping,
+            settle=preset.settle,
+            ramp=preset.ramp,
+            ramp_start=preset.ramp_start,
+        )
 
     @classmethod
     def stack(cls, controls: Sequence[Self]) -> Self:
-        """Return several controls of one body as one, of a batch with an environment for each."""
+        """Return several controls of one body as the control of a batch, with an environment for each."""
 
         def stack_values(values):
             return np.stack([np.atleast_1d(value) for value in values])
 
-        patterns, feedforwards, *numbers = zip(*controls, strict=True)
-        added = next(filter(None, feedforwards), None)
-        if added is not None:
-            none = Feedforward(*map(np.zeros_like, added))
-            added = Feedforward(*map(stack_values, zip(*(each or none for each in feedforwards), strict=True)))
-        return cls(Pattern(*map(stack_values, zip(*patterns, strict=True))), added, *map(stack_values, numbers))
+        patterns, feedforwards, *numbers = zip(*controls, strict=True)  # values of each field
+        pattern = Pattern(*map(stack_values, zip(*patterns, strict=True)))
+        feedforward = None
+        first_feedforward = next((value for value in feedforwards if value is not None), None)
+        if first_feedforward is not None:
+            zeros = Feedforward(*map(np.zeros_like, first_feedforward))
+            complete_feedforwards = [zeros if value is None else value for value in feedforwards]
+            feedforward = Feedforward(*map(stack_values, zip(*complete_feedforwards, strict=True)))
+        return cls(pattern, feedforward, *map(stack_values, numbers))
 
     def __call__(self, clock, quaternion, angles, velocities):
         """Return the actions (..., joints) after `clock` (...) control steps; few presets read the quaternion."""
-        numpy, steps = clock.__array_namespace__(), clock[..., None]
+        xp = clock.__array_namespace__()
+        steps = clock[..., None]
         time = (self.control_timestep * steps)[..., 0]
-        walking = joint_targets(self.pattern, time)
-        targets = numpy.where(steps < self.settle, self.crouch, walking)
+        targets = xp.where(steps < self.settle, self.crouch, joint_targets(self.pattern, time))
         ramp = (self.ramp_start + (1.0 - self.ramp_start) * steps / self.ramp).clip(max=1.0)
-        added = 0.0 if self.feedforward is None else self.feedforward(self.pattern, time, rotations.yaw(quaternion))
-        return torques(targets, angles, velocities, ramp * self.stiffness, self.damping, added)
+        feedforward = 0.0
+        if self.feedforward is not None:
+            feedforward = self.feedforward(self.pattern, time, rotations.yaw(quaternion))
+        return torques(targets, angles, velocities, ramp * self.stiffness, self.damping, feedforward)
 
 
 class PrescribedLaw(Clocked):
     """The law by a preset, at the frequency and target velocity of a task.
 
-    A preset's numbers are for walk with default settings. Its frequency and sweep scale with those of the task,
-    but duty factor and offsets stay: a preset that was searched for in another gait walks at a fifth of the speed,
-    and earns less; see docs/demonstrators.md.
+    A preset's numbers are for walk with default settings. Its frequency and sweep scale with those of the task.
+    Duty factor and offsets stay: a preset that was searched for in another gait walks at a fifth of the speed, and has
+    a lower return; see docs/demonstrators.md.
     """
 
     def __init__(self, task: Task, preset: Preset):
@@ -148,42 +164,47 @@ class PrescribedLaw(Clocked):
         Raises:
             ValueError: the preset does not fit the body.
         """
-        gait, control = gait_of(task), Prescribed.fit(task.scene.body, preset)
-        laid = control.pattern
-        laid = laid._replace(frequency=gait.tempo * laid.frequency, sweep=gait.pace * laid.sweep)
-        super().__init__(control._replace(pattern=laid, control_timestep=task.scene.control_timestep))
+        gait = gait_of(task)
+        control = Prescribed.fit(task.scene.body, preset)
+        pattern = control.pattern._replace(
+            frequency=gait.tempo * control.pattern.frequency, sweep=gait.pace * control.pattern.sweep
+        )
+        super().__init__(control._replace(pattern=pattern, control_timestep=task.scene.control_timestep))
 
 
 def lay_out_pattern(body: Body, preset: Preset) -> Pattern:
-    """Return a preset, laid out over a body's joints."""
+    """Return the pattern of a body's joints by a preset."""
 
-    def by_rank(angle: ByRank, rank: int) -> float:
+    def radians(angle: ByRank, rank: int) -> float:
         return math.radians(angle[rank] if isinstance(angle, tuple) else angle)
 
-    rows = []
+    rows = []  # offset, sweep, center, stance, swing of each joint
     for leg, rank, offset in zip(body.legs, body.ranks, preset.phase_offsets, strict=True):
-        forwards = -1.0 if leg.side == "left" else 1.0
+        forward_sign = -1.0 if leg.side == "left" else 1.0  # of a hip's angle
         for joint in leg.joints:
             if joint.name == "hip":
-                angles = (preset.sweep, preset.center.get("hip", 0.0))
-                rows.append((offset, *(forwards * by_rank(angle, rank) for angle in angles), 0.0, 0.0))
+                sweep = forward_sign * radians(preset.sweep, rank)
+                center = forward_sign * radians(preset.center.get("hip", 0.0), rank)
+                rows.append((offset, sweep, center, 0.0, 0.0))
             else:
+                center = radians(preset.center[joint.name], rank)
                 bend = preset.bends[joint.name]
-                angles = (preset.center[joint.name], bend.stance, bend.swing)
-                rows.append((offset, 0.0, *(by_rank(angle, rank) for angle in angles)))
-    return Pattern(preset.frequency, preset.duty_factor, *np.array(rows).T)
+                rows.append((offset, 0.0, center, radians(bend.stance, rank), radians(bend.swing, rank)))
+    offsets, sweeps, centers, stances, swings = np.array(rows).T
+    return Pattern(preset.frequency, preset.duty_factor, offsets, sweeps, centers, stances, swings)
 
 
 def lay_out_feedforward(body: Body, preset: Preset) -> Feedforward | None:
-    """Return the torques that a preset adds to the PD loop's, laid out over a body's joints; None for none."""
+    """Return the actions that a preset adds to those of the PD control, by a body's joints; None for none."""
     if preset.torques is None and not preset.steering:
         return None
-    amplitudes, steering = [], []
+    amplitudes = []  # of cosines, then of sines, of each joint
+    steering = []
     for leg, rank in zip(body.legs, body.ranks, strict=True):
         for joint in leg.joints:
-            hip = joint.name == "hip"
-            sign = -1.0 if hip and leg.side == "left" else 1.0
+            is_hip = joint.name == "hip"
+            sign = -1.0 if is_hip and leg.side == "left" else 1.0
             amplitudes.append(sign * np.array(preset.torques[joint.name][rank]) if preset.torques else (0.0, 0.0))
-            steering.append(preset.steering if hip else 0.0)
+            steering.append(preset.steering if is_hip else 0.0)
     cosines, sines = np.split(np.array(amplitudes), 2, axis=-1)
     return Feedforward(cosines, sines, np.array(steering))

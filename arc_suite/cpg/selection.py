@@ -28,47 +28,49 @@ LAWS: dict[type, Any] = {
     PlanningParameters: Planned,
 }
 
-# In place of these in a task whose pose and gait are by command.
-_DIRECTED = {Steered: Directed}
+# Laws that replace others in a task whose commands include gait and pose.
+_GAIT_AND_POSE_LAWS = {Steered: Directed}
 
-_MOST_UNSTEADY = 5  # legs with which a body steps for its balance
-_AHEAD = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
+_MAX_BALANCING_LEGS = 5  # bodies with servos and more legs need no steps for their balance
+_STRAIGHT_PRESETS = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
 
 
 def law(task: Task, preset: Any, laws: Mapping[type, Any] = LAWS):
     """Return the law of a preset, fitted to a task; see `cpg.law`.
 
     Args:
-        task: to act in.
+        task: task to act in.
         preset: parameters of the law.
-        laws: by class of preset.
+        laws: laws by class of preset.
 
     Raises:
         ValueError: the preset is of no class that has a law, or does not fit.
     """
     kind = law_class(preset, laws)
-    return (_DIRECTED.get(kind, kind) if observes_gait_and_pose(task) else kind)(task, preset)
+    if observes_gait_and_pose(task):
+        kind = _GAIT_AND_POSE_LAWS.get(kind, kind)
+    return kind(task, preset)
 
 
 def law_class(preset: Any, laws: Mapping[type, Any] = LAWS) -> Any:
-    """Return the class of the law that a preset has parameters of.
+    """Return the class of the law of a preset.
 
     Raises:
         ValueError: the preset is of no class that has a law.
     """
-    kind = float if isinstance(preset, Real) else type(preset)
-    if kind not in laws:
-        kinds = ", ".join(each.__name__ for each in laws)
-        raise ValueError(f"preset: expected one of {kinds}, got {kind.__name__}")
-    return laws[kind]
+    preset_class = float if isinstance(preset, Real) else type(preset)
+    if preset_class not in laws:
+        expected = ", ".join(known_class.__name__ for known_class in laws)
+        raise ValueError(f"preset: expected one of {expected}, got {preset_class.__name__}")
+    return laws[preset_class]
 
 
 def preset_of(body: Body, name: str) -> Any:
-    """Return a body's preset of a name.
+    """Return a body's preset by name.
 
     Args:
-        body: whose preset of the name comes first.
-        name: see `presets_of`; or `module:name` of a law of another package, whose module is imported.
+        body: body, whose own presets come first.
+        name: name of `presets_of`, or `module:name` of a law of another package, whose module is imported.
 
     Raises:
         ValueError: an unknown name, or a body of a robot's name that has other joints.
@@ -97,24 +99,28 @@ def presets_of(body: Body) -> Mapping[str, Any]:
     Raises:
         ValueError: a body of a robot's name that has other joints.
     """
-    own = robots.parameters(PRESETS, body, "presets") or {}
-    defaults = {**_defaults(body), **_presets_of_added_laws()}
-    return own | {name: preset for name, preset in defaults.items() if name not in own}
+    body_presets = robots.parameters(PRESETS, body, "presets") or {}
+    defaults = {**_default_presets(body), **_registered_presets()}
+    return body_presets | {name: preset for name, preset in defaults.items() if name not in body_presets}
 
 
-def _presets_of_added_laws() -> dict[str, Any]:
+def _registered_presets() -> dict[str, Any]:
+    """Return the presets of laws of other packages by name."""
     return {name: law.preset for name, law in registry.ADDITIONS["law"].items()}
 
 
-def _defaults(body: Body) -> Mapping[str, Any]:
+def _default_presets(body: Body) -> Mapping[str, Any]:
+    """Return the presets that suit any body of its kind by name."""
     if not body.source:
         return DEFAULTS
-    return DEFAULTS_OF_SERVOS if len(body.legs) > _MOST_UNSTEADY else DEFAULTS_OF_SERVOS | BALANCING
+    if len(body.legs) > _MAX_BALANCING_LEGS:
+        return DEFAULTS_OF_SERVOS
+    return DEFAULTS_OF_SERVOS | BALANCING
 
 
 def preset_names() -> tuple[str, ...]:
-    """Return the names of the presets of all robots and laws, those of other packages included."""
-    tables = (*PRESETS.values(), DEFAULTS, _presets_of_added_laws())
+    """Return the names of the presets of all robots and laws, including those of other packages."""
+    tables = (*PRESETS.values(), DEFAULTS, _registered_presets())
     return tuple(dict.fromkeys(name for presets in tables for name in presets))
 
 
@@ -124,15 +130,21 @@ SUITE_PRESETS = frozenset(preset_names())  # before other packages add any
 def suited_presets(task: Task) -> tuple[str, ...]:
     """Return the presets that suit a task and its body, the best first; empty where none does.
 
-    They are those of the task's `demonstrators` that the body has and whose blocks the task observes; then
-    `steered`; then, where the task prescribes a walk, those that walk straight ahead.
+    First come the task's `demonstrators`, then `steered`, then those that walk straight ahead if the task prescribes
+    a gait. Of these, the body must have the preset, and the task must observe the blocks of its law.
 
     Raises:
         ValueError: as `presets_of`.
     """
     presets = presets_of(task.scene.body)
-    names = dict.fromkeys((*task.demonstrators, "steered", *(() if task.parameters is None else _AHEAD)))
-    return tuple(n for n in names if n in presets and set(law_class(presets[n]).reads) <= task.blocks.keys())
+    candidates = [*task.demonstrators, "steered"]
+    if task.parameters is not None:
+        candidates += _STRAIGHT_PRESETS
+    suited_names = []
+    for name in dict.fromkeys(candidates):
+        if name in presets and set(law_class(presets[name]).reads) <= task.blocks.keys():
+            suited_names.append(name)
+    return tuple(suited_names)
 
 
 def suited_preset(task: Task) -> str:
@@ -141,7 +153,8 @@ def suited_preset(task: Task) -> str:
     Raises:
         ValueError: no preset suits the task, or as `presets_of`.
     """
-    if names := suited_presets(task):
+    names = suited_presets(task)
+    if names:
         return names[0]
     raise ValueError(
         f"task {task.name}: no demonstrator suits a task that observes no command and prescribes no gait; choose "
