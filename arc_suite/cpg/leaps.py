@@ -289,13 +289,13 @@ def find_best_leap(
     leg_angles = legs.by_leg(np.array(rest_angles))
     targets_of_leaps = [leap_targets(body, legs, leg_angles, leap) for leap in choice]
     crouch_ends = [plan_movement(body, legs, leg_angles, leap).crouch_end for leap in choice]
-    flights = simulate_flights(body, np.array(rest_angles), _stack_padded(targets_of_leaps), crouch_ends)
+    flights = simulate_flights(body, np.array(rest_angles), _pad_and_stack(targets_of_leaps), crouch_ends)
     scores = [getattr(flight, measure) if flight.landed else 0.0 for flight in flights]
     best = scores.index(max(scores))
     return choice[best], flights[best]
 
 
-def _stack_padded(arrays: Sequence[np.ndarray]) -> np.ndarray:
+def _pad_and_stack(arrays: Sequence[np.ndarray]) -> np.ndarray:
     """Return arrays (steps, ...) as one; shorter ones repeat their last step."""
     step_count = max(len(array) for array in arrays)
     padded = []
