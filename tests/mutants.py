@@ -16,9 +16,9 @@ import tempfile
 from tqdm import tqdm
 
 ROOT = pathlib.Path(__file__).parents[1]
+ROOMS = ("arc_suite", "tools/preset_search")
 
-
-# By mistake: a text that the package holds once, in which «right→wrong» marks the right code and the wrong code.
+# By mistake: a text that `ROOMS` hold once, in which «right→wrong» marks the right code and the wrong code.
 MUTANTS = {
     # Bodies.
     "swapped leg": 'leg.«mirrored(→replace(name=»leg.name.replace("l", "r")) for leg in LEFT_LEGS)\n\n'
@@ -38,10 +38,10 @@ MUTANTS = {
     "joints of a giant as fast as a mite's": "«_FREQUENCY_SHARE / control_timestep(body)→7.0»",
     "contacts of a giant as hard as a mite's": '"solref": («simulation.contact_time→0.02», 1.0)',
     # Arenas.
-    "triangles of the ground exchanged": "right = u «>→<» v",
-    "stairs without their fourth tread": "(steps + 1).clip(0, «4→3») -",
+    "triangles of the ground exchanged": "is_right = u_in_cell «>→<» v_in_cell",
+    "stairs without their fourth tread": "(treads + 1).clip(0, «4→3») -",
     "ground under the torso's middle alone": "x in («-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0→0.0,) for y in (0.0,»)",
-    "lanes all alike": "np.random.RandomState(«(self.seed, KINDS.index(kind), before)→self.seed»)",
+    "lanes all alike": "np.random.RandomState(«(self.seed, KINDS.index(kind), kinds_before.count(kind))→self.seed»)",
     "feet may sink": "is_stuck=steps_under_ground «>= SUNK_STEPS→< 0»",
     "levels never fall": "«xp.where(stream.outcome < down, (level - 1).clip(0), level)→level»",
     "the highest level for ever": "& «(chance >= STAY_PROBABILITY)→False»",
@@ -52,7 +52,7 @@ MUTANTS = {
     "no sensors, so no contact forces": "«option.disableflags = flags→pass»\n",
     "one substep too few": "mj_step(model, data, nstep - «1→2»)",
     "one substep of batches too few": "simulations.step(mask, nstep - «1→2»)",
-    "margin of a pair not summed": "model.geom_margin[both].«sum→max»()",
+    "margin of a pair not summed": "model.geom_margin[pair].«sum→max»()",
     "friction of a pair not mixed": "friction«.max(axis=0)→[0]»",
     "Euler without damping": "«        and model.dof_damping.any()\n→»",
     "clock not put back": "if «self._variable.value is None→False»:",
@@ -99,8 +99,8 @@ MUTANTS = {
     "the same noise in every step": "key« ^ (step * _GOLDEN)→»",
     "positions held without damping": "(«self.damping→0.0» * state.speeds)",
     "the reward sees what weak motors give": "self.task.before(memory.task, «→0.5 * »action)",
-    "a changed model stays so": "«self._change(self._unchanged)→pass»\n        super().reset(keyframe_id)",
-    "the last substep of batches on the compiled model": "set_models(«self._own→None»)\n"
+    "a changed model stays so": "«self._write_fields(self._unchanged)→pass»\n        super().reset(keyframe_id)",
+    "the last substep of batches on the compiled model": "set_models(«self._models→None»)\n"
     "            simulations.step(mask)",
     # Environments.
     "dropped clip of the action": "return array«.clip(-1.0, 1.0)→»",
@@ -127,7 +127,7 @@ MUTANTS = {
     "the same noise in all episodes": "default_rng(«(seed, 1)→1»)",
     # Style.
     "feet in the air slip": "« * track.contacts→»",
-    "early taken for late": "«actual * wanted→wanted * actual».conj()",
+    "early taken for late": "«actual * prescribed→prescribed * actual».conj()",
     "mirror image of a foot's path forgotten": "« * (1.0, -1.0, 1.0)→»",
     "motors win back what they brake": "np.diff(track.joint_angles, axis=0)).«clip(0.0).→»sum()",
     "a foot that bounces strides": "«0.5 * foot_clearance(track)→0.0»",
@@ -136,9 +136,9 @@ MUTANTS = {
     "len(track.rewards) == episode.length»",
     # Searches and datasets.
     "all legs lead alike": "offset + leads[«rank→0»]",
-    "the fallen go on earning": "totals += rewards« * counted→»",
+    "the fallen go on earning": "totals += rewards« * counts→»",
     "a search is told its worst": "«[-value for value in fitness]→fitness»",
-    "a damaged episode is read": "if found[key] «!=→is» value:",
+    "a damaged episode is read": "if stored_attributes[key] «!=→is» value:",
     # Clips and pages.
     "axes of glTF are a mirror": "_AXES = («1, 2, 0→0, 2, 1»)",
     "the seam of a loop is left": "np.«linspace(-0.5, 0.5, →zeros(»len(motion.joints))",
@@ -155,22 +155,22 @@ MUTANTS = {
 
 
 def texts(marked: str) -> tuple[str, str]:
-    """Return a marked text as it is in the package, and with the mistake."""
+    """Return a marked text as it is in the code, and with the mistake."""
     old, new = (re.sub("«(.*?)→(.*?)»", which, marked, flags=re.DOTALL) for which in (r"\1", r"\2"))
     return old, new
 
 
 def place(mistake: str) -> pathlib.Path:
-    """Return the one file of the package that holds a mutant's text once, as a path in the project.
+    """Return the one file of `ROOMS` that holds a mutant's text once, as a path in the project.
 
     Raises:
         ValueError: there is none, or the text is there more often.
     """
     old, _ = texts(MUTANTS[mistake])
-    counts = {path: path.read_text().count(old) for path in sorted((ROOT / "arc_suite").rglob("*.py"))}
+    counts = {path: path.read_text().count(old) for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))}
     found = [str(path.relative_to(ROOT)) for path, count in counts.items() for _ in range(count)]
     if len(found) != 1:
-        raise ValueError(f"{mistake}: expected {old!r} once in the package, found it in {found}")
+        raise ValueError(f"{mistake}: expected {old!r} once in {' and '.join(ROOMS)}, found it in {found}")
     return pathlib.Path(found[0])
 
 

@@ -200,7 +200,7 @@ def _describe_leaps(law: Directed) -> dict[str, Any]:
         except ValueError:
             continue  # and the page has no key for it
         leap_of_name[name] = {
-            "crouched": leaps.plan_movement(body, legs, law.rest_angles, leap).crouch_end,
+            "crouched": leaps.lay_out_movement(body, legs, law.rest_angles, leap).crouch_end,
             "targets": leaps.leap_targets(body, legs, law.rest_angles, leap),
         }
     return leap_of_name

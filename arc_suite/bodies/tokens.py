@@ -105,7 +105,7 @@ def privileged_sizes(task: Task) -> dict[str, int]:
     return {name: _padding(block).size for name, block in task.privileged_blocks.items()}
 
 
-def pad_privileged(task: Task, vectors: np.ndarray) -> np.ndarray:
+def pad_privileged_blocks(task: Task, vectors: np.ndarray) -> np.ndarray:
     """Return privileged observations (environments, size) with 12 legs of 4 joints, 0 where there is none."""
     return spread(privileged_padding(task), vectors)
 

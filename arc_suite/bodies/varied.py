@@ -180,10 +180,9 @@ def _make_leg(name: str, mount: Vector, heading: float, shape: _Shape, joints: _
     for index in range(link_count):
         sign = joints.signs[index]
         low, high = joints.ranges[index]
-        if sign < 0.0:  # the axis is turned round, and so is the range
-            low, high = -high, -low
+        range_deg = (-high, -low) if sign < 0.0 else (low, high)  # of the signed axis
         axis = first_axis if index == 0 else normal
-        joint = Joint(name=JOINT_NAMES[index], axis=_to_vector(sign * axis), range_deg=(low, high))
+        joint = Joint(name=JOINT_NAMES[index], axis=_to_vector(sign * axis), range_deg=range_deg)
         end = _to_vector((0.0, outs[index], 0.0) + rises[index] * up)
         links_after = link_count - 1 - index
         radius = _LINK_THICKNESS * shape.foot * (1.0 + _LINK_THICKENING * links_after)

@@ -115,16 +115,21 @@ def main() -> None:
             code_permalink=FLAGS.code_permalink,
         )
         dataset = data.open(dataset_id)
-        if not collected_episodes:
+        if collected_episodes:
+            print(f"{dataset_id}: {describe_dataset(dataset)}")
+        else:
             print(f"{dataset_id}: has its {len(dataset)} episodes already")
-            continue
-        summaries = list(dataset.summaries())
-        returns = [summary["return"] for summary in summaries]
-        lengths = [summary["length"] for summary in summaries]
-        print(
-            f"{dataset_id}: {len(dataset)} episodes, return {np.mean(returns):.1f} +- {np.std(returns):.1f}, "
-            f"length {np.mean(lengths):.1f}, {dataset.metadata['dataset_size']} MB in {dataset.path}"
-        )
+
+
+def describe_dataset(dataset) -> str:
+    """Return the number, returns and lengths of a dataset's episodes, and its size and folder, as text."""
+    summaries = list(dataset.summaries())
+    returns = [summary["return"] for summary in summaries]
+    lengths = [summary["length"] for summary in summaries]
+    return (
+        f"{len(dataset)} episodes, return {np.mean(returns):.1f} +- {np.std(returns):.1f}, "
+        f"length {np.mean(lengths):.1f}, {dataset.metadata['dataset_size']} MB in {dataset.path}"
+    )
 
 
 def presets_for(setup: Setup) -> Sequence[str]:

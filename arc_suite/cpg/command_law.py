@@ -121,7 +121,7 @@ class CommandLaw(ABC):
     def targets(self, state: CommandLawState, observation: Mapping) -> tuple:
         """Return the next state, and target angles, rad, and velocities, rad/s, of joints: (environments, joints)."""
         next_state, request = self._make_request(state, observation["command"], observation["gait_clock"])
-        paths, target_angles, angle_changes = self.planned(state.paths, request, observation)
+        paths, target_angles, angle_changes = self.follow_request(state.paths, request, observation)
         return next_state._replace(paths=paths), target_angles, angle_changes / self.control_timestep
 
     def _make_request(self, state: CommandLawState, command, clock) -> tuple[CommandLawState, Request]:
@@ -156,7 +156,7 @@ class CommandLaw(ABC):
         """Return the state of a derived law at the start of episodes in a number of environments."""
 
     @abstractmethod
-    def planned(self, state, request: Request, observation: Mapping) -> tuple:
+    def follow_request(self, state, request: Request, observation: Mapping) -> tuple:
         """Return a derived law's next state, target angles (environments, joints), rad, and their change in a step.
 
         Args:

@@ -83,7 +83,7 @@ class Leaping(Sighted):
         self._cycle_steps = math.ceil(1.0 / self.cycles_per_step)
         joint_angles = tuple(self.legs.by_joint(rest_angles).tolist())
         self.leap, self.flight = leaps.find_best_leap(task.scene.body, joint_angles, parameters.choice)
-        self._movement = leaps.plan_movement(self.body, self.legs, rest_angles, self.leap)
+        self._movement = leaps.lay_out_movement(self.body, self.legs, rest_angles, self.leap)
         self._last_step = len(self._movement.sole_offsets)  # of a leap
         distance = self.flight.distance if self.flight.landed else 0.0
         self._can_leap = distance >= _MIN_LEAP
@@ -96,11 +96,11 @@ class Leaping(Sighted):
         walk = super().initial_paths(count)
         return LeapingState(walk, np.zeros(count, int), walk.shifts, np.zeros(count))
 
-    def planned(self, state: LeapingState, request: Request, observation: Mapping) -> tuple:
+    def follow_request(self, state: LeapingState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         walk_motion = _where(state.step < 0, _TURN_ALONE * request.motion, request.motion)
         walk_request = request._replace(motion=walk_motion)
-        walk, walk_targets, walk_changes = super().planned(state.walk, walk_request, observation)
+        walk, walk_targets, walk_changes = super().follow_request(state.walk, walk_request, observation)
         if not self._can_leap:
             return state._replace(walk=walk), walk_targets, walk_changes
 

@@ -87,7 +87,7 @@ class Movement(NamedTuple):
     landing_step: int
 
 
-def plan_movement(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap) -> Movement:
+def lay_out_movement(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap) -> Movement:
     """Return the plan of a leap from a pose (legs, links), rad, in which soles are level."""
     standing_height = body.torso.standing_height
     steps_per_time_unit = math.sqrt(standing_height / GRAVITY) / control_timestep(body)
@@ -149,7 +149,7 @@ def _solve_leg_angles(legs: Legs, start_angles, sole_goals, standing_height: flo
 
 def leap_targets(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap) -> np.ndarray:
     """Return the targets (steps, joints) of joints in the control steps of a leap from a pose (legs, links), rad."""
-    movement = plan_movement(body, legs, rest_angles, leap)
+    movement = lay_out_movement(body, legs, rest_angles, leap)
     rest_soles, _ = legs.soles(rest_angles)
     sole_goals = rest_soles + movement.sole_offsets[:, None]
     start_angles = np.tile(rest_angles, (len(sole_goals), 1, 1))
@@ -288,7 +288,7 @@ def find_best_leap(
     legs = Legs.of(size_body(body))
     leg_angles = legs.by_leg(np.array(rest_angles))
     targets_of_leaps = [leap_targets(body, legs, leg_angles, leap) for leap in choice]
-    crouch_ends = [plan_movement(body, legs, leg_angles, leap).crouch_end for leap in choice]
+    crouch_ends = [lay_out_movement(body, legs, leg_angles, leap).crouch_end for leap in choice]
     flights = simulate_flights(body, np.array(rest_angles), _pad_and_stack(targets_of_leaps), crouch_ends)
     scores = [getattr(flight, measure) if flight.landed else 0.0 for flight in flights]
     best = scores.index(max(scores))

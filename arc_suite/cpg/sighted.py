@@ -107,7 +107,7 @@ class Sighted(CommandLaw):
         """Return feet at rest and no scans, for a number of environments."""
         return SightedState(*(np.tile(array, (count, *[1] * array.ndim)) for array in self._first_state))
 
-    def planned(self, state: SightedState, request: Request, observation: Mapping) -> tuple:
+    def follow_request(self, state: SightedState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         parameters = self.parameters
         torso_quaternion = observation["posture"][:, 1:5]

@@ -96,7 +96,7 @@ class Steered(CommandLaw):
         """Return nothing: the law remembers no more than `CommandLawState` does."""
         return ()
 
-    def planned(self, state: tuple, request: Request, observation: Mapping) -> tuple:
+    def follow_request(self, state: tuple, request: Request, observation: Mapping) -> tuple:
         """Return the state, target angles (environments, joints), rad, and their change in a step; see `CommandLaw`."""
         xp = request.motion.__array_namespace__()
         parameters = self.parameters

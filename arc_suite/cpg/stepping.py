@@ -91,7 +91,7 @@ class Stepping(CommandLaw):
         """Return the angles at rest and an integral of 0, for a number of environments."""
         return SteppingState(np.tile(self.rest_angles, (count, 1, 1)), np.zeros((count, 3)))
 
-    def planned(self, state: SteppingState, request: Request, observation: Mapping) -> tuple:
+    def follow_request(self, state: SteppingState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         torso_height = observation["posture"][:, 0]  # m
         torso_quaternion = observation["posture"][:, 1:5]

@@ -69,12 +69,7 @@ def collect(
         further_metadata["code_permalink"] = code_permalink
     provenance = settings.provenance()
     with Storage.open(dataset_id, overwrite, wait) as storage:
-        if storage.metadata is not None:
-            difference = _difference(storage.metadata["arc_suite"], provenance)
-            if difference and storage.kept and not overwrite:
-                raise ValueError(f"dataset {dataset_id!r} is another: {difference}; --overwrite replaces it")
-            if difference:
-                storage.clear()
+        _check_same_dataset(storage, dataset_id, provenance, overwrite)
         missing = [index for index in range(episodes) if index not in storage.kept]
         try:
             try:
@@ -105,6 +100,17 @@ def _check(settings: DatasetSettings, episodes: int) -> None:
 
 def _policy(settings: DatasetSettings, num_envs: int, task: Task | None = None) -> policies.Policy:
     return policies.policy(settings.policy, settings.setup.body, settings.presets, num_envs, settings.noise, task)
+
+
+def _check_same_dataset(storage: Storage, dataset_id: str, provenance: dict, overwrite: bool) -> None:
+    """Check that stored episodes have a provenance; others are deleted if they may be overwritten."""
+    if storage.metadata is None:
+        return
+    difference = _difference(storage.metadata["arc_suite"], provenance)
+    if difference and storage.kept and not overwrite:
+        raise ValueError(f"dataset {dataset_id!r} is another: {difference}; --overwrite replaces it")
+    if difference:
+        storage.clear()
 
 
 def _difference(stored: dict, present: dict) -> str | None:

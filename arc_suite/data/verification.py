@@ -10,6 +10,7 @@ from arc_suite.data import rollouts
 from arc_suite.data.collection import NUM_ENVS
 from arc_suite.data.dataset import Dataset, open
 from arc_suite.data.episodes import Episode
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import Script
 from arc_suite.robots.spec import Body
 
@@ -41,11 +42,7 @@ def verify(
     """
     dataset = open(dataset_id)
     settings = dataset.settings
-    setup = settings.setup
-    if body not in (None, settings.setup.body):
-        raise ValueError(f"dataset {dataset_id!r} holds episodes of {settings.setup.body.name}, and not of {body.name}")
-    if task is not None and registry.task_of(task) is not setup.kind:
-        raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {setup.task}, and not of {task}")
+    _check_body_and_task(dataset_id, settings.setup, body, task)
     _check_provenance(dataset)
     count = len(dataset)
     first_seed = settings.seed
@@ -78,6 +75,14 @@ def verify(
                     difference = _difference(recorded, episode)
                     raise ValueError(f"dataset {dataset_id!r}: episode {index} differs from its replay: {difference}")
     return count
+
+
+def _check_body_and_task(dataset_id: str, setup: Setup, body: Body | None, task: str | None) -> None:
+    """Check that a dataset's setup has the expected body and task; None for any."""
+    if body not in (None, setup.body):
+        raise ValueError(f"dataset {dataset_id!r} holds episodes of {setup.body.name}, and not of {body.name}")
+    if task is not None and registry.task_of(task) is not setup.kind:
+        raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {setup.task}, and not of {task}")
 
 
 def _check_provenance(dataset: Dataset) -> None:

@@ -275,7 +275,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         """In the mode human, show the present state in the window, at the pace of the simulated time."""
         if self.render_mode != "human":
             return
-        decorated = self._env.physics.pose_decorated()
+        decorated = self._env.physics.decorated_pose()
         if self._window is None:
             self._window = Window(decorated, self.render_kwargs["camera_id"])
             weakref.finalize(self, self._window.close)  # at the latest before the interpreter unloads GLFW

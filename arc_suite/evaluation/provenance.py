@@ -12,10 +12,11 @@ UNKNOWN = "training data unknown"
 
 
 def of_setup(setup: Setup) -> dict[str, Any]:
-    """Return, JSON-able, what a setup's results depend on: names, settings, and hashes of body, model and task."""
+    """Return what the results of a setup depend on, for JSON: names, settings, and hashes of body, model and task."""
     settings = repr(setup.definition.settings)
-    known = setup.provenance() | {"task_sha256": hashlib.sha256(settings.encode()).hexdigest()}
-    return {name: known[name] for name in _FIELDS}
+    values = setup.provenance()
+    values["task_sha256"] = hashlib.sha256(settings.encode()).hexdigest()
+    return {name: values[name] for name in _FIELDS}
 
 
 def policy_sha256(policy: str) -> str | None:
@@ -25,18 +26,19 @@ def policy_sha256(policy: str) -> str | None:
 
 
 def training_seeds(policy, played: range) -> seed_ranges.Ranges | None:
-    """Return the seeds of the episodes that a policy learned from; None where they are unknown.
+    """Return the seeds of the episodes that a policy learned from; None if they are unknown.
 
     Args:
-        policy: its name, as on the command line, or the policy.
-        played: seeds of the episodes that judge it.
+        policy: name of the policy, as on the command line, or the policy.
+        played: seeds of the episodes that evaluate it.
 
     Raises:
-        ValueError: it learned from some of them.
+        ValueError: the policy learned from some of the seeds of `played`.
     """
-    found = policies.training_seeds(policy)
-    if shared := seed_ranges.common_seeds(found or (), played):
-        free = f"those below {seed_ranges.COLLECTING.start} are evaluation's"
+    learned_seeds = policies.training_seeds(policy)
+    shared_seeds = seed_ranges.common_seeds(learned_seeds or (), played)
+    if shared_seeds:
+        hint = f"those below {seed_ranges.COLLECTING.start} are evaluation's"
         name = f"policy {policy}" if isinstance(policy, str | os.PathLike) else "policy"
-        raise ValueError(f"{name}: learned from episodes of seeds {shared.start} to {shared[-1]}; {free}")
-    return found
+        raise ValueError(f"{name}: learned from episodes of seeds {shared_seeds.start} to {shared_seeds[-1]}; {hint}")
+    return learned_seeds

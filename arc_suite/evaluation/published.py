@@ -1,5 +1,7 @@
 """Returns that the paper publishes for the task walk, by robot. `studies/paper.csv` holds the same as a table."""
 
+import itertools
+
 # Of the demonstrators, read off the expert lines of the figures.
 DEMONSTRATORS = {"queen": 2048.0, "bastion": 2311.0, "tick": 1971.0, "leaper": 2630.0}
 
@@ -46,13 +48,13 @@ FINALS = {robot: {name: points[-1] for name, points in curves.items()} for robot
 
 
 def at(robot: str, algorithm: str, steps: int) -> float | None:
-    """Return what the paper's algorithm earns after environment steps, interpolated between points of its curve.
+    """Return the return of the paper's algorithm after environment steps, interpolated between points of its curve.
 
-    None before its first point, after its last, and for other robots and algorithms.
+    None before the first point, after the last, and for other robots and algorithms.
     """
     curve = CURVES.get(robot, {}).get(algorithm, ())
-    known = [(step, point) for step, point in zip(STEPS, curve, strict=False) if point is not None]
-    for (before, low), (after, high) in zip(known, known[1:], strict=False):
-        if before <= steps <= after:
-            return low + (high - low) * (steps - before) / (after - before)
+    points = [(step, value) for step, value in zip(STEPS, curve, strict=False) if value is not None]
+    for (step, value), (next_step, next_value) in itertools.pairwise(points):
+        if step <= steps <= next_step:
+            return value + (next_value - value) * (steps - step) / (next_step - step)
     return None

@@ -147,7 +147,8 @@ def performance_profile(strata, thresholds, seed: int = 0) -> Curve:
         thresholds: (points,)
         seed: of the resampling.
     """
-    random, thresholds = np.random.default_rng(seed), np.asarray(thresholds, float)
+    random = np.random.default_rng(seed)
+    thresholds = np.asarray(thresholds, float)
     strata = [np.asarray(scores, float) for scores in strata]
 
     def shares(of_strata):
@@ -179,9 +180,10 @@ def curve(strata, seed: int = 0) -> Curve:
 
 
 def _better(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """P(x > y) + P(x = y) / 2 of all pairs of two samples, over the last axis."""
-    x, y = x[..., :, None], y[..., None, :]
-    return (np.greater(x, y) + 0.5 * np.equal(x, y)).mean(axis=(-2, -1))
+    """Return P(x > y) + P(x = y) / 2 of all pairs of two samples, over the last axis."""
+    first = x[..., :, None]
+    second = y[..., None, :]
+    return (np.greater(first, second) + 0.5 * np.equal(first, second)).mean(axis=(-2, -1))
 
 
 def _interval(resamples: np.ndarray) -> tuple[float, float]:

@@ -71,8 +71,8 @@ class SpecError(ValueError):
             field: see the class.
             owner: the spec that has the field, as a label or a path; None if unknown.
         """
-        place = ".".join(part for part in (owner, field) if part)
-        super().__init__(": ".join(part for part in (place, reason) if part))
+        full_field = ".".join(part for part in (owner, field) if part)
+        super().__init__(": ".join(part for part in (full_field, reason) if part))
         self.reason = reason
         self.field = field
 

@@ -58,11 +58,11 @@ def compile_model(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
     Returns:
         A new model, to which the caller may write.
     """
-    return copy.copy(_compiled(body, arena))
+    return copy.copy(_cached_model(body, arena))
 
 
 @functools.lru_cache(maxsize=32)
-def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
+def _cached_model(body: Body, arena: Arena) -> mujoco.MjModel:
     has_fast_path = arena == FLAT and not body.source
     spec = direct.on_flat_ground(size_body(body)) if has_fast_path else models.model_spec(body, arena)
     model = spec.compile()

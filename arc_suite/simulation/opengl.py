@@ -227,7 +227,8 @@ class _Renderer:
         import mujoco
         from dm_control.mujoco import engine, wrapper
 
-        width, height = model.vis.global_.offwidth, model.vis.global_.offheight
+        width = model.vis.global_.offwidth
+        height = model.vis.global_.offheight
         if self._gl is None:
             self._gl = self._open(width, height)
             self._gl.increment_refcount()  # dm_control frees it with the last MuJoCo context
@@ -307,8 +308,9 @@ def _explain(error: Exception) -> str:
 
 
 def _wrong_device() -> str | None:
-    """What is wrong with `MUJOCO_EGL_DEVICE_ID`, where EGL has found its devices."""
-    device, egl = os.environ.get(_DEVICE), sys.modules.get(f"{_BACKEND}.pyopengl.egl_ext")
+    """Return what is wrong with `MUJOCO_EGL_DEVICE_ID`; None if nothing is, or if EGL has not listed its devices."""
+    device = os.environ.get(_DEVICE)
+    egl = sys.modules.get(f"{_BACKEND}.pyopengl.egl_ext")
     if device is None or egl is None:
         return None
     last = len(egl.eglQueryDevicesEXT()) - 1

@@ -117,7 +117,9 @@ class Physics(dm_mujoco.Physics):
             ForkError: made before a fork.
         """
         self._check_process()
-        model, data, option = self.model.ptr, self.data.ptr, self._option
+        model = self.model.ptr
+        data = self.data.ptr
+        option = self._option
         time = data.time
         self._warnings.fill(0)
         if nstep < 1:
@@ -161,7 +163,7 @@ class Physics(dm_mujoco.Physics):
         options = self._pose() | kwargs
         return pictures.picture(self.body, self.arena, height=height, width=width, camera_id=camera_id, **options)
 
-    def pose_decorated(self) -> pictures.Decorated:
+    def decorated_pose(self) -> pictures.Decorated:
         """Return the decorated body in the present pose, for a window; the same object at every call."""
         if self._decorated is None:
             self._decorated = pictures.Decorated.from_body(self.body, self.arena)
@@ -207,7 +209,8 @@ class Physics(dm_mujoco.Physics):
 
     def snapshot(self, fields: Iterable[str]) -> dict[str, np.ndarray]:
         """Return the simulation's state and derived fields of `MjData` as a snapshot of a `Batch` of one."""
-        model, data = self.model.ptr, self.data.ptr
+        model = self.model.ptr
+        data = self.data.ptr
         state = np.empty((1, mujoco.mj_stateSize(model, _STATE)))
         mujoco.mj_getState(model, data, state[0], _STATE)
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
@@ -233,7 +236,8 @@ class Physics(dm_mujoco.Physics):
         self._lasting = {name: values for name, values in lasting.items() if not np.isnan(values).any()}
         if fields:
             self.change_model(fields)
-        model, data = self.model.ptr, self.data.ptr
+        model = self.model.ptr
+        data = self.data.ptr
         mujoco.mj_setState(model, data, arrays["state"][0], _STATE)
         mujoco.mj_forward(model, data)
         mujoco.mj_setState(model, data, arrays["state"][0], _STATE)  # again, as the solver starts from it

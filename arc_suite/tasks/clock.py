@@ -55,7 +55,7 @@ class Clock(NamedTuple):
             stance=desired_contacts(phases, duty_factor, offsets),
         )
 
-    def look_up(self, table: np.ndarray, tick):
+    def at(self, table: np.ndarray, tick):
         """Return the entries (..., n) of a table at ticks (...), integers of Python, NumPy or JAX."""
         if not isinstance(tick, int):
             table = tick.__array_namespace__().asarray(table)
@@ -90,7 +90,7 @@ class Clocks(NamedTuple):
         phases, circle, stance = (np.concatenate(tables) for tables in zip(*distinct_clocks.values(), strict=True))
         return cls(phases, circle, stance, starts[indices], counts[indices])
 
-    def look_up(self, table: np.ndarray, tick):
+    def at(self, table: np.ndarray, tick):
         """Return the entries (environments, n) of a table at ticks (environments,)."""
         return table[self.starts + tick % self.counts]
 

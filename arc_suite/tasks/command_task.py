@@ -266,7 +266,7 @@ class CommandTask(Task):
     def phase(self, memory: CommandTaskMemory):
         """Return the phase (...) of the gait, rad."""
         if self.settings.gait_and_pose is None:
-            return self.clock.look_up(self.clock.phases, memory.core.tick)
+            return self.clock.at(self.clock.phases, memory.core.tick)
         return self.settings.gait_and_pose.phase(memory.gait_and_pose)
 
     def leg_phases(self, memory: CommandTaskMemory) -> tuple[Any, Any]:
@@ -375,7 +375,7 @@ class CommandTask(Task):
         gait_and_pose = self.settings.gait_and_pose
         gait_memory = memory.gait_and_pose
         if gait_and_pose is None:
-            stance = self.clock.look_up(self.clock.stance, tick)
+            stance = self.clock.at(self.clock.stance, tick)
             crouch = 1.0
         else:
             gait_memory = gait_and_pose.before_feet(context, gait_memory, steps, is_going)
@@ -468,7 +468,7 @@ class CommandTask(Task):
         velocity = rotations.to_heading_frame(velocities[..., :2], heading)
         gait_and_pose = self.settings.gait_and_pose
         if gait_and_pose is None:
-            clock_circle = self.clock.look_up(self.clock.circle, core.tick)
+            clock_circle = self.clock.at(self.clock.circle, core.tick)
             gait_blocks = {}
         else:
             clock_circle = gait_and_pose.circle(memory.gait_and_pose)

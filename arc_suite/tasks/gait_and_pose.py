@@ -167,7 +167,7 @@ class GaitAndPose:
     def reference(self, scene, parameters) -> Reference:
         """Return the reference of a body, in a task with `parameters.Parameters`."""
         body = scene.body
-        rest = posture.find_rest_pose(body)
+        rest_pose = posture.find_rest_pose(body)
         height = body.torso.standing_height
         step = scene.control_timestep
         prescribed = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))
@@ -177,9 +177,9 @@ class GaitAndPose:
             frequency_range=(1.0, 1.0) if self.gaits == () else _FREQUENCY_RANGE,
         )
         return Reference(
-            ride=rest.ride_height,
-            feet=rest.sole_positions[:, :2],
-            angles=rest.legs.by_joint(rest.joint_angles),
+            ride=rest_pose.ride_height,
+            feet=rest_pose.sole_positions[:, :2],
+            angles=rest_pose.legs.by_joint(rest_pose.joint_angles),
             turns=posture.linearize_joint_angles(body),
             glide=_GLIDE_SPEED * math.sqrt(GRAVITY / height) * step,
             step=step,

@@ -86,7 +86,7 @@ def layout(model, body: Body) -> Layout:
     feet = [model.body(name).id for name in body.foot_names]
     is_imported = model.nkey > 0  # a keyframe holds its standing pose
     if is_imported:
-        return _layout_of_imported(model, body, feet)
+        return _imported_layout(model, body, feet)
     angles = _span([model.joint(name).qposadr[0] for name in body.joint_names])
     velocities = _span([model.joint(name).dofadr[0] for name in body.joint_names])
     if (angles.start, velocities.start) != (7, 6):
@@ -102,7 +102,7 @@ def layout(model, body: Body) -> Layout:
     )
 
 
-def _layout_of_imported(model, body: Body, feet: list[int]) -> Layout:
+def _imported_layout(model, body: Body, feet: list[int]) -> Layout:
     """Return the layout of an imported body, whose model may have further joints and parts between those of the body.
 
     A foot has no collider; the forces on it are those on the part above, which has the collider.

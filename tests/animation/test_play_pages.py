@@ -142,7 +142,7 @@ def test_leaps_follow_the_keyframes_of_python(script, name, speed, plays):
     asked[pressed] |= {"leaps": True}
     episode = {"creature": creature, "ground": "level", "qvel": [], "desired": [0.0] * 3, "asked": asked}
     (found,) = nodes.run(script, [episode | {"qpos": creature["grounds"]["level"]["start"]}])
-    crouched = leaps.plan_movement(
+    crouched = leaps.lay_out_movement(
         body, legs, law.rest_angles, leap
     ).crouch_end  # until then joints go over from where they were
     steps = slice(pressed + crouched, pressed + len(targets) - 1)

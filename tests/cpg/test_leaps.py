@@ -15,7 +15,7 @@ def test_keyframes_crouch_and_come_back():
     legs = Legs.of(body)
     rest = legs.by_leg(np.zeros(len(body.joint_names)))
     angles = leaps.leap_targets(body, legs, rest, leaps.Leap())
-    made = leaps.plan_movement(body, legs, rest, leaps.Leap())
+    made = leaps.lay_out_movement(body, legs, rest, leaps.Leap())
     assert made.crouch_end < made.stretch_end < made.landing_step < len(angles) == len(made.sole_offsets)
     low = legs.soles(legs.by_leg(angles[made.crouch_end - 1]))[0] - legs.soles(rest)[0]
     assert low[:, 2].min() > 0.3 * body.torso.standing_height  # soles come up to the torso

@@ -41,6 +41,8 @@ ALLOWED = {
     "following": r"agents\.",  # the next observations of a transition
     "build": r"models\.builder build$|build_model",  # a model from a spec
     "plan": r"\(\) plan$",  # a path around obstacles
+    "balance": r"\.(Balanced|Stepping) balance$",  # steps that keep a body from falling
+    "trace": r"\.leg_networks trace_shared_layers$",  # records the operations of a function
     "motions": r" ROOT_MOTIONS$",  # whether clips move the root
     "events": r"cli\.train events$",  # files of TensorBoard
     "lift": r"cpg\.|models\.stride|LIFT_OFF$",  # height of a foot in swing; the end of a stance

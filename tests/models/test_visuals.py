@@ -78,7 +78,7 @@ def test_near_cameras_frame_the_standing_body(body, camera):
     environment = arc_suite.simulation.physics.Physics.from_body(body)
     environment.forward()
     kinds = environment.render(120, 160, camera, segmentation=True)
-    model = environment.pose_decorated().model
+    model = environment.decorated_pose().model
     geoms = [model.geom(i).name for i in range(model.ngeom)]
     seen = (kinds[..., 1] == mujoco.mjtObj.mjOBJ_GEOM) & (kinds[..., 0] != geoms.index("floor"))
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
@@ -100,7 +100,7 @@ def test_pictures_show_something_and_differ_by_camera(robot):
 
 
 def glow_in(physics) -> np.ndarray:
-    return physics.pose_decorated().model.mat("glow").rgba.copy()
+    return physics.decorated_pose().model.mat("glow").rgba.copy()
 
 
 @pytest.mark.slow

@@ -135,14 +135,14 @@ def test_different_bodies_have_one_padded_layout(mode):
         assert together["privileged"].shape == (3, width) and together["privileged"].dtype == np.float32
         for index, info in enumerate(own):
             task = mixed.tasks[index]
-            assert_array_equal(together["privileged"][index], tokens.pad_privileged(task, info["privileged"])[0])
+            assert_array_equal(together["privileged"][index], tokens.pad_privileged_blocks(task, info["privileged"])[0])
             blocks = privileged.split(tokens.privileged_sizes(task), together["privileged"][index])
             legs = len(task.scene.body.legs)
             assert blocks["ground"][:legs].all() and not blocks["ground"][legs:].any()
             assert (blocks["strength"] > 0.0).sum() == len(task.scene.body.joint_names)
             if "final_info" in info:
                 last = together["final_info"]["privileged"][index]
-                assert_array_equal(last, tokens.pad_privileged(task, info["final_info"]["privileged"])[0])
+                assert_array_equal(last, tokens.pad_privileged_blocks(task, info["final_info"]["privileged"])[0])
                 assert (last != together["privileged"][index]).any()
                 ends += 1
         infos = (

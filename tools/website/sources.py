@@ -66,14 +66,14 @@ def _copy(page: Path, folder: Path) -> None:
 
     Pages of tasks get the tables of the code, and pages with others below them get cards that lead to these.
     """
-    place = page.relative_to(ROOT)
+    relative_page = page.relative_to(ROOT)
     text = resolve_links(page.read_text(encoding="utf-8"), page.parent)
     is_task_page = page.parent.name == "docs" and page.stem in _TASKS_WITH_PAGE
     parts = [tasks.page(page.stem, text) if is_task_page else text]
-    pages_below = BELOW.get(place.as_posix())
+    pages_below = BELOW.get(relative_page.as_posix())
     if pages_below:
         parts += [markdown.cards(pages_below), toctree(pages_below)]
-    _write(folder / place, "\n".join(parts))
+    _write(folder / relative_page, "\n".join(parts))
     _copy_files(text, page.parent, folder)
 
 

@@ -308,15 +308,15 @@ def _make_clips_from_rest(
         planted_walk: the same with planted feet; None if feet are not to be planted.
         left_out: takes the reasons why clips cannot be made.
     """
-    rest = root_motion.stay_at_start(transition.gait.recording, transition.start, samples=1).pose(0)
+    rest_pose = root_motion.stay_at_start(transition.gait.recording, transition.start, samples=1).pose(0)
     idle_clip = cast(Acted, clip_of("idle"))
-    idle = _play(body, idle_clip, rest).put_on_ground(body)
+    idle = _play(body, idle_clip, rest_pose).put_on_ground(body)
     drafts = {"idle": idle}
     for name in names:
         try:
             match clip_of(name):
                 case Acted() as clip if name != "idle":
-                    drafts[name] = _act(body, clip, rest, idle.start)
+                    drafts[name] = _act(body, clip, rest_pose, idle.start)
                 case Turn() as clip if name in turns:
                     draft = _make_turn(body, math.radians(clip.angle), turns[name], idle.start)
                     if planted_walk is not None:

@@ -38,7 +38,7 @@ class Perceptron:
         joints: numbers of an action.
         privileged: sizes of the privileged blocks after the observation, which only values depend on.
         size: numbers of an observation.
-        own: numbers of a view that actions depend on; they come first.
+        action_inputs: numbers of a view that actions depend on; they come first.
         inputs: numbers of a view, privileged ones counted; the size of the moments that normalize it.
         symmetric: whether the networks treat left and right alike, whatever their parameters.
     """
@@ -55,7 +55,7 @@ class Perceptron:
         return sum(self.blocks)
 
     @property
-    def own(self) -> int:
+    def action_inputs(self) -> int:
         """Numbers of a view that actions depend on; they come first."""
         return sum(self.blocks)
 
@@ -76,16 +76,16 @@ class Perceptron:
         privileged = tuple(task.privileged_blocks[name].size for name in critic_blocks)
         return cls(tuple(task.sizes.values()), len(task.scene.body.joint_names), privileged)
 
-    def viewed(self, observations):
+    def view(self, observations):
         """Return observations (..., size), with privileged blocks after them, as networks view them."""
         return observations
 
-    def drawn(self, random, hidden, last_gain=1.0):
+    def draw_policy(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""
         sizes = (self.size, hidden, hidden, self.joints)
         return networks.mlp(random, sizes, "orthogonal", gain=_GAIN, last_gain=last_gain)
 
-    def drawn_values(self, random, hidden):
+    def draw_values(self, random, hidden):
         """Draw the parameters of a network of values."""
         return networks.mlp(random, (self.inputs, hidden, hidden, 1), "orthogonal", gain=_GAIN)
 
@@ -103,22 +103,22 @@ class Perceptron:
         """(size,) factors of normalized numbers; see `networks.equalizing_scale`."""
         return networks.equalizing_scale(self.blocks)
 
-    def seen(self, views):
+    def moment_vectors(self, views):
         """Return the vectors (..., inputs) whose moments normalize views."""
         return views
 
     def normalize(self, moments: Moments) -> Normalizer:
-        """Return the normalizer of views, from the moments of the vectors of `seen`."""
+        """Return the normalizer of views, from the moments of the vectors of `moment_vectors`."""
         return moments.normalizer()
 
-    def exported(self, parameters, x):
+    def export_actions(self, parameters, x):
         """Write the nodes of the actions (1, joints) for a normalized observation (1, size)."""
         first_layer, *later_layers = parameters
         scaled_layer = {**first_layer, "weight": first_layer["weight"] * self.scale[:, None]}
         return perceptron(x, (scaled_layer, *later_layers), ACTIVATION)
 
-    def imported(self, weights):
-        """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order.
+    def import_actions(self, weights):
+        """Return the parameters from the weights and biases of the nodes that `export_actions` wrote, in order.
 
         Raises:
             ValueError: they are of another network.
@@ -135,17 +135,17 @@ Architecture = Perceptron | Legs | AnyLegs
 _ATTRIBUTES = (
     "symmetric",
     "size",
-    "own",
+    "action_inputs",
     "inputs",
-    "viewed",
-    "seen",
+    "view",
+    "moment_vectors",
     "normalize",
-    "drawn",
-    "drawn_values",
+    "draw_policy",
+    "draw_values",
     "actions",
     "values",
-    "exported",
-    "imported",
+    "export_actions",
+    "import_actions",
 )
 
 
@@ -185,14 +185,14 @@ def of_environment(
 
 def policy_graph(architecture: Architecture, normalize: Normalizer, parameters) -> Graph:
     """Return the graph of a policy: a normalizer and a network of actions."""
-    action_inputs = architecture.own
+    action_inputs = architecture.action_inputs
     normalize_action_inputs = Normalizer(
         normalize.mean[:action_inputs], normalize.factor[:action_inputs], normalize.limit
     )
 
     def trace_actions(observation):
-        view = normalize_action_inputs(architecture.viewed(observation))
-        return architecture.exported(parameters, view).clip(-1.0, 1.0)
+        view = normalize_action_inputs(architecture.view(observation))
+        return architecture.export_actions(parameters, view).clip(-1.0, 1.0)
 
     return traced(trace_actions, architecture.size)
 
@@ -205,7 +205,7 @@ def read_policy_graph(architecture: Architecture, graph: Graph) -> tuple[Normali
     """
     try:
         normalize = _read_normalizer(graph)
-        parameters = architecture.imported(_layer_arrays(graph))
+        parameters = architecture.import_actions(_layer_arrays(graph))
         is_same_graph = policy_graph(architecture, normalize, parameters).nodes == graph.nodes
     except (KeyError, TypeError, ValueError):
         is_same_graph = False

@@ -33,7 +33,7 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
     replay = priors.open_replay(context, task)
     normalize = _observation_moments(replay, task.size).normalizer()
     architecture = Perceptron.of(task)
-    state = dagger.begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
+    state = dagger.begin(architecture.draw_policy(generator(context.seed, "networks", 0), hp.hidden))
     step = 0  # updates so far
 
     saved = context.checkpoint

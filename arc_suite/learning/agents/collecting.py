@@ -131,4 +131,4 @@ def network_views(architecture: Architecture, observation, privileged, columns):
     if privileged is not None:
         xp = observation.__array_namespace__()
         observation = xp.concatenate([observation, privileged[..., columns]], axis=-1)
-    return architecture.viewed(observation)
+    return architecture.view(observation)

@@ -46,7 +46,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
     environment = context.environment(hp.num_envs)
     architecture = architectures.of_environment(environment)
     teacher = Teacher(environment, hp.preset)
-    state = begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
+    state = begin(architecture.draw_policy(generator(context.seed, "networks", 0), hp.hidden))
     moments = Moments.empty(architecture.inputs)
     normalize = architecture.normalize(moments)
     length = -(-context.steps // hp.num_envs)  # control steps of each environment in the run, rounded up
@@ -101,7 +101,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         observations, labels = _learned_pairs(hp, dataset, control_steps)
         error = 0.0
         if len(labels):
-            normalize = architecture.normalize(moments.with_vectors(architecture.seen(observations)))
+            normalize = architecture.normalize(moments.with_vectors(architecture.moment_vectors(observations)))
             if control_steps == length:
                 rates = hp.learning_rate * np.linspace(1.0, 0.0, hp.last_updates, endpoint=False)
             else:

@@ -118,7 +118,7 @@ class NetworkInputs(NamedTuple):
 
     def _view(self, observations):
         """Return observations as networks see them, before normalization."""
-        return observations if self.legs is None else self.legs.seen(self.legs.viewed(observations))
+        return observations if self.legs is None else self.legs.moment_vectors(self.legs.view(observations))
 
 
 def _mirror_every_other(mirror: Mirror, vectors: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ class Legs:
         return sum(self.views.sizes[: 1 + self.blocks])  # the size before the blocks is that of the pairs of legs
 
     @property
-    def own(self) -> int:
+    def action_inputs(self) -> int:
         """Numbers of a view that actions depend on; they come first."""
         return self.legs * self.features
 
@@ -86,20 +86,20 @@ class Legs:
         views = leg_views(task.scene.body, {**task.blocks, **privileged}, symmetry)
         return cls(views, task.size, len(task.sizes), symmetric=symmetry is not None)
 
-    def viewed(self, observations):
+    def view(self, observations):
         """Return the view of observations (..., size), or of observations with privileged blocks after them."""
         has_privileged = observations.shape[-1] != self.size
-        count = None if has_privileged else self.own
+        count = None if has_privileged else self.action_inputs
         sources, factors, bias = self._flat_views
         # The order of these steps is that of the nodes in policy files.
         view = bias[:count] + observations[..., sources[0, :count]] * factors[0, :count]
         return view + observations[..., sources[1, :count]] * factors[1, :count]
 
-    def drawn(self, random, hidden, last_gain=1.0):
+    def draw_policy(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""
         return _draw_parameters(random, (self.features, hidden), self.views.most, last_gain)
 
-    def drawn_values(self, random, hidden):
+    def draw_values(self, random, hidden):
         """Draw the parameters of a network of values."""
         return _draw_parameters(random, (self.inputs, hidden), 1)
 
@@ -114,7 +114,7 @@ class Legs:
         leg_values = _leg_outputs(parameters, inputs, np.ones(self.legs, bool))
         return networks.body_outputs(leg_values, legs=True)[..., 0]
 
-    def seen(self, views):
+    def moment_vectors(self, views):
         """Return the vectors (..., legs, inputs) whose moments normalize views."""
         return self._by_leg(views)
 
@@ -123,15 +123,15 @@ class Legs:
         mean, factor, limit = moments.normalizer()
         return Normalizer(self._repeat_for_legs(mean), self._repeat_for_legs(factor), limit)
 
-    def exported(self, parameters, x):
+    def export_actions(self, parameters, x):
         """Write the nodes of the actions (1, joints) for a normalized view (1, own)."""
         inputs = x.reshape(1, self.legs, self.features)
         (feature_layer,), head = parameters
         scaled_layer = {**feature_layer, "weight": feature_layer["weight"] * self.scale[:, None]}
         return self.body_actions(_trace_outputs(((scaled_layer,), head), inputs, _trace_full_mask(inputs)))
 
-    def imported(self, weights):
-        """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order."""
+    def import_actions(self, weights):
+        """Return the parameters from the weights and biases of the nodes that `export_actions` wrote, in order."""
         (scaled_layer,), head = _parameters_of_nodes(weights)
         feature_layer = {**scaled_layer, "weight": scaled_layer["weight"] / self.scale[:, None]}
         return (feature_layer,), head
@@ -175,9 +175,9 @@ class Legs:
         """Return what each leg sees (..., legs, features or inputs), the inverse of `_flatten`."""
         xp = views.__array_namespace__()
         lead_shape = views.shape[:-1]
-        parts = [views[..., : self.own].reshape(*lead_shape, self.legs, -1)]
-        if views.shape[-1] > self.own:
-            parts.append(views[..., self.own :].reshape(*lead_shape, self.legs, -1))
+        parts = [views[..., : self.action_inputs].reshape(*lead_shape, self.legs, -1)]
+        if views.shape[-1] > self.action_inputs:
+            parts.append(views[..., self.action_inputs :].reshape(*lead_shape, self.legs, -1))
         return xp.concatenate(parts, axis=-1)
 
 
@@ -200,19 +200,19 @@ class AnyLegs(NamedTuple):
     symmetric = False
 
     @property
-    def own(self) -> int:
+    def action_inputs(self) -> int:
         """Numbers of an observation that actions depend on: all."""
         return self.size
 
-    def viewed(self, observations):
+    def view(self, observations):
         """Return observations."""
         return observations
 
-    def drawn(self, random, hidden, last_gain=1.0):
+    def draw_policy(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""
         return _draw_parameters(random, (self.inputs, hidden, hidden), MAX_JOINTS, last_gain)
 
-    def drawn_values(self, random, hidden):
+    def draw_values(self, random, hidden):
         """Draw the parameters of a network of values."""
         return _draw_parameters(random, (self.inputs, hidden, hidden), 1)
 
@@ -230,7 +230,7 @@ class AnyLegs(NamedTuple):
         leg_values = _leg_outputs(parameters, inputs, leg_mask)[..., 0]
         return jnp.where(leg_mask, leg_values, 0.0).sum(axis=-1) / leg_mask.sum(axis=-1)
 
-    def seen(self, observations):
+    def moment_vectors(self, observations):
         """Return the inputs (n, 81) of all legs that bodies have."""
         inputs, joint_mask = tokens.leg_inputs(observations)
         return inputs[joint_mask.any(axis=-1)]
@@ -240,15 +240,15 @@ class AnyLegs(NamedTuple):
         mean, factor, limit = moments.normalizer()
         return Normalizer(tokens.repeat_for_legs(mean, 0.0), tokens.repeat_for_legs(factor, 1.0), limit)
 
-    def exported(self, parameters, x):
+    def export_actions(self, parameters, x):
         """Write the nodes of a network of actions, which compute the legs that the body has."""
         inputs, joint_mask = tokens.leg_inputs(x)
         leg_mask = joint_mask.sum(axis=-1) > 0.0
         outputs = _trace_outputs(parameters, inputs, leg_mask) * joint_mask
         return outputs.reshape(1, -1)
 
-    def imported(self, weights):
-        """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order."""
+    def import_actions(self, weights):
+        """Return the parameters from the weights and biases of the nodes that `export_actions` wrote, in order."""
         return _parameters_of_nodes(weights)
 
 

@@ -193,8 +193,3 @@ def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
 
 def _path_text(path) -> str:
     return "/" + jax.tree_util.keystr(path, simple=True, separator="/")
-
-
-# Former names, which learners of other packages may use.
-named = flatten_tree
-restored = restore_tree

@@ -85,9 +85,11 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
         # Update the normalizer.
         if not hp.start and progress < hp.normalize_until:
-            moments = moments.with_vectors(architecture.seen(rollout["observations"]))
+            moments = moments.with_vectors(architecture.moment_vectors(rollout["observations"]))
             if symmetry is not None:
-                moments = moments.with_vectors(architecture.seen(symmetry.observation(rollout["observations"])))
+                moments = moments.with_vectors(
+                    architecture.moment_vectors(symmetry.observation(rollout["observations"]))
+                )
             normalize = architecture.normalize(moments)
 
         metrics = {
@@ -198,7 +200,7 @@ def _read_start(hp: ProximalPolicy, context: RunContext, task, architecture: Arc
         normalize, policy = architectures.read_policy_graph(architecture, start_policy.graph)
     except ValueError as error:
         raise ValueError(f"{hp.start}: expected {error}, {hp.network}") from None
-    expected_policy = architecture.drawn(np.random.default_rng(0), hp.hidden)
+    expected_policy = architecture.draw_policy(np.random.default_rng(0), hp.hidden)
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
     expected_shapes = [leaf.shape for leaf in jax.tree.leaves(expected_policy)]
     if len(shapes) != len(expected_shapes):

@@ -69,10 +69,10 @@ def begin(
         random: generator to draw from.
         policy: parameters of the policy to start from; None for drawn ones.
     """
-    drawn_policy = architecture.drawn(random, hp.hidden, last_gain=0.01)
+    drawn_policy = architecture.draw_policy(random, hp.hidden, last_gain=0.01)
     if policy is None:
         policy = drawn_policy
-    values = architecture.drawn_values(random, hp.hidden)
+    values = architecture.draw_values(random, hp.hidden)
     adam = optax.scale_by_adam()
     moments = (adam.init(policy), adam.init(values))
     return jax.tree.map(jnp.asarray, PpoState(policy, values, moments, np.float32(hp.policy_rate)))

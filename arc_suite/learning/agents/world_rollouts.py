@@ -96,7 +96,7 @@ class WorldRollouts:
             "next_observations": jnp.where(has_new_command[:, None], view, self._view(state_after)),
         }
         first_state = jax.vmap(self.env.reset)(jax.random.split(restart_key, self._hp.num_envs))
-        next_state = jax.vmap(mjx.restart_where_ended)(state_after, first_state, has_ended)
+        next_state = jax.vmap(mjx.restart_at_ends)(state_after, first_state, has_ended)
         next_steps = jnp.where(has_ended, 0, steps)
         return (next_state, next_steps), transitions
 

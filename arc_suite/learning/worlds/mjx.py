@@ -339,7 +339,7 @@ def _with_inputs(data, inputs: Inputs, torso: int):
     return data
 
 
-def restart_where_ended(state: WorldState, start: WorldState, ended) -> WorldState:
+def restart_at_ends(state: WorldState, start: WorldState, ended) -> WorldState:
     """Return the state after a step; where the episode has ended, that of the first step of another episode.
 
     Args:

@@ -32,9 +32,9 @@ def drawn(task, critic_blocks=(), count=6):
     size = task.size + sum(task.privileged_blocks[name].size for name in critic_blocks)
     vectors = random.normal(size=(count, size)).astype(np.float32)
     normalize = architecture.normalize(
-        Moments.empty(architecture.inputs).with_vectors(architecture.seen(architecture.viewed(vectors)))
+        Moments.empty(architecture.inputs).with_vectors(architecture.moment_vectors(architecture.view(vectors)))
     )
-    networks = architecture.drawn(random, 16), architecture.drawn_values(random, 16)
+    networks = architecture.draw_policy(random, 16), architecture.draw_values(random, 16)
     return architecture, *networks, normalize, vectors
 
 
@@ -44,7 +44,7 @@ def test_left_and_right_are_treated_alike(body, critic_blocks):
     architecture, policy, values, normalize, vectors = drawn(task, critic_blocks)
     assert architecture.symmetric
     mirror, mirror_action = behind.mirror_maps(task, critic_blocks)
-    here, there = (normalize(architecture.viewed(each)) for each in (vectors, mirror(vectors)))
+    here, there = (normalize(architecture.view(each)) for each in (vectors, mirror(vectors)))
     acted, found = architecture.actions(policy, here), architecture.values(values, here)
     assert_allclose(architecture.actions(policy, there), mirror_action(np.asarray(acted)), atol=1e-5)
     assert_allclose(architecture.values(values, there), found, atol=1e-5)
@@ -56,7 +56,7 @@ def test_a_network_is_exported_and_imported_as_it_acts(body):
     task = Setup.of(body, "steer").definition
     architecture, policy, _, normalize, vectors = drawn(task)
     graph = architectures.policy_graph(architecture, normalize, policy)
-    expected = np.asarray(architecture.actions(policy, normalize(architecture.viewed(vectors)))).clip(-1.0, 1.0)
+    expected = np.asarray(architecture.actions(policy, normalize(architecture.view(vectors)))).clip(-1.0, 1.0)
     assert_allclose(graph(vectors), expected, atol=1e-5)
     for row, actions in zip(vectors, graph(vectors), strict=True):
         assert_array_equal(graph(row[None])[0], actions)  # whatever the number of environments
@@ -88,8 +88,8 @@ def test_goals_and_rays_are_mirrored_on_the_right():
     task = Setup.of("tick", "navigate").definition
     architecture, policy, _, normalize, vectors = drawn(task)
     mirror, mirror_action = task.symmetry
-    acted = architecture.actions(policy, normalize(architecture.viewed(vectors)))
-    there = architecture.actions(policy, normalize(architecture.viewed(mirror(vectors))))
+    acted = architecture.actions(policy, normalize(architecture.view(vectors)))
+    there = architecture.actions(policy, normalize(architecture.view(mirror(vectors))))
     assert_allclose(there, mirror_action(np.asarray(acted)), atol=1e-5)
 
 

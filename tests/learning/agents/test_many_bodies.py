@@ -39,8 +39,10 @@ def vectors():
 
 def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
     architecture = AnyLegs()
-    parameters = architecture.drawn(np.random.default_rng(0), 16)
-    normalize = architecture.normalize(Moments.empty(architecture.inputs).with_vectors(architecture.seen(vectors)))
+    parameters = architecture.draw_policy(np.random.default_rng(0), 16)
+    normalize = architecture.normalize(
+        Moments.empty(architecture.inputs).with_vectors(architecture.moment_vectors(vectors))
+    )
     normalized = normalize(vectors)
     expected = np.asarray(architecture.actions(parameters, normalized))
     graph = architectures.policy_graph(architecture, normalize, parameters)
@@ -58,7 +60,7 @@ def test_the_order_of_legs_does_not_matter(vectors):
     """Actions follow the legs, and values stay."""
     architecture = AnyLegs()
     random = np.random.default_rng(0)
-    of_actions, of_values = architecture.drawn(random, 16), architecture.drawn_values(random, 16)
+    of_actions, of_values = architecture.draw_policy(random, 16), architecture.draw_values(random, 16)
     legs = int(tokens.leg_inputs(vectors[:1])[1].any(axis=-1).sum())
     order = np.arange(tokens.MAX_LEGS)
     order[:legs] = order[:legs][::-1]
@@ -76,7 +78,7 @@ def test_the_order_of_legs_does_not_matter(vectors):
 
 def test_normalized_observations_keep_the_number_of_joints(vectors):
     architecture = AnyLegs()
-    seen = architecture.seen(vectors)
+    seen = architecture.moment_vectors(vectors)
     normalize = architecture.normalize(Moments.empty(architecture.inputs).with_vectors(seen))
     inputs, mask = tokens.leg_inputs(normalize(vectors))
     assert_array_equal(mask, tokens.leg_inputs(vectors)[1])

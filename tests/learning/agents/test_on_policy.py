@@ -172,7 +172,7 @@ def test_blocks_of_the_observation_weigh_alike():
 def test_a_network_is_exported_and_imported_as_it_acts():
     architecture = Perceptron((2, 150, 6), 3)
     random = np.random.default_rng(0)
-    parameters = architecture.drawn(random, 16)
+    parameters = architecture.draw_policy(random, 16)
     x = random.normal(size=(5, 158)).astype(np.float32)
     graph = architectures.policy_graph(architecture, Moments.empty(158).normalizer(), parameters)
     acted = graph(x)
