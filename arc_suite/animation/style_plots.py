@@ -156,13 +156,13 @@ def _write_gait_metrics(axis, track: Track) -> None:
 def reward(tracks: Mapping[str, Track]) -> Figure:
     """Draw the reward's weighted terms over time, gains stacked upwards and costs downwards, as means over a cycle."""
     figure, axes = _stack_axes(tracks, _REWARD_HEIGHT, sharey=True)
-    for track, axis in zip(tracks.values(), axes, strict=True):
+    for (label, track), axis in zip(tracks.items(), axes, strict=True):
         term_handles = _draw_terms(axis, track)
         reward_label = f"{track.rewards.mean():+.3f}  reward"
         mean_rewards = _mean_over_a_cycle(track, track.rewards)
         (reward_handle,) = axis.plot(track.times, mean_rewards, color="black", linewidth=1.2, label=reward_label)
         axis.axhline(0.0, color="white", linewidth=0.8)
-        axis.set_title(f"{reward_label}: return {track.rewards.sum():.0f}")
+        axis.set_title(f"{label}: return {track.rewards.sum():.0f}")
         axis.set_ylabel("reward a step")
         axis.set_xlim(0.0, track.times[-1])
         axis.legend(handles=[reward_handle, *term_handles], title="mean a step", **_LEGEND_ON_THE_RIGHT)

@@ -58,6 +58,12 @@ def test_gait_diagram_shows_stance_and_schedule():
     assert "duty factor\n(0.50 wanted)" in texts
 
 
+def test_a_picture_of_rewards_names_its_tracks():
+    tracks = {"slow": synthetic(), "fast": synthetic(late=(0, 4, 0, 0))}
+    titles = [axis.get_title(loc="left") for axis in PICTURES["reward"](tracks).axes]
+    assert titles == [f"{label}: return {track.rewards.sum():.0f}" for label, track in tracks.items()]
+
+
 @pytest.mark.slow
 def test_pictures_of_a_track_of_one_step():
     track = record(arc_suite.load("tick", "walk"), Demonstrator("tick"), seed=0, max_steps=1)
