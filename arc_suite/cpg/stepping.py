@@ -225,12 +225,12 @@ class Directed(Stepping):
         """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
         arrays_of_legs = {
             "mount": self.legs.mounts,
-            "turn": self.legs.turns,
+            "turn": self.legs.mount_rotations,
             "axes": self.legs.axes,
             "ends": self.legs.ends,
             "radius": self.legs.radii,
-            "joints": self.legs.joints,
-            "moves": self.legs.moves,
+            "joints": self.legs.joint_indices,
+            "moves": self.legs.has_joint,
             "low": self.legs.low,
             "high": self.legs.high,
             "place": self.rest_soles,

@@ -73,9 +73,9 @@ def iqm_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[
         The interquartile mean, and the ends of the interval.
     """
     random = np.random.default_rng(seed)
-    strata = [np.asarray(values, dtype=float) for values in strata]
-    resamples = np.concatenate([random.choice(values, (RESAMPLES, values.size)) for values in strata], axis=-1)
-    return float(interquartile_mean(np.concatenate(strata))), _interval(interquartile_mean(resamples))
+    samples = [np.asarray(values, dtype=float) for values in strata]
+    resamples = np.concatenate([random.choice(values, (RESAMPLES, values.size)) for values in samples], axis=-1)
+    return float(interquartile_mean(np.concatenate(samples))), _interval(interquartile_mean(resamples))
 
 
 def mean_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[float, tuple[float, float]]:
@@ -91,9 +91,10 @@ def mean_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple
         The mean, and the ends of the interval.
     """
     random = np.random.default_rng(seed)
-    strata = [np.asarray(values, dtype=float) for values in strata]
-    resamples = np.mean([random.choice(v, (RESAMPLES, v.size)).mean(axis=-1) for v in strata], axis=0)
-    return float(np.mean([values.mean() for values in strata])), _interval(resamples)
+    samples = [np.asarray(values, dtype=float) for values in strata]
+    resampled_means = [random.choice(values, (RESAMPLES, values.size)).mean(axis=-1) for values in samples]
+    mean = float(np.mean([values.mean() for values in samples]))
+    return mean, _interval(np.mean(resampled_means, axis=0))
 
 
 class Curve(NamedTuple):

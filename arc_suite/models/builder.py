@@ -214,7 +214,8 @@ def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:
     """
     if points is None:
         points = outline(body)
-    camera_of_name = {"tracking": {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}}
+    tracking_camera = {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}
+    camera_of_name: dict[str, dict[str, Any]] = {"tracking": tracking_camera}
     for name, (azimuth, elevation) in _VIEWS.items():
         camera_of_name[name] = {"fovy": _VIEW_FOVY, **_framing_pose(points, azimuth, elevation)}
     return camera_of_name

@@ -14,20 +14,25 @@ from arc_suite.tasks.modifiers import Control
 
 
 class Policy(Protocol):
-    """A policy for a batch of environments, each in an episode of its own.
+    """A policy for a batch of environments, each in its own episode.
 
-    Its actions in an episode depend on the episode's seed, observations and rewards alone.
+    The actions of an episode depend on its seed, observations and rewards alone.
     """
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
-        """Start the episodes of seeds in some environments, given by their indices."""
+        """Start episodes in some environments.
+
+        Args:
+            indices: indices of the environments.
+            seeds: seed of the episode of each.
+        """
 
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the actions of a control step.
 
         Args:
             observation: blocks by name, each (num_envs, size).
-            rewards: (num_envs,) of the step before; ignored in the first step of an episode.
+            rewards: (num_envs,) rewards of the step before; ignored in the first step of an episode.
 
         Returns:
             (num_envs, joints), to be clipped to [-1, 1].
@@ -38,7 +43,14 @@ class Script:
     """An open-loop policy: its actions do not depend on observations."""
 
     def __init__(self, script: Callable[[int], Iterable[np.ndarray]], num_envs: int, joints: int):
-        """Take a function from a seed to the actions (joints,) of its episode; after the last one, actions are 0."""
+        """Set the script.
+
+        Args:
+            script: function of a seed that returns the actions (joints,) of its episode. After the last one actions
+                are 0.
+            num_envs: number of environments.
+            joints: number of joints of an action.
+        """
         self._script = script
         self._scripts: list[Iterator] = [iter(())] * num_envs
         self._zero = np.zeros(joints)
@@ -57,8 +69,8 @@ class Sum:
     """The sum of the actions of two policies."""
 
     def __init__(self, first: Policy, second: Policy):
-        """Take the policies."""
-        self._policies = first, second
+        """Set the policies."""
+        self._policies = (first, second)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start the episodes of seeds in some environments."""
@@ -72,13 +84,14 @@ class Sum:
 
 
 class Positioned:
-    """A policy of torques in a task of positions: the positions at which the motors apply these torques.
+    """A policy of torques that acts in a task of positions.
 
-    The torques are exact if the observation is, within the range of the joints.
+    It returns the positions at which the motors apply its torques. The torques are exact if the observation is exact,
+    and if the positions are within the range of the joints.
     """
 
     def __init__(self, policy, task: Modified):
-        """Take a policy of torques, and a task with `actions="position"`."""
+        """Set a policy of torques, and a task with `actions="position"`."""
         self._policy = policy
         self._task = task
 
@@ -109,7 +122,7 @@ class Mixture:
     """Several policies that take turns from seed to seed."""
 
     def __init__(self, policies: Sequence[Policy], num_envs: int):
-        """Take the policies; policy i acts in episodes whose seed modulo the number of policies is i."""
+        """Set the policies; policy i acts in episodes whose seed modulo the number of policies is i."""
         self._policies = policies
         self._policy_indices = np.zeros(num_envs, int)
 
@@ -126,33 +139,33 @@ class Mixture:
 
 
 class Individuals:
-    """A policy of plain functions of a dm_env `TimeStep`, a new one for every episode.
+    """A policy of functions of a dm_env `TimeStep`: every episode has a new function.
 
-    A function gets the observations of the environment of `arc_suite.load`: named blocks.
+    A function gets the observations of an environment of `arc_suite.load`: named blocks.
     """
 
     def __init__(self, make: Callable[[], Callable], num_envs: int, joints: int, name: str = "policy"):
-        """Take a function that makes functions of a `TimeStep`.
+        """Set the function that makes the functions of episodes.
 
         Args:
-            make: function without arguments.
+            make: function without arguments that returns a function of a `TimeStep`.
             num_envs: number of environments.
             joints: number of joints of an action.
-            name: the first words of errors.
+            name: name of the policy, with which errors begin.
         """
         self._make = make
         self._name = name
         self._joints = joints
-        self._functions: list[Callable | None] = [None] * num_envs
+        self._functions: list[Callable | None] = [None] * num_envs  # None before the first episode
         self._seeds = [0] * num_envs
-        self._clock = [0] * num_envs  # control steps of the present episodes
+        self._steps = [0] * num_envs  # control steps since the starts of the episodes
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start the episodes of seeds in some environments."""
         for index, seed in zip(indices, seeds, strict=True):
             self._functions[index] = self._make()
             self._seeds[index] = seed
-            self._clock[index] = 0
+            self._steps[index] = 0
 
     def act(self, observation, rewards) -> np.ndarray:
         """Return the actions (num_envs, joints).
@@ -165,16 +178,16 @@ class Individuals:
             if function is None:
                 continue
             blocks = {name: block[index].astype(float) for name, block in observation.items()}
-            if self._clock[index] == 0:
+            if self._steps[index] == 0:
                 timestep = dm_env.restart(blocks)
             else:
                 timestep = dm_env.transition(float(rewards[index]), blocks)
             try:
                 actions[index] = checked_action(function(timestep), (self._joints,))
             except ValueError as error:
-                where = f"episode of seed {self._seeds[index]}, step {self._clock[index]}"
+                where = f"episode of seed {self._seeds[index]}, step {self._steps[index]}"
                 raise ValueError(f"{self._name}: {where}: {error}") from None
-            self._clock[index] += 1
+            self._steps[index] += 1
         return actions
 
 
@@ -184,11 +197,11 @@ def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarr
     The first `TimeStep` of an episode begins it.
 
     Args:
-        policy: made for one environment.
-        seed: of its episodes.
+        policy: policy of a batch of one environment.
+        seed: seed of all its episodes.
 
     Raises:
-        ValueError: not a seed.
+        ValueError: `seed` is no seed.
     """
     seed = checks.seed(seed)
 

@@ -1,9 +1,9 @@
-"""Metrics of style: pure functions of a track, numpy only, one definition each.
+"""Metrics of style: pure functions of a track, in NumPy.
 
-A metric of legs gives one value for each, (feet,), and the robot's value is their mean; any other
-gives a number. A value is NaN where what it measures did not happen, such as the stride of a robot
-that stands. A robot that gets nowhere, over less than 5 % of the distance that the target speed asks
-for, has no course, and its expenses per meter are infinite.
+A metric of legs gives one value for each leg, (feet,), and the robot's value is their mean. Any other metric gives a
+number. A value is NaN if the motion that it measures did not happen, such as the stride of a robot that stands. A
+robot gets nowhere if it moves less than 5 % of the distance at the target speed: then it has no course, and its costs
+per meter are infinite.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ from arc_suite.style.tracks import Track
 
 TWO_PI = 2.0 * np.pi
 
-_NOWHERE = 0.05  # of the distance at the target speed
-_UNLOCKED = 0.1  # of the schedule's own vector strength; below it a leg follows another rhythm or none
-_BINS = 20  # of a cycle, over which paths of feet are averaged
+_MIN_DISTANCE_SHARE = 0.05  # of the distance at the target speed; a robot that moves less gets nowhere
+_MIN_STRENGTH_SHARE = 0.1  # of the schedule's vector strength; a leg below it follows another rhythm or none
+_BINS = 20  # parts of a cycle, in which paths of feet are averaged
 
 
 def gait_compliance(track: Track) -> np.ndarray:
@@ -34,27 +34,27 @@ def duty_factor(track: Track) -> np.ndarray:
 def phase_error(track: Track) -> np.ndarray:
     """Lateness of the middle of stance against the schedule, in cycles of the clock; (feet,) in -0.5 to 0.5.
 
-    The middle of stance is its circular mean over the clock (Fisher, "Statistical analysis of
-    circular data", 1993), taken of the schedule on the same samples too. NaN for a leg that never
-    changes between stance and swing, or does so in another rhythm than the clock's.
+    The middle of stance is its circular mean over the clock (Fisher, "Statistical analysis of circular data", 1993).
+    That of the schedule is computed from the same samples. NaN for a leg that never changes between stance and swing,
+    or does so in another rhythm than the clock's.
     """
-    turns = np.exp(1j * track.leg_phases)
+    phase_vectors = np.exp(1j * track.leg_phases)
 
-    def middle(stance):
-        return ((stance - stance.mean(axis=0)) * turns).mean(axis=0)
+    def mean_vector(stance):
+        """Return complex numbers (feet,): the angle is the middle of stance, the size its vector strength."""
+        return ((stance - stance.mean(axis=0)) * phase_vectors).mean(axis=0)
 
-    actual = middle(track.stance)
-    prescribed = middle(track.schedule)
-    has_phase = (abs(actual) > _UNLOCKED * abs(prescribed)) & (abs(prescribed) > 1e-9)
+    actual = mean_vector(track.stance)
+    prescribed = mean_vector(track.schedule)
+    has_phase = (abs(actual) > _MIN_STRENGTH_SHARE * abs(prescribed)) & (abs(prescribed) > 1e-9)
     return np.where(has_phase, np.angle(actual * prescribed.conj()) / TWO_PI, np.nan)
 
 
 def phase_scatter(track: Track) -> float:
     """Circular variance of the legs' phase errors (Fisher, 1993), 0 to 1.
 
-    0 if all legs are late by the same time, so that the gait is the prescribed one with a lag;
-    1 if half of the legs are half a cycle off the others, as in a hop. NaN for fewer than two legs
-    that have a phase.
+    0 if all legs are late by the same time: the gait is the prescribed one with a lag. 1 if half of the legs are half
+    a cycle off the others, as in a hop. NaN for fewer than two legs that have a phase.
     """
     errors = phase_error(track)
     errors = errors[~np.isnan(errors)]
@@ -64,54 +64,63 @@ def phase_scatter(track: Track) -> float:
 def stride_length(track: Track) -> np.ndarray:
     """Mean displacement of a foot from touchdown to touchdown along world x (Alexander, 1984), m; (feet,).
 
-    Negative backwards. NaN for a foot without two touchdowns. A touchdown ends a swing in which the
-    foot rose over half of its clearance: a foot that bounces in stance does not stride.
+    Negative backwards. NaN for a foot without two touchdowns. A touchdown ends a swing in which the foot rose over
+    half of its clearance: a foot that bounces in stance does not stride.
     """
-    return _between_touchdowns(track, lambda leg, rows: np.diff(track.foot_positions[rows, leg, 0])[0])
+    lengths = np.full(len(track.legs), np.nan)
+    for leg, steps in enumerate(_touchdown_steps(track)):
+        if steps.size > 1:
+            first, last = track.foot_positions[steps[[0, -1]], leg, 0]
+            lengths[leg] = (last - first) / (steps.size - 1)
+    return lengths
 
 
 def stride_frequency(track: Track) -> np.ndarray:
-    """Strides, from touchdown to touchdown, in a second (Alexander, 1984), Hz; (feet,).
+    """Number of strides, from touchdown to touchdown, in a second (Alexander, 1984), Hz; (feet,).
 
     Touchdowns are those of `stride_length`; NaN for a foot without two of them.
     """
-    return 1.0 / _between_touchdowns(track, lambda leg, rows: track.time_step * (rows[1] - rows[0]))
+    durations = np.full(len(track.legs), np.nan)  # of a stride, s
+    for leg, steps in enumerate(_touchdown_steps(track)):
+        if steps.size > 1:
+            durations[leg] = track.time_step * (steps[-1] - steps[0]) / (steps.size - 1)
+    return 1.0 / durations
 
 
-def _between_touchdowns(track, difference) -> np.ndarray:
-    """Return a difference between the first and the last touchdown of each leg, by number of strides; (feet,)."""
-    touchdown = track.stance[1:] & ~track.stance[:-1]
-    lifts = (~track.stance & (_heights(track) > 0.5 * foot_clearance(track))).cumsum(axis=0)
-    means = np.full(len(track.legs), np.nan)
+def _touchdown_steps(track) -> list[np.ndarray]:
+    """Return the steps of the touchdowns of each leg; see `stride_length`."""
+    begins_stance = track.stance[1:] & ~track.stance[:-1]  # of the second step on
+    is_lifted = ~track.stance & (_heights(track) > 0.5 * foot_clearance(track))
+    lifted_steps = is_lifted.cumsum(axis=0)
+    touchdowns = []
     for leg in range(len(track.legs)):
-        rows = np.flatnonzero(touchdown[:, leg]) + 1
-        rows = rows[np.diff(lifts[rows, leg], prepend=0) > 0]
-        if rows.size > 1:
-            means[leg] = difference(leg, rows[[0, -1]]) / (rows.size - 1)
-    return means
+        steps = np.flatnonzero(begins_stance[:, leg]) + 1
+        lifted_steps_before = np.diff(lifted_steps[steps, leg], prepend=0)  # since the last start of a stance
+        touchdowns.append(steps[lifted_steps_before > 0])
+    return touchdowns
 
 
 def foot_slip(track: Track) -> np.ndarray:
     """Path of a foot that slides on the ground, divided by the displacement of the torso, m/m; (feet,).
 
-    Integral of the horizontal speed of the foot's lowest point, so that rolling does not count (the
-    foot slippage of Hwangbo et al., "Learning agile and dynamic motor skills for legged robots",
-    2019, as a length).
+    The path is the integral of the horizontal speed of the foot's lowest point: rolling does not count. It is the foot
+    slippage of Hwangbo et al., "Learning agile and dynamic motor skills for legged robots", 2019, as a length.
     """
-    sliding = np.hypot(track.foot_velocities[..., 0], track.foot_velocities[..., 1]) * track.contacts
-    return _per_meter(track, sliding.sum(axis=0) * track.time_step)
+    horizontal_speeds = np.hypot(track.foot_velocities[..., 0], track.foot_velocities[..., 1])
+    sliding_speeds = horizontal_speeds * track.contacts
+    return _per_meter(track, sliding_speeds.sum(axis=0) * track.time_step)
 
 
 def foot_clearance(track: Track) -> np.ndarray:
     """Greatest height of a foot's lowest point over the ground, mean over the clock's cycles, m; (feet,).
 
-    The usual peak height of swing, but also defined for a foot that never swings, where it is the
-    height it is dragged at. Cycles that the track cuts short do not count unless there is no other.
+    It is the peak height of swing. For a foot that never swings it is the height at which the foot is dragged. The
+    first and the last cycle of a track are incomplete, and count only if there are no others.
     """
-    heights = _heights(track)
-    starts = np.flatnonzero(np.diff(track.phases) < 0.0) + 1
-    cycles = np.split(heights, starts)
-    return np.mean([cycle.max(axis=0) for cycle in cycles[1:-1] or cycles], axis=0)
+    cycle_starts = np.flatnonzero(np.diff(track.phases) < 0.0) + 1
+    cycles = np.split(_heights(track), cycle_starts)
+    complete_cycles = cycles[1:-1]
+    return np.mean([cycle.max(axis=0) for cycle in complete_cycles or cycles], axis=0)
 
 
 def _heights(track) -> np.ndarray:
@@ -121,8 +130,8 @@ def _heights(track) -> np.ndarray:
 
 def speed(track: Track) -> float:
     """Mean velocity of the torso along world x (the paper's Section 4), m/s; NaN for a single step."""
-    seconds = _seconds(track)
-    return float((track.positions[-1, 0] - track.positions[0, 0]) / seconds) if seconds else np.nan
+    duration = _duration(track)
+    return float((track.positions[-1, 0] - track.positions[0, 0]) / duration) if duration else np.nan
 
 
 def heading_error(track: Track) -> float:
@@ -134,8 +143,8 @@ def heading_error(track: Track) -> float:
 def lateral_drift(track: Track) -> float:
     """Displacement along world y, divided by the straight line from start to end, m/m; 0 to 1.
 
-    The sine of the angle between the course and world x: 1 for a robot that walks sideways. NaN
-    for a robot that gets nowhere.
+    It is the sine of the angle between the course and world x: 1 for a robot that walks sideways. NaN for a robot that
+    gets nowhere.
     """
     sideways = abs(track.positions[-1, 1] - track.positions[0, 1])
     displacement = _displacement(track)
@@ -166,7 +175,7 @@ def posture_deviation(track: Track) -> np.ndarray:
 def action_change(track: Track) -> np.ndarray:
     """Root mean square change of a leg's actions from step to step (of the paper's smoothness cost); (feet,) in 0 to 2.
 
-    Actions are shares of the full torque; before the first there is 0, as in the reward.
+    Actions are shares of the full torque. The action before the first is 0, as in the reward.
     """
     return _rms_by_leg(track, np.diff(track.actions, axis=0, prepend=0.0))
 
@@ -179,50 +188,53 @@ def torque(track: Track) -> np.ndarray:
 def asymmetry(track: Track) -> np.ndarray:
     """Distance between a foot's mean path and the reflected one of its left-right counterpart, m; (feet,).
 
-    Paths are relative to the torso, averaged over the leg's own cycle of the schedule in bins of a
-    twentieth; the distance is the root mean square over the cycle. 0 for a symmetrical gait in
-    Hildebrand's sense ("Symmetrical gaits of horses", 1965), whose left and right feet do the same
-    half a cycle apart. NaN for a leg that has no counterpart.
+    Paths are relative to the torso, and averaged in 20 bins of the leg's cycle in the schedule. The distance is the
+    root mean square over the cycle. It is 0 for a symmetrical gait in Hildebrand's sense ("Symmetrical gaits of
+    horses", 1965): left and right feet move alike, half a cycle apart. NaN for a leg that has no counterpart.
     """
-    torso = track.positions[:, None]
-    paths = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), track.foot_positions - torso)
+    offsets = track.foot_positions - track.positions[:, None]  # from the torso, in the world
+    positions = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), offsets)  # in the torso's frame
     bins = (track.leg_phases / TWO_PI % 1.0 * _BINS).astype(int) % _BINS  # a cycle that is rounded to 1 is 0
-    means = np.full((len(track.legs), _BINS, 3), np.nan)
+    mean_paths = np.full((len(track.legs), _BINS, 3), np.nan)
     for leg in range(len(track.legs)):
-        for occupied in np.unique(bins[:, leg]):
-            means[leg, occupied] = paths[bins[:, leg] == occupied, leg].mean(axis=0)
-    squares = ((means - means[track.mirrors] * (1.0, -1.0, 1.0)) ** 2).sum(axis=-1)
-    is_measured = ~np.isnan(squares) & (track.mirrors >= 0)[:, None]
-    return np.sqrt(_mean_where(squares, is_measured))
+        for occupied_bin in np.unique(bins[:, leg]):
+            mean_paths[leg, occupied_bin] = positions[bins[:, leg] == occupied_bin, leg].mean(axis=0)
+    reflected_paths = mean_paths[track.mirrors] * (1.0, -1.0, 1.0)
+    squared_distances = ((mean_paths - reflected_paths) ** 2).sum(axis=-1)  # (feet, bins)
+    has_counterpart = (track.mirrors >= 0)[:, None]
+    return np.sqrt(_mean_where(squared_distances, ~np.isnan(squared_distances) & has_counterpart))
 
 
 def cost_of_transport(track: Track) -> float:
     """Positive work of the motors by weight and displacement, J/(N m).
 
-    See Collins et al., "Efficient bipedal robots based on passive-dynamic walkers", 2005. The motors do not win back
-    what they brake. Torque is constant over a control step, so its work is torque times the turn of the joint.
+    See Collins et al., "Efficient bipedal robots based on passive-dynamic walkers", 2005. Negative work does not count,
+    as motors do not recover it. Torque is constant in a control step: its work is torque times the change of the angle.
     """
     work = (track.torques[1:] * np.diff(track.joint_angles, axis=0)).clip(0.0).sum()
     return float(_per_meter(track, work / (track.mass * track.gravity)))
 
 
 def forward_axes(track: Track) -> np.ndarray:
-    """Return where the torso faces: its x axis in the world, (steps, 3)."""
+    """Return the torso's x axes in the world, (steps, 3), which point forward."""
     return rotations.matrix(track.quaternions)[:, :, 0]
 
 
-def _seconds(track) -> float:
+def _duration(track) -> float:
+    """Return the time from the first to the last step, s."""
     return track.time_step * (len(track.positions) - 1)
 
 
 def _displacement(track) -> float:
     """Return the length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
     displacement = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
-    target = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity) * _seconds(track)
-    return displacement if displacement > _NOWHERE * target else 0.0
+    target_speed = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity)
+    min_displacement = _MIN_DISTANCE_SHARE * (target_speed * _duration(track))
+    return displacement if displacement > min_displacement else 0.0
 
 
 def _per_meter(track, amount):
+    """Return an amount divided by the displacement; infinite for a robot that gets nowhere."""
     displacement = _displacement(track)
     return amount / displacement if displacement else np.full_like(amount, np.inf)
 

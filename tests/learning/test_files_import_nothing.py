@@ -142,7 +142,7 @@ def test_a_policy_imports_nothing(folder, change):
     described = {name: value for name, value in change.items() if name != "algorithm"}
     arrays["policy"] = np.array(json.dumps(json.loads(str(arrays["policy"])) | described))
     np.savez(folder / "policy.npz", **arrays)
-    for read in (policies.setup_of, policies.trained, policies.training_seeds):
+    for read in (policies.setup_of, policies.load_network, policies.training_seeds):
         with pytest.raises(ValueError, match=rf"^policy .*policy\.npz: \w+ 'strolling:\w+': {LINE}$"):
             read(str(folder / "policy.npz"))
     assert not (folder / "imported").exists()

@@ -190,6 +190,7 @@ def _arrange_cells(pictures: Mapping[Cell, np.ndarray]) -> Layout:
     if len(values_by_axis) == 1 or min(len(values) for values in values_by_axis) == 1:
         return Layout(sorted(pictures), min(_MAX_COLUMNS, len(pictures)))
     first_values, second_values = values_by_axis
+    cells: list[Cell]
     if len(second_values) < len(first_values):
         cells = [(first, second) for first in first_values for second in second_values]
         return Layout(cells, columns=len(second_values))

@@ -231,7 +231,7 @@ class _CylinderStyle(NamedTuple):
         color: 0 to 255.
     """
 
-    index: int
+    index: int  # type: ignore[assignment]  # hides the method of tuples
     radius: float
     height: float
     color: tuple[int, int, int]
