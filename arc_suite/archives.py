@@ -26,7 +26,7 @@ def read(path: str | os.PathLike, max_bytes: int, only: str | None = None) -> di
     """Return the arrays of an archive by name.
 
     Args:
-        path: of the file.
+        path: path of the file.
         max_bytes: the largest valid size of all arrays together, uncompressed.
         only: name of the single array to read; None for all.
 

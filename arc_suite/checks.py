@@ -69,7 +69,7 @@ def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
     """Return the extension of a file to write, in lower case.
 
     Args:
-        path: of the file.
+        path: path of the file.
         valid: the valid extensions, each with its dot.
 
     Raises:

@@ -193,7 +193,7 @@ def read_json(path: str | os.PathLike, max_bytes: int = MAX_JSON) -> Any:
     """Return the content of a JSON file that others may have written.
 
     Args:
-        path: of the file.
+        path: path of the file.
         max_bytes: the largest valid size of the file.
 
     Raises:
@@ -231,7 +231,7 @@ def hold_lock(path: str | os.PathLike, refusal: str | None = None) -> Iterator[N
     """Hold a lock against other processes during the block. The lock is a file that exists while it is held.
 
     Args:
-        path: of the lock's file, in a folder that exists.
+        path: path of the lock's file, in a folder that exists.
         refusal: message of the error if another process holds the lock; with None, wait for that process.
 
     Raises:

@@ -20,7 +20,7 @@ class Journal:
         """Open the file, or start one.
 
         Args:
-            path: of the file, in a folder that exists.
+            path: path of the file, in a folder that exists.
             settings: what determines the search; plain values.
             generation: NamedTuple class of a generation, or another function of the fields of a line.
 

@@ -12,7 +12,7 @@ class Marker(NamedTuple):
         shape: "arrow" or "cylinder".
         start: (3,) position in the world where its axis starts, m.
         end: (3,) position in the world where its axis ends, m; an arrow's tip.
-        radius: of a cylinder or of an arrow's shaft, m.
+        radius: radius of a cylinder or of an arrow's shaft, m.
         color: red, green, blue and opacity, 0 to 1.
     """
 

@@ -25,7 +25,7 @@ class MissingExtra(ImportError, ValueError):
         Args:
             need: what needs which package, such as "ONNX needs onnx".
             extra: name of the extra in setup.cfg.
-            error: of the import that failed.
+            error: error of the import that failed.
         """
         folder = clone_folder()
         if folder is None:  # the package may come from anywhere: no package index has it

@@ -53,7 +53,7 @@ def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path)
     """Make a client's environment, if it is not there, and run its blocks.
 
     Args:
-        client: of the page.
+        client: client of the page.
         surroundings: variables of the blocks' environment.
         folder: where they run, and that their files go into.
 

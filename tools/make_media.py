@@ -34,15 +34,16 @@ class View(NamedTuple):
     Attributes:
         robot: its name.
         task: its name.
-        seed: of the episode.
+        seed: seed of the episode.
         start: control steps before the first picture.
         moment: control steps from there to the still picture.
         command: set live throughout; None for that of the task.
-        azimuth: of the camera from where the torso heads in the middle of the view, degrees, positive to the left.
-        elevation: of the camera, degrees.
-        distance: of the camera, in distances of the farthest foot from the torso.
+        azimuth: azimuth of the camera from where the torso heads in the middle of the view, degrees, positive to the
+            left.
+        elevation: elevation of the camera, degrees.
+        distance: distance of the camera, in distances of the farthest foot from the torso.
         drives: whether the camera goes along in a straight line; else it stands.
-        settings: of the task.
+        settings: settings of the task.
     """
 
     robot: str
@@ -173,16 +174,16 @@ class Media(NamedTuple):
     """A picture or film, of one view or of several in a grid.
 
     Attributes:
-        path: of the file, from the repository's root.
+        path: path of the file, from the repository's root.
         views: by caption.
-        columns: of the grid.
+        columns: columns of the grid.
         size: width and height of a view, pixels.
         steps: control steps of a film, a frame each; 0 for a still.
         captions: whether it shows them.
         large: whether the first view takes four cells.
         limit: bytes.
-        source: of a view's pictures.
-        quality: of WebP, 0 to 100.
+        source: source of a view's pictures.
+        quality: quality of WebP, 0 to 100.
         fps: frames a second.
     """
 

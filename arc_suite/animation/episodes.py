@@ -17,7 +17,7 @@ class Episodes:
     """Episodes of one environment under a policy.
 
     Attributes:
-        environment: of `arc_suite.load`.
+        environment: environment of `arc_suite.load`.
         follows_velocities: whether the task has a command of velocities.
         desired: (3,) command that a person has set; None for that of the task.
         timestep: the latest.
@@ -30,7 +30,7 @@ class Episodes:
         """Start the first episode.
 
         Args:
-            environment: of `arc_suite.load`.
+            environment: environment of `arc_suite.load`.
             act: maps a `TimeStep` to an action.
         """
         self.environment = environment

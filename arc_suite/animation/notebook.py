@@ -45,10 +45,10 @@ def show(
     The episode is played in another environment of the same body, task and settings.
 
     Args:
-        environment: of `arc_suite.load`, `gymnasium.make` or `gymnasium.make_vec`.
+        environment: environment of `arc_suite.load`, `gymnasium.make` or `gymnasium.make_vec`.
         policy: a name as of `policies.policy`, with the preset that suits task and body; a policy for one
             environment; or a function of a `TimeStep` with named blocks.
-        seed: of the episode.
+        seed: seed of the episode.
         steps: control steps, at most; None for 400, in a film 80.
         film: show a film in place of the page with its controls. It needs OpenGL, a page needs none.
 

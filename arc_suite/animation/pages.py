@@ -110,7 +110,7 @@ def to_json_values(value, decimals: int | None = _DECIMALS):
     """Return a value of arrays, tuples and dictionaries as one of lists and dictionaries, as JSON has it.
 
     Args:
-        value: of finite numbers, text, None and truth values.
+        value: finite numbers, text, None and truth values.
         decimals: to which floating-point numbers are rounded; None for all.
     """
     if hasattr(value, "_asdict"):

@@ -39,7 +39,7 @@ class Shape(NamedTuple):
     """A visible shape.
 
     Attributes:
-        kind: of `shapes.KINDS`, or hull.
+        kind: kind of `shapes.KINDS`, or hull.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
         place: (3,) position in the part's frame, m.
         quaternion: (4,) orientation in the same frame, w first.
@@ -59,12 +59,12 @@ class Part(NamedTuple):
     """A rigid body.
 
     Attributes:
-        name: of the body in the MJCF.
+        name: name of the body in the MJCF.
         parent: index of the part above; None for the torso.
         place: (3,) position in the frame of the part above, m; that of the torso is in the world, as the body stands.
         quaternion: (4,) orientation in the same frame, w first.
         joint: index of its joint; None for the torso and for rigid parts.
-        axis: (3,) of the joint; None without one.
+        axis: (3,) axis of the joint; None without one.
         shapes: that it shows.
     """
 

@@ -71,7 +71,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         body: any.
         policy: cpg, for a demonstrator that follows the command; or the name of a trained policy, as for
             `policies.policy`.
-        preset: of the demonstrator: steered, which None stands for, surefooted or reactive.
+        preset: preset of the demonstrator: steered, which None stands for, surefooted or reactive.
 
     Raises:
         ValueError: a policy or preset that a page cannot run, or that does not fit the body.
@@ -122,8 +122,8 @@ def _describe_task(task: Task, command_task: Task) -> dict[str, Any]:
     """Return what a page computes of a task: its frame, clock, units and health; see web/task.js.
 
     Args:
-        task: of the policy.
-        command_task: of the same body, whose units and health hold where the task has none.
+        task: task of the policy.
+        command_task: task of the same body, whose units and health hold where the task has none.
     """
     has_command = "command" in task.commands
     # Tasks with commands have a context with their units, and health, which others lack.
@@ -215,7 +215,7 @@ def _load_network(body: Body, name: str, command_task: Task) -> Network:
     Args:
         body: that it moves.
         name: as for `policies.policy`.
-        command_task: of the body, with a command that the player gives.
+        command_task: task of the body, with a command that the player gives.
     """
     policy = policies.policy(name, body, task=command_task if name == universal.NAME else None)
     if other_libraries.find(name):

@@ -51,7 +51,7 @@ def describe_ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str,
     """Return the ground and the obstacles of an episode between two corners (2,), m: `level` to `solids` of `scenery`.
 
     Args:
-        environment: of `arc_suite.load`, in an episode.
+        environment: environment of `arc_suite.load`, in an episode.
         low: the corner of the least x and y.
         high: the opposite corner.
     """
@@ -119,7 +119,7 @@ class _Replay(NamedTuple):
     """What a replay shows, as of `describe_scenery`.
 
     Attributes:
-        styles: of marks.
+        styles: styles of marks.
         marks: for every step, of each mark the index of its style, start and end.
         failed: for every step, the names of the parts of legs whose motors have failed.
     """
@@ -177,7 +177,7 @@ def _describe_marks(markers: Sequence[Marker], styles: dict[_Style, int]) -> lis
     """Return the marks of one step: of each the index of its style, start and end.
 
     Args:
-        markers: of the step.
+        markers: markers of the step.
         styles: indices of styles; new styles are added.
     """
     marks = []

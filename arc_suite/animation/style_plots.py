@@ -258,7 +258,7 @@ def _stack_axes(tracks: Mapping[str, Track], height: float, **shared):
 
     Args:
         tracks: to be drawn.
-        height: of the axes of a track, inches.
+        height: height of the axes of a track, inches.
         shared: see `Figure.subplots`.
     """
     figure = Figure(figsize=(_WIDTH, height * len(tracks) + _LEGEND_HEIGHT), layout="constrained")

@@ -38,9 +38,9 @@ class Obstacle(NamedTuple):
     """Size of the obstacles of a lane.
 
     Attributes:
-        rise: of a step or a hurdle, or the greatest height of rough ground.
+        rise: rise of a step or a hurdle, or the greatest height of rough ground.
         slope: tangent of a ramp.
-        width: of a tread or a trench.
+        width: width of a tread or a trench.
     """
 
     rise: float = 0.0
@@ -135,9 +135,9 @@ class Terrain(Arena):
 
     Attributes:
         unit: the standing height of the body, m; other lengths are multiples of it.
-        length: of the lanes ahead of the start, in units.
+        length: length of the lanes ahead of the start, in units.
         lanes: kind and obstacle of each, in the order of `KINDS`; widths of stairs and trenches are equal.
-        seed: of the random ground; a lane does not depend on its neighbors.
+        seed: seed of the random ground; a lane does not depend on its neighbors.
     """
 
     unit: float
@@ -300,9 +300,9 @@ def make_lanes(
     Args:
         body: any.
         kinds: number of lanes of each difficulty, by kind of ground.
-        length: of lanes ahead of the start, in standing heights.
+        length: length of lanes ahead of the start, in standing heights.
         levels: difficulties, from 0 to 1.
-        seed: of the random lanes.
+        seed: seed of the random lanes.
         sizes_in_meters: sizes of obstacles by name, m and rad, in place of those of the difficulties.
 
     Returns:

@@ -24,9 +24,9 @@ class BodiesTask(NamedTuple):
     """The task of environments of different bodies with flat observations, for learners.
 
     Attributes:
-        name: of the task.
+        name: name of the task.
         step_limit: control steps after which an episode is over, may be infinite.
-        sizes: of the blocks of an observation by name, in order.
+        sizes: sizes of the blocks of an observation by name, in order.
     """
 
     name: str
@@ -69,11 +69,11 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     Autoreset modes, infos, `rest`, `command`, `snapshot`, pickles, copies and threads are as in `VectorEnv`.
 
     Attributes:
-        bodies: of each environment.
-        tasks: of each environment, for demonstrators.
-        task: of all, for learners.
+        bodies: bodies of each environment.
+        tasks: tasks of each environment, for demonstrators.
+        task: task of all, for learners.
         step_limit: control steps after which every episode is over, may be infinite.
-        description: of each environment, (num_envs, ...) float32; see `bodies.tokens.Description`.
+        description: description of each environment, (num_envs, ...) float32; see `bodies.tokens.Description`.
         autoreset_mode: what happens to an environment whose episode has ended.
     """
 
@@ -104,8 +104,8 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             max_episode_steps: as in `VectorEnv`.
             task_kwargs: as in `VectorEnv`, the same for all bodies; without `actions`.
             render_mode: as in `VectorEnv`.
-            width: of a picture, pixels.
-            height: of a picture, pixels.
+            width: width of a picture, pixels.
+            height: height of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
             flat: whether observations and actions are vectors.
             privileged: as in `VectorEnv`; blocks of legs and joints are padded to 12 legs of 4 joints.

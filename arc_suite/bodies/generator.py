@@ -61,8 +61,8 @@ class Proportions(NamedTuple):
         half_length, half_width: of the torso, m.
         thickness: half of it, of the height.
         fan: degrees by which the first pair of legs points forward and the last one backward.
-        profile: of every leg; see `PROFILES`.
-        reaches: of each pair, or of each leg around a torso: from mount to foot, seen from above, of
+        profile: profile of every leg; see `PROFILES`.
+        reaches: reaches of each pair, or of each leg around a torso: from mount to foot, seen from above, of
             the height.
     """
 
@@ -312,8 +312,8 @@ def _deform_leg(leg: Leg, logarithms: np.ndarray, turn: float) -> Leg:
 
     Args:
         leg: to change.
-        logarithms: (links, 1) of the factors.
-        turn: of the leg about the vertical, rad.
+        logarithms: (links, 1) logarithms of the factors.
+        turn: turn of the leg about the vertical, rad.
     """
     ends = np.array([link.end for link in leg.links])
     drop = ends[:, 2].sum()  # of the foot below the mount, m
@@ -331,8 +331,8 @@ def _change_body(body: Body, change: str, legs: Sequence[Leg], **fields) -> Body
     Args:
         body: to change.
         change: in its name, "scaled" or "mutated".
-        legs: of the body.
-        **fields: of the body.
+        legs: legs of the body.
+        **fields: fields of the body.
     """
     stem = _SUFFIX.sub("", body.name)[: MAX_NAME - len(change) - 1]
     legs_to_size = tuple(_forget_sizes(leg) for leg in legs)
@@ -423,11 +423,11 @@ def _make_leg(name: str, mount: Vector, heading: float, reach: float, proportion
     """Return a leg that points to a heading and ends on the floor.
 
     Args:
-        name: of the leg.
+        name: name of the leg.
         mount: m.
         heading: degrees, counter-clockwise from forward.
         reach: from mount to foot, seen from above, of the height.
-        proportions: of the body.
+        proportions: proportions of the body.
     """
     profile = proportions.profile
     height = proportions.height

@@ -68,9 +68,9 @@ def scatter(info: dict, group_info: Mapping[str, Any], indices: np.ndarray, coun
     """Put the info of a group of environments into that of all.
 
     Args:
-        info: of all environments, which is changed.
-        group_info: of the group.
-        indices: of the group's environments among all.
+        info: info of all environments, which is changed.
+        group_info: info of the group.
+        indices: indices of the group's environments among all.
         count: number of all environments.
     """
     for name, value in group_info.items():

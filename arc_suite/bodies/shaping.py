@@ -105,10 +105,10 @@ def _shape_leg(
 
     Args:
         leg: to change.
-        link_factors: of lengths, by name of the link.
-        ends: of links, m, by name of the part.
+        link_factors: factors of lengths, by name of the link.
+        ends: ends of links, m, by name of the part.
         torso_factors: by which the mount moves along x and y.
-        turn: of the leg forward, degrees; a leg on the midline keeps its heading.
+        turn: turn of the leg forward, degrees; a leg on the midline keeps its heading.
     """
     x, y, z = leg.mount
     length, width, _ = torso_factors

@@ -146,8 +146,8 @@ def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np
 
     Args:
         tokens: see `Tokens.make_tokens`.
-        legs: (environments, 12, 41) of the description.
-        torso: (environments, 10) of the description.
+        legs: (environments, 12, 41) legs of the description.
+        torso: (environments, 10) torso of the description.
     """
     parts = [tokens["legs"], tokens["torso"], tokens["command"], legs, torso]
     return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=-1)
@@ -162,7 +162,8 @@ def leg_inputs(vectors):
     """Return the inputs (..., 12, 81) of a network of legs, and whether a leg has a joint (..., 12, 4).
 
     Args:
-        vectors: (..., 664) of `flatten_tokens`, of NumPy or JAX; normalized ones keep the number of joints as it is.
+        vectors: (..., 664) vectors of `flatten_tokens`, of NumPy or JAX; normalized ones keep the number of joints as
+            it is.
     """
     xp = vectors.__array_namespace__()
     legs, torso, command, leg_descriptions, torso_description = split_flat(vectors).values()
@@ -230,8 +231,8 @@ def _describe_legs(body: Body, pose: PoseMechanics, ranges: np.ndarray, duty_fac
     Args:
         body: any body.
         pose: the standing one.
-        ranges: (joints, 2) of the joints, rad.
-        duty_factor: of the gait.
+        ranges: (joints, 2) ranges of the joints, rad.
+        duty_factor: duty factor of the gait.
     """
     leg_count = len(body.legs)
     rate = math.sqrt(GRAVITY / pose.height)  # rad/s
@@ -268,7 +269,7 @@ class Tokens(NamedTuple):
         height: (environments,) h, m.
         velocity_unit: (environments,) sqrt(g h), m/s.
         rate_unit: (environments,) sqrt(g / h), rad/s.
-        command_units: (environments, 3) of the command; see `fitting.velocity_units`.
+        command_units: (environments, 3) units of the command; see `fitting.velocity_units`.
         turn_scale: (environments,) R / h.
         direction: (environments,) 1 for a walk forward, -1 for one backward.
         loaded_force: (environments,) upward force from which on a foot is loaded, in units of the block.

@@ -25,7 +25,7 @@ def load(name: str | os.PathLike, task: Task | None = None) -> Network:
     """Return a policy of many bodies: `universal`, which comes with the package, a policy file, or that of a run.
 
     Args:
-        name: of the policy.
+        name: name of the policy.
         task: in which `universal` acts: it follows a command where the task has one. None for walk.
 
     Raises:
@@ -49,10 +49,10 @@ class Universal:
     Torques are those of motors that hold the positions with the body's own gains, as with `actions="position"`.
 
     Attributes:
-        network: of many bodies.
+        network: network of many bodies.
         task: that it acts in.
         tokens: that the network sees, of one environment.
-        descriptions: of the legs (1, 12, 41) and of the torso (1, 10).
+        descriptions: descriptions of the legs (1, 12, 41) and of the torso (1, 10).
         reach: (joints,) angles that an action of 1 asks for, rad.
         gains: stiffness (joints,), action per rad, and damping (joints,), action per rad/s, of position control.
     """

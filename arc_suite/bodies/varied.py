@@ -38,11 +38,11 @@ class _Joints(NamedTuple):
     """Joints of a leg, from the torso outwards.
 
     Attributes:
-        ranges: of each joint, degrees.
-        signs: of each axis; a negative one turns the other way.
-        tilt: of the leg's plane from the vertical, degrees.
-        skew: of the axes of bends from the normal of that plane, about the vertical, degrees.
-        lean: of the first axis from the vertical, in that plane, degrees.
+        ranges: ranges of each joint, degrees.
+        signs: signs of each axis; a negative one turns the other way.
+        tilt: tilt of the leg's plane from the vertical, degrees.
+        skew: skew of the axes of bends from the normal of that plane, about the vertical, degrees.
+        lean: lean of the first axis from the vertical, in that plane, degrees.
     """
 
     ranges: tuple[tuple[float, float], ...]
@@ -59,7 +59,7 @@ class _Shape(NamedTuple):
         height: from the floor to the mount, m.
         foot: radius of the foot, m.
         reach: from mount to foot, seen from above, m.
-        profile: of each link, its share of the leg's length and its elevation in degrees.
+        profile: of each link its share of the leg's length and its elevation in degrees.
     """
 
     height: float

@@ -26,7 +26,7 @@ class Finding(NamedTuple):
 
     Attributes:
         subject: that was examined.
-        state: of the subject.
+        state: state of the subject.
         remedy: for a problem; None if all is well.
     """
 

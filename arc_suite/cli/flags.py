@@ -238,7 +238,7 @@ def policy_setup(policy: str | None = None) -> Setup | None:
     """Return the setup that judges a policy, see `Setup.judging`; None for a policy that is no file.
 
     Args:
-        policy: of a program without --policy; None for the policy of --policy.
+        policy: policy of a program without --policy; None for the policy of --policy.
 
     Raises:
         ValueError: as `policies.setup_of`.
@@ -255,7 +255,7 @@ def choose_bodies(origin: Setup | None, bodies: dict[str, Body]) -> dict[str, Bo
 
     Args:
         origin: the setup of a policy or of tracks, of one body or of several; None without one.
-        bodies: of `bodies_from_flags`.
+        bodies: result of `bodies_from_flags`.
     """
     if origin is None or origin.several or FLAGS["robot"].present or custom_body():
         return bodies
@@ -267,8 +267,8 @@ def complete_task(origin: Setup | None, task: str, settings: dict[str, Any]) -> 
 
     Args:
         origin: the setup of a policy or of tracks; None without one.
-        task: of `task_from_flags`.
-        settings: of `task_from_flags`.
+        task: task of `task_from_flags`.
+        settings: settings of `task_from_flags`.
     """
     if origin is None or FLAGS["task"].present:
         return task, settings
@@ -310,7 +310,7 @@ def check_flags_suit_file(extension: str, extensions_of_flags: Mapping[str, Iter
     """Check that all flags of the command line suit the file to write.
 
     Args:
-        extension: of the file to write.
+        extension: extension of the file to write.
         extensions_of_flags: by flag, the extensions of the files that have the option.
 
     Raises:
@@ -326,7 +326,7 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
 
     Args:
         flag: its name, for errors.
-        texts: of the command line; values are JSON where they parse, else text.
+        texts: texts of the command line; values are JSON where they parse, else text.
 
     Raises:
         ValueError: a text without a name or without =.

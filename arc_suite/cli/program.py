@@ -134,7 +134,7 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
 
     Args:
         work: takes nothing, returns an exit status or None.
-        name: of the program, with which the line begins.
+        name: name of the program, with which the line begins.
     """
 
     def print_reason(reason, *_, **__):

@@ -23,10 +23,10 @@ class CommandLawState(NamedTuple):
 
     Attributes:
         command: (environments, 3) smoothed, in units of the command.
-        integral: (environments, 3) of the error of the motion, in the same units.
+        integral: (environments, 3) integral of the error of the motion, in the same units.
         motion: (environments, 3) requested of the feet, in the same units; held while the command rests.
-        size: (environments, 1) of the gait, from 0 to 1.
-        phase: (environments,) of the gait in the next control step, cycles; held while the command rests.
+        size: (environments, 1) size of the gait, from 0 to 1.
+        phase: (environments,) phase of the gait in the next control step, cycles; held while the command rests.
         paths: state of a law derived from this one, an array or a NamedTuple of arrays.
     """
 
@@ -43,9 +43,9 @@ class Request(NamedTuple):
 
     Attributes:
         motion: (environments, 3) command, corrected by feedback, in units of the command.
-        size: (environments, 1) of the gait, from 0 to 1.
-        phase: (environments,) of the gait, cycles.
-        advance: (environments,) of the phase in a control step, cycles; 0 while the command rests.
+        size: (environments, 1) size of the gait, from 0 to 1.
+        phase: (environments,) phase of the gait, cycles.
+        advance: (environments,) advance of the phase in a control step, cycles; 0 while the command rests.
     """
 
     motion: np.ndarray
@@ -58,17 +58,17 @@ class CommandLaw(ABC):
     """A law that follows the block `command` in the gait of a task, whose phase the block `gait_clock` shows.
 
     Attributes:
-        parameters: of the law; a NamedTuple with fields `gain`, `integral` and `lead`, at least.
+        parameters: parameters of the law; a NamedTuple with fields `gain`, `integral` and `lead`, at least.
         body: with motors and armatures.
-        mechanics: of the pose about which joints are controlled.
+        mechanics: mechanics of the pose about which joints are controlled.
         control_timestep: s between two actions.
-        cycles_per_step: of the gait in a control step.
+        cycles_per_step: cycles of the gait in a control step.
         smoothing: share of a new command that takes hold in a control step.
         onset: share of its full size by which the gait grows in a control step.
         duty_factor: share of a cycle that a foot stands.
         stance_duration: s.
         phase_offsets: (legs,) over the task's clock, cycles.
-        units: (3,) of the command, m/s and rad/s.
+        units: (3,) units of the command, m/s and rad/s.
         drive: moves the joints to their targets.
     """
 
@@ -79,8 +79,8 @@ class CommandLaw(ABC):
 
         Args:
             task: whose body is to walk, and whose gait it walks in.
-            parameters: of the law.
-            angles: (joints,) of the pose about which joints are controlled, rad; None for the standing pose.
+            parameters: parameters of the law.
+            angles: (joints,) angles of the pose about which joints are controlled, rad; None for the standing pose.
 
         Raises:
             ValueError: a gait without a cycle, or without stance or swing.
@@ -160,7 +160,7 @@ class CommandLaw(ABC):
         """Return a derived law's next state, target angles (environments, joints), rad, and their change in a step.
 
         Args:
-            state: of the derived law, before the control step.
+            state: state of the derived law, before the control step.
             request: what feet are to do.
             observation: blocks by name, (environments, size) each.
         """

@@ -27,7 +27,8 @@ class View(NamedTuple):
     """The latest scans of heights in a number of environments.
 
     Attributes:
-        heights: (environments, scans, points) of the ground, in standing heights, as a task's block `scan` gives them.
+        heights: (environments, scans, points) heights of the ground, in standing heights, as a task's block `scan`
+            gives them.
         moved: (environments, scans, 2) displacement of the torso since each scan, m, forward and left.
         reach: R, the mean distance of the feet from their center, m: the points of a scan are multiples of it.
     """
@@ -68,7 +69,7 @@ def find_shifts(view: View, landing, along, places, height: float):
     """Return by how much feet should land further ahead, (environments, feet) m: the least that finds ground, or 0.
 
     Args:
-        view: of the ground.
+        view: view of the ground.
         landing: (environments, feet, 2) where feet would land, m, forward and left of the torso.
         along: (environments, feet, 2) directions of their paths, unit vectors.
         places: (feet, 2) positions of the feet at rest, m.
@@ -82,7 +83,7 @@ def find_landings(view: View, landing, along, places, height: float, support_poi
     """Return the shifts of `find_shifts`, m, and whether they find ground, both (environments, feet).
 
     Args:
-        view: of the ground.
+        view: view of the ground.
         landing: (environments, feet, 2) where feet would land, m, forward and left of the torso.
         along: (environments, feet, 2) directions of their paths, unit vectors.
         places: (feet, 2) positions of the feet at rest, m.

@@ -29,7 +29,7 @@ class Law(Protocol):
         """Fit the law to a task.
 
         Args:
-            task: of the contract; `task.scene.body` is the body, `cpg.gait.gait_of(task)` the gait.
+            task: task of the contract; `task.scene.body` is the body, `cpg.gait.gait_of(task)` the gait.
             preset: parameters, such as `preset` of the class.
 
         Raises:

@@ -52,10 +52,10 @@ class LeapingState(NamedTuple):
     """What this law adds to the state of a `CommandLaw`.
 
     Attributes:
-        walk: of the law that walks.
+        walk: state of the law that walks.
         step: (environments,) 0 while it walks and looks for what to leap over; from 1 on control steps of a leap, then
             of a cycle of the walk after a leap was given up; below 0 those until a leap, on the spot.
-        shifts: (environments, legs) of where feet land, m.
+        shifts: (environments, legs) shifts of the footholds, m.
         moved: (environments,) distance that the torso has moved forward since the leap began, m.
     """
 
@@ -131,7 +131,7 @@ class Leaping(Sighted):
         """Return the next step (environments,) of a state; see `LeapingState`.
 
         Args:
-            step: (environments,) of the state.
+            step: (environments,) step of the state.
             may_leap: (environments,) whether a trench is close, and all feet would land on ground.
         """
         xp = step.__array_namespace__()
@@ -150,7 +150,7 @@ class Leaping(Sighted):
         """Return shifts (environments, legs) of where feet land, m, and whether they find ground there.
 
         Args:
-            view: of the ground.
+            view: view of the ground.
             moved: (environments,) distance that the torso has moved since the leap began, m.
         """
         xp = moved.__array_namespace__()
@@ -194,8 +194,8 @@ class Leaping(Sighted):
         Args:
             previous: state of the walk before the control step.
             walk: the same after a step of the walk.
-            step: (environments,) of the leap.
-            shifts: (environments, legs) of where feet land, m.
+            step: (environments,) step of the leap.
+            shifts: (environments, legs) shifts of the footholds, m.
         """
         xp = step.__array_namespace__()
         sole_offsets = xp.concatenate([np.zeros((1, 3)), self._movement.sole_offsets])

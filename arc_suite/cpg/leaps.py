@@ -73,7 +73,7 @@ class Movement(NamedTuple):
     """A leap of one body. Control steps count from 1.
 
     Attributes:
-        sole_offsets: (steps, 3) of soles from their positions at rest, in the torso's frame, m.
+        sole_offsets: (steps, 3) offsets of soles from their positions at rest, in the torso's frame, m.
         joint_drive: (legs, links) added to the angles of the crouch while legs stretch, rad.
         crouch_end: control step at which the crouch ends.
         stretch_end: control step at which the stretch ends.
@@ -166,7 +166,7 @@ class Flight(NamedTuple):
         torso_distance: that the torso moves while no foot is on the ground.
         air_time: for which no foot is on the ground, s.
         clearance: the largest height of the lowest foot.
-        rise: of the torso.
+        rise: rise of the torso.
         landed: whether the torso stays upright, and is high enough at the end.
     """
 
@@ -186,7 +186,7 @@ def simulate_flights(
     Args:
         body: any.
         rest_angles: (joints,) from which leaps start, rad.
-        targets: (leaps, steps, joints) of joints by control step, rad; the last one is held.
+        targets: (leaps, steps, joints) targets of joints by control step, rad; the last one is held.
         crouch_ends: control step of each leap at which its crouch ends.
     """
     sized_body = size_body(body)
@@ -281,7 +281,7 @@ def find_best_leap(
 
     Args:
         body: any.
-        rest_angles: (joints,) of a pose in which soles are level, rad.
+        rest_angles: (joints,) angles of a pose in which soles are level, rad.
         choice: leaps to try.
         measure: `distance` or `clearance`.
     """

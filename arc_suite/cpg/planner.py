@@ -136,7 +136,7 @@ def shortest_path(
     Args:
         goal: (2,) forward and left of the torso.
         circles: (n, 2) their middles.
-        extent: of the feet about the torso.
+        extent: extent of the feet about the torso.
         parameters: how near the path may lead to circles.
 
     Returns:

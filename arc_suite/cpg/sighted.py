@@ -26,11 +26,11 @@ class SightedParameters(NamedTuple):
     Attributes:
         lift: height of a foot in mid-swing, in standing heights.
         ride: height of the torso, in standing heights: lower than one, for feet to reach further.
-        gain: of the feedback on the motion's error: forward, left and turning.
+        gain: gain of the feedback on the motion's error: forward, left and turning.
         integral: gain of the same error, added up over a cycle of the gait.
         most: largest request, in units of the command.
         attitude: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
-        lead: of all legs over the gait's clock, cycles.
+        lead: lead of all legs over the gait's clock, cycles.
         longer: by which the swing is longer than in the task's gait, cycles, since feet follow late.
         trust: weight of the requested velocity against the measured one, from 0 to 1, in the prediction of
             where the torso is when a foot lands. The mean of the measured velocity comes late.
@@ -61,7 +61,7 @@ class SightedState(NamedTuple):
     Attributes:
         feet: (environments, legs, 3) planned positions of the soles, m.
         angles: (environments, legs, links) planned for them, rad.
-        shifts: (environments, legs) of where feet land, m.
+        shifts: (environments, legs) shifts of the footholds, m.
         heights: (environments, scans, points) the latest scans, in standing heights; -inf before there were any.
         moved: (environments, scans, 2) displacement of the torso since each scan, m.
     """
@@ -147,7 +147,7 @@ class Sighted(CommandLaw):
         Args:
             state: with the scans before.
             scan: (environments, points) heights, in standing heights.
-            velocity: (environments, 2) of the torso, forward and left, m/s.
+            velocity: (environments, 2) velocity of the torso, forward and left, m/s.
         """
         xp = scan.__array_namespace__()
         moved = state.moved[:, :-1] + velocity[:, None] * self.control_timestep
@@ -165,7 +165,7 @@ class Sighted(CommandLaw):
             velocity: (environments, 3) requested, m/s and rad/s.
             predicted_velocity: (environments, 3) until feet land, m/s and rad/s.
             gait_size: (environments, 1) from 0 to 1.
-            quaternion: (environments, 4) of the torso.
+            quaternion: (environments, 4) quaternion of the torso.
         """
         xp = leg_phases.__array_namespace__()
         duty_factor = self.duty_factor

@@ -27,14 +27,14 @@ class SteeringParameters(NamedTuple):
 
     Attributes:
         lift: height of a foot in mid-swing, in standing heights.
-        gain: of the feedback on the motion's error: forward, left and turning.
+        gain: gain of the feedback on the motion's error: forward, left and turning.
         integral: gain of the same error, added up over a cycle of the gait.
         attitude: how far the low side of the torso is pushed up, rad of lift per rad of tilt.
-        share: of a joint's range that the neutral pose leaves to either side.
+        share: share of a joint's range that the neutral pose leaves to either side.
         level: weight of a foot's vertical motion in stance against its motion along its path.
         sweep: most that a joint is swept to either side, rad.
-        unload: of the standing height, by which a leg is held up that cannot sweep as requested.
-        lead: of all legs over the gait's clock, cycles.
+        unload: unload of the standing height, by which a leg is held up that cannot sweep as requested.
+        lead: lead of all legs over the gait's clock, cycles.
     """
 
     lift: float = 0.2
@@ -62,7 +62,7 @@ class _Leg(NamedTuple):
     """A leg in the neutral pose.
 
     Attributes:
-        jacobian: (3, n) of the sole, m/rad.
+        jacobian: (3, n) jacobian of the sole, m/rad.
         room: (n,) to either side for sweeping, rad.
         lift: (n,) angles in mid-swing, rad.
     """
@@ -79,7 +79,7 @@ class Steered(CommandLaw):
         neutral: (joints,) pose, rad.
         legs: in that pose.
         feet: (legs, 2) positions of the soles, from the center of mass, m.
-        extent: of the feet from the center of mass, m.
+        extent: extent of the feet from the center of mass, m.
     """
 
     def __init__(self, task: Task, parameters: SteeringParameters):
@@ -143,7 +143,7 @@ def _solve_sweep(leg: _Leg, path, level: float) -> tuple:
 
     Args:
         leg: in the neutral pose.
-        path: (environments, 2) of the foot, forward and left, m.
+        path: (environments, 2) path of the foot, forward and left, m.
         level: weight of the vertical motion.
 
     Returns:

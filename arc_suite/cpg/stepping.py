@@ -35,7 +35,7 @@ class SteppingState(NamedTuple):
 
     Attributes:
         joint_angles: (environments, legs, links) planned, rad.
-        pose_integral: (environments, 3) of the errors of height, standing heights, roll and pitch, rad.
+        pose_integral: (environments, 3) integral of the errors of height, standing heights, roll and pitch, rad.
     """
 
     joint_angles: np.ndarray
@@ -47,15 +47,15 @@ class Stepping(CommandLaw):
 
     Attributes:
         directed: whether pose and gait are by command.
-        proportional_gain: of the feedback on the error of a pose.
+        proportional_gain: gain of the feedback on the error of a pose.
         legs: their kinematics.
         rest_soles: (legs, 3) positions of the soles at rest, in the torso's frame, m.
-        rest_angles: (legs, links) of the joints at rest, rad.
+        rest_angles: (legs, links) angles of the joints at rest, rad.
         foot_lift: height of a foot in mid-swing, m.
         slip_weight: weight of a foot's slip across its path against its motion along it.
         stance_reduction: by which the stance is shorter than in the commanded gait, cycles.
         tilt_share: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
-        relative_ik_damping: of inverse kinematics, standing heights.
+        relative_ik_damping: damping of inverse kinematics, standing heights.
         max_request: the largest request, in units of the command.
     """
 
@@ -185,7 +185,7 @@ class Stepping(CommandLaw):
         Args:
             leg_phases: (environments, legs) in the next control step, cycles.
             velocity: (environments, 3) requested of the torso, m/s and rad/s.
-            foothold_shift: (environments, 2) of all footholds for balance, m.
+            foothold_shift: (environments, 2) shift of all footholds for balance, m.
             gait_size: (environments, 1) from 0 to 1.
             vertical: (environments, 3) the world's, in the torso's frame.
             duty_factor: a number or (environments, 1).

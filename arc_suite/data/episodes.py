@@ -20,8 +20,8 @@ class Episode(NamedTuple):
     """A recorded episode.
 
     Attributes:
-        seed: of its reset.
-        preset: of the demonstrator; None for other policies.
+        seed: seed of its reset.
+        preset: preset of the demonstrator; None for other policies.
         observations: (steps + 1, size) float32; the first is that of the reset.
         actions: (steps, joints) float32 in [-1, 1], as applied.
         rewards: (steps,) float64.

@@ -31,7 +31,7 @@ def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: in
     Args:
         environment: with at most as many environments as there are seeds.
         policy: made for as many environments.
-        seeds: of the episodes, started in this order.
+        seeds: seeds of the episodes, started in this order.
         steps: largest number of control steps of an episode.
 
     Yields:

@@ -19,8 +19,8 @@ class DatasetSettings(NamedTuple):
     Attributes:
         setup: body, task and settings of the task.
         policy: a name, or `module:attribute`; see `policies.policy`.
-        presets: of the demonstrator, names or `module:name`; the episode with seed s has number s modulo their count.
-            Empty for other policies.
+        presets: presets of the demonstrator, names or `module:name`; the episode with seed s has number s modulo their
+            count. Empty for other policies.
         noise: standard deviation of the normal noise on actions, which are clipped after it.
         seed: seed of the first episode, of `seed_ranges.COLLECTING`.
         steps: control steps after which an episode is truncated.

@@ -85,7 +85,7 @@ class Storage:
         """Open a dataset to add episodes; meanwhile, no other process can open it.
 
         Args:
-            dataset_id: of an existing dataset or of a new one.
+            dataset_id: id of an existing dataset or of a new one.
             overwrite: whether to start a new dataset even if there is one, which stays until `finish`.
             wait: whether to wait until no other process collects it; else that is an error.
 

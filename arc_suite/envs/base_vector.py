@@ -23,10 +23,10 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
         """Call a method, or read an attribute, of every environment, as Gymnasium's own vector environments do.
 
         Args:
-            name: of an attribute or method of this environment. A value that the environments share is returned for
-                each of them.
-            *args: of the method.
-            **kwargs: of the method.
+            name: name of an attribute or method of this environment. A value that the environments share is returned
+                for each of them.
+            *args: arguments of the method.
+            **kwargs: keyword arguments of the method.
 
         Returns:
             A value for each environment.
@@ -52,7 +52,7 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
         """Set an attribute that the environments share.
 
         Args:
-            name: of the attribute.
+            name: name of the attribute.
             values: one for all, or a list or tuple of equal values, one for each environment.
 
         Raises:

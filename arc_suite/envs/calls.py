@@ -100,7 +100,7 @@ class LiveCommands:
         """Set the value of a command.
 
         Args:
-            name: of the command.
+            name: name of the command.
             value: checked, (size,), or (num_envs, size) with a mask.
             mask: (num_envs,) the environments of a batch that get the value; None for a single environment.
         """
@@ -134,7 +134,7 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
     """Return the action as float64, clipped to [-1, 1].
 
     Args:
-        action: of the shape.
+        action: action of the shape.
         shape: (..., motors)
 
     Raises:
@@ -160,7 +160,7 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
     """Return the value of a live command as floats, (*leading, size).
 
     Args:
-        task: of the environment.
+        task: task of the environment.
         name: one of the task's `commands`.
         value: (size,) or (*leading, size) numbers, the name of a value, or None. None and NaN leave the command to
             the task itself.

@@ -222,8 +222,8 @@ class _Now:
     They are in an object of their own, as setting an attribute of a `TaskRun` is slower: it is checked.
 
     Attributes:
-        memory: of the present episode; None before the first.
-        readings: of the present state; None if they have to be read from the simulation.
+        memory: memory of the present episode; None before the first.
+        readings: readings of the present state; None if they have to be read from the simulation.
         terms: unweighted terms of the latest reward by name.
     """
 
@@ -241,7 +241,8 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         definition: the task of the present episode, see `tasks.contract.Task`.
         opened: the task with the settings with which the environment was opened.
         next_changes: JSON of the settings of the next episode that differ from those.
-        memory: of the present episode with the live commands, as the next step will use it; None before the first.
+        memory: memory of the present episode with the live commands, as the next step will use it; None before the
+            first.
         visualize_reward: whether rendered pictures show the reward as a color.
     """
 
@@ -475,7 +476,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         Args:
             simulations: arrays of the simulation by name, with this axis.
             physics: the simulation.
-            steps: of the present episode.
+            steps: steps of the present episode.
             ended: whether the episode has ended.
         """
         self._consume_commands()

@@ -73,8 +73,8 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             task_kwargs: see `arc_suite.load`.
             visualize_reward: see `arc_suite.load`.
             render_mode: None, rgb_array, depth_array (m) or, where there is a display, human.
-            width: of a picture, pixels; a window has its own size.
-            height: of a picture, pixels.
+            width: width of a picture, pixels; a window has its own size.
+            height: height of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
             privileged: whether infos contain the privileged observation, `privileged` (size,) float32.
 

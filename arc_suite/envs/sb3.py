@@ -139,7 +139,7 @@ def _distribute(info: Mapping[str, Any], infos: list[dict[str, Any]]) -> None:
 
     Args:
         info: arrays by name, and by `_name` the mask (num_envs,) of the environments that have the entry.
-        infos: of each environment; changed in place.
+        infos: infos of each environment; changed in place.
     """
     for name, values in info.items():
         if name.startswith("_"):

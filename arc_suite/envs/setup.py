@@ -201,7 +201,7 @@ class Setup:
         """Open a dm_env.
 
         Args:
-            seed: of the stream of episodes; None for a random one.
+            seed: seed of the stream of episodes; None for a random one.
             options: see `arc_suite.load`.
         """
         return dm.load(self.body, self.task, self._task_kwargs_with(seed), **options)
@@ -215,7 +215,7 @@ class Setup:
 
         Args:
             num_envs: number of environments; environment i has body i modulo the number of bodies.
-            seed: of the first environment's stream of episodes; environment i has seed + i. None for random seeds.
+            seed: seed of the first environment's stream of episodes; environment i has seed + i. None for random seeds.
             options: see `arc_suite.envs.vector.VectorEnv`.
         """
         options["task_kwargs"] = self._task_kwargs_with(seed)

@@ -24,7 +24,7 @@ class _RandomArray(NamedTuple):
     """An array with one part of the states of all `RandomState`s.
 
     Attributes:
-        dtype: of the array.
+        dtype: dtype of the array.
         smallest: valid number.
         largest: valid number.
     """
@@ -50,7 +50,7 @@ class State(NamedTuple):
 
     Attributes:
         simulations: arrays of the simulations by name.
-        memory: of the task, with a leading axis for the environments.
+        memory: memory of the task, with a leading axis for the environments.
         streams: state of each environment's stream of episodes; see `Task.stream_state`.
         randoms: state of each environment's `RandomState`, as its `get_state` returns it.
         environment_arrays: by the names of `ENVIRONMENT_ARRAYS`.
@@ -96,7 +96,7 @@ def from_arrays(
 
     Args:
         like: the present state of the environments that will continue from the snapshot; shapes must be equal.
-        task: of all these environments together.
+        task: task of all these environments together.
         check_simulations: raises ValueError for arrays of the simulations that do not fit.
         arrays: the snapshot.
         opened_tasks: task of each environment with the settings with which it was opened.

@@ -42,7 +42,7 @@ def stack_tasks(tasks: Sequence[Task]) -> Task:
     of the single tasks, as these have no leading axes.
 
     Args:
-        tasks: of one `kind`.
+        tasks: tasks of one `kind`.
     """
     values = {}
     for name in _stacked_names(tasks[0]):
@@ -82,8 +82,8 @@ def _stack_values(values: Sequence[Any], name: str = "") -> Any:
     """Return the values of all tasks as one value; arrays and numbers that differ get a leading axis.
 
     Args:
-        values: of each task, of one type.
-        name: of the value, if it is a field of a NamedTuple.
+        values: values of each task, of one type.
+        name: name of the value, if it is a field of a NamedTuple.
     """
     first = values[0]
     if isinstance(first, Task):

@@ -33,7 +33,7 @@ def where(mask: np.ndarray, tree, other_tree) -> Any:
     Args:
         mask: (num_envs,) booleans.
         tree: its leaves are arrays with a leading axis of num_envs.
-        other_tree: of the same structure.
+        other_tree: other tree of the same structure.
     """
     if mask.all():
         return tree

@@ -142,8 +142,8 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             task_kwargs: as in `arc_suite.load`; `random=s` seeds environment i with s + i, and
                 `on_divergence` can only be "terminate".
             render_mode: None, rgb_array or depth_array (m).
-            width: of a picture, pixels.
-            height: of a picture, pixels.
+            width: width of a picture, pixels.
+            height: height of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
             privileged: whether infos contain the privileged observations, `privileged` (num_envs, size) float32.
 
@@ -405,7 +405,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         Args:
             mask: (num_envs,) booleans, the environments.
-            changes: of each environment, JSON of all changed settings and the task with them.
+            changes: changes of each environment, JSON of all changed settings and the task with them.
             restart: whether the next episodes start as the first ones of a stream.
         """
         for index in np.flatnonzero(mask).tolist():
@@ -456,7 +456,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """Return pictures of the present states, in the mode and size that were chosen at the start.
 
         Args:
-            indices: of the environments; None for all.
+            indices: indices of the environments; None for all.
 
         Returns:
             A picture for each environment: in the mode rgb_array (height, width, 3) uint8, in depth_array
@@ -565,7 +565,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         Args:
             mask: (num_envs,) booleans, the environments.
-            observation: (num_envs, size) of all environments; changed in place.
+            observation: (num_envs, size) observation of all environments; changed in place.
         """
         starts = [self._draw_start(index) for index in np.flatnonzero(mask).tolist()]
         self._streams_begin &= ~mask
@@ -694,7 +694,7 @@ def _replace_entries(memory, mask: np.ndarray, entries):
     """Return a memory with other entries in the environments of a mask.
 
     Args:
-        memory: of all environments.
+        memory: memory of all environments.
         mask: (num_envs,) booleans.
         entries: memory of the environments of the mask alone.
     """

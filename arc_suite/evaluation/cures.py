@@ -67,7 +67,7 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
 
     Args:
         body: any.
-        quality: of its walk with all fields.
+        quality: quality of its walk with all fields.
     """
     names_in_spec = given_fields(body)
     better_walks = {}

@@ -71,9 +71,9 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
     """Play one episode.
 
     Args:
-        environment: of `arc_suite.load`.
+        environment: environment of `arc_suite.load`.
         policy: made for one environment.
-        seed: of the episode's start.
+        seed: seed of the episode's start.
         max_steps: control steps after which to stop; None for a whole episode.
 
     Yields:
@@ -113,9 +113,9 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
     """Run one episode for each seed.
 
     Args:
-        environment: of `arc_suite.load`.
+        environment: environment of `arc_suite.load`.
         policy: made for one environment.
-        seeds: of the episodes; by default the protocol's.
+        seeds: seeds of the episodes; by default the protocol's.
     """
     return [run(environment, policy, seed) for seed in seeds]
 
@@ -133,7 +133,7 @@ def episodes_in_batch(
     Args:
         environment: a `VectorEnv` or `BodiesEnv` with one environment for each seed, in the mode Disabled.
         policy: made for as many environments.
-        seeds: of the episodes; by default from 0 on.
+        seeds: seeds of the episodes; by default from 0 on.
         watch: called after the reset and after each control step with two masks (num_envs,): of the environments
             that played the step, none after the reset, and of those whose episodes it terminated.
 

@@ -28,10 +28,10 @@ class Player(NamedTuple):
     """A policy with an environment in which it is evaluated.
 
     Attributes:
-        setup: of the environment.
+        setup: setup of the environment.
         policy: made for one environment.
-        environment: of the setup.
-        preset: of the demonstrator; None for another policy.
+        environment: environment of the setup.
+        preset: preset of the demonstrator; None for another policy.
     """
 
     setup: Setup
@@ -44,8 +44,8 @@ class Report(NamedTuple):
     """Results of a policy in a setup. As text it is the table of `arc-suite evaluate`.
 
     Attributes:
-        setup: of the episodes.
-        preset: of the demonstrator; None for another policy.
+        setup: setup of the episodes.
+        preset: preset of the demonstrator; None for another policy.
         returns: over the episodes.
         zero: mean return of standing still.
         score: 0 for standing still, 1 for the best demonstrator; None where no anchors are committed.
@@ -133,9 +133,9 @@ def evaluate(
         robot: a body; None for that of a trained policy.
         task: its name; None for that of a trained policy with its settings, which `task_kwargs` change, or walk.
         task_kwargs: see `arc_suite.load`.
-        preset: of the demonstrator; None for the one that suits task and body.
+        preset: preset of the demonstrator; None for the one that suits task and body.
         episodes: number of episodes.
-        seed: of the first episode; the others count on from it.
+        seed: seed of the first episode; the others count on from it.
         progress: wraps the seeds.
 
     Raises:
@@ -180,7 +180,7 @@ def report(
 
     Args:
         evaluated: the policy and its environment.
-        seeds: of the episodes.
+        seeds: seeds of the episodes.
         progress: wraps the seeds.
 
     Raises:

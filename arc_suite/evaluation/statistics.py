@@ -18,7 +18,7 @@ class Summary(NamedTuple):
     """The summary of a figure over episodes; those in which it is NaN are left out, NaN if that is all of them.
 
     Attributes:
-        mean: of the values.
+        mean: mean of the values.
         deviation: population standard deviation.
         iqm: interquartile mean.
         interval: lower and upper end of the 95 % bootstrap interval of the interquartile mean.
@@ -67,7 +67,7 @@ def iqm_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[
 
     Args:
         strata: values by stratum, such as the returns of each robot; at least one value in each.
-        seed: of the resampling.
+        seed: seed of the resampling.
 
     Returns:
         The interquartile mean, and the ends of the interval.
@@ -85,7 +85,7 @@ def mean_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple
 
     Args:
         strata: values by stratum, such as the scores of runs in each place; at least one value in each.
-        seed: of the resampling.
+        seed: seed of the resampling.
 
     Returns:
         The mean, and the ends of the interval.
@@ -118,8 +118,8 @@ def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float
 
     Args:
         strata_x: scores of X by stratum, such as of each robot; one for each run.
-        strata_y: of Y, in the same strata.
-        seed: of the resampling.
+        strata_y: values of Y, in the same strata.
+        seed: seed of the resampling.
 
     Returns:
         The probability, and the ends of the interval.
@@ -146,7 +146,7 @@ def performance_profile(strata, thresholds, seed: int = 0) -> Curve:
     Args:
         strata: scores by stratum, one for each run.
         thresholds: (points,)
-        seed: of the resampling.
+        seed: seed of the resampling.
     """
     random = np.random.default_rng(seed)
     thresholds = np.asarray(thresholds, float)
@@ -167,7 +167,7 @@ def curve(strata, seed: int = 0) -> Curve:
 
     Args:
         strata: scores (runs, points) by stratum, such as the returns of each robot at each evaluation.
-        seed: of the resampling.
+        seed: seed of the resampling.
     """
     random = np.random.default_rng(seed)
     strata = [np.asarray(scores, float) for scores in strata]

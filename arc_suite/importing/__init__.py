@@ -54,7 +54,7 @@ def import_robot(path: str | os.PathLike, home: str | None = None, feet: Sequenc
     """Return the legged robot of an MJCF or URDF file.
 
     Args:
-        path: of the file.
+        path: path of the file.
         home: name of the keyframe in which it stands; None to find a pose.
         feet: names of bodies or geoms at the ends of its legs; none to find them.
 

@@ -34,11 +34,11 @@ class Mesh(NamedTuple):
     """The mesh of a geom.
 
     Attributes:
-        name: of the mesh in the file.
+        name: name of the mesh in the file.
         whole: whether it has all points of the file, and not only the corners of its hull.
-        attributes: of the asset, as in MJCF.
-        position: (3,) of the geom, before the compiler moves it.
-        orientation: (4,) of the geom, a quaternion.
+        attributes: attributes of the asset, as in MJCF.
+        position: (3,) position of the geom, before the compiler moves it.
+        orientation: (4,) orientation of the geom, a quaternion.
     """
 
     name: str
@@ -52,7 +52,7 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
     """Return the meshes of geoms that collide, by geom.
 
     Args:
-        spec: of the file; it is not changed.
+        spec: spec of the file; it is not changed.
         model: compiled from it.
     """
     geoms = [geom for geom in colliding_geoms(model) if model.geom_type[geom] == _MESH]

@@ -17,9 +17,9 @@ class Names(NamedTuple):
     """Names in the model, by MuJoCo's indices in the file.
 
     Attributes:
-        legs: of each leg, in the order of the legs.
-        joints: of all joints except the free one.
-        bodies: of all bodies of the robot.
+        legs: one value for each leg, in the order of the legs.
+        joints: all joints except the free one.
+        bodies: all bodies of the robot.
         held: joints outside of the legs.
     """
 

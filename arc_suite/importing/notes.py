@@ -19,9 +19,9 @@ def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int
     """Yield notes on the legs, the map of the joints, and the standing pose.
 
     Args:
-        robot: of the file.
+        robot: robot of the file.
         stance: in which it stands.
-        names: of its parts.
+        names: names of its parts.
         order: joints of the legs in the order of the file.
     """
     joint_counts = sorted({len(leg.joints) for leg in stance.legs})

@@ -30,7 +30,7 @@ class RobotFile(NamedTuple):
     Attributes:
         model: compiled, with a free joint at the torso.
         root: body of the torso.
-        meshes: of geoms whose shape is a mesh, by geom.
+        meshes: meshes of geoms whose shape is a mesh, by geom.
         order: names of joints in the order of the file; empty if the model has that order.
         notes: one line for each thing that is left out or repaired.
     """
@@ -46,7 +46,7 @@ class _Spec(NamedTuple):
     """A file as a spec that is not compiled yet.
 
     Attributes:
-        spec: of MuJoCo.
+        spec: spec of MuJoCo.
         order: as in `RobotFile`.
         notes: as in `RobotFile`.
     """
@@ -60,7 +60,7 @@ def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
     """Return the robot of an MJCF or a URDF file.
 
     Args:
-        path: of the file.
+        path: path of the file.
         turn: roll, pitch and yaw, rad, of a URDF's base in the torso's frame.
 
     Raises:

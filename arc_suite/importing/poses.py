@@ -56,12 +56,12 @@ class Leg(NamedTuple):
     """A leg of a robot in its standing pose, in the torso's frame.
 
     Attributes:
-        joints: of the leg alone, from the torso outwards.
+        joints: joints of the leg alone, from the torso outwards.
         body: the last link.
         geom: the foot's collider.
         sole: (3,) the lowest point.
-        center: (3,) of the foot, as a ball that touches the floor at the sole.
-        radius: of that ball, m.
+        center: (3,) center of the foot, as a ball that touches the floor at the sole.
+        radius: radius of that ball, m.
     """
 
     joints: tuple[int, ...]
@@ -76,9 +76,9 @@ class Stance(NamedTuple):
     """A standing pose.
 
     Attributes:
-        qpos: (nq,) of the file's model, with the torso's frame as the world's.
+        qpos: (nq,) qpos of the file's model, with the torso's frame as the world's.
         legs: in the order of the file.
-        height: of the torso's origin above the lowest sole, m.
+        height: height of the torso's origin above the lowest sole, m.
         origin: where the pose comes from, in words.
     """
 
@@ -120,7 +120,7 @@ def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
     reach the floor, with the center of mass inside them and no straight legs.
 
     Args:
-        robot: of the file.
+        robot: robot of the file.
         home: name of a keyframe, which is then taken without checks; None to find a pose.
         feet: names of bodies or geoms at the ends of the legs; none to find them.
 
@@ -230,7 +230,7 @@ def _stance_of_pose(
     """Return the stance of a pose.
 
     Args:
-        robot: of the file.
+        robot: robot of the file.
         qpos: (nq,) the pose.
         origin: where it comes from.
         named_feet: colliders of feet that the user names, by chain; None to find them.
@@ -381,10 +381,10 @@ def _search_bent_knees(
     """Return a pose (nq,) with bent knees and each foot below the joint before the last; None if there is none.
 
     Args:
-        robot: of the file.
+        robot: robot of the file.
         foot_colliders: by chain.
-        front_sign: of the bend of legs in front of the torso's origin, 1 or -1.
-        rear_sign: of the bend of the other legs.
+        front_sign: sign of the bend of legs in front of the torso's origin, 1 or -1.
+        rear_sign: sign of the bend of the other legs.
     """
     zero_qpos = robot.clip_to_limits(robot.model.qpos0 * 0.0)
     data = robot.forward_kinematics(zero_qpos)

@@ -25,9 +25,9 @@ def sketch_legs(robot: Robot, stance: Stance, names: Names, servos: Mapping[int,
     """Return the legs of the spec, in the order of the file.
 
     Args:
-        robot: of the file.
+        robot: robot of the file.
         stance: in which it stands.
-        names: of its parts.
+        names: names of its parts.
         servos: by joint.
     """
     data = robot.forward_kinematics(stance.qpos)

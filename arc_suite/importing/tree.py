@@ -25,7 +25,7 @@ class Robot(NamedTuple):
     Attributes:
         model: the file, whose torso has a free joint.
         root: body of the torso.
-        bodies: of the robot, parents first.
+        bodies: bodies of the robot, parents first.
         joints: all except the free one, in the order of the file.
         colliders: geoms that collide with anything.
         chains: by body, the joints between the torso and it, outwards.
@@ -82,7 +82,7 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
     """Return the robot whose torso is a body with a free joint.
 
     Args:
-        model: of the file.
+        model: model of the file.
         root: body of the torso.
         notes: what was left out of the file, for an error.
 

@@ -55,7 +55,7 @@ def repair_urdf(
 
     Args:
         robot: the root element, which is changed.
-        folder: of the file; meshes are searched there and upwards.
+        folder: folder of the file; meshes are searched there and upwards.
         turn: roll, pitch and yaw, rad, of the base in the torso's frame, for files whose z axis does not point up.
 
     Raises:

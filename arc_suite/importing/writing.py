@@ -66,9 +66,9 @@ def write_source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, M
     """Return the MJCF of a robot: one free body, its joints and colliders, a site in each foot, the keyframe `home`.
 
     Args:
-        robot: of the file.
+        robot: robot of the file.
         stance: in which it stands.
-        names: of its parts.
+        names: names of its parts.
         meshes: by geom.
     """
     root = ElementTree.Element("mujoco")
@@ -206,7 +206,7 @@ def _geom_attributes(model: mujoco.MjModel, geom: int, mesh_geom: dict[str, str]
     """Return the attributes of a collider, which touches the floor alone and weighs nothing.
 
     Args:
-        model: of the file.
+        model: model of the file.
         geom: the collider.
         mesh_geom: attributes of its shape and pose if it is a mesh.
     """

@@ -137,7 +137,7 @@ def _leg_elements(leg: Leg, material: dict[str, Any], simulation: Simulation | N
     """Return the links and the foot of a leg.
 
     Args:
-        leg: of the body.
+        leg: leg of the body.
         material: attributes of its geoms.
         simulation: as of `parts`.
     """
@@ -240,8 +240,8 @@ def _framing_pose(points: np.ndarray, azimuth: float, elevation: float) -> dict:
 
     Args:
         points: (n, 3) in the torso's frame, m.
-        azimuth: of the camera from straight ahead, rad.
-        elevation: of the camera, rad.
+        azimuth: azimuth of the camera from straight ahead, rad.
+        elevation: elevation of the camera, rad.
     """
     back = np.array(
         (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation))

@@ -22,10 +22,10 @@ class Legs(NamedTuple):
     Attributes:
         mounts: (legs, 3) where they begin, m.
         mount_rotations: (legs, 3, 3) orientations there.
-        axes: (legs, links, 3) of the joint at the beginning of each link, unit vectors; 0 where it is fixed.
-        ends: (legs, links, 3) of links from their beginnings, m.
-        radii: (legs,) of the feet, m.
-        joint_indices: (legs, links) of joints in the body; 0 where a link is fixed.
+        axes: (legs, links, 3) axes of the joint at the beginning of each link, unit vectors; 0 where it is fixed.
+        ends: (legs, links, 3) ends of links from their beginnings, m.
+        radii: (legs,) radii of the feet, m.
+        joint_indices: (legs, links) indices of joints in the body; 0 where a link is fixed.
         has_joint: (legs, links) whether a link has a joint.
         low: (legs, links) lower bounds of targets, rad.
         high: (legs, links) upper bounds of targets, rad.
@@ -110,10 +110,10 @@ class Legs(NamedTuple):
 
         Args:
             angles: (..., legs, links) to begin with, rad.
-            goals: (..., legs, 3) of the soles, m.
+            goals: (..., legs, 3) goals of the soles, m.
             weights: (..., legs, 3, 3) matrices that multiply the errors of the soles.
             damping: m.
-            steps: of the search.
+            steps: control steps of the search.
         """
         xp = goals.__array_namespace__()
         for _ in range(steps):
@@ -132,7 +132,7 @@ class Legs(NamedTuple):
         """Return the angles (legs, links), rad, near the middle of the joints' ranges, that bring soles near goals.
 
         Args:
-            goals: (legs, 3) of the soles, m.
+            goals: (legs, 3) goals of the soles, m.
             weights: (3, 3) as for `solve_joint_angles`, the same for all legs.
             damping: m.
         """
@@ -213,7 +213,7 @@ def path_weights(paths, across: float, level: float = 1.0):
     """Return matrices (..., 3, 3) that weigh an error along paths (..., 2), across them, and in height.
 
     Args:
-        paths: of feet, of any length.
+        paths: paths of feet, of any length.
         across: weight of the error across the path, against that along it.
         level: weight of the error in height.
     """

@@ -27,7 +27,7 @@ class Overlap(NamedTuple):
     """Two parts of a body that overlap.
 
     Attributes:
-        names: of a solid of the torso and a part of a leg, or of parts of two legs.
+        names: names of a solid of the torso and a part of a leg, or of parts of two legs.
         depth: m.
         pose: in which they overlap, "the standing pose" or "a stride".
     """

@@ -188,10 +188,10 @@ def _weak_motor_flaw(body: Body, torques: np.ndarray, loads: np.ndarray, purpose
     """Return the flaw of motors that give less than their loads.
 
     Args:
-        body: of the motors.
+        body: body of the motors.
         torques: (joints,) that motors give, N m.
         loads: (joints,) that they should give, N m.
-        purpose: of the loads, which ends the text.
+        purpose: purpose of the loads, which ends the text.
         effect: begins the text.
     """
     is_weak = torques < loads

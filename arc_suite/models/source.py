@@ -134,7 +134,7 @@ def _add_servo(
     Args:
         actuators: the section.
         joint: element of the joint.
-        servo: of the joint.
+        servo: servo of the joint.
         home: angle in the standing pose, rad.
         reach: angle from there for a control of 1, rad.
     """

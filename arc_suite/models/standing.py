@@ -20,9 +20,9 @@ class PoseMechanics(NamedTuple):
     """Mechanics of a pose, such as the standing one, in the torso's frame and SI units; joints are the actuated ones.
 
     Attributes:
-        height: of the torso's origin above the floor.
-        mass: of the whole body.
-        center: (3,) of mass.
+        height: height of the torso's origin above the floor.
+        mass: mass of the whole body.
+        center: (3,) center of mass.
         soles: (legs, 3) the lowest points of the feet.
         jacobians: for each leg (3, joints of the leg): velocity of the sole per joint velocity.
         inertias: (joints,) diagonal of the mass matrix without armature.

@@ -84,7 +84,7 @@ def cycle_angles(cycle, duty_factor: float, sweep, lift):
 
     Args:
         cycle: phases, in cycles; a leg stands before the duty factor and swings after it.
-        duty_factor: of the gait.
+        duty_factor: duty factor of the gait.
         sweep: (..., n) angles at touchdown, rad.
         lift: (..., n) angles added in mid-swing, rad.
     """
@@ -147,7 +147,7 @@ def lift_angles(jacobian, height: float, below, above) -> np.ndarray:
     """Return the joint angles (joints of the leg,) that lift a leg's foot by a height, m.
 
     Args:
-        jacobian: (3, joints of the leg) of the foot.
+        jacobian: (3, joints of the leg) jacobian of the foot.
         height: m.
         below: (joints of the leg,) room that targets have below the pose, rad.
         above: the same above it.
@@ -169,9 +169,9 @@ def _angles_towards(jacobian, displacement, weights, below, above) -> np.ndarray
     zero bounds the length.
 
     Args:
-        jacobian: (3, joints) of the foot.
+        jacobian: (3, joints) jacobian of the foot.
         displacement: (3,) m.
-        weights: (3,) of its components.
+        weights: (3,) weights of its components.
         below: (joints,) room below zero, rad.
         above: (joints,) room above zero, rad.
     """

@@ -60,7 +60,7 @@ class Operator(NamedTuple):
     """An operator.
 
     Attributes:
-        function: of arrays.
+        function: function of arrays.
         inputs: number of inputs; 0 for any.
         shape: function from the shapes of the inputs to that of the result; axes of environments have length 1.
     """

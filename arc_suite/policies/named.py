@@ -112,8 +112,8 @@ def policy(
             A function takes the name of a robot, or another body, and returns a function from a `TimeStep` to an
             action.
         robot: a body; see `registry.body_of`.
-        presets: of the demonstrator, a name or several that take turns from seed to seed, see `cpg.Demonstrator`; None
-            for the one that suits the task and the body.
+        presets: presets of the demonstrator, a name or several that take turns from seed to seed, see
+            `cpg.Demonstrator`; None for the one that suits the task and the body.
         num_envs: number of environments.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
         task: the task in which it acts. The demonstrator is fitted to it, and gives positions in place of torques
@@ -153,7 +153,7 @@ def acting(source, task: Task, presets: str | Sequence[str] | None = None) -> Po
         source: a name or a path, as of `policy`; a policy for one environment; or a function of a `TimeStep` with
             named blocks.
         task: the task in which it acts.
-        presets: of the demonstrator, see `policy`.
+        presets: presets of the demonstrator, see `policy`.
 
     Raises:
         ValueError: something else, or as `policy`.
@@ -233,7 +233,8 @@ def setup_of(name) -> Setup | None:
     """Return the setup in which a policy was trained; None for a policy that is no network, or without a file.
 
     Args:
-        name: of a policy, or the policy. Of a zip of stable-baselines3, only the setup is read, which may be missing.
+        name: name of a policy, or the policy. Of a zip of stable-baselines3, only the setup is read, which may be
+            missing.
 
     Raises:
         ValueError: a damaged file, or a robot, task or arena whose module has not been imported.

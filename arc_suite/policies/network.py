@@ -37,7 +37,7 @@ class Network(NamedTuple):
         graph: from the flat observation (num_envs, size) to actions (num_envs, joints).
         setup: body, or bodies, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
-        training_seeds: of the episodes of its training; None if they are unknown.
+        training_seeds: seeds of the episodes of its training; None if they are unknown.
     """
 
     graph: Graph

@@ -61,9 +61,9 @@ class PolicyFile(NamedTuple):
     """A file of another library.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         further: a file that belongs to it; None for none.
-        extension: of `READERS`.
+        extension: extension of `READERS`.
     """
 
     path: Path

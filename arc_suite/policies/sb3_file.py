@@ -37,7 +37,7 @@ class Saved:
         """Read a zip.
 
         Args:
-            path: of the zip.
+            path: path of the zip.
             statistics: file that `VecNormalize.save` wrote; None for a policy of plain observations.
 
         Raises:

@@ -171,7 +171,7 @@ def perceptron(x: Traced, layers: Sequence[Mapping], activation: str = "relu") -
     Args:
         x: (1, inputs)
         layers: mappings to `weight`, `bias`, and `scale` and `offset` where a layer norm follows.
-        activation: of hidden layers, relu, elu or tanh.
+        activation: activation of hidden layers, relu, elu or tanh.
     """
     *hidden_layers, last_layer = layers
     for layer in hidden_layers:

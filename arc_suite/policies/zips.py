@@ -65,7 +65,7 @@ def load(path: Path, further: Path | None) -> Loaded:
     """Return the policy of a zip. The pickles that it holds run code.
 
     Args:
-        path: of the zip.
+        path: path of the zip.
         further: file of its statistics; None for those next to it, if there are any.
 
     Raises:

@@ -170,8 +170,8 @@ def _field(check, *args, default=dataclasses.MISSING, optional=False):
 
     Args:
         check: one of the checks above.
-        *args: of the check, after the value.
-        default: of the field.
+        *args: arguments of the check, after the value.
+        default: default of the field.
         optional: whether None is valid without a check.
     """
     metadata = {"check": check, "args": args, "optional": optional}
@@ -331,8 +331,8 @@ class Link(_Spec):
 
     Attributes:
         name: `<leg>_<name>` is the name of the link's body in the model.
-        end: of the capsule's axis in the link's frame.
-        radius: of the capsule.
+        end: end of the capsule's axis in the link's frame.
+        radius: radius of the capsule.
         joint: about which the link turns at its origin; None: it is rigidly fixed to the part before it.
     """
 
@@ -448,7 +448,7 @@ class Solid(_Spec):
         name: name of the geom.
         shape: sphere, capsule, cylinder, ellipsoid or box.
         size: radius or half-extents, as MuJoCo takes them for the shape.
-        position: of its center in the torso's frame.
+        position: position of its center in the torso's frame.
         euler_deg: angles of turns about the x, then the y, then the z axis of the frame that turns.
     """
 
@@ -482,8 +482,8 @@ class Torso(_Spec):
     """The free-floating root: solids around its origin, which stands above the floor.
 
     Attributes:
-        standing_height: of the origin above the floor, m; None: the body derives it, so that its lowest foot
-            stands on the floor.
+        standing_height: height of the origin above the floor, m; None: the body derives it, so that its lowest
+            foot stands on the floor.
         solids: the torso's shapes.
     """
 
@@ -522,7 +522,7 @@ class Simulation(_Spec):
     floor and robot each have half of the published one.
 
     Attributes:
-        timestep: of one substep, s.
+        timestep: timestep of one substep, s.
         contact_time: time constant of contacts and joint limits, s.
         contact_width: depth over which a contact hardens, m.
         contact_margin: distance at which contacts begin, of every geom that can touch, m.
@@ -545,7 +545,7 @@ class Held(_Spec):
     """A joint of an imported body that belongs to no leg. A servo holds it in the standing pose.
 
     Attributes:
-        name: of the joint and its servo in the model.
+        name: name of the joint and its servo in the model.
         servo: holds the joint.
     """
 
@@ -561,15 +561,15 @@ class Body(_Spec):
     Fields that are None are sized to the body before its model is built; see `arc_suite.models.sizing`.
 
     Attributes:
-        name: of the body and its model; with a robot's name it uses the robot's parameters and presets.
+        name: name of the body and its model; with a robot's name it uses the robot's parameters and presets.
         torso: the root of the kinematic tree.
         legs: all legs, left and right ones.
         camera: the side view that follows the body; None: placed to suit the body.
         ballast: additional masses on the torso.
-        density: of solids, links and feet, kg/m^3.
+        density: density of solids, links and feet, kg/m^3.
         simulation: constants of the simulation; None: scaled to the body.
         agility: factor on the gear of motors that are sized; above 1 for bodies that leap.
-        palette: of the body's colors, one of `PALETTES` or a seed; None: the robot's own, or gray.
+        palette: palette of the body's colors, one of `PALETTES` or a seed; None: the robot's own, or gray.
         source: MJCF of an imported body. It has parts and joints of the same names as here, and the standing pose as
             the keyframe `home`; see `arc_suite.models.source`.
         held: joints of an imported body that belong to no leg.

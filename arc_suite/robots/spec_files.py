@@ -31,7 +31,7 @@ def load_body(path: str | os.PathLike) -> Body:
     """Read a body from a file.
 
     Args:
-        path: of the file, or the name of an example, such as "spider".
+        path: path of the file, or the name of an example, such as "spider".
 
     Raises:
         SpecError: the file is no JSON, or describes no valid body; the message names the file and the field by its

@@ -17,9 +17,9 @@ def play_episode(
     Meanwhile the environment stands still: who watches may read it, set commands or apply forces.
 
     Args:
-        environment: of `arc_suite.load`.
+        environment: environment of `arc_suite.load`.
         act: maps a `TimeStep` to an action.
-        seed: of the episode's start; None for the environment's next episode.
+        seed: seed of the episode's start; None for the environment's next episode.
         max_steps: control steps after which to stop; None plays to the end.
 
     Yields:

@@ -29,7 +29,7 @@ class Footage:
         robot: its name.
         episode_return: sum of the rewards so far.
         steps: control steps so far.
-        advance: of the gait clock in the latest step, cycles; 0 before the first step, or without a gait clock.
+        advance: advance of the gait clock in the latest step, cycles; 0 before the first step, or without a gait clock.
     """
 
     def __init__(
@@ -39,11 +39,11 @@ class Footage:
 
         Args:
             robot: its name.
-            environment: of `arc_suite.load`; `close` closes it.
+            environment: environment of `arc_suite.load`; `close` closes it.
             policy: maps a `TimeStep` to an action.
             camera: one of `builder.CAMERAS`.
             size: width and height of a view in pixels.
-            quality: of views; see `pictures.QUALITIES`. The camera `eye` has another quality.
+            quality: quality of views; see `pictures.QUALITIES`. The camera `eye` has another quality.
         """
         self.robot = robot
         self.episode_return = 0.0
@@ -88,7 +88,7 @@ class Footage:
         """Return the picture (height, width, 3) uint8 of the camera.
 
         Args:
-            share: of the latest control step, at which the pose is interpolated; 1 for its end.
+            share: share of the latest control step, at which the pose is interpolated; 1 for its end.
         """
         width, height = self._size
         physics = self._environment.physics
@@ -153,8 +153,8 @@ def frames(footages: Sequence[Footage], seconds: float, frame: float) -> Iterato
     """Yield views of several episodes at equal times until all have ended.
 
     Args:
-        footages: of the episodes.
-        seconds: of the film.
+        footages: footages of the episodes.
+        seconds: duration of the film.
         frame: duration of a frame, s; the last one shows the end.
     """
     start = footages[0].steps * footages[0].control_timestep
@@ -207,7 +207,7 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
     """Write a film that any browser plays: H.264, yuv420p, which needs even width and height.
 
     Args:
-        path: of the file.
+        path: path of the file.
         frames: (height, width, 3) uint8.
         seconds: duration of a frame.
 
@@ -234,7 +234,7 @@ def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: flo
     """Write a film that repeats; one palette for all frames, without dithering, keeps it small and steady.
 
     Args:
-        path: of the file, or an open one.
+        path: path of the file, or an open one.
         frames: (height, width, 3) uint8.
         seconds: duration of a frame. The format counts in hundredths of a second, to which frames are rounded.
     """

@@ -69,7 +69,7 @@ class Decorated(dm_mujoco.Physics):
         Args:
             body: the spec.
             arena: where it stands.
-            quality: of the pictures.
+            quality: quality of the pictures.
             ground: red, green, blue and alpha of a ground without a grid; None keeps the grid.
         """
         decorated = cls.from_model(wrapper.MjModel(models.model_spec(body, arena, decorated=True).compile()))
@@ -104,7 +104,7 @@ class Decorated(dm_mujoco.Physics):
 
         Args:
             qpos: (nq,) positions of the simulation.
-            share: of the greatest reward, 0 to 1, shown as the color of the material `glow`; None
+            share: share of the greatest reward, 0 to 1, shown as the color of the material `glow`; None
                 keeps its own color.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
             markers: debug markers to show.
@@ -197,14 +197,14 @@ def picture(
         height: pixels.
         width: pixels.
         camera_id: a camera's name or index, -1 for a free one.
-        share: of the greatest reward, 0 to 1, shown as the color of the material `glow`; None keeps its own.
+        share: share of the greatest reward, 0 to 1, shown as the color of the material `glow`; None keeps its own.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
         failed_legs: names of legs to show dark.
         quality: a name of `QUALITIES`. Pictures of depth or segments are not averaged, and the largest pictures less.
             "sense" has no ornaments, markers, reward or failed legs. None for "sense" through the camera `eye`, and
             for "fast" through others.
-        **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
+        **kwargs: keyword arguments of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
         (height, width, 3) uint8; with `depth`, (height, width) float32, m.
@@ -241,7 +241,7 @@ def shrink(picture: np.ndarray, scale: int) -> np.ndarray:
 
     Args:
         picture: (scale * height, scale * width, channels) uint8.
-        scale: of the squares, up to 16.
+        scale: scale of the squares, up to 16.
 
     Returns:
         (height, width, channels) uint8.

@@ -70,7 +70,7 @@ def check_finite(name: str, array: np.ndarray, may_be_nan: np.ndarray | bool = F
     """Return an array of finite numbers that simulations can reach.
 
     Args:
-        name: of the array, for the error.
+        name: name of the array, for the error.
         array: any.
         may_be_nan: where NaN may stand.
 

@@ -42,7 +42,7 @@ class Metric(NamedTuple):
     """The entry of a metric in the table.
 
     Attributes:
-        function: of a track.
+        function: function of a track.
         unit: shares and indices have none.
         prescribed: the value that the task prescribes, of a track; None if it prescribes none.
         of_gait: whether it needs the prescribed gait or pose; left out in a task without one.

@@ -24,7 +24,7 @@ class Source(NamedTuple):
 
     Attributes:
         label: its name in tables.
-        setup: of the tracks that it has; None for a policy, which is recorded in any.
+        setup: setup of the tracks that it has; None for a policy, which is recorded in any.
         recorders: takes a setup and seeds; returns functions that return a track each.
     """
 
@@ -40,7 +40,7 @@ def source(name: str, preset: str | None = "medium") -> Source:
         name: a policy, see `policies.policy`, which is recorded once for every seed; a file of tracks,
             path/to/file.npz; or the id of a dataset, arc_suite/queen/walk/cpg-medium-v0. Of the latter two, at most as
             many tracks are taken as there are seeds.
-        preset: of the demonstrator; None for the one that suits the task and the body.
+        preset: preset of the demonstrator; None for the one that suits the task and the body.
 
     Raises:
         ValueError: an unknown name, a file that holds no tracks, or a dataset that cannot be opened.

@@ -22,24 +22,25 @@ class Track(NamedTuple):
 
     Attributes:
         setup: body, task and settings.
-        seed: of the episode; the actions repeat it, unless motors were weak or actions late.
+        seed: seed of the episode; the actions repeat it, unless motors were weak or actions late.
         time_step: s between rows.
-        positions: (steps, 3) of the torso.
-        quaternions: (steps, 4) of the torso, w first.
-        linear_velocities: (steps, 3) of the torso, world frame.
-        angular_velocities: (steps, 3) of the torso, its own frame.
+        positions: (steps, 3) positions of the torso.
+        quaternions: (steps, 4) quaternions of the torso, w first.
+        linear_velocities: (steps, 3) linear velocities of the torso, world frame.
+        angular_velocities: (steps, 3) angular velocities of the torso, its own frame.
         joint_angles: (steps, joints)
         joint_velocities: (steps, joints)
         actions: (steps, joints), as applied.
-        torques: (steps, joints) of the motors, N m.
-        torso_heights: (steps,) of the torso over the ground.
-        foot_positions: (steps, feet, 3) of the feet's centers.
-        foot_heights: (steps, feet) of the feet's centers over the ground.
-        foot_velocities: (steps, feet, 3) of the lowest points of the feet, world frame.
+        torques: (steps, joints) torques of the motors, N m.
+        torso_heights: (steps,) heights of the torso over the ground.
+        foot_positions: (steps, feet, 3) positions of the feet's centers.
+        foot_heights: (steps, feet) heights of the feet's centers over the ground.
+        foot_velocities: (steps, feet, 3) velocities of the lowest points of the feet, world frame.
         contacts: (steps, feet) whether the ground pushes on the foot.
-        phases: (steps,) of the gait clock, rad; None in a task without a gait.
-        leg_phases: (steps, feet) of the legs in the gait that holds, up to whole turns; None in a task without a gait.
-        duty_factors: (steps,) of the gait that holds; None in a task without a gait.
+        phases: (steps,) phases of the gait clock, rad; None in a task without a gait.
+        leg_phases: (steps, feet) phases of the legs in the gait that holds, up to whole turns; None in a task
+            without a gait.
+        duty_factors: (steps,) duty factors of the gait that holds; None in a task without a gait.
         terms: the reward's unweighted terms by name, each (steps,).
         weights: signed weight of every term.
         progress: the task's metrics at the end by name.
@@ -132,9 +133,9 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
     Foot positions, velocities and contacts are one substep behind the torso, as in the reward.
 
     Args:
-        environment: of `arc_suite.load`.
+        environment: environment of `arc_suite.load`.
         policy: made for one environment.
-        seed: of the episode's start.
+        seed: seed of the episode's start.
         max_steps: control steps after which to stop; None for a whole episode.
 
     Returns:

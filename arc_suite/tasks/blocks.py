@@ -134,8 +134,8 @@ def gait_clock(phase_offsets: np.ndarray | None = None, default_angles: np.ndarr
     """Return the block of sine and cosine of the phase of a gait: (2).
 
     Args:
-        phase_offsets: (legs,) of the gait, rad; None where they change.
-        default_angles: (joints,) of the pose around which the gait moves, rad; None where it changes.
+        phase_offsets: (legs,) phase offsets of the gait, rad; None where they change.
+        default_angles: (joints,) angles of the pose around which the gait moves, rad; None where it changes.
     """
     return Block((Phase("the phase", phase_offsets, default_angles),))
 

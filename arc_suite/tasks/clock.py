@@ -33,7 +33,7 @@ class Clock(NamedTuple):
         """Make the clock of a gait.
 
         Args:
-            frequency: of the gait, Hz.
+            frequency: frequency of the gait, Hz.
             duty_factor: share of a cycle that a foot spends in stance.
             offsets: (feet,) rad, added to the clock's phase.
             control_timestep: s between ticks.

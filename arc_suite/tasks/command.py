@@ -50,7 +50,7 @@ class Followed(NamedTuple):
     """A command after a control step.
 
     Attributes:
-        memory: of the command.
+        memory: memory of the command.
         desired: (..., 3) the velocity that holds from now on.
         tracking: (...) how well the step followed the velocity, at most 1.
         arrived: (...) whether the step reached a goal; False where there are none.
@@ -98,8 +98,8 @@ class Command(ABC):
         """Return the command after a control step.
 
         Args:
-            context: of the task.
-            memory: of the command, before the step.
+            context: context of the task.
+            memory: memory of the command, before the step.
             steps: (...) control steps since the start.
             before: (..., 3) the place before the step.
             place: (..., 3) the place after it.
@@ -112,7 +112,7 @@ class Command(ABC):
         """Return the bonuses for following, each (...), by name.
 
         Args:
-            memory: of the command, after the step.
+            memory: memory of the command, after the step.
             step_tracking: (...) tracking of the step.
             upright: (...) cosine of the torso's tilt.
             feet_in_schedule: (...) share of the feet that followed the contact schedule.

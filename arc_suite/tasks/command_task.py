@@ -58,10 +58,10 @@ class CommandTaskSettings(NamedTuple):
     """Settings of a task with a command.
 
     Attributes:
-        parameters: of the gait, and the target velocity.
+        parameters: parameters of the gait, and the target velocity.
         weights: signed weight of every term.
         cost_limit: bound of the costs of a step, whose weights are negative; see `terms.reward`.
-        noise: of the start.
+        noise: noise of the start.
         ground: the ground with its own settings.
         command: the command with its own settings.
         gait_and_pose: the gait and pose by command with its own settings; None where the task prescribes them.
@@ -96,14 +96,14 @@ class Core(NamedTuple):
 
     Attributes:
         steps: (...) control steps since the start.
-        tick: (...) of the gait's clock, which stands still while the command is a stop.
-        action: (..., joints) of the latest step, clipped to [-1, 1].
-        previous_action: (..., joints) of the step before; 0 before the first.
+        tick: (...) tick of the gait's clock, which stands still while the command is a stop.
+        action: (..., joints) action of the latest step, clipped to [-1, 1].
+        previous_action: (..., joints) action of the step before; 0 before the first.
         schedule_errors: (...) number of contact schedule errors in the latest step.
         all_schedule_errors: (...) sum of `schedule_errors` over the steps.
-        energy: of the motors.
+        energy: energy of the motors.
         path: (...) length of the path since the start, from `motion`, m.
-        place: (..., 3) of the torso's frame at the latest reading: x and y, m, and yaw, rad.
+        place: (..., 3) place of the torso's frame at the latest reading: x and y, m, and yaw, rad.
         motion: (..., 3) velocity of the torso, a leaky mean over a cycle of the gait.
         desired: (..., 3) velocity that the command asks for.
         step_tracking: (...) tracking of the latest step.

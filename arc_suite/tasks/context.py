@@ -16,10 +16,10 @@ class Context(NamedTuple):
         arena: where the task takes place: an `arenas.Arena`, of the class that the command and the ground need.
         height: h, the standing height, m.
         reach: R, the mean distance of the feet from their center, m.
-        units: (3,) of commands: the target velocity, twice, m/s, and the turning velocity, rad/s, at which feet on a
-            circle of radius R are as fast.
-        force_unit: (1, 6) of contact forces: three times the weight times the standing height, N m, then three times
-            the weight, N.
+        units: (3,) units of commands: the target velocity, twice, m/s, and the turning velocity, rad/s, at which feet
+            on a circle of radius R are as fast.
+        force_unit: (1, 6) unit of contact forces: three times the weight times the standing height, N m, then
+            three times the weight, N.
         step_units: (3,) displacements of a control step at `units`, m and rad.
         pace: displacement of a control step at the target velocity, m.
         leak: weight of the latest step in leaky means over a cycle of the gait.

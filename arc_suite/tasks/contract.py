@@ -58,8 +58,8 @@ class Observed(ABC):
     """What follows from the blocks of the observation that a task declares.
 
     Attributes:
-        name: of the task.
-        scene: of the task.
+        name: name of the task.
+        scene: scene of the task.
     """
 
     name: ClassVar[str]

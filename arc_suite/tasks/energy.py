@@ -44,9 +44,9 @@ def after(memory: Energy, torques: np.ndarray, action, angles) -> Energy:
 
     Args:
         memory: before it.
-        torques: (joints,) of the body; see `torques`.
-        action: (..., joints) of the step, or the torques of servos as shares of the largest.
-        angles: (..., joints) of the joints after it, rad.
+        torques: (joints,) torques of the body; see `torques`.
+        action: (..., joints) action of the step, or the torques of servos as shares of the largest.
+        angles: (..., joints) angles of the joints after it, rad.
     """
     step = (torques * action * (angles - memory.angles)).clip(0.0).sum(axis=-1)
     return Energy(angles + 0.0, step, memory.total + step)
@@ -56,7 +56,7 @@ def cost_of_transport(memory: Energy, path, target_path):
     """Return the cost of transport (...): work over weight and path.
 
     Args:
-        memory: of the episode.
+        memory: memory of the episode.
         path: (...) length of the path so far, m.
         target_path: (...) length at the target velocity, m; see `MIN_PATH`.
     """

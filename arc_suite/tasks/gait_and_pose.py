@@ -42,7 +42,7 @@ class Choices:
     Attributes:
         room: (6, 2) bounds of the numbers of a pose.
         gaits: (n, legs + 2) in units of the clock.
-        frequency_range: of drawn frequencies, multiples of the prescribed one.
+        frequency_range: range of drawn frequencies, multiples of the prescribed one.
     """
 
     room: np.ndarray
@@ -87,8 +87,8 @@ class GaitAndPoseMemory(NamedTuple):
             of the schedule.
         pose: (..., 6) the present one, which glides to the command.
         gait: (..., legs + 2) the present one, in units of the clock.
-        phase: (...) of the gait, in units of the clock.
-        pose_error: (..., 6) of the torso, a leaky mean over a cycle of the prescribed gait.
+        phase: (...) phase of the gait, in units of the clock.
+        pose_error: (..., 6) error of the torso's pose, a leaky mean over a cycle of the prescribed gait.
         pose_tracking: (...) how well the latest step kept the pose, 0 to 1.
         all_pose_tracking: (...) sum of `pose_tracking` over the steps.
         feet_in_schedule: (...) share of the feet that follow the contact schedule, a leaky mean over the same cycle.
@@ -252,7 +252,7 @@ class GaitAndPose:
         """Return the memory with pose and gait a control step nearer to the command, and the clock advanced.
 
         Args:
-            context: of the task.
+            context: context of the task.
             memory: before the step.
             steps: (...) control steps since the start, this one included.
             is_going: (...) whether the commanded velocity is no stop; at a stop the clock stands still.
@@ -274,7 +274,7 @@ class GaitAndPose:
         """Return the memory with how well the torso keeps its pose, and the feet their schedule.
 
         Args:
-            context: of the task.
+            context: context of the task.
             memory: from `before_feet`.
             readings: after the step.
             feet_in_schedule: (...) share of the feet that followed the contact schedule.
@@ -327,9 +327,9 @@ class GaitAndPose:
         """Return the angles (..., joints) from which the posture is measured: those of the present pose, rad.
 
         Args:
-            context: of the task.
+            context: context of the task.
             memory: after the step.
-            default_angles: (joints,) of the task, rad.
+            default_angles: (joints,) default angles of the task, rad.
         """
         reference = context.reference
         angles_in_pose = (reference.turns * memory.pose[..., None, :]).sum(axis=-1)
@@ -340,7 +340,7 @@ class GaitAndPose:
 
         Args:
             memory: after the step.
-            bonuses: of the command of the velocity, by name.
+            bonuses: bonuses of the command of the velocity, by name.
             step_tracking: (...) tracking of the step.
         """
         gait_tracking = ((memory.feet_in_schedule - _CHANCE_IN_SCHEDULE) / (1.0 - _CHANCE_IN_SCHEDULE)).clip(0.0)

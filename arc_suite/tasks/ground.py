@@ -130,8 +130,8 @@ class Stream(NamedTuple):
     """Stream state of a curriculum, which an episode leaves for the next one.
 
     Attributes:
-        level: of the episode.
-        outcome: of the episode, see `Command.outcome`; NaN where there was none.
+        level: level of the episode.
+        outcome: outcome of the episode, see `Command.outcome`; NaN where there was none.
         failed: whether the episode ended in failure.
         visited: whether the episode visited a level, from the highest one.
     """
@@ -147,7 +147,7 @@ class Lane(NamedTuple):
 
     Attributes:
         middle: (...) y of the middle of the lane, m.
-        level: (...) of the curriculum; 0 without one.
+        level: (...) level of the curriculum; 0 without one.
         visits: (...) whether the episode visits this level, from the highest one.
         steps_under_ground: (...) consecutive control steps for which a foot has been at `SUNK_DEPTH`.
         is_stuck: (...) whether a foot is stuck under the ground, an artifact of contacts.
@@ -192,7 +192,7 @@ class Widened(NamedTuple):
     """Memory of level ground with a curriculum.
 
     Attributes:
-        level: (...) of the curriculum.
+        level: (...) level of the curriculum.
         visits: (...) whether the episode visits this level, from the highest one.
     """
 
@@ -282,7 +282,7 @@ class Lanes(Ground):
     """Lanes along x. An episode draws one lane of the difficulty, or of the level of a curriculum.
 
     Attributes:
-        kinds: of ground, in the order of `terrain.KINDS`; an episode draws one.
+        kinds: kinds of ground, in the order of `terrain.KINDS`; an episode draws one.
         copies: number of lanes of each kind without a curriculum, and of each kind and level with one. There are fewer
             of kinds made of boxes, which take time to simulate.
         middle: share of the lane's length at which a body starts.

@@ -50,7 +50,7 @@ class Upright:
         """Return the memory after a control step.
 
         Args:
-            context: of the task.
+            context: context of the task.
             memory: before the step.
             readings: after it.
             steps: (...) since the start, this one included.

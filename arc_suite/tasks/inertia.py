@@ -12,9 +12,9 @@ class Inertia(NamedTuple):
 
     Attributes:
         mass: kg.
-        center: (3,) of mass in the part's frame, m.
+        center: (3,) center of mass in the part's frame, m.
         principal: (3,) moments of inertia about the principal axes, kg m^2.
-        quaternion: (4,) of the principal axes in the part's frame, w first.
+        quaternion: (4,) quaternion of the principal axes in the part's frame, w first.
     """
 
     mass: float
@@ -26,7 +26,7 @@ class Inertia(NamedTuple):
         """Return the inertia with a point mass added, by the parallel-axis theorem.
 
         Args:
-            mass: of the point, kg.
+            mass: mass of the point, kg.
             point: (3,) position in the part's frame, m.
         """
         total_mass = self.mass + mass

@@ -47,8 +47,8 @@ class Symmetry(NamedTuple):
     """The mirror maps of a task.
 
     Attributes:
-        observation: of vectors (..., size).
-        action: of actions (..., joints), and of joint angles and velocities.
+        observation: mirror of observations (..., size).
+        action: mirror of actions (..., joints), and of joint angles and velocities.
     """
 
     observation: Mirror

@@ -172,7 +172,7 @@ def values(
         overrides: settings of the caller, by name. "base_noise" and "joint_noise" set several kinds of noise; "gait", a
             name of `gaits.NAMES`, sets the duty factor and the phase offsets. A setting under its own name prevails.
         task: its name, for errors.
-        names: of the settings that the task has.
+        names: names of the settings that the task has.
         names_of_others: names of settings that are not the task's, to suggest in errors.
 
     Raises:

@@ -30,7 +30,7 @@ class ViewingLeg(NamedTuple):
     """A leg for which observations are transformed, such that it sees what the first leg would see in its place.
 
     Attributes:
-        index: of the leg in the body.
+        index: index of the leg in the body.
         turn: angle by which planar vectors are turned, rad.
         joints: (joints of a leg, joints) matrix that takes the joints of the leg from those of the body: the sign of
             the joint, 1 or -1, in its column, else 0.
@@ -47,7 +47,7 @@ class Padding(NamedTuple):
     """Where the numbers of one body lie in a longer vector, which has room for bodies with more legs and joints.
 
     Attributes:
-        size: of the longer vector.
+        size: size of the longer vector.
         places: (numbers of the body,) index of each number in the longer vector.
     """
 
@@ -107,8 +107,8 @@ class Scalar(Part):
     """A number that is the same to every leg, such as a height.
 
     Attributes:
-        name: of the number.
-        unit: of the number.
+        name: name of the number.
+        unit: unit of the number.
         sign: 1, or -1 where the mirror changes it, as of a rotation about the vertical axis.
     """
 
@@ -148,8 +148,8 @@ class Planar(_Components):
     """A horizontal vector (2,).
 
     Attributes:
-        name: of the vector.
-        unit: of its components.
+        name: name of the vector.
+        unit: unit of its components.
         axes: names of its components.
         axial: whether it is an axis of rotation, as roll and pitch are to first order.
     """
@@ -172,8 +172,8 @@ class Vector(_Components):
     """A vector (3,) in the world's frame, in that of the heading, or in the torso's.
 
     Attributes:
-        name: of the vector.
-        unit: of its components.
+        name: name of the vector.
+        unit: unit of its components.
         axes: names of its components.
         axial: whether it is an axis of rotation, such as an angular velocity or a torque.
     """
@@ -196,7 +196,7 @@ class Quaternion(Part):
     """An orientation (4,), w first: x and y turn as a planar vector.
 
     Attributes:
-        name: of the quaternion.
+        name: name of the quaternion.
     """
 
     name: str = ""
@@ -223,8 +223,8 @@ class Joints(Part):
 
     Attributes:
         body: with the joints.
-        name: of the numbers; {} stands for the joint's name.
-        unit: of the numbers.
+        name: name of the numbers; {} stands for the joint's name.
+        unit: unit of the numbers.
         signed: whether signs depend on the direction of the joint's axis, as those of angles and torques do.
     """
 
@@ -263,8 +263,8 @@ class Legs(Part):
 
     Attributes:
         body: with the legs.
-        name: of the numbers; {} stands for the leg's name.
-        unit: of the numbers.
+        name: name of the numbers; {} stands for the leg's name.
+        unit: unit of the numbers.
     """
 
     body: Body
@@ -380,11 +380,11 @@ class Phase(Part):
     """Sine and cosine of the phase of a gait (2,).
 
     Attributes:
-        name: of the phase.
+        name: name of the phase.
         offsets: (legs,) by which legs are ahead of the clock, rad: a leg sees its own phase. None where offsets change
             with the gait: a leg sees the clock. Opposite legs are then half a cycle apart in each gait.
-        default_angles: (joints,) of the pose around which the gait moves, rad, which must be symmetric; None where the
-            pose does not count.
+        default_angles: (joints,) angles of the pose around which the gait moves, rad, which must be symmetric;
+            None where the pose does not count.
     """
 
     name: str = ""
@@ -453,8 +453,8 @@ class Grid(_Points):
 
     Attributes:
         points: (2, n) forward and left, R.
-        name: of the numbers; two {} stand for the coordinates.
-        unit: of the numbers.
+        name: name of the numbers; two {} stand for the coordinates.
+        unit: unit of the numbers.
     """
 
     def constants(self, leg: ViewingLeg) -> np.ndarray:
@@ -469,8 +469,8 @@ class Rays(_Points):
 
     Attributes:
         points: (2, n) directions, forward and left.
-        name: of the numbers; {} stands for the angle in degrees.
-        unit: of the numbers.
+        name: name of the numbers; {} stands for the angle in degrees.
+        unit: unit of the numbers.
     """
 
     def view(self, leg: ViewingLeg) -> np.ndarray:
@@ -543,8 +543,8 @@ class Unframed(Part):
 
     Attributes:
         size: how many there are.
-        name: of the numbers; {} stands for the index.
-        unit: of the numbers.
+        name: name of the numbers; {} stands for the index.
+        unit: unit of the numbers.
     """
 
     size: int = 1

@@ -35,14 +35,14 @@ class Readings(NamedTuple):
     behind the other readings, as in the published benchmark.
 
     Attributes:
-        qpos: (..., nq) of the simulation.
+        qpos: (..., nq) qpos of the simulation.
         posture: (..., 5 + joints): torso height over the ground, torso quaternion, joint angles.
         torso_position: (..., 3) in the world.
         torso_quaternion: (..., 4), w first.
         joint_angles: (..., joints) from the standing pose.
         velocities: (..., 6 + joints): torso linear (world) and angular (body), joint velocities.
         contact_forces: (..., 6 * parts), torque and force on each part, clipped to [-1, 1].
-        frame_position: (..., 3) of the torso's frame, world.
+        frame_position: (..., 3) position of the torso's frame, world.
         foot_heights: (..., feet) over the ground.
         efforts: (..., joints) torques of servos, shares of the largest; None for motors, whose actions are the torques.
     """
@@ -181,7 +181,7 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
 
     Args:
         data: `MjData`, or an object that has its fields, with any leading axes.
-        layout: of the body in the model.
+        layout: layout of the body in the model.
         arena: the ground over which heights are measured.
         forces: (..., parts, 6) torque and force on each part in other units or another frame; None
             for those of the simulation, N m and N in the world.

@@ -17,8 +17,8 @@ def costs(readings: Readings, action, previous_action, schedule_errors, default_
 
     Args:
         readings: after the control step.
-        action: (..., joints) of the step.
-        previous_action: (..., joints) of the step before.
+        action: (..., joints) action of the step.
+        previous_action: (..., joints) action of the step before.
         schedule_errors: (...) number of contact schedule errors.
         default_angles: (joints,) rad, from which the posture is measured.
     """

@@ -20,7 +20,7 @@ class WalkSettings(NamedTuple):
     """Settings of a walk.
 
     Attributes:
-        parameters: of the gait, and the target velocity.
+        parameters: parameters of the gait, and the target velocity.
         velocity_band: half-width of the triangular kernel of the velocity, m/s.
         healthy_range: lowest and highest torso height, m.
         weights: signed weight of every term.
@@ -39,15 +39,15 @@ class WalkMemory(NamedTuple):
 
     Attributes:
         tick: (...) control steps since the start.
-        action: (..., joints) of the latest step, clipped to [-1, 1].
-        previous_action: (..., joints) of the step before; 0 before the first.
-        x: (...) of the torso's frame in the world at the latest reading, m.
+        action: (..., joints) action of the latest step, clipped to [-1, 1].
+        previous_action: (..., joints) action of the step before; 0 before the first.
+        x: (...) x of the torso's frame in the world at the latest reading, m.
         forward_velocity: (...) mean of the torso's world x velocity over the latest step, m/s.
         schedule_errors: (...) number of contact schedule errors in the latest step.
         distance: (...) along world x since the start, m.
         all_schedule_errors: (...) sum of `schedule_errors` over the steps.
         healthy: (...) whether the torso is in its healthy range of heights.
-        energy: of the motors.
+        energy: energy of the motors.
     """
 
     tick: int | np.ndarray

@@ -23,7 +23,7 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
 
     Args:
         robots: whose walks.
-        episodes: of a dataset.
+        episodes: episodes of a dataset.
         rounds: how often each has its turn.
 
     Returns:

@@ -46,8 +46,8 @@ def measure(
 
     Args:
         robots: whose walks.
-        rows: of the vector environment.
-        threads: of the vector environment.
+        rows: rows of the vector environment.
+        threads: threads of the vector environment.
         workers: processes of Gymnasium's own.
         rounds: how often each contestant has its turn.
         steps: control steps of a turn, fewer where there are many environments, but not less than a third.

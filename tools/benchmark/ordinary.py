@@ -49,7 +49,7 @@ class OrdinaryEnv(MujocoEnv):
             robot: whose numbers to footage.
             xml_file: the model.
             terminate_when_unhealthy: whether a fall ends the episode.
-            **kwargs: of `MujocoEnv`.
+            **kwargs: keyword arguments of `MujocoEnv`.
         """
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
         settings = Walk.settings_for(ROBOTS[robot], {})

@@ -40,7 +40,7 @@ class Evaluator:
         Args:
             setup: body and task, whose reward has the terms of `TERMS`.
             presets: how many are evaluated at once.
-            episodes: of each.
+            episodes: episodes of each.
             steps: control steps of an episode.
             skipped: first steps that count for neither rewards nor style.
 

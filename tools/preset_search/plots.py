@@ -22,7 +22,7 @@ def course(robot: str, reward: float, generations: Sequence[Generation], length:
     Args:
         robot: whose search it was.
         reward: mean reward of `medium`.
-        generations: of the search.
+        generations: generations of the search.
         length: control steps of an episode, to convert rewards to returns.
     """
     figure = Figure(figsize=(8.0, 6.0), dpi=120, layout="constrained")

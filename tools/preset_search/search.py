@@ -32,9 +32,9 @@ class Generation(NamedTuple):
     """The result of a generation.
 
     Attributes:
-        fitness: of its candidates.
+        fitness: fitness of its candidates.
         reward: mean over the episodes of the fittest.
-        tipping: of the fittest in the hard starts; see `PresetScore`.
+        tipping: tipping of the fittest in the hard starts; see `PresetScore`.
         style: the fittest's costs of style as shares of medium's, in the order of `evaluator.STYLE`.
     """
 
@@ -60,11 +60,11 @@ class Search:
 
         Args:
             setup: a robot that has presets, in a task.
-            seed: of the search and its episodes.
+            seed: seed of the search and its episodes.
             episodes: by which a candidate is evaluated.
             steps: control steps of each.
             starts: to choose the hard ones from, at least `HARD`; 0 for none.
-            space: of the searched parameters, a name of `space.SPACES`.
+            space: space of searched parameters, a name of `space.SPACES`.
 
         Raises:
             ImportError: no package `cma`.
@@ -102,7 +102,7 @@ class Search:
         """Go on by a generation.
 
         Args:
-            fitness: of its candidates, if they have been evaluated before.
+            fitness: fitness of its candidates, if they have been evaluated before.
 
         Returns:
             The result of the generation; None with `fitness`.

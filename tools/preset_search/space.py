@@ -64,7 +64,7 @@ class Space(NamedTuple):
     is the gait's and stays.
 
     Attributes:
-        body: of the robot.
+        body: body of the robot.
         origin: the preset.
     """
 
@@ -132,7 +132,7 @@ class Torques(NamedTuple):
     preset's.
 
     Attributes:
-        body: of the robot.
+        body: body of the robot.
         origin: the preset.
     """
 
@@ -169,10 +169,10 @@ class Kind(NamedTuple):
     """A kind of search with its default settings.
 
     Attributes:
-        space: of the parameters.
+        space: space of the parameters.
         preset: around which it searches.
-        generations: of the search.
-        candidates: of a generation; None for the default of CMA-ES.
+        generations: generations of the search.
+        candidates: candidates of a generation; None for the default of CMA-ES.
         episodes: by which a candidate is evaluated.
         steps: control steps of each.
         skipped: first steps of an episode, in which the robot starts to walk; they do not count.

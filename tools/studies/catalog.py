@@ -35,7 +35,7 @@ def runs_of_the_paper(
         seeds: number of seeds.
         prior: data of the algorithms that take any.
         phases: hyperparameters of the algorithms that have stabilization phases.
-        names: of the algorithms, for fewer than six.
+        names: names of the algorithms, for fewer than six.
         **fields: others of `run`.
     """
     runs = []

@@ -26,9 +26,9 @@ class Claim(NamedTuple):
 
     Attributes:
         text: in short.
-        margin: of a robot, from the metrics of algorithms. It is above zero if the claim holds, and NaN if a metric is
-            missing.
-        metric: of a result; None for the return. The paper's curves have returns alone.
+        margin: margin of a robot, from the metrics of algorithms. It is above zero if the claim holds, and NaN if a
+            metric is missing.
+        metric: metric of a result; None for the return. The paper's curves have returns alone.
     """
 
     text: str
@@ -147,7 +147,8 @@ def next_to_the_papers(studies: Iterable[Sequence[RunResult]], steps: int) -> st
 
     Args:
         studies: results of each study; where several have an algorithm and a robot, the first counts.
-        steps: of the runs; a cell tells where they are fewer, and where hyperparameters are not the published ones.
+        steps: environment steps of the runs; a cell tells if they are fewer, and if hyperparameters are not the
+            published ones.
     """
     our_cells: dict[tuple[str, str], str] = {}
     for run_results in studies:

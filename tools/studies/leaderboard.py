@@ -63,7 +63,7 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
     """Return the rows of a study, one for each kind of run in a place: cells by `HEADS`.
 
     Args:
-        name: of the study.
+        name: name of the study.
         published: folder of its tables.
 
     Raises:

@@ -11,7 +11,7 @@ def write(name: str, study: Study, published: Path) -> Path:
     """Write the report of a study into the folder of its tables, and the leaderboard one folder above.
 
     Args:
-        name: of the study.
+        name: name of the study.
         study: its title and runs.
         published: folder of its tables.
 

@@ -23,7 +23,7 @@ class Case(NamedTuple):
 
     Attributes:
         setup: a body in a kind of walk, whose settings have a `time_limit`.
-        seed: of the initial pose.
+        seed: seed of the initial pose.
     """
 
     setup: Setup

@@ -26,7 +26,7 @@ def dropdown(title: str, heads: Sequence[str], lines: Iterable[Sequence[str]]) -
 
     Args:
         title: text on which to click.
-        heads: of the columns.
+        heads: heads of the columns.
         lines: cells of each line of the table.
     """
     head_line = _table_line("th", heads)

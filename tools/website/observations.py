@@ -25,8 +25,8 @@ class Entry(NamedTuple):
 
     Attributes:
         block: name of its block.
-        name: of the number.
-        unit: of the number; empty if it has none.
+        name: name of the number.
+        unit: unit of the number; empty if it has none.
     """
 
     block: str

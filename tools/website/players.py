@@ -52,7 +52,7 @@ def frame(source: str, title: str, style_class: str = "creature") -> str:
 
     Args:
         source: path of the page that is shown.
-        title: of the frame.
+        title: title of the frame.
         style_class: one of docs/_static/site.css.
     """
     attributes = {"class": style_class, "src": source, "title": title, "loading": "lazy"}

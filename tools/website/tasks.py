@@ -70,7 +70,7 @@ def page(name: str, written: str = "") -> str:
     """Return the page of a task.
 
     Args:
-        name: of the task.
+        name: name of the task.
         written: text of its page in docs/; empty for a task on ground, which docs/ground.md explains.
     """
     tasks = {robot: Setup.of(robot, name).definition for robot in ROBOTS}

@@ -156,7 +156,7 @@ def run_search(folder: pathlib.Path, search: Search, settings: Mapping[str, Any]
     """Start or continue a search, behind a progress bar.
 
     Args:
-        folder: of the journal.
+        folder: folder of the journal.
         search: without bodies; gets those of the journal, and new bodies.
         settings: that determine the search.
     """
@@ -240,7 +240,7 @@ def check_one_step(trial: Trial, body: Body | str) -> None:
     """Let one body take a step, to find errors before the search.
 
     Args:
-        trial: of the search.
+        trial: trial of the search.
         body: to try, or the reason why there is no body.
 
     Raises:

@@ -173,7 +173,7 @@ class TableLine(NamedTuple):
     """A line of a table.
 
     Attributes:
-        name: of a metric.
+        name: name of a metric.
         metric: with its `unit` and the value `prescribed`, if it has them; see `style.report`.
         cells: one for each column.
     """
@@ -188,7 +188,7 @@ def print_report(robot: str, reports: Mapping[str, Mapping[str, Any]]) -> None:
 
     Args:
         robot: its name.
-        reports: of `style.report`, by label of the policy.
+        reports: reports of `style.report`, by label of the policy.
     """
     print_table(robot, list(reports), _robot_lines(list(reports.values())))
     first_report = next(iter(reports.values()))
@@ -221,9 +221,9 @@ def print_table(heading: str, columns: list[str], lines: list[TableLine]) -> Non
     """Print a table.
 
     Args:
-        heading: of the first column.
+        heading: heading of the first column.
         columns: headings of the columns of cells.
-        lines: of the table.
+        lines: lines of the table.
     """
     texts = [*columns, *(cell for line in lines for cell in line.cells)]
     cell_width = max(8, *(len(text) for text in texts))

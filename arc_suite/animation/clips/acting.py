@@ -136,7 +136,7 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     Args:
         body: the spec.
         rest: first pose.
-        targets: (steps + 1, joints) of position control, rad; NaN for no torque.
+        targets: (steps + 1, joints) targets of position control, rad; NaN for no torque.
         damping_share: damping of the joints, as a share of their own.
 
     Returns:

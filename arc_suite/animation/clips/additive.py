@@ -23,7 +23,7 @@ def find_bases(
 
     Args:
         body: the spec.
-        name: of the additive clip.
+        name: name of the additive clip.
         motion_of_clip: motions by name, with frames of one rate.
         loops: whether each clip loops, by name.
         idle: first pose of the idle clip, which engines subtract from additive clips.
@@ -60,9 +60,9 @@ def add_clip(motion: Motion, idle: Pose, base_motion: Motion, base_frames: np.nd
     """Return the poses (frames, 7 + joints) of an additive clip over a base, with a root at 0.
 
     Args:
-        motion: of the additive clip.
+        motion: motion of the additive clip.
         idle: pose that is subtracted from it.
-        base_motion: of the base.
+        base_motion: motion of the base.
         base_frames: (frames,) the frame of the base for each frame of the additive clip.
     """
     turns = rotations.product(motion.quaternions, idle.quaternion * _CONJUGATE)

@@ -20,7 +20,7 @@ def align_bones(parts: Sequence[Part]) -> list[Part]:
     lies along its hinge has the hinge as y. A foot has the direction of the link above. The torso keeps its frame.
 
     Args:
-        parts: of a body, those above first.
+        parts: parts of a body, those above first.
     """
     positions, orientations = part_frames(parts)
     axes_of_bones: list[np.ndarray] = []  # (3, 3) in the world, as columns
@@ -85,7 +85,7 @@ def _bone_axes(hinge: np.ndarray | None, link: np.ndarray | None, parent_axes: n
     Args:
         hinge: (3,) its direction; None for a part without a joint.
         link: (3,) direction to the next part; None for the last part of a leg.
-        parent_axes: (3, 3) of the bone above.
+        parent_axes: (3, 3) axes of the bone above.
     """
     if link is None and hinge is None:
         return parent_axes

@@ -30,7 +30,7 @@ class Passage(NamedTuple):
 
     Attributes:
         starts: whether it begins at rest.
-        cycles: of the gait.
+        cycles: cycles of the gait.
     """
 
     starts: bool

@@ -68,12 +68,12 @@ def animate(
 
     Args:
         robot, task, task_kwargs: see `arc_suite.load`.
-        path: of the file.
+        path: path of the file.
         clips: names of `CLIPS`, or `module:name` of clips of other packages, one or several; or "all".
         policy, preset, fps, straight, plant: see `clips.clips`.
         progress: wraps what takes long, as `tqdm` does.
-        options: of a `.glb`, `rig`, `root_motion`, `triangles`, `uv` and `reduce`, see `creatures.glb`; of pictures,
-            `size` in pixels, `transparent`, `turntable` of a film and `directions` of a sheet, see `filming`.
+        options: options of a `.glb`, `rig`, `root_motion`, `triangles`, `uv` and `reduce`, see `creatures.glb`; of
+            pictures, `size` in pixels, `transparent`, `turntable` of a film and `directions` of a sheet, see `filming`.
 
     Raises:
         ValueError: an option that does not suit the file, or as `clips.clips`.

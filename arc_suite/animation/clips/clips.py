@@ -27,7 +27,7 @@ class Clip(NamedTuple):
         name: see `catalog.clip_of`, without a module.
         motion: a sample for each frame, both ends included.
         loops: whether the last pose is the first one.
-        cycles: of the gait.
+        cycles: cycles of the gait.
         foot_contacts: events, in the order of time.
         feet: names of all feet.
         slip: mean path of a foot in stance over the ground, m a meter of the root; None if the root stays.
@@ -81,8 +81,8 @@ def clips(
         setup: body and task.
         names: see `catalog.clip_of`.
         policy: see `policies.policy`.
-        preset: of the policy; None for `steered` on level ground with a command, elsewhere for the one that suits the
-            task and the body.
+        preset: preset of the policy; None for `steered` on level ground with a command, elsewhere for the one that
+            suits the task and the body.
         fps: frames a second.
         progress: wraps the recordings, such as `tqdm`.
         straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body

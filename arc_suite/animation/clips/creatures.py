@@ -48,7 +48,7 @@ def glb(
 
     Args:
         body: any body.
-        clips: of the body.
+        clips: clips of the body.
         rig: skin, or nodes, each with the mesh of its part.
         root_motion: moving, in_place, or both, two animations of each clip that moves.
         generator: what the file says that it was made by.
@@ -92,7 +92,7 @@ class _Nodes(NamedTuple):
 
     Attributes:
         root: that on the ground below the torso.
-        parts: of each part.
+        parts: one value for each part.
     """
 
     root: int
@@ -253,7 +253,7 @@ class _Track(NamedTuple):
 
     Attributes:
         node: its index.
-        path: of the property: translation or rotation.
+        path: path of the property: translation or rotation.
         times: accessor of the times of keys.
         values: accessor of the values of keys.
     """
@@ -272,8 +272,8 @@ class _ClipTracks:
 
         Args:
             document: to add tracks to.
-            clip: of the tracks.
-            max_errors: of reduced tracks, by the path of the property; None for a key in each frame.
+            clip: clip of the tracks.
+            max_errors: largest errors of reduced tracks, by the path of the property; None for a key in each frame.
         """
         self._document = document
         self._clip = clip
@@ -315,10 +315,10 @@ def _add_animations(
     """Add the animations of a clip, moving, in place or both, which share all tracks except those of the root.
 
     Args:
-        document: of the file.
+        document: document of the file.
         clip: to add.
-        parts: of the body.
-        nodes: of the root and the parts.
+        parts: parts of the body.
+        nodes: nodes of the root and the parts.
         roots_move: whether the root moves, for each animation.
         max_errors: see `_ClipTracks`.
     """

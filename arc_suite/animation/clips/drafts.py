@@ -49,7 +49,7 @@ class Draft(NamedTuple):
     """A motion with a sample for every substep.
 
     Attributes:
-        motion: of the body.
+        motion: motion of the body.
         cycles: gait cycles that it holds; 0 without a gait.
         cycle: duration of a gait cycle, s; NaN without a gait.
         loops: whether its last pose is its first one.
@@ -106,7 +106,7 @@ def make_drafts(
     """Record what clips need, and return their drafts by name, with those of the clips that they connect to.
 
     Args:
-        recorder: of the body.
+        recorder: recorder of the body.
         names: see `catalog.clip_of`, without modules.
         progress: wraps the recordings.
         left_out: takes the reasons why clips cannot be made, by name.
@@ -303,7 +303,7 @@ def _make_clips_from_rest(
         body: the spec.
         transition: from which rest, stops and starts are taken.
         turns: recordings by name.
-        names: of the clips.
+        names: names of the clips.
         walk: that stops and starts connect to, with feet as in the physics.
         planted_walk: the same with planted feet; None if feet are not to be planted.
         left_out: takes the reasons why clips cannot be made.

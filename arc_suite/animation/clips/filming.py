@@ -33,12 +33,12 @@ def film_pictures(
     """Yield the pictures of a film that plays forever, one for each frame of the clip.
 
     Args:
-        body: of the clip.
+        body: body of the clip.
         clip: to show; its root stays.
-        size: of the square pictures, pixels.
+        size: size of the square pictures, pixels.
         transparent: whether all but the body is left out.
         turntable: whether the body turns once while the clip is repeated.
-        heading: of the body, rad; at 0 it goes to the right, at -pi / 2 towards the viewer.
+        heading: heading of the body, rad; at 0 it goes to the right, at -pi / 2 towards the viewer.
 
     Yields:
         (size, size, 3 or 4) uint8; the last value is the alpha of a transparent picture.
@@ -68,9 +68,9 @@ def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent
     those of `film_pictures`.
 
     Args:
-        body: of the clip.
+        body: body of the clip.
         clip: to show.
-        size: of a square, pixels.
+        size: size of a square, pixels.
         directions: how many.
         transparent: whether all but the body is left out.
     """

@@ -28,7 +28,7 @@ class FootContact(NamedTuple):
     Attributes:
         foot: name of its body.
         event: `TOUCH_DOWN` or `LIFT_OFF`.
-        sample: of the motion.
+        sample: sample of the motion.
         time: s from its start.
     """
 
@@ -42,7 +42,7 @@ def sole_heights(model: mujoco.MjModel, body: Body, poses: np.ndarray) -> np.nda
     """Return the heights (samples, feet), m, of the feet's lowest points over a level floor.
 
     Args:
-        model: of the body.
+        model: model of the body.
         body: its spec.
         poses: (samples, 7 + joints) in the world.
     """
@@ -62,7 +62,7 @@ def find_swings(heights: np.ndarray, min_rise: float, bounce: float, loops: bool
     """Return when a foot swings, (samples,) booleans.
 
     Args:
-        heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.
+        heights: (samples,) heights of its lowest point, m; of a loop without the last sample, which is the first one.
         min_rise: m; a foot that rises less does not swing.
         bounce: samples; a shorter contact does not end a swing.
         loops: whether the first sample follows the last.
@@ -96,7 +96,7 @@ def find_touching(heights: np.ndarray, swings: np.ndarray, near: float, loops: b
     end of the samples, or already rises at the start, does not touch there.
 
     Args:
-        heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.
+        heights: (samples,) heights of its lowest point, m; of a loop without the last sample, which is the first one.
         swings: (samples,) when it swings.
         near: m.
         loops: whether the first sample follows the last.
@@ -126,10 +126,10 @@ def find_foot_contacts(
     """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
 
     Args:
-        motion: of the body.
+        motion: motion of the body.
         body: its spec.
-        heights: (samples, feet) of the soles, m.
-        cycle: of the gait, s.
+        heights: (samples, feet) heights of the soles, m.
+        cycle: cycle of the gait, s.
         loops: whether the motion is a loop; its last sample is its first one then, and has no events.
         min_rise: standing heights; a foot that rises less stays on the ground.
     """

@@ -224,8 +224,8 @@ def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> Motion:
     Args:
         body: the spec.
         rest: pose from which it turns.
-        number: of the pose that changes; see `posture.POSE_NAMES`.
-        sign: of the change.
+        number: number of the pose that changes; see `posture.POSE_NAMES`.
+        sign: sign of the change.
 
     Raises:
         ValueError: the legs have no room for it.
@@ -278,7 +278,7 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
     Args:
         body: the spec.
         rest: pose from which the torso moves.
-        poses: (samples, 6) of the torso from there; see `posture`.
+        poses: (samples, 6) poses of the torso from there; see `posture`.
         lifts: (samples, legs, 3) by which feet leave their positions, standing heights; None for feet that stay.
     """
     standing_height = body.torso.standing_height
@@ -311,9 +311,9 @@ def _follow_with_legs(
     Args:
         body: the spec.
         rest: pose from which the torso moves.
-        poses: (samples, 6) of the torso at full size.
+        poses: (samples, 6) poses of the torso at full size.
         action: what an error says that the body has no room to do.
-        lifts: (samples, legs, 3) of the feet at full size, standing heights; None for feet that stay.
+        lifts: (samples, legs, 3) lifts of the feet at full size, standing heights; None for feet that stay.
 
     Raises:
         ValueError: the legs cannot follow the smallest size.

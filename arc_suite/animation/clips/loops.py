@@ -58,7 +58,7 @@ class Closing(NamedTuple):
 
     Attributes:
         seam: rad, difference of the poses at both ends of the best of these loops.
-        samples: of a loop; the sample after the last is the first one again.
+        samples: samples of a loop; the sample after the last is the first one again.
     """
 
     seam: float
@@ -70,7 +70,7 @@ def find_closings(recording: Recording, cycle: float, most_cycles: int) -> Mappi
 
     Args:
         recording: with some cycles more than the longest loop.
-        cycle: of the gait, s.
+        cycle: cycle of the gait, s.
         most_cycles: in a loop.
     """
     substeps = recording.substeps
@@ -96,7 +96,7 @@ def choose_cycles(closings: Mapping[str, Mapping[int, Closing]], good_seam: floa
     The fewest recordings have a seam over `MAX_SEAM`, then the fewest one over `good_seam`; of equal numbers the least.
 
     Args:
-        closings: of each recording, by its name; see `find_closings`.
+        closings: closings of each recording, by its name; see `find_closings`.
         good_seam: rad.
 
     Raises:
@@ -123,7 +123,7 @@ def choose_start(recording: Recording, samples: int) -> int:
 
     Args:
         recording: to choose from.
-        samples: of the loop.
+        samples: samples of the loop.
     """
     torso = ground_poses(recording.poses)
     displacements = twist_to(relative_pose(torso[:-samples], torso[samples:]))
@@ -151,7 +151,7 @@ def cut_loop(recording: Recording, first: int, samples: int) -> Motion:
     Args:
         recording: to take the loop from.
         first: sample with which the loop begins.
-        samples: of the loop; the sample after the last is the first one again.
+        samples: samples of the loop; the sample after the last is the first one again.
     """
     poses = recording.poses[first : first + samples + 1]
     displacement, torso_on_root = _fit_root(ground_poses(poses))

@@ -26,7 +26,7 @@ def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
     """Return the shapes of a part in its frame, one mesh for each material.
 
     Args:
-        part: of a body.
+        part: part of a body.
         tolerance: m, by which a face may cut into a round shape.
     """
     return _join_by_material([_ShapeMesh(shape, _make_mesh(shape, tolerance)) for shape in part.shapes])
@@ -38,7 +38,7 @@ def body_meshes(
     """Return the meshes of parts, each by material, in the parts' frames.
 
     Args:
-        parts: of a body.
+        parts: parts of a body.
         height: at which the body stands, m.
         triangles: that all meshes may have together; None for as many as look round. Where these are more, round
             shapes and hulls become coarser, and the smallest are left out.
@@ -73,9 +73,9 @@ def _make_coarse(parts: Sequence[Part], tolerance: float, max_triangles: int) ->
     """Return the shapes of parts with meshes that have at most a number of triangles together.
 
     Args:
-        parts: of a body.
+        parts: parts of a body.
         tolerance: m, of the first meshes that are tried.
-        max_triangles: of all meshes.
+        max_triangles: largest number of triangles of all meshes.
     """
     shapes_of_parts = [[_simplify(shape) for shape in part.shapes] for part in parts]
     largest_size = max(max(shape.size) for part_shapes in shapes_of_parts for shape in part_shapes)

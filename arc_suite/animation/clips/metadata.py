@@ -35,8 +35,8 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
     """Return the metadata of clips by name of the animation, and their blend spaces.
 
     Args:
-        body: of the clips.
-        clips: of one file.
+        body: body of the clips.
+        clips: clips of one file.
         root_motion: that of the file; see `creatures.glb`.
     """
     roots_move = ROOT_MOTIONS[root_motion]
@@ -97,7 +97,7 @@ def name_animations(clip: Clip, roots_move: Sequence[bool]) -> dict[str, bool]:
 
     Args:
         clip: any.
-        roots_move: of `ROOT_MOTIONS`: whether the root moves, for each animation of a clip that moves.
+        roots_move: value of `ROOT_MOTIONS`: whether the root moves, for each animation of a clip that moves.
     """
     suffix = "_loop" if clip.loops else ""
     if not clip.moves:

@@ -36,7 +36,7 @@ def plant_feet(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     Args:
         body: the spec.
         motion: whose soles in stance are on the ground.
-        cycle: of the gait, s.
+        cycle: cycle of the gait, s.
         loops: whether the last sample is the first one.
     """
     standing_height = body.torso.standing_height
@@ -110,9 +110,9 @@ def _find_stances_of_legs(
     """Return the stances of each leg; of a loop, those in three rounds.
 
     Args:
-        legs: of the body.
+        legs: legs of the body.
         standing_height: m.
-        motion: of the body.
+        motion: motion of the body.
         min_swing: samples; a shorter swing does not end a stance.
         loops: whether the last sample is the first one.
     """
@@ -154,10 +154,10 @@ def _move_feet_nearer(
     """Return the motion with feet in stance nearer to a point of the ground that is the same throughout the stance.
 
     Args:
-        legs: of the body.
+        legs: legs of the body.
         standing_height: m.
         motion: to change.
-        stances: of each leg; of a loop, those in three rounds.
+        stances: stances of each leg; of a loop, those in three rounds.
         max_joint_steps: (legs,) rad, by which a joint of a leg may turn between two samples.
         loops: whether the last sample is the first one.
     """
@@ -185,7 +185,7 @@ def _solve_joint_angles(
     """Return the angles (samples, legs, links), rad, of legs with the largest share of a correction that they follow.
 
     Args:
-        legs: of the body.
+        legs: legs of the body.
         standing_height: m.
         poses: (samples, 7 + joints) in the world.
         feet: (samples, legs, 3) positions of their centers, m.
@@ -228,8 +228,8 @@ def _corrections(positions: np.ndarray, radius: float, stances: list[tuple[int, 
     """Return what to add to the positions (samples, 3) of a foot's center, m.
 
     Args:
-        positions: of the foot in the world, m.
-        radius: of the foot, m.
+        positions: positions of the foot in the world, m.
+        radius: radius of the foot, m.
         stances: see `_find_stances`.
         keeps_ends: whether a stance at an end of the motion stays where it is there.
     """
@@ -253,8 +253,8 @@ def _stance_corrections(positions: np.ndarray, radius: float, keeps_first: bool,
     """Return what to add to the positions (samples, 3) of a foot's center in one stance, m.
 
     Args:
-        positions: of the foot in the world, m.
-        radius: of the foot, m.
+        positions: positions of the foot in the world, m.
+        radius: radius of the foot, m.
         keeps_first: whether the foot stays where it is in the first sample.
         keeps_last: whether the foot stays where it is in the last sample.
     """

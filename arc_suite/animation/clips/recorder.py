@@ -31,9 +31,9 @@ class GaitRecording(NamedTuple):
 
     Attributes:
         recording: the poses.
-        cycle: of the gait, s.
-        phase: of the first foot at the first sample, cycles since its scheduled touchdown; None if the task has no
-            clock.
+        cycle: cycle of the gait, s.
+        phase: phase of the first foot at the first sample, cycles since its scheduled touchdown; None if the task has
+            no clock.
     """
 
     recording: Recording
@@ -95,9 +95,9 @@ class Recorder:
     """Makes recordings of a body, each from the start of an episode.
 
     Attributes:
-        body: of the recordings.
+        body: body of the recordings.
         has_command: whether the task has a command of velocities.
-        velocity_units: (3,) of commands: forward and left, m/s, turning, rad/s; None without a command.
+        velocity_units: (3,) units of commands: forward and left, m/s, turning, rad/s; None without a command.
     """
 
     def __init__(self, setup: Setup, policy: str, preset: str | None):
@@ -109,7 +109,7 @@ class Recorder:
         Args:
             setup: body and task.
             policy: see `policies.policy`.
-            preset: of the policy; None for the one that suits the task and the body.
+            preset: preset of the policy; None for the one that suits the task and the body.
 
         Raises:
             ValueError: a policy or preset that does not fit.

@@ -20,7 +20,7 @@ class Recording(NamedTuple):
 
     Attributes:
         time_step: s between two poses.
-        substeps: of a control step.
+        substeps: substeps of a control step.
         poses: (samples, 7 + joints): torso position and quaternion in the world, joint angles from the standing pose,
             rad.
     """
@@ -44,7 +44,7 @@ def record(
     begins, with the same controls, which is bit-exact.
 
     Args:
-        environment: of `arc_suite.load`; its next episode is played.
+        environment: environment of `arc_suite.load`; its next episode is played.
         policy: made for one environment.
         settle: control steps before the recording.
         steps: control steps to record.

@@ -19,8 +19,8 @@ class Pose(NamedTuple):
     """A pose in the root's frame, or the difference of two.
 
     Attributes:
-        position: (3,) of the torso, m.
-        quaternion: (4,) of the torso, w first.
+        position: (3,) position of the torso, m.
+        quaternion: (4,) quaternion of the torso, w first.
         joints: (joints,) rad.
     """
 
@@ -43,8 +43,8 @@ class Motion(NamedTuple):
     Attributes:
         time_step: s between two samples.
         root: (samples, 3) ground poses of the root; yaw is continuous and starts at 0.
-        positions: (samples, 3) of the torso in the root's frame, m.
-        quaternions: (samples, 4) of the torso in the root's frame, w first.
+        positions: (samples, 3) positions of the torso in the root's frame, m.
+        quaternions: (samples, 4) quaternions of the torso in the root's frame, w first.
         joints: (samples, joints) rad.
         twist: (3,) mean velocity of the root in its own frame.
         seam: rad, largest difference that was spread over the motion so that an end meets another pose.
@@ -211,7 +211,7 @@ def follow_mean_path(recording: Recording, first: int, samples: int, window: int
     Args:
         recording: with half a window more at both ends.
         first: sample with which the motion begins.
-        samples: of the motion, without the last.
+        samples: samples of the motion, without the last.
         window: samples that the mean is taken over, a gait cycle.
     """
     torso = ground_poses(recording.poses)

@@ -15,7 +15,7 @@ class Mesh(NamedTuple):
 
     Attributes:
         points: (n, 3)
-        normals: (n, 3) of unit length.
+        normals: (n, 3) normals of unit length.
         triangles: (m, 3) indices of points.
         uv: (n, 2) texture coordinates, to the right and down; None for a mesh without.
     """
@@ -52,7 +52,7 @@ def shape_mesh(kind: str, size, tolerance: float, min_segments: int = MIN_SEGMEN
     """Return the mesh of a shape about its center.
 
     Args:
-        kind: of `KINDS`.
+        kind: kind of `KINDS`.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
         tolerance: m, by which a face may cut into a round shape.
         min_segments: around a round shape.
@@ -124,7 +124,7 @@ def _merge_poles(points, normals, triangles, segments: int) -> Mesh:
 
     Args:
         points: (rings * segments, 3) from the upper pole down.
-        normals: of the points.
+        normals: normals of the points.
         triangles: (m, 3) between the rings.
         segments: points in a ring.
     """

@@ -56,8 +56,8 @@ class Map(NamedTuple):
     """Cells of bodies.
 
     Attributes:
-        names: of the axes.
-        edges: of the bins by axis; None for counts.
+        names: names of the axes.
+        edges: edges of the bins by axis; None for counts.
     """
 
     names: tuple[str, ...]
@@ -68,7 +68,7 @@ class Map(NamedTuple):
         """Return the map of one or two axes.
 
         Args:
-            names: of the axes.
+            names: names of the axes.
             around: a body whose variants are searched, with bins about it; None for bins of all bodies.
             amount: standard deviation of the logarithms of the variants' lengths.
 

@@ -40,9 +40,9 @@ class Elite(NamedTuple):
     """The best body of a cell.
 
     Attributes:
-        label: of the cell.
-        cell: of the map.
-        number: of the body in the table.
+        label: label of the cell.
+        cell: cell of the map.
+        number: number of the body in the table.
         body: the body.
         first: its first walk; see `trials.Outcome`.
         second: its second walk.

@@ -22,7 +22,7 @@ class Budget(NamedTuple):
     """What a body may spend.
 
     Attributes:
-        mass: of every body, kg; its density follows.
+        mass: mass of every body, kg; its density follows.
         span: greatest extent of the standing body along x, y or z, m.
         height: greatest standing height, m.
         power: greatest mean of the motors' positive power over a walk, W/kg.
@@ -143,7 +143,7 @@ def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: st
         budget: to keep.
         space: that makes bodies of genes.
         genes: (n,) from 0 to 1.
-        name: of the body.
+        name: name of the body.
 
     Raises:
         ValueError: a length or density out of range.

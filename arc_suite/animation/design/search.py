@@ -32,8 +32,8 @@ class Candidate(NamedTuple):
 
     Attributes:
         genes: (n,) from 0 to 1.
-        cell: of the map; None for genes that make no body.
-        outcome: of the body.
+        cell: cell of the map; None for genes that make no body.
+        outcome: outcome of the body.
     """
 
     genes: tuple[float, ...]
@@ -84,11 +84,11 @@ class Search:
         """Start a search.
 
         Args:
-            space: of genes.
+            space: genes.
             cell_map: with the cells to fill.
             trial: by which bodies are evaluated.
-            seed: of the genes.
-            stem: of the names of bodies, `<stem>_<index>`.
+            seed: seed of the genes.
+            stem: first part of the names of bodies, `<stem>_<index>`.
             random_bodies: number of bodies of random genes, with which the search begins.
         """
         self.genes = space.names

@@ -46,12 +46,12 @@ class Goal(NamedTuple):
     """What bodies are searched for.
 
     Attributes:
-        metric: of a walk, a field of `WalkMeans`.
+        metric: metric of a walk, a field of `WalkMeans`.
         sign: 1 for a metric to be raised, -1 for a metric to be lowered.
         task: name of the default task.
-        preset: of the demonstrator; None for the one that suits task and body.
+        preset: preset of the demonstrator; None for the one that suits task and body.
         may_fall: whether a fall lowers the metric only, and does not exclude the body.
-        unit: of the metric.
+        unit: unit of the metric.
     """
 
     metric: str
@@ -79,8 +79,8 @@ class Round(NamedTuple):
     """The episodes of one evaluation.
 
     Attributes:
-        settings: of the task.
-        seeds: of the episodes.
+        settings: settings of the task.
+        seeds: seeds of the episodes.
         steps: control steps of each.
     """
 
@@ -141,7 +141,7 @@ def evaluate(trial: Trial, body: Body | str, elite_value: float) -> Outcome:
     Args:
         trial: how to evaluate.
         body: to evaluate, or the reason why there is no body.
-        elite_value: of the metric; see `Goal.value`.
+        elite_value: value of the metric; see `Goal.value`.
     """
     if isinstance(body, str):
         return Outcome(body)

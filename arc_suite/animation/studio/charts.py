@@ -37,7 +37,7 @@ class Charts:
         """Draw the last control steps.
 
         Args:
-            history: of the walk.
+            history: history of the walk.
             leg_names: in the order of the feet in the history.
         """
         if not len(history):

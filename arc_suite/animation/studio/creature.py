@@ -22,17 +22,17 @@ class Creature(NamedTuple):
     """A creature that can walk.
 
     Attributes:
-        sketch: of which it is made.
+        sketch: sketch of which it is made.
         setup: body, task and settings.
         environment: in which it walks. Episodes have no time limit; physics that diverges ends an episode.
         act: maps a `TimeStep` to an action.
-        flaws: of the body.
+        flaws: flaws of the body.
         links: names of the links of its legs.
         tile: side of the square tiles of its ground, m: the standing height of the body at scale 1. So tiles show how
             much a sketch scales the body.
         reach: greatest distance of a point of the body from the torso's origin along an axis, m.
         parts: visible parts of the body; a part follows its parent.
-        materials: of the parts, by name.
+        materials: materials of the parts, by name.
     """
 
     sketch: Sketch

@@ -34,7 +34,7 @@ class Editor:
 
         Args:
             change: maps the present state to the new one.
-            name: of what changes; see `states.record_edit`.
+            name: name of what changes; see `states.record_edit`.
         """
         with self.lock:
             state = change(self._edits.now)

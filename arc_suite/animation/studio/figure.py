@@ -25,10 +25,10 @@ class Figure:
         """Add a creature, in its standing pose.
 
         Args:
-            scene: of viser.
+            scene: scene of viser.
             root: name of a node of the scene.
             creature: to show.
-            unit: of lengths in the scene, m.
+            unit: unit of lengths in the scene, m.
         """
         self.creature = creature
         self._scene = scene

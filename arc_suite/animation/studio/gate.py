@@ -88,8 +88,8 @@ def offers(handle: Any, value: Any) -> bool:
     """Return whether a widget offers a value: an option of a list, a number in a range, or a text of bounded length.
 
     Args:
-        handle: of viser.
-        value: of any type, as a visitor sends it.
+        handle: handle of viser.
+        value: value of any type, as a visitor sends it.
     """
     for handle_type, is_valid in _IS_VALID_VALUE.items():
         if isinstance(handle, handle_type):
@@ -166,7 +166,7 @@ def admits(request: Request, host: str, token: str) -> bool:
     """Return whether a request comes from a page of this server, under a name of this machine, with the token.
 
     Args:
-        request: of a browser.
+        request: request of a browser.
         host: that the server listens on.
         token: that the address or the cookie must hold.
     """

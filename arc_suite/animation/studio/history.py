@@ -19,7 +19,7 @@ class Moment(NamedTuple):
         terms: weighted terms of the reward by name.
         stance: (feet,) whether the foot is in stance; None in a task without a gait.
         schedule: (feet,) whether the gait schedules a stance, at a stop for all feet; None in a task without a gait.
-        position: (2,) of the torso over the ground, m.
+        position: (2,) position of the torso over the ground, m.
         desired_speed: by command, m/s; NaN without a command.
     """
 

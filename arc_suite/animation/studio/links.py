@@ -30,9 +30,9 @@ class LinkWidgets:
         """Add the widgets to the present container of the page.
 
         Args:
-            gui: of the page.
+            gui: gui of the page.
             view: that shows the balls.
-            editor: of the state.
+            editor: editor of the state.
             show_state: has all widgets of the page show the state.
             switch_dragging: called when visitors begin or end to drag links.
         """

@@ -44,8 +44,8 @@ class _Key(NamedTuple):
     Attributes:
         label: says what it does.
         letter: on the key.
-        field: of the command.
-        change: of the field.
+        field: field of the command.
+        change: change of the field.
     """
 
     label: str

@@ -32,8 +32,8 @@ class File(NamedTuple):
     """A kind of file of a creature.
 
     Attributes:
-        label: of its button.
-        suffix: of its name, after the name of the body.
+        label: label of its button.
+        suffix: suffix of its name, after the name of the body.
         make: returns the content for a creature, the positions (nq,) of its pose, and the commands of its task.
     """
 

@@ -29,8 +29,8 @@ class Walker:
 
     Attributes:
         creature: that walks.
-        episodes: of the creature.
-        history: of the episodes.
+        episodes: episodes of the creature.
+        history: history of the episodes.
     """
 
     def __init__(self, creature: Creature):
@@ -65,7 +65,7 @@ class Session:
     of `run`.
 
     Attributes:
-        walker: of the latest sketch.
+        walker: walker of the latest sketch.
         companion: an earlier creature that was kept, and follows the same command; None without one.
         error: one line that says why the latest sketch makes no creature; empty if it makes one.
         velocity: (3,) that visitors command, in multiples of the body's own; None for the task's command.

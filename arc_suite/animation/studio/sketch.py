@@ -30,7 +30,7 @@ class Sketch:
     """A creature and what it does.
 
     Attributes:
-        source: of the body: `LEGS`, `RANDOM`, the name of a robot or an example, or `FILE`.
+        source: source of the body: `LEGS`, `RANDOM`, the name of a robot or an example, or `FILE`.
         legs: number of legs, for the source `LEGS`.
         links: actuated links of each leg, for the source `LEGS`.
         layout: pairs, radial or `DEFAULT_CHOICE`, for the source `LEGS`.
@@ -257,7 +257,7 @@ def open_file(sketch: Sketch, text: str) -> Sketch:
 
     Args:
         sketch: whose task and policy stay.
-        text: of the spec file.
+        text: text of the spec file.
     """
     body_fields: dict[str, Any]
     body_fields = {field.name: field.default for field in dataclasses.fields(Sketch) if field.name not in _TASK_FIELDS}
@@ -275,7 +275,7 @@ def length_factor(sketch: Sketch, link: str) -> float:
     """Return the length of a link as a multiple of its length in the source body.
 
     Args:
-        sketch: of the body.
+        sketch: sketch of the body.
         link: name of a link in all legs, or name of its part in one leg.
     """
     original_ends = _original_ends(sketch)
@@ -392,7 +392,7 @@ def _shape_changes(sketch: Sketch, body: Body) -> dict[str, Any]:
 
     Args:
         sketch: with proportions.
-        body: of the source.
+        body: body of the source.
     """
     shape: dict[str, Any] = {name: getattr(sketch, name) for name in Shape._fields if name not in ("links", "ends")}
     links = link_names(body)

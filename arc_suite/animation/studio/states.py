@@ -108,8 +108,9 @@ def record_edit(edits: Edits, state: PageState, name: str, time: float) -> Edits
     Args:
         edits: the history so far.
         state: the new state.
-        name: of what has changed. Changes of one name that follow each other at once, as in a drag, are one change.
-        time: of the change, s.
+        name: name of what has changed. Changes of one name that follow each other at once, as in a drag, are one
+            change.
+        time: time of the change, s.
     """
     if state == edits.now:
         return edits
@@ -179,7 +180,7 @@ def _read(part_class: type, value: Any, part_name: str) -> Any:
 
     Args:
         part_class: `Sketch` or `VisitorCommand`.
-        value: of JSON.
+        value: value of JSON.
         part_name: with which errors begin.
     """
     defaults = {field.name: field.default for field in dataclasses.fields(part_class)}

@@ -97,7 +97,7 @@ class View:
 
         Args:
             qpos: (nq,) positions of the creature.
-            markers: of the task.
+            markers: markers of the task.
             companion_qpos: (nq,) positions of the companion; None without one.
         """
         with self._server.atomic():
@@ -122,8 +122,8 @@ class View:
         The companion moves as in its own episode. Where it would leave the picture, it comes back next to the creature.
 
         Args:
-            torso_position: (3,) of the creature, m.
-            companion_position: (3,) of the companion's torso in its own episode, m.
+            torso_position: (3,) position of the creature's torso, m.
+            companion_position: (3,) position of the companion's torso in its own episode, m.
         """
         lane_error = np.linalg.norm(companion_position + self._companion_shift - torso_position - self._lane)
         is_in_picture = lane_error < self._lane[1]
@@ -143,9 +143,9 @@ class _Ground:
         """Draw the ground.
 
         Args:
-            scene: of viser, with a node "/world".
+            scene: scene of viser, with a node "/world".
             creature: on the ground.
-            unit: of lengths in the scene, m.
+            unit: unit of lengths in the scene, m.
         """
         self._scene = scene
         self._environment = creature.environment
@@ -247,8 +247,8 @@ class _Markers:
         """Begin without markers.
 
         Args:
-            scene: of viser, with a node "/world".
-            unit: of lengths in the scene, m.
+            scene: scene of viser, with a node "/world".
+            unit: unit of lengths in the scene, m.
         """
         self._scene = scene
         self._unit = unit
@@ -260,7 +260,7 @@ class _Markers:
         """Move the markers, or draw them again if they are other ones.
 
         Args:
-            markers: of the task.
+            markers: markers of the task.
             torso_position: (3,) m.
         """
         anchor = torso_position / self._unit * (1.0, 1.0, 0.0)
@@ -346,7 +346,7 @@ def _tile_edges(field: dict, tile: float) -> np.ndarray:
     """Return the edges of tiles on a height field, at rows and columns of its points, as segments (n, 2, 3), m.
 
     Args:
-        field: of `scenery.describe_ground`.
+        field: field of `scenery.describe_ground`.
         tile: side of a tile, m.
     """
     points = _surface_points(field)

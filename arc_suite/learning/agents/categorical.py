@@ -45,7 +45,7 @@ def target_distribution(hp, target_networks, batch: Transitions, next_actions, b
         hp: hyperparameters.
         target_networks: one for each critic.
         batch: transitions.
-        next_actions: of the policy at the next observations.
+        next_actions: actions of the policy at the next observations.
         bonus: (batch,) the logarithm of the density of these actions times the temperature; it is subtracted.
         dropout_masks: not used, as categorical critics have no dropout.
     """
@@ -95,7 +95,8 @@ def finish_step(critics, batch_layers):
 
     Args:
         critics: after a step of Adam.
-        batch_layers: of each critic the hidden layers with the batch's statistics, as `cross_entropy_loss` returns.
+        batch_layers: of each critic the hidden layers with the batch's statistics, as `cross_entropy_loss`
+            returns.
     """
     finished_critics = []
     for critic, layers_of_batch in zip(critics, batch_layers, strict=True):

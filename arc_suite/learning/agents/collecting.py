@@ -21,8 +21,8 @@ class EnvironmentRollouts:
 
     Attributes:
         environment: the vector environment.
-        task: of the environments.
-        architecture: of the networks.
+        task: task of the environments.
+        architecture: architecture of the networks.
         observation: (num_envs, ...) before the next step, as networks view it.
     """
 
@@ -100,9 +100,9 @@ class EnvironmentRollouts:
         """Return observations as networks view them.
 
         Args:
-            observation: of all environments, or of one.
-            info: of all environments.
-            index: of the environment of the observation; None for all environments.
+            observation: observation of all environments, or of one.
+            info: info of all environments.
+            index: index of the environment of the observation; None for all environments.
         """
         privileged = None
         if self._has_privileged:
@@ -123,7 +123,7 @@ def network_views(architecture: Architecture, observation, privileged, columns):
     """Return observations as networks view them.
 
     Args:
-        architecture: of the networks.
+        architecture: architecture of the networks.
         observation: (..., size)
         privileged: (..., privileged size) privileged observation; None for none.
         columns: indices of the privileged numbers that networks see.

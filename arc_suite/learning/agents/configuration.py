@@ -51,8 +51,8 @@ class Configuration:
     Attributes:
         setup: body, or bodies, task and settings.
         algorithm: name, or `module:name`; see `algorithms.algorithm`.
-        hyperparameters: of the algorithm, a frozen dataclass.
-        seed: of all random numbers.
+        hyperparameters: hyperparameters of the algorithm, a frozen dataclass.
+        seed: seed of all random numbers.
         steps: environment steps.
         evaluate_every: environment steps between evaluations.
         prior: id of a dataset of prior data; None for none.
@@ -176,8 +176,8 @@ class Configuration:
         """Return the context of the run, which its learner takes.
 
         Args:
-            folder: of the run.
-            threads: of the simulation.
+            folder: folder of the run.
+            threads: threads of the simulation.
             checkpoint: arrays to resume from; None for a new run.
 
         Raises:

@@ -29,7 +29,7 @@ class DaggerState(NamedTuple):
     """What an update changes.
 
     Attributes:
-        layers: of the network.
+        layers: layers of the network.
         moments: state of Adam.
     """
 
@@ -153,7 +153,7 @@ def fit(
     """Make updates by Adam towards the least squared distance from labels.
 
     Args:
-        architecture: of the network.
+        architecture: architecture of the network.
         state: before the updates.
         observations: (n, size), normalized.
         labels: (n, joints)

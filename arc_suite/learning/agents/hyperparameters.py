@@ -24,8 +24,8 @@ class SoftActorCritic:
 
     Attributes:
         hidden: units of each of the two hidden layers, of policy and critics.
-        learning_rate: of Adam, for policy, critics and temperature.
-        discount: of a control step.
+        learning_rate: learning rate of Adam, for policy, critics and temperature.
+        discount: discount of a control step.
         n_step: control steps of the rewards in a target, before the critics' value.
         tau: step of the target networks towards the critics in each update.
         batch: transitions of an update from each source of data.
@@ -33,8 +33,8 @@ class SoftActorCritic:
         dropout: share of units that the critics drop.
         critics: "squared": they learn values, by squared errors. "categorical": they learn distributions over returns,
             by cross-entropy, with batch norm and weights on the unit sphere; see `categorical`.
-        network: of policy and critics. "perceptron": it sees the complete observation. "legs": all legs share it, and
-            half of its first units are means over legs; see `leg_networks.Legs`.
+        network: network of policy and critics. "perceptron": it sees the complete observation. "legs": all legs share
+            it, and half of its first units are means over legs; see `leg_networks.Legs`.
         prior: use of prior data. "none"; "protected": in one buffer with online data, never overwritten; or
             "symmetric_sampling": a second batch in every update.
         num_envs: environments, which step together.
@@ -137,17 +137,17 @@ class DAgger:
     """Hyperparameters of DAgger, imitation of a demonstrator.
 
     Attributes:
-        preset: of the demonstrator; "" for the preset that suits the task.
+        preset: preset of the demonstrator; "" for the preset that suits the task.
         num_envs: environments; the demonstrator acts in half of them.
         noise: standard deviation of the noise on actions.
         left_out: number of the first control steps of an episode that are not learned from, as the demonstrator
             starts by a clock that the network does not see.
         round: control steps of each environment between fits.
-        updates: of a fit.
-        last_updates: of the last fit, over which the learning rate falls to 0.
+        updates: updates of a fit.
+        last_updates: updates of the last fit, over which the learning rate falls to 0.
         batch: labels of an update.
         hidden: units of each of the two hidden layers.
-        learning_rate: of Adam.
+        learning_rate: learning rate of Adam.
         exclude_blocks: names of blocks of the observation that the network does not see, where a task has them.
     """
 
@@ -175,7 +175,7 @@ class BehaviorCloning:
     Attributes:
         batch: transitions of an update.
         hidden: units of each of the two hidden layers.
-        learning_rate: of Adam at the start; it falls to 0.
+        learning_rate: learning rate of Adam at the start; it falls to 0.
         exclude_blocks: names of blocks of the observation that the network does not see, where a task has them.
     """
 
@@ -199,13 +199,13 @@ class ProximalPolicy:
             `arc_suite.learning.worlds.mjx`, with which all of learning stays on JAX's device.
         num_envs: environments.
         horizon: control steps of each environment between updates.
-        network: of policy and values. "perceptron": two layers that see the complete observation. "legs": all legs
-            share it, see `leg_networks`. `module:name`: that of another package.
+        network: network of policy and values. "perceptron": two layers that see the complete observation. "legs": all
+            legs share it, see `leg_networks`. `module:name`: that of another package.
         symmetry_augmentation: whether left and right are alike, for symmetric bodies. A perceptron learns from a
             mirrored copy of each transition; left and right legs share one network.
         epochs: passes over the transitions of a horizon.
         minibatch: transitions of an update, mirrored ones counted.
-        discount: of a control step.
+        discount: discount of a control step.
         gae_lambda: decay of the generalized advantage estimate.
         clip: range of the probability ratio around 1.
         initial_std: standard deviation of actions at the start.

@@ -22,7 +22,7 @@ class NetworkInputs(NamedTuple):
         observation_size: numbers of an observation.
         size: numbers of a network's input; of a leg's, if legs share the network.
         joints: shape of a network's output: (joints,), or (legs, joints of a leg).
-        moments: of the inputs, which normalize them; None for no normalization.
+        moments: moments of the inputs, which normalize them; None for no normalization.
         symmetry: mirror maps of the task; None for no mirrored transitions.
         legs: architecture of legs that share a network; None for a perceptron of the body.
     """

@@ -40,12 +40,12 @@ class RunContext(NamedTuple):
     Attributes:
         setup: body, or bodies, task and settings in which the policy is evaluated.
         training: body, or bodies, task and settings in which the policy learns; it sees the same blocks.
-        seed: of the run.
+        seed: seed of the run.
         steps: environment steps of the run.
         evaluate_every: environment steps between evaluations.
-        folder: of the run.
+        folder: folder of the run.
         prior: id of a dataset of prior data; None for none.
-        threads: of the simulation; results do not depend on it.
+        threads: threads of the simulation; results do not depend on it.
         checkpoint: arrays of the latest `Slice` to resume from; None for a new run.
     """
 

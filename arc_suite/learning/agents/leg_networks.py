@@ -36,7 +36,7 @@ class Legs:
     leg by leg; then the privileged ones, leg by leg.
 
     Attributes:
-        views: of the legs.
+        views: views of the legs.
         size: numbers of an observation.
         blocks: number of its blocks; blocks of the views after them are privileged.
         symmetric: whether the networks treat left and right alike, whatever their parameters.
@@ -257,9 +257,9 @@ def _draw_parameters(random, sizes: tuple[int, ...], outputs: int, last_gain: fl
 
     Args:
         random: generator to draw from.
-        sizes: of a leg's input and of the layers of features.
+        sizes: sizes of a leg's input and of the layers of features.
         outputs: numbers of a leg's output.
-        last_gain: of the weights of the outputs.
+        last_gain: gain of the weights of the outputs.
 
     Returns:
         The layers of features, and the layers of the head.

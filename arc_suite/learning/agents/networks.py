@@ -49,11 +49,11 @@ def mlp(
 
     Args:
         random: generator to draw from.
-        sizes: of the input, the hidden layers and the output.
+        sizes: sizes of the input, the hidden layers and the output.
         initial: distribution of the weights, a name of `INITIALIZERS`.
         layer_norm: whether hidden layers have a layer norm.
-        gain: of the weights of hidden layers.
-        last_gain: of the weights of the output layer.
+        gain: gain of the weights of hidden layers.
+        last_gain: gain of the weights of the output layer.
     """
     draw_weight = INITIALIZERS[initial]
     *hidden_shapes, last_shape = zip(sizes[:-1], sizes[1:], strict=True)
@@ -86,7 +86,7 @@ def equalizing_scale(sizes: Sequence[int]) -> np.ndarray:
     The mean square of the factors is 1, so the gain of the first weights stays as it was drawn.
 
     Args:
-        sizes: of the parts, in order; empty parts do not count.
+        sizes: sizes of the parts, in order; empty parts do not count.
     """
     part_sizes = [size for size in sizes if size]
     total = sum(part_sizes)
@@ -112,7 +112,7 @@ def apply_hidden_layers(
     Each layer is linear; then come dropout, the norm if the layer has one, and the activation.
 
     Args:
-        layers: of the network.
+        layers: layers of the network.
         x: (..., inputs)
         activation: a name of `ACTIVATIONS`.
         dropout_masks: booleans (layers, ..., outputs), True for the units that dropout keeps; None for no dropout.
@@ -161,7 +161,7 @@ def body_outputs(outputs, legs: bool):
     """Return the outputs (..., outputs) of a body.
 
     Args:
-        outputs: (..., outputs) of the body; with `legs`, (..., legs, outputs), which are averaged over legs.
+        outputs: (..., outputs) outputs of the body; with `legs`, (..., legs, outputs), which are averaged over legs.
         legs: whether the axis before the last is that of legs.
     """
     return outputs.mean(axis=-2) if legs else outputs

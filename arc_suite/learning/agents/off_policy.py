@@ -260,9 +260,9 @@ def _draw_update(
 
     Args:
         hp: hyperparameters.
-        seed: of the run.
+        seed: seed of the run.
         updates: made so far.
-        sources: of transitions.
+        sources: sources of transitions.
         inputs: how networks see observations.
         with_policy: whether the policy learns too.
         phase: that the update belongs to; None for none.

@@ -138,7 +138,7 @@ def batch_of(
 
     Args:
         hp: hyperparameters.
-        architecture: of the networks.
+        architecture: architecture of the networks.
         rollout: arrays (horizon, num_envs, ...), as a collector returns them.
         values: parameters of the value network.
         normalize: normalizer of observations.

@@ -48,7 +48,7 @@ class _Level(NamedTuple):
     Attributes:
         value: the return.
         name: in the label.
-        color: of line and label.
+        color: color of line and label.
         dashes: line style; "-" for the end of a curve, which has no line across the axis.
     """
 
@@ -83,8 +83,8 @@ def plot_run(
 
     Args:
         evaluations: table of a run (`run_folder.table`): a `step` and a `return` of each episode.
-        algorithm: of the run, named at the end of the curve.
-        title: of the picture.
+        algorithm: algorithm of the run, named at the end of the curve.
+        title: title of the picture.
         lines: returns to compare with, by name.
         finals: final returns of the paper, by algorithm.
     """
@@ -204,8 +204,8 @@ def _finish_axis(
     """Draw levels to compare with, label them and ends of curves on the right of the axis, and set title and limits.
 
     Args:
-        axis: of the panel.
-        title: of the panel.
+        axis: axis of the panel.
+        title: title of the panel.
         lines: returns to compare with, by name.
         finals: final returns of the paper, by algorithm.
         styles: colors and markers by algorithm.

@@ -65,7 +65,7 @@ def begin(
 
     Args:
         hp: hyperparameters.
-        architecture: of the networks.
+        architecture: architecture of the networks.
         random: generator to draw from.
         policy: parameters of the policy to start from; None for drawn ones.
     """
@@ -96,9 +96,9 @@ def estimate_advantages(hp: ProximalPolicy, rewards, values, next_values, termin
     Args:
         hp: hyperparameters, for `discount` and `gae_lambda`.
         rewards: (steps, num_envs)
-        values: (steps, num_envs) of the observations before the step.
-        next_values: (steps, num_envs) of the observations after the step, also after the last step of an episode. If
-            the step began another command, of the observation before it.
+        values: (steps, num_envs) values of the observations before the step.
+        next_values: (steps, num_envs) values of the observations after the step, also after the last step of an
+            episode. If the step began another command, of the observation before it.
         terminated: (steps, num_envs) booleans: the return after the step is 0.
         ended: (steps, num_envs) booleans: the next step is of another episode, or follows another command.
     """
@@ -126,7 +126,7 @@ def update(
 
     Args:
         hp: hyperparameters.
-        architecture: of the networks.
+        architecture: architecture of the networks.
         state: before the updates.
         batch: transitions.
         orders: (updates, minibatch) indices of transitions.

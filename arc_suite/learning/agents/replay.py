@@ -60,7 +60,7 @@ class Replay:
         """Map the files.
 
         Args:
-            folder: of the files.
+            folder: folder of the files.
             capacity: transitions that can be sampled.
             size: numbers of an observation.
             joints: numbers of an action.
@@ -124,7 +124,7 @@ class Replay:
         Args:
             indices: (batch,) from 0 to `len` - 1.
             n_step: control steps of a transition; fewer where an episode or the stored transitions end.
-            discount: of a control step.
+            discount: discount of a control step.
 
         Returns:
             Arrays (batch, ...).
@@ -194,9 +194,9 @@ class Replay:
         """Map a file of the folder as an array.
 
         Args:
-            name: of the file.
-            dtype: of the array.
-            shape: of the array.
+            name: name of the file.
+            dtype: dtype of the array.
+            shape: shape of the array.
             make: whether to make the file or to lengthen it.
 
         Raises:
@@ -243,7 +243,7 @@ class CombinedReplay:
         Args:
             indices: (batch,) from 0 to `len` - 1.
             n_step: control steps of a transition.
-            discount: of a control step.
+            discount: discount of a control step.
 
         Returns:
             Arrays (batch, ...), in the order of the indices.

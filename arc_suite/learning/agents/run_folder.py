@@ -38,8 +38,8 @@ class RunFolder:
     """An open folder of a run; `open_run` opens it.
 
     Attributes:
-        path: of the folder.
-        arrays: of the learner at the checkpoint; None before the first.
+        path: path of the folder.
+        arrays: arrays of the learner at the checkpoint; None before the first.
         progress: plain values that `save` wrote with the arrays.
     """
 
@@ -107,7 +107,7 @@ def open_run(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequen
     """Open the folder of a run, or make one, which is deleted if an error comes before the run has begun.
 
     Args:
-        path: of the folder.
+        path: path of the folder.
         config: record of the configuration, plain values.
         growing: fields of the record whose integers may be larger than in the folder.
 
@@ -162,7 +162,7 @@ def check_same_run(path: str | os.PathLike, config: Mapping[str, Any], left_out:
     """Check that a folder has the record of a configuration.
 
     Args:
-        path: of the folder.
+        path: path of the folder.
         config: record of a configuration.
         left_out: fields of it that may differ.
 
@@ -189,8 +189,8 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
     A line without an end is left out, as it is still being written.
 
     Args:
-        path: of the folder.
-        name: of the table.
+        path: path of the folder.
+        name: name of the table.
         columns: that the table must have, if it has a line.
 
     Raises:
@@ -228,7 +228,7 @@ def check_latest_evaluation(path: str | os.PathLike, step: int) -> None:
     """Check that the latest evaluation of a checkpoint is that of the table of evaluations.
 
     Args:
-        path: of the folder.
+        path: path of the folder.
         step: environment step of the latest evaluation, by the checkpoint; 0 for none.
 
     Raises:

@@ -299,7 +299,7 @@ def target_values(hp: SoftActorCritic, target_networks, batch: Transitions, next
         hp: hyperparameters.
         target_networks: one for each critic.
         batch: transitions.
-        next_actions: of the policy at the next observations.
+        next_actions: actions of the policy at the next observations.
         bonus: (batch,) the logarithm of the density of these actions times the temperature; it is subtracted.
         dropout_masks: as in `Noise`, of this use; None without dropout.
     """

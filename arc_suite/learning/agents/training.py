@@ -32,10 +32,10 @@ def train(
     """Train, resume, or extend a run to more steps if its algorithm can.
 
     Args:
-        configuration: of the run.
-        folder: of the run.
-        minutes: of CPU time of the run to stop after, all its processes together; None to train to the end.
-        threads: of the simulation; results do not depend on it.
+        configuration: configuration of the run.
+        folder: folder of the run.
+        minutes: CPU time of the run to stop after, all its processes together; None to train to the end.
+        threads: threads of the simulation; results do not depend on it.
         progress: makes a progress bar as `tqdm` does.
         on_metrics: called after each line of training.csv, and after each evaluation, with the environment step and
             metrics by name; the metric of an evaluation is `return`.

@@ -70,7 +70,7 @@ class WorldRollouts:
             normalize: normalizer of observations.
             std: standard deviation of actions.
             worlds: their state, and the steps (num_envs,) of their episodes.
-            key: of JAX.
+            key: key of JAX.
 
         Returns:
             The worlds after the step, in another episode where one has ended, and the transitions.

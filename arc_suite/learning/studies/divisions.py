@@ -21,7 +21,7 @@ class Division(NamedTuple):
         steps: environment steps of a run.
         far_steps: the same in tasks of `FAR`.
         source: what its algorithms learn from, see `Algorithm.source`.
-        episodes: of prior data; 0 for none.
+        episodes: episodes of prior data; 0 for none.
     """
 
     steps: int

@@ -131,7 +131,7 @@ def make_data(model: mujoco.MjModel, impl: str, num_envs: int) -> mjx.Data:
     """Return data of one world, as after MuJoCo's reset.
 
     Args:
-        model: of the world, as `adapt_model` returns it.
+        model: model of the world, as `adapt_model` returns it.
         impl: the implementation.
         num_envs: worlds that step together; they share Warp's table of contacts.
 

@@ -50,10 +50,10 @@ class WorldState:
     Attributes:
         data: of the simulation, an `mjx.Data`.
         obs: (..., size) float32.
-        reward: (...) of the latest step.
+        reward: (...) reward of the latest step.
         done: (...) 1.0 where the episode is over, otherwise 0.0.
-        metrics: of the latest step, by name.
-        info: of the episode, by name.
+        metrics: metrics of the latest step, by name.
+        info: info of the episode, by name.
     """
 
     data: Any
@@ -206,7 +206,7 @@ class Env:
             camera: name or index of a camera; None for the one that tracks the body.
             scene_option: None; wrappers hand it on.
             modify_scene_fns: None; wrappers hand it on.
-            index: of the world to draw, in states of many worlds; None for states of one world.
+            index: index of the world to draw, in states of many worlds; None for states of one world.
 
         Raises:
             ValueError: no such camera, an impossible size, or options of a scene.
@@ -249,7 +249,7 @@ class Env:
 
         Args:
             model: fields of the model that the episode has drawn, by name.
-            blocks: of the privileged observation, by name.
+            blocks: blocks of the privileged observation, by name.
         """
         changed_fields = {}
         for name in self.task.read_back_fields:
@@ -327,7 +327,7 @@ def _with_inputs(data, inputs: Inputs, torso: int):
 
     Args:
         data: of the simulation.
-        inputs: of the control step.
+        inputs: inputs of the control step.
         torso: index of the torso among the bodies of the model.
     """
     controls = inputs.ctrl.shape[-1]  # those of the body come first
@@ -344,7 +344,7 @@ def restart_at_ends(state: WorldState, start: WorldState, ended) -> WorldState:
 
     Args:
         state: after a step.
-        start: of the other episode.
+        start: start of the other episode.
         ended: () whether the episode has ended.
     """
 

@@ -23,7 +23,7 @@ class Starts(NamedTuple):
         qpos: (seeds, nq) positions.
         qvel: (seeds, nv) velocities.
         mocap_pos: (seeds, nmocap, 3) m, of obstacles.
-        memory: of the task, from which the first step starts.
+        memory: memory of the task, from which the first step starts.
         observation: (seeds, size) float32.
         model: fields of the model that differ from seed to seed, by name.
         privileged: (seeds, size) float32, the privileged observation; None where it is not asked for.

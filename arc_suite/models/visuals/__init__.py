@@ -40,7 +40,7 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
     which no part of a spec can have. The material `glow` can show a reward.
 
     Args:
-        root: of `assemble`.
+        root: root of `assemble`.
         body: the spec it was built from.
     """
     visuals = _visuals(body)
@@ -110,10 +110,10 @@ def _add_joint(part, name: str, link: Link, radius: float, light: str) -> None:
     """Add a hub, a band and a cap about the axis of a joint.
 
     Args:
-        part: of the link.
-        name: of the part.
+        part: part of the link.
+        name: name of the part.
         link: whose joint it is.
-        radius: of the wider of the two links that meet at the joint, m.
+        radius: radius of the wider of the two links that meet at the joint, m.
         light: material of band and cap.
     """
     axis = link.joint.axis

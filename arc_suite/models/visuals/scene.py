@@ -35,7 +35,7 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
 
     Args:
         root: holds the body `torso` and the geoms of an arena.
-        height: of the creature, m; a cell of the grid is about that wide.
+        height: height of the creature, m; a cell of the grid is about that wide.
     """
     _set_rendering(root)
     _add_materials(root, height)
@@ -92,8 +92,8 @@ def _shade_ground(geoms, height: float) -> None:
     """Give geoms the material of the ground; higher boxes are brighter.
 
     Args:
-        geoms: of the ground.
-        height: of the creature, m.
+        geoms: geoms of the ground.
+        height: height of the creature, m.
     """
     tops = {geom: geom.pos[2] + geom.size[2] for geom in geoms if geom.type == "box"}  # m
     for geom in geoms:
@@ -109,10 +109,10 @@ def _add_light(torso, name: str, direction: tuple, strength: float, height: floa
 
     Args:
         torso: that it rides on.
-        name: of the light.
+        name: name of the light.
         direction: (3,) in which it shines, of any length.
-        strength: of its diffuse color, at most 1.
-        height: of the creature, m.
+        strength: strength of its diffuse color, at most 1.
+        height: height of the creature, m.
         casts_shadow: whether things cast shadows in it.
     """
     unit_direction = np.array(direction) / np.linalg.norm(direction)

@@ -44,7 +44,7 @@ class Visuals(NamedTuple):
     """Colors and ornaments of one creature.
 
     Attributes:
-        colors: of the materials; "shell", "trim", "frame", "limb" and "glow" are those of any body.
+        colors: colors of the materials; "shell", "trim", "frame", "limb" and "glow" are those of any body.
         solids: materials of the torso's solids and ballast by name; those without an entry are "shell".
         ornaments: on the torso.
         glowing: names of the joints that glow; None for all of them.

@@ -51,7 +51,7 @@ def fit_modifiers(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, 
     Args:
         settings: some of the settings in `MODIFIERS`, by name.
         body: the body of the task.
-        blocks: of the task's observation, by name.
+        blocks: blocks of the task's observation, by name.
 
     Raises:
         ValueError: an unknown name, or a value that does not fit.

@@ -28,8 +28,8 @@ class ControlState(NamedTuple):
 
     Attributes:
         gains: (..., 2) multiples of stiffness and of damping that the episode has drawn.
-        angles: (..., joints) of the joints at the latest reading, rad.
-        speeds: (..., joints) of the joints at the latest reading, rad/s.
+        angles: (..., joints) angles of the joints at the latest reading, rad.
+        speeds: (..., joints) speeds of the joints at the latest reading, rad/s.
     """
 
     gains: np.ndarray
@@ -123,8 +123,8 @@ class Control(_ControlFields, Modifier):
 
         Args:
             torques: (..., joints) in [-1, 1].
-            angles: (..., joints) of the joints, rad.
-            speeds: (..., joints) of the joints, rad/s.
+            angles: (..., joints) angles of the joints, rad.
+            speeds: (..., joints) speeds of the joints, rad/s.
         """
         target_angles = angles + (torques + self.damping * speeds) / self.stiffness
         return (target_angles / self.reach).clip(-1.0, 1.0)

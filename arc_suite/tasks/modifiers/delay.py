@@ -18,7 +18,7 @@ class DelayState(NamedTuple):
     """Actions that have not arrived at the motors.
 
     Attributes:
-        delay: (...) of actions in this episode, control steps.
+        delay: (...) delay of actions in this episode, control steps.
         waiting: (..., longest delay, joints) the latest actions, the newest first.
     """
 

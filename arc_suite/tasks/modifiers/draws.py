@@ -80,7 +80,7 @@ class Episode(NamedTuple):
     """What modifiers draw from in an episode.
 
     Attributes:
-        scene: of the task.
+        scene: scene of the task.
         stream: numbers from the stream of seeds.
         keyed: numbers from the key of the noise.
     """

@@ -41,7 +41,7 @@ class History(_HistoryFields, Modifier):
         history: number of earlier control steps in the block `history`. Of each step it holds the blocks that measure
             joints, and the action after them, the newest first. Steps before the start repeat the observation of the
             start, with actions of 0.
-        names: of the blocks that the history keeps.
+        names: names of the blocks that the history keeps.
         size: numbers of these blocks together.
     """
 

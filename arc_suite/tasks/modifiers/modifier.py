@@ -42,7 +42,7 @@ class Modifier:
         Args:
             settings: the values of the settings of all modifiers, by name.
             body: the body of the task.
-            blocks: of the task's observation, by name.
+            blocks: blocks of the task's observation, by name.
 
         Raises:
             ValueError: a value that does not fit.
@@ -95,7 +95,7 @@ class Modifier:
         """Return the fields of the model that the episode changes.
 
         Args:
-            scene: of the task.
+            scene: scene of the task.
             model: the fields that `scene.CHANGEABLE` names, as the task and the modifiers before this one change them.
             state: the state at the start.
         """
@@ -106,7 +106,7 @@ class Modifier:
 
         Args:
             state: the state before the step.
-            action: (..., joints) of the policy, or from the modifier after this one.
+            action: (..., joints) action of the policy, or from the modifier after this one.
             elapsed: (..., 1) uint32, control steps since the start.
         """
         return state, action
@@ -145,7 +145,7 @@ class Modifier:
         Args:
             state: the state after the step.
             elapsed: (..., 1) uint32, control steps since the start.
-            heading: (...) of the torso, rad.
+            heading: (...) heading of the torso, rad.
         """
         return {}
 
@@ -155,7 +155,7 @@ class Modifier:
         A privileged observation shows the body as it is, also where a user has changed the model of an environment.
 
         Args:
-            scene: of the task.
+            scene: scene of the task.
             blocks: the privileged blocks of one environment as the episode has drawn them, by name.
             fields: fields of the model that a user has set, by name.
         """

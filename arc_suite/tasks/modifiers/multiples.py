@@ -10,9 +10,9 @@ def find_multiples(scene: Scene, fields: Mapping[str, Any], name: str, part: Any
     """Return the multiples (n,) of a field, 1 where the compiled number is 0; None for a field that is not changed.
 
     Args:
-        scene: of the task.
+        scene: scene of the task.
         fields: the fields that a user has set, by name.
-        name: of the field.
+        name: name of the field.
         part: index of the numbers of the field whose multiples are returned.
     """
     if name not in fields:

@@ -54,7 +54,7 @@ class Pushes(_PushesFields, Modifier):
         force: the greatest force on the torso, as a multiple of the body's weight. The force of each push is uniform
             from 0 up to it, in any horizontal direction. A push lasts 1 to 4 control steps, and the next one begins 40
             to 120 control steps after its begin.
-        weight: of the body without a load, N.
+        weight: weight of the body without a load, N.
     """
 
     __slots__ = ()
