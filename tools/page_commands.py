@@ -29,7 +29,7 @@ class Block(NamedTuple):
     Attributes:
         kind: sh or python.
         text: commands, or a script.
-        file: that the text goes into, instead of being run; None for a block that is run.
+        file: file that the text goes into, instead of being run; None for a block that is run.
     """
 
     kind: str

@@ -111,7 +111,7 @@ def to_json_values(value, decimals: int | None = _DECIMALS):
 
     Args:
         value: finite numbers, text, None and truth values.
-        decimals: to which floating-point numbers are rounded; None for all.
+        decimals: decimals to which floating-point numbers are rounded; None for all.
     """
     if hasattr(value, "_asdict"):
         value = value._asdict()

@@ -65,7 +65,7 @@ class Part(NamedTuple):
         quaternion: (4,) orientation in the same frame, w first.
         joint: index of its joint; None for the torso and for rigid parts.
         axis: (3,) axis of the joint; None without one.
-        shapes: that it shows.
+        shapes: shapes that it shows.
     """
 
     name: str

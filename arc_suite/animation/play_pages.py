@@ -213,7 +213,7 @@ def _load_network(body: Body, name: str, command_task: Task) -> Network:
     """Return a trained network by name; a ValueError if a page cannot run it.
 
     Args:
-        body: that it moves.
+        body: body that it moves.
         name: as for `policies.policy`.
         command_task: task of the body, with a command that the player gives.
     """

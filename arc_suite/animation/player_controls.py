@@ -46,7 +46,7 @@ def commands(
     """Return what a person sets of a task's commands, by name; None leaves it to the task.
 
     Args:
-        task: whose other commands are left out.
+        task: task whose other commands are left out.
         desired: (3,) velocity, or None.
         pose: (6,), reduced to the body's room, or None.
         gait: its name, or None; a gait that does not fit is replaced by the body's own.

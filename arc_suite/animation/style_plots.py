@@ -257,7 +257,7 @@ def _stack_axes(tracks: Mapping[str, Track], height: float, **shared):
     """Return a figure with axes for each track, one above the other, and these axes.
 
     Args:
-        tracks: to be drawn.
+        tracks: tracks to be drawn.
         height: height of the axes of a track, inches.
         shared: see `Figure.subplots`.
     """

@@ -151,7 +151,7 @@ def draw_body(
       pair (radial: each leg) reaches 0.75 to 1.3 times that.
 
     Args:
-        random: to draw from.
+        random: generator of random numbers.
         legs: 4 to 12.
         links: 1 to 4.
         layout: pairs or radial.
@@ -192,7 +192,7 @@ def scaled(body: Body, factor: float) -> Body:
     """Return a body with all lengths multiplied, to be sized anew.
 
     Args:
-        body: to scale.
+        body: body to scale.
         factor: 0.01 to 100.
 
     Returns:
@@ -242,7 +242,7 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
     Mirrored legs stay mirrored, and feet at their height.
 
     Args:
-        body: to change.
+        body: body to change.
         seed: 0 or more.
         amount: standard deviation of the logarithm of lengths, and of leg's headings in rad; 0 to 0.5.
 
@@ -270,7 +270,7 @@ def deform_legs(body: Body, changes: np.ndarray) -> Body:
     """Return a body with legs of other lengths and headings; mirrored legs stay mirrored, and feet at their height.
 
     Args:
-        body: to change.
+        body: body to change.
         changes: (deformations,) for each of these legs the logarithm of the factor of each link, and the turn of the
             leg about the vertical, rad.
 
@@ -311,7 +311,7 @@ def _deform_leg(leg: Leg, logarithms: np.ndarray, turn: float) -> Leg:
     """Return a leg whose links are longer by factors, and whose foot stays at its height if it can.
 
     Args:
-        leg: to change.
+        leg: leg to change.
         logarithms: (links, 1) logarithms of the factors.
         turn: turn of the leg about the vertical, rad.
     """
@@ -329,7 +329,7 @@ def _change_body(body: Body, change: str, legs: Sequence[Leg], **fields) -> Body
     """Return a body with other legs and fields, to be sized anew.
 
     Args:
-        body: to change.
+        body: body to change.
         change: in its name, "scaled" or "mutated".
         legs: legs of the body.
         **fields: fields of the body.

@@ -49,7 +49,7 @@ def shaped(body: Body, **changes) -> Body:
     """Return a body of other proportions, to be sized anew; its lowest foot stands on the floor.
 
     Args:
-        body: to change.
+        body: body to change.
         **changes: fields of `Shape`.
 
     Returns:
@@ -104,10 +104,10 @@ def _shape_leg(
     """Return a leg of other proportions.
 
     Args:
-        leg: to change.
+        leg: leg to change.
         link_factors: factors of lengths, by name of the link.
         ends: ends of links, m, by name of the part.
-        torso_factors: by which the mount moves along x and y.
+        torso_factors: factors by which the mount moves along x and y.
         turn: turn of the leg forward, degrees; a leg on the midline keeps its heading.
     """
     x, y, z = leg.mount

@@ -26,7 +26,7 @@ def load(name: str | os.PathLike, task: Task | None = None) -> Network:
 
     Args:
         name: name of the policy.
-        task: in which `universal` acts: it follows a command where the task has one. None for walk.
+        task: task in which `universal` acts: it follows a command where the task has one. None for walk.
 
     Raises:
         ValueError: a damaged file, or a policy of one body.
@@ -50,8 +50,8 @@ class Universal:
 
     Attributes:
         network: network of many bodies.
-        task: that it acts in.
-        tokens: that the network sees, of one environment.
+        task: task that it acts in.
+        tokens: tokens that the network sees, of one environment.
         descriptions: descriptions of the legs (1, 12, 41) and of the torso (1, 10).
         reach: (joints,) angles that an action of 1 asks for, rad.
         gains: stiffness (joints,), action per rad, and damping (joints,), action per rad/s, of position control.

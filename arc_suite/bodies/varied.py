@@ -81,7 +81,7 @@ def draw_varied_body(random: np.random.Generator) -> Body:
     - torsos are ellipsoids and boxes; a quarter have three solids, three in twenty a shell.
 
     Args:
-        random: to draw from.
+        random: generator of random numbers.
 
     Raises:
         SpecError: a length is out of range.

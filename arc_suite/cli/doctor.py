@@ -25,7 +25,7 @@ class Finding(NamedTuple):
     """One line of the report.
 
     Attributes:
-        subject: that was examined.
+        subject: subject that was examined.
         state: state of the subject.
         remedy: for a problem; None if all is well.
     """

@@ -97,7 +97,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
         main: reads `absl.flags.FLAGS`. It takes the arguments that are no flags, each with a default, and returns an
             exit status or None.
         name: how errors name the program; None for the file name of the running script.
-        arguments: to parse; None for those of the command line.
+        arguments: arguments to parse; None for those of the command line.
     """
     script = sys.argv[0]
     if arguments is None:

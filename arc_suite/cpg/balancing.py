@@ -32,7 +32,7 @@ class BalancingParameters(NamedTuple):
         gain: gain of the feedback on the motion's error: forward, left and turning.
         integral: gain of the same error, added up over a cycle of the gait.
         most: largest request, in units of the command.
-        shorter: by which the stance is shorter than in the task's gait, cycles.
+        shorter: time by which the stance is shorter than in the task's gait, cycles.
         lead: lead of all legs over the gait's clock, cycles.
         attitude: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
         lean: shift of footholds, as a share of the distance by which the torso's weight falls aside of the feet.

@@ -78,7 +78,7 @@ class CommandLaw(ABC):
         """Fit the law to a task.
 
         Args:
-            task: whose body is to walk, and whose gait it walks in.
+            task: task whose body is to walk, and whose gait it walks in.
             parameters: parameters of the law.
             angles: (joints,) angles of the pose about which joints are controlled, rad; None for the standing pose.
 

@@ -29,7 +29,7 @@ class LeapingParameters(NamedTuple):
         choice: leaps to choose from; the body takes the farthest one that lands on level ground.
         widest: trench that it steps over.
         near: distance of a foot from a trench at which it leaps.
-        most: by which a foot may be shifted in the air.
+        most: largest distance by which a foot may be shifted in the air.
     """
 
     walk: SightedParameters = SightedParameters()
@@ -69,7 +69,7 @@ class Leaping(Sighted):
     """Follows a command over ground that the block `scan` shows, and leaps.
 
     Attributes:
-        leap: that it leaps.
+        leap: the leap of the body.
         flight: what the leap does on level ground.
     """
 

@@ -28,13 +28,13 @@ class Leap(NamedTuple):
     """How a body leaps.
 
     Attributes:
-        crouch: by which the torso sinks.
-        back: by which the torso is drawn back while it sinks.
-        forward: by which legs stretch the torso ahead of its feet.
+        crouch: distance by which the torso sinks.
+        back: distance by which the torso is drawn back while it sinks.
+        forward: distance by which legs stretch the torso ahead of its feet.
         drive: how far joints are driven, by the way from the crouch to the stretch: motors of position control
             give the more, the further the target is.
-        tuck: by which feet are drawn up in the air.
-        ahead: by which feet land ahead of their positions at rest.
+        tuck: distance by which feet are drawn up in the air.
+        ahead: distance by which feet land ahead of their positions at rest.
         stretch: duration of the stretch.
         fly: duration from the stretch to the landing.
     """
@@ -163,8 +163,8 @@ class Flight(NamedTuple):
 
     Attributes:
         distance: between the mean position of the feet before the leap and after it; 0 if they do not leave the ground.
-        torso_distance: that the torso moves while no foot is on the ground.
-        air_time: for which no foot is on the ground, s.
+        torso_distance: distance that the torso moves while no foot is on the ground.
+        air_time: time for which no foot is on the ground, s.
         clearance: the largest height of the lowest foot.
         rise: rise of the torso.
         landed: whether the torso stays upright, and is high enough at the end.
@@ -185,7 +185,7 @@ def simulate_flights(
 
     Args:
         body: any.
-        rest_angles: (joints,) from which leaps start, rad.
+        rest_angles: (joints,) angles from which leaps start, rad.
         targets: (leaps, steps, joints) targets of joints by control step, rad; the last one is held.
         crouch_ends: control step of each leap at which its crouch ends.
     """

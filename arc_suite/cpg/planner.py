@@ -38,7 +38,7 @@ class PlanningParameters(NamedTuple):
     Attributes:
         steering: parameters of the law that follows it.
         room: between feet and pillars, where there is enough space, R.
-        least: that the torso keeps from pillars, as a share of the extent of the feet.
+        least: distance that the torso keeps from pillars, as a share of the extent of the feet.
         nearness: cost of a unit of missing room, in units of path.
         aim: how far along the path the point is that is steered for, R.
         forward: largest command forward, in target velocities.

@@ -31,7 +31,7 @@ class SightedParameters(NamedTuple):
         most: largest request, in units of the command.
         attitude: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
         lead: lead of all legs over the gait's clock, cycles.
-        longer: by which the swing is longer than in the task's gait, cycles, since feet follow late.
+        longer: time by which the swing is longer than in the task's gait, cycles, since feet follow late.
         trust: weight of the requested velocity against the measured one, from 0 to 1, in the prediction of
             where the torso is when a foot lands. The mean of the measured velocity comes late.
     """

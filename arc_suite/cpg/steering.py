@@ -63,7 +63,7 @@ class _Leg(NamedTuple):
 
     Attributes:
         jacobian: (3, n) jacobian of the sole, m/rad.
-        room: (n,) to either side for sweeping, rad.
+        room: (n,) room to either side for sweeping, rad.
         lift: (n,) angles in mid-swing, rad.
     """
 

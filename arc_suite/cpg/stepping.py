@@ -53,7 +53,7 @@ class Stepping(CommandLaw):
         rest_angles: (legs, links) angles of the joints at rest, rad.
         foot_lift: height of a foot in mid-swing, m.
         slip_weight: weight of a foot's slip across its path against its motion along it.
-        stance_reduction: by which the stance is shorter than in the commanded gait, cycles.
+        stance_reduction: time by which the stance is shorter than in the commanded gait, cycles.
         tilt_share: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
         relative_ik_damping: damping of inverse kinematics, standing heights.
         max_request: the largest request, in units of the command.

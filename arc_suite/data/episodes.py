@@ -186,7 +186,7 @@ def _open_array(group, key: str, shape: tuple[int | None, ...], dtype) -> h5py.D
     """Return an array as `write` stores it, in this file, without reading its values.
 
     Args:
-        group: that holds it.
+        group: group that holds it.
         key: its name in the group.
         shape: expected; None stands for any length.
         dtype: expected.

@@ -77,7 +77,7 @@ class Window:
         A window that was closed shows nothing and does not wait.
 
         Args:
-            duration: for which this picture stands, s.
+            duration: duration for which this picture stands, s.
             markers: debug markers to show.
             text: a line in the lower left corner.
         """

@@ -20,7 +20,7 @@ def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int
 
     Args:
         robot: robot of the file.
-        stance: in which it stands.
+        stance: stance in which it stands.
         names: names of its parts.
         order: joints of the legs in the order of the file.
     """

@@ -26,7 +26,7 @@ def sketch_legs(robot: Robot, stance: Stance, names: Names, servos: Mapping[int,
 
     Args:
         robot: robot of the file.
-        stance: in which it stands.
+        stance: stance in which it stands.
         names: names of its parts.
         servos: by joint.
     """

@@ -67,7 +67,7 @@ def write_source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, M
 
     Args:
         robot: robot of the file.
-        stance: in which it stands.
+        stance: stance in which it stands.
         names: names of its parts.
         meshes: by geom.
     """

@@ -109,7 +109,7 @@ class Legs(NamedTuple):
         """Return the angles (..., legs, links) that bring soles near goals, by damped least squares.
 
         Args:
-            angles: (..., legs, links) to begin with, rad.
+            angles: (..., legs, links) angles to begin with, rad.
             goals: (..., legs, 3) goals of the soles, m.
             weights: (..., legs, 3, 3) matrices that multiply the errors of the soles.
             damping: m.

@@ -29,7 +29,7 @@ class Overlap(NamedTuple):
     Attributes:
         names: names of a solid of the torso and a part of a leg, or of parts of two legs.
         depth: m.
-        pose: in which they overlap, "the standing pose" or "a stride".
+        pose: pose in which they overlap, "the standing pose" or "a stride".
     """
 
     names: tuple[str, str]

@@ -67,7 +67,7 @@ def position_gains(body: Body, inertias: np.ndarray) -> tuple[np.ndarray, np.nda
 
     Args:
         body: sized.
-        inertias: (joints,) that the joints move, without armature, kg m^2.
+        inertias: (joints,) inertias that the joints move, without armature, kg m^2.
     """
     joints = body.joints
     if body.source:
@@ -138,9 +138,9 @@ def _size_leg(leg: Leg, agility: float, inertias: np.ndarray, loads: np.ndarray,
     """Return a leg with sized joints.
 
     Args:
-        leg: to size.
+        leg: leg to size.
         agility: factor on the torques of motors.
-        inertias: (joints of the leg,) that the joints move, kg m^2.
+        inertias: (joints of the leg,) inertias that the joints move, kg m^2.
         loads: (joints of the leg,) N m.
         frequency: natural frequency of position control, rad/s.
     """

@@ -189,8 +189,8 @@ def _weak_motor_flaw(body: Body, torques: np.ndarray, loads: np.ndarray, purpose
 
     Args:
         body: body of the motors.
-        torques: (joints,) that motors give, N m.
-        loads: (joints,) that they should give, N m.
+        torques: (joints,) torques that motors give, N m.
+        loads: (joints,) loads that they should give, N m.
         purpose: purpose of the loads, which ends the text.
         effect: begins the text.
     """
@@ -214,7 +214,7 @@ def _estimate_speed_share(body: Body, torque_shares: np.ndarray) -> float:
 
     Args:
         body: any body.
-        torque_shares: (joints,) that motors give of the torque for the target speed.
+        torque_shares: (joints,) shares that motors give of the torque for the target speed.
     """
     strokes_of_legs = stride.strokes(body, stride.half_stroke(body, stride.fitted_gait(body)))
     shares_of_legs = by_leg(body, torque_shares)

@@ -21,7 +21,7 @@ class Loaded(Policy, Protocol):
     """A policy that such a file holds.
 
     Attributes:
-        joints: that it moves.
+        joints: joints that it moves.
     """
 
     joints: int

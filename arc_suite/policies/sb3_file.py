@@ -77,7 +77,7 @@ class Saved:
         """Return the policy as a graph, which normalizes observations with the statistics.
 
         Args:
-            setup: in which it was trained.
+            setup: setup in which it was trained.
 
         Raises:
             ValueError: a policy that is no multilayer perceptron of known layers, or of another size.

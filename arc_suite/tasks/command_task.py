@@ -139,10 +139,10 @@ class CommandTask(Task):
     """Following a command.
 
     Attributes:
-        command: what to follow.
-        gait_and_pose: which gait and pose to follow, in addition; None for the prescribed gait.
-        ground: where, with its default settings.
-        health: when a body has fallen.
+        command: command to follow.
+        gait_and_pose: gait and pose to follow, in addition to the velocity; None for the prescribed gait.
+        ground: ground of the task, with its default settings.
+        health: criterion of a fall.
         yaw: half-width of the heading at the start, rad.
     """
 

@@ -151,7 +151,7 @@ class Task(Observed):
         scene: what it is made for.
         settings: its numbers. The field `weights` holds `weights`, with changes of the robot or the caller.
         step_limit: control steps of an episode, may be infinite.
-        name: by which `arc_suite.load` and ids know the task.
+        name: name by which `arc_suite.load` and ids know the task.
         weights: signed weight of every term of the reward by name, in the order of summation.
         cost_limit: bound of the weighted sum of the costs of a step; None for no bound. See `terms.reward`.
         version: increased with any change of dynamics, reward or observation.

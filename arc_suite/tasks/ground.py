@@ -207,7 +207,7 @@ class Level(Ground):
     Attributes:
         start: "standing", or "belly": the body begins with its torso on the ground.
         curriculum: whether the ranges of commands widen from the default ones to those of the setting `commands`.
-        level: at which a curriculum begins.
+        level: level at which a curriculum begins.
         thresholds: outcomes below and above which its level falls and rises.
     """
 

@@ -33,7 +33,7 @@ class LegViews(NamedTuple):
         factors: (2, legs, features) weights of these numbers.
         bias: (legs, features) added to the sum. The first features say to which pair a leg belongs: 1, or else 0.
         joints: (joints,) index of each joint's action among the actions of all legs, (legs * most,).
-        signs: (joints,) by which these actions are multiplied.
+        signs: (joints,) signs by which these actions are multiplied.
         most: number of joints of the leg with the most joints; each leg has as many actions.
         sizes: numbers of features: first those of pairs, then those of each block.
     """

@@ -381,8 +381,8 @@ class Phase(Part):
 
     Attributes:
         name: name of the phase.
-        offsets: (legs,) by which legs are ahead of the clock, rad: a leg sees its own phase. None where offsets change
-            with the gait: a leg sees the clock. Opposite legs are then half a cycle apart in each gait.
+        offsets: (legs,) phases by which legs are ahead of the clock, rad: a leg sees its own phase. None where offsets
+            change with the gait: a leg sees the clock. Opposite legs are then half a cycle apart in each gait.
         default_angles: (joints,) angles of the pose around which the gait moves, rad, which must be symmetric;
             None where the pose does not count.
     """

@@ -22,7 +22,7 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
     """Collect and step in turn, on all cores, behind a progress bar.
 
     Args:
-        robots: whose walks.
+        robots: names of the robots.
         episodes: episodes of a dataset.
         rounds: how often each has its turn.
 

@@ -45,7 +45,7 @@ def measure(
     """Run the whole benchmark.
 
     Args:
-        robots: whose walks.
+        robots: names of the robots.
         rows: rows of the vector environment.
         threads: threads of the vector environment.
         workers: processes of Gymnasium's own.

@@ -46,7 +46,7 @@ class OrdinaryEnv(MujocoEnv):
         """Load the model.
 
         Args:
-            robot: whose numbers to footage.
+            robot: name of the robot.
             xml_file: the model.
             terminate_when_unhealthy: whether a fall ends the episode.
             **kwargs: keyword arguments of `MujocoEnv`.

@@ -20,7 +20,7 @@ def course(robot: str, reward: float, generations: Sequence[Generation], length:
     """Draw returns and style over generations, with those of the preset `medium`.
 
     Args:
-        robot: whose search it was.
+        robot: robot of the search.
         reward: mean reward of `medium`.
         generations: generations of the search.
         length: control steps of an episode, to convert rewards to returns.

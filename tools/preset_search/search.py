@@ -61,9 +61,9 @@ class Search:
         Args:
             setup: a robot that has presets, in a task.
             seed: seed of the search and its episodes.
-            episodes: by which a candidate is evaluated.
+            episodes: episodes by which a candidate is evaluated.
             steps: control steps of each.
-            starts: to choose the hard ones from, at least `HARD`; 0 for none.
+            starts: starts to choose the hard ones from, at least `HARD`; 0 for none.
             space: space of searched parameters, a name of `space.SPACES`.
 
         Raises:

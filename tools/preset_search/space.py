@@ -20,7 +20,7 @@ class Range(NamedTuple):
     Attributes:
         scale: its deviation in the first generation.
         low, high: its bounds.
-        decimals: to which it is rounded in a result.
+        decimals: decimals to which it is rounded in a result.
     """
 
     scale: float
@@ -173,10 +173,10 @@ class Kind(NamedTuple):
         preset: around which it searches.
         generations: generations of the search.
         candidates: candidates of a generation; None for the default of CMA-ES.
-        episodes: by which a candidate is evaluated.
+        episodes: episodes by which a candidate is evaluated.
         steps: control steps of each.
         skipped: first steps of an episode, in which the robot starts to walk; they do not count.
-        starts: from which the hard ones are chosen; 0 for none.
+        starts: starts from which the hard ones are chosen; 0 for none.
     """
 
     space: type[Space] | type[Torques]

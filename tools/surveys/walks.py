@@ -92,8 +92,8 @@ def survey(cases: Sequence[Case], processes: int | None = None, progress: Callab
     """Run many cases.
 
     Args:
-        cases: to run.
-        processes: to run them on, at most one for each; None for one per core.
+        cases: cases to run.
+        processes: processes to run them on, at most one for each; None for one per core.
         progress: makes a progress bar as `tqdm` does.
 
     Yields:

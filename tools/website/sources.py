@@ -48,7 +48,7 @@ def write(folder: Path, walks: bool) -> None:
     """Write all sources into a new folder.
 
     Args:
-        folder: to write into.
+        folder: folder to write into.
         walks: whether the site has pages in which creatures walk.
     """
     paths = {path for pattern in PAGES for path in ROOT.glob(pattern)}

@@ -120,7 +120,7 @@ def open_evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]
     """Yield a function that maps tuples of arguments of `trials.evaluate` to outcomes, in order.
 
     Args:
-        processes: that evaluate bodies; None for one per core.
+        processes: processes that evaluate bodies; None for one per core.
     """
     if processes == 1:
         yield lambda jobs: list(itertools.starmap(evaluate, jobs))
@@ -158,7 +158,7 @@ def run_search(folder: pathlib.Path, search: Search, settings: Mapping[str, Any]
     Args:
         folder: folder of the journal.
         search: without bodies; gets those of the journal, and new bodies.
-        settings: that determine the search.
+        settings: settings that determine the search.
     """
     with contextlib.closing(Journal(folder / "journal.jsonl", settings, Candidates.from_json)) as journal:
         for batch in journal.generations:
@@ -241,7 +241,7 @@ def check_one_step(trial: Trial, body: Body | str) -> None:
 
     Args:
         trial: trial of the search.
-        body: to try, or the reason why there is no body.
+        body: body to try, or the reason why there is no body.
 
     Raises:
         ValueError: no body within the budget, a setting that does not fit, or a task that does not measure the metric.

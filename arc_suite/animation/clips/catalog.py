@@ -17,7 +17,7 @@ class WalkLoop(NamedTuple):
     Attributes:
         command: forward, left and turning, in units of the task, which are speeds that suit the body.
         failing: index of a leg whose motors fail; None for a sound body.
-        crouch: by which the torso is lowered, standing heights, as far as the legs fold.
+        crouch: distance by which the torso is lowered, standing heights, as far as the legs fold.
     """
 
     command: tuple[float, float, float]
@@ -52,7 +52,7 @@ class Acted(NamedTuple):
 
     Attributes:
         play: makes the motion, given the body and its pose at rest.
-        ends: at which it has the first pose of idle: the first sample, 0, the last one, -1, or both.
+        ends: ends at which it has the first pose of idle: the first sample, 0, the last one, -1, or both.
         loops: whether it is a loop.
         steps: whether feet step in it.
         additive: whether it is added to other clips, as its difference from the first pose of idle.

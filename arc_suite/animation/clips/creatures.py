@@ -52,7 +52,7 @@ def glb(
         rig: skin, or nodes, each with the mesh of its part.
         root_motion: moving, in_place, or both, two animations of each clip that moves.
         generator: what the file says that it was made by.
-        triangles: that the mesh has at most; see `meshes.body_meshes`.
+        triangles: triangles that the mesh has at most; see `meshes.body_meshes`.
         uv: whether meshes have texture coordinates.
         reduced: whether keys are left out that lines between others replace within 0.1 degrees and 0.001 standing
             heights.
@@ -91,7 +91,7 @@ class _Nodes(NamedTuple):
     """Indices of nodes.
 
     Attributes:
-        root: that on the ground below the torso.
+        root: point on the ground below the torso.
         parts: one value for each part.
     """
 
@@ -271,7 +271,7 @@ class _ClipTracks:
         """Begin without tracks.
 
         Args:
-            document: to add tracks to.
+            document: document to add tracks to.
             clip: clip of the tracks.
             max_errors: largest errors of reduced tracks, by the path of the property; None for a key in each frame.
         """
@@ -316,7 +316,7 @@ def _add_animations(
 
     Args:
         document: document of the file.
-        clip: to add.
+        clip: clip to add.
         parts: parts of the body.
         nodes: nodes of the root and the parts.
         roots_move: whether the root moves, for each animation.

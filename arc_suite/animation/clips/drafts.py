@@ -301,10 +301,10 @@ def _make_clips_from_rest(
 
     Args:
         body: the spec.
-        transition: from which rest, stops and starts are taken.
+        transition: transition from which rest, stops and starts are taken.
         turns: recordings by name.
         names: names of the clips.
-        walk: that stops and starts connect to, with feet as in the physics.
+        walk: clip that stops and starts connect to, with feet as in the physics.
         planted_walk: the same with planted feet; None if feet are not to be planted.
         left_out: takes the reasons why clips cannot be made.
     """

@@ -34,7 +34,7 @@ def film_pictures(
 
     Args:
         body: body of the clip.
-        clip: to show; its root stays.
+        clip: clip to show; its root stays.
         size: size of the square pictures, pixels.
         transparent: whether all but the body is left out.
         turntable: whether the body turns once while the clip is repeated.
@@ -69,7 +69,7 @@ def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent
 
     Args:
         body: body of the clip.
-        clip: to show.
+        clip: clip to show.
         size: size of a square, pixels.
         directions: how many.
         transparent: whether all but the body is left out.

@@ -180,7 +180,7 @@ def hit(body: Body, rest: Pose, side: str) -> Motion:
     Args:
         body: the spec.
         rest: pose from which it sways.
-        side: from which the blow comes, of `HIT_DIRECTIONS`.
+        side: side from which the blow comes, of `HIT_DIRECTIONS`.
 
     Raises:
         ValueError: the legs leave no room for it.
@@ -265,7 +265,7 @@ class LegMotion(NamedTuple):
 
     Attributes:
         joints: (samples, joints) angles, rad.
-        misses: (samples, legs, 3) by which feet miss their goals along the root's axes, m; not negative.
+        misses: (samples, legs, 3) distances by which feet miss their goals along the root's axes, m; not negative.
     """
 
     joints: np.ndarray
@@ -279,7 +279,8 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
         body: the spec.
         rest: pose from which the torso moves.
         poses: (samples, 6) poses of the torso from there; see `posture`.
-        lifts: (samples, legs, 3) by which feet leave their positions, standing heights; None for feet that stay.
+        lifts: (samples, legs, 3) displacements by which feet leave their positions, standing
+            heights; None for feet that stay.
     """
     standing_height = body.torso.standing_height
     torso_rotation = rotations.matrix(rest.quaternion)

@@ -122,7 +122,7 @@ def choose_start(recording: Recording, samples: int) -> int:
     Loops are compared by the displacement of the root, as the torso's depends on where in its sway the loop begins.
 
     Args:
-        recording: to choose from.
+        recording: recording to choose from.
         samples: samples of the loop.
     """
     torso = ground_poses(recording.poses)
@@ -149,7 +149,7 @@ def cut_loop(recording: Recording, first: int, samples: int) -> Motion:
     """Return a part of a recording as a loop: a root of constant velocity, and a pose that returns exactly.
 
     Args:
-        recording: to take the loop from.
+        recording: recording to take the loop from.
         first: sample with which the loop begins.
         samples: samples of the loop; the sample after the last is the first one again.
     """

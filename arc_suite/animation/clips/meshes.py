@@ -39,9 +39,9 @@ def body_meshes(
 
     Args:
         parts: parts of a body.
-        height: at which the body stands, m.
-        triangles: that all meshes may have together; None for as many as look round. Where these are more, round
-            shapes and hulls become coarser, and the smallest are left out.
+        height: height at which the body stands, m.
+        triangles: triangles that all meshes may have together; None for as many as look round. Where these are more,
+            round shapes and hulls become coarser, and the smallest are left out.
         uv: whether meshes have texture coordinates.
 
     Raises:

@@ -37,7 +37,7 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
     Args:
         body: body of the clips.
         clips: clips of one file.
-        root_motion: that of the file; see `creatures.glb`.
+        root_motion: value for the file; see `creatures.glb`.
     """
     roots_move = ROOT_MOTIONS[root_motion]
     metadata_of_animation = {}

@@ -35,7 +35,7 @@ def plant_feet(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
 
     Args:
         body: the spec.
-        motion: whose soles in stance are on the ground.
+        motion: motion whose soles in stance are on the ground.
         cycle: cycle of the gait, s.
         loops: whether the last sample is the first one.
     """
@@ -156,7 +156,7 @@ def _move_feet_nearer(
     Args:
         legs: legs of the body.
         standing_height: m.
-        motion: to change.
+        motion: motion to change.
         stances: stances of each leg; of a loop, those in three rounds.
         max_joint_steps: (legs,) rad, by which a joint of a leg may turn between two samples.
         loops: whether the last sample is the first one.
@@ -189,7 +189,7 @@ def _solve_joint_angles(
         standing_height: m.
         poses: (samples, 7 + joints) in the world.
         feet: (samples, legs, 3) positions of their centers, m.
-        corrections: (samples, legs, 3) to be added, m.
+        corrections: (samples, legs, 3) corrections to be added, m.
         max_joint_steps: (legs,) rad.
     """
     torso_rotations = rotations.matrix(poses[:, 3:7])[:, None]
@@ -297,7 +297,7 @@ def _smooth(values: np.ndarray, width: int, loops: bool) -> np.ndarray:
     """Return values (samples, n) as means over samples, so that a foot which leaves the ground does not jerk.
 
     Args:
-        values: to smooth; those at the ends of a motion that is no loop stay.
+        values: values to smooth; those at the ends of a motion that is no loop stay.
         width: samples to either side.
         loops: whether the last sample is the first one.
     """

@@ -140,8 +140,8 @@ class Recorder:
         Args:
             command: forward, left and turning, in units of the task.
             failing: index of the leg whose motors fail; None for a sound body.
-            crouch: by which the torso is lowered, standing heights, as far as the legs fold; demonstrators do so in
-                the task `directed`.
+            crouch: distance by which the torso is lowered, standing heights, as far as the legs fold;
+                demonstrators do so in the task `directed`.
 
         Raises:
             ValueError: the episode ends, the task has no command, or the body or policy cannot crouch.

@@ -153,9 +153,9 @@ class Motion(NamedTuple):
         the samples next to the end.
 
         Args:
-            pose: to meet, in the root's frame.
+            pose: pose to meet, in the root's frame.
             end: 0 or -1.
-            samples: over which the remaining difference fades.
+            samples: samples over which the remaining difference fades.
         """
         torso = ground_poses(self.poses()[[end]])[0]
         torso_on_root = np.append(pose.position[:2], rotations.yaw(pose.quaternion))
@@ -173,7 +173,7 @@ class Motion(NamedTuple):
         """Return the motion with a pose at one of its ends, on the same path of the root.
 
         Args:
-            pose: to end with, in the root's frame.
+            pose: pose to end with, in the root's frame.
             end: 0 or -1.
             samples: next to the end, over which the difference of the poses fades.
         """

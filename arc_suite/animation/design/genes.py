@@ -140,8 +140,8 @@ def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: st
     """Return the body of genes, with the scale and the density that keep a budget.
 
     Args:
-        budget: to keep.
-        space: that makes bodies of genes.
+        budget: budget to keep.
+        space: space that makes bodies of genes.
         genes: (n,) from 0 to 1.
         name: name of the body.
 

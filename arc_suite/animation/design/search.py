@@ -86,7 +86,7 @@ class Search:
         Args:
             space: genes.
             cell_map: with the cells to fill.
-            trial: by which bodies are evaluated.
+            trial: trial by which bodies are evaluated.
             seed: seed of the genes.
             stem: first part of the names of bodies, `<stem>_<index>`.
             random_bodies: number of bodies of random genes, with which the search begins.

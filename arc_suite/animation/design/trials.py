@@ -95,7 +95,7 @@ class Trial(NamedTuple):
     Attributes:
         task: its name.
         goal: a name of `GOALS`.
-        budget: that the body keeps.
+        budget: budget that the body keeps.
         first: episodes of all bodies.
         second: episodes of the bodies that challenge the elite of their cell.
     """
@@ -140,7 +140,7 @@ def evaluate(trial: Trial, body: Body | str, elite_value: float) -> Outcome:
 
     Args:
         trial: how to evaluate.
-        body: to evaluate, or the reason why there is no body.
+        body: body to evaluate, or the reason why there is no body.
         elite_value: value of the metric; see `Goal.value`.
     """
     if isinstance(body, str):

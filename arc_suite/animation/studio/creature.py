@@ -24,7 +24,7 @@ class Creature(NamedTuple):
     Attributes:
         sketch: sketch of which it is made.
         setup: body, task and settings.
-        environment: in which it walks. Episodes have no time limit; physics that diverges ends an episode.
+        environment: environment in which it walks. Episodes have no time limit; physics that diverges ends an episode.
         act: maps a `TimeStep` to an action.
         flaws: flaws of the body.
         links: names of the links of its legs.
@@ -77,7 +77,7 @@ def load_environment(setup: Setup, **options) -> dm.Environment:
     """Open an environment of a setup, with the same first episode every time.
 
     Args:
-        setup: to open.
+        setup: setup to open.
         options: settings of the task that the setup may replace.
     """
     settings = options | setup.task_kwargs | {"random": 0}

@@ -13,7 +13,7 @@ class Editor:
     """Holds the page's state, and asks the session for what the state says.
 
     Attributes:
-        initial_state: with which the studio began.
+        initial_state: state with which the studio began.
         lock: held while the state changes. Hold it while widgets show a state.
     """
 

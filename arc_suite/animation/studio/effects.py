@@ -15,7 +15,7 @@ def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
     """Return the names of the fields of a page's state that change nothing of a creature.
 
     Args:
-        creature: that walks.
+        creature: creature that walks.
         command: the present one.
     """
     sketch = creature.sketch

@@ -27,7 +27,7 @@ class Figure:
         Args:
             scene: scene of viser.
             root: name of a node of the scene.
-            creature: to show.
+            creature: creature to show.
             unit: unit of lengths in the scene, m.
         """
         self.creature = creature

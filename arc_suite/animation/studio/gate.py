@@ -167,8 +167,8 @@ def admits(request: Request, host: str, token: str) -> bool:
 
     Args:
         request: request of a browser.
-        host: that the server listens on.
-        token: that the address or the cookie must hold.
+        host: host that the server listens on.
+        token: token that the address or the cookie must hold.
     """
     host_names = (host, "localhost", "127.0.0.1", "::1")
     try:

@@ -32,7 +32,7 @@ class _Slider(NamedTuple):
 
     Attributes:
         field: name of the number.
-        label: that visitors see.
+        label: label that visitors see.
         low: lowest number.
         high: highest number.
         step: between two numbers.

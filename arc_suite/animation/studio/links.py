@@ -31,7 +31,7 @@ class LinkWidgets:
 
         Args:
             gui: gui of the page.
-            view: that shows the balls.
+            view: view that shows the balls.
             editor: editor of the state.
             show_state: has all widgets of the page show the state.
             switch_dragging: called when visitors begin or end to drag links.
@@ -68,8 +68,8 @@ class LinkWidgets:
         """Show the lengths of a sketch.
 
         Args:
-            sketch: that has the lengths.
-            creature: that walks, of which the sliders show the links.
+            sketch: sketch that has the lengths.
+            creature: creature that walks, of which the sliders show the links.
             visible: whether the widgets have an effect.
         """
         layout.set_visible(self._folder, visible)

@@ -68,9 +68,9 @@ def serve(session: Session, host: str, port: int, report: Callable[[str], None])
     """Serve the page until the session is closed or the keyboard interrupts.
 
     Args:
-        session: to show and change.
+        session: session to show and change.
         host: address to listen on.
-        port: to listen on; the next free one if it is taken.
+        port: port to listen on; the next free one if it is taken.
         report: called with the address of the page.
 
     Raises:

@@ -28,7 +28,7 @@ class Walker:
     """A creature that walks its episodes.
 
     Attributes:
-        creature: that walks.
+        creature: creature that walks.
         episodes: episodes of the creature.
         history: history of the episodes.
     """
@@ -68,8 +68,8 @@ class Session:
         walker: walker of the latest sketch.
         companion: an earlier creature that was kept, and follows the same command; None without one.
         error: one line that says why the latest sketch makes no creature; empty if it makes one.
-        velocity: (3,) that visitors command, in multiples of the body's own; None for the task's command.
-        pose: (6,) that visitors command, see `models.posture`; None for that of the task.
+        velocity: (3,) velocity that visitors command, in multiples of the body's own; None for the task's command.
+        pose: (6,) pose that visitors command, see `models.posture`; None for that of the task.
         gait: name of the gait that visitors command, None for that of the task, and multiple of its frequency.
         paused: whether time stands still.
         pace: simulated seconds a second, a mean over the last two seconds.

@@ -256,7 +256,7 @@ def open_file(sketch: Sketch, text: str) -> Sketch:
     """Return the sketch with the body of a spec file, in the file's proportions.
 
     Args:
-        sketch: whose task and policy stay.
+        sketch: sketch whose task and policy stay.
         text: text of the spec file.
     """
     body_fields: dict[str, Any]
@@ -289,9 +289,9 @@ def set_length_factor(sketch: Sketch, link: str, factor: float, symmetric: bool)
     """Return the sketch with another length of a link.
 
     Args:
-        sketch: to change.
+        sketch: sketch to change.
         link: as for `length_factor`.
-        factor: that `length_factor` returns for the new sketch.
+        factor: factor that `length_factor` returns for the new sketch.
         symmetric: as for `set_end`.
     """
     original_ends = _original_ends(sketch)
@@ -308,7 +308,7 @@ def drag_end(sketch: Sketch, part: str, shift: Sequence[float], symmetric: bool)
     """Return the sketch with a shifted end of a link of one leg.
 
     Args:
-        sketch: to change.
+        sketch: sketch to change.
         part: name of the link's part; the sketch stays as it is if the body lacks it.
         shift: (3,) in the frame of the link, m, in the body's present proportions.
         symmetric: as for `set_end`.
@@ -330,7 +330,7 @@ def set_end(sketch: Sketch, part: str, end: Vector, symmetric: bool) -> Sketch:
     """Return the sketch with another end of a link of one leg.
 
     Args:
-        sketch: to change.
+        sketch: sketch to change.
         part: name of the link's part, which the body may lack.
         end: (3,) in the frame of the link, before proportions change, m.
         symmetric: whether the leg on the other side of the body gets the mirrored end, if there is such a leg.

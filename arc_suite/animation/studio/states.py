@@ -181,7 +181,7 @@ def _read(part_class: type, value: Any, part_name: str) -> Any:
     Args:
         part_class: `Sketch` or `VisitorCommand`.
         value: value of JSON.
-        part_name: with which errors begin.
+        part_name: name with which errors begin.
     """
     defaults = {field.name: field.default for field in dataclasses.fields(part_class)}
     fields = {}

@@ -69,7 +69,7 @@ class Perceptron:
         """Return the architecture for a task.
 
         Args:
-            task: whose observations networks see.
+            task: task whose observations networks see.
             critic_blocks: names of privileged blocks for networks of values.
             symmetric: makes no difference: mirrored transitions teach both sides.
         """
@@ -155,7 +155,7 @@ def of(
     """Return the architecture for a task of one body.
 
     Args:
-        task: whose observations networks see.
+        task: task whose observations networks see.
         network: "perceptron", "legs", or that of another package. Its function takes the other arguments.
         critic_blocks: names of privileged blocks for networks of values.
         symmetric: whether legs on the left and on the right share their network, if the task is symmetric.

@@ -64,7 +64,7 @@ def project_distribution(probabilities, returns):
 
     Args:
         probabilities: (batch, RETURN_COUNT)
-        returns: (batch, RETURN_COUNT) that have these probabilities.
+        returns: (batch, RETURN_COUNT) returns that have these probabilities.
     """
     positions = (returns.clip(-MAX_RETURN, MAX_RETURN) + MAX_RETURN) * ((RETURN_COUNT - 1) / (2.0 * MAX_RETURN))
     below = jnp.floor(positions).astype(jnp.int32)

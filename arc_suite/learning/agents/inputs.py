@@ -39,7 +39,7 @@ class NetworkInputs(NamedTuple):
         """Return the inputs before the first observation.
 
         Args:
-            task: whose observations they are.
+            task: task whose observations they are.
             normalize: whether running moments normalize the inputs.
             symmetry_augmentation: whether left and right are alike, if the task is symmetric: transitions are
                 mirrored, unless the network of legs treats both sides alike.

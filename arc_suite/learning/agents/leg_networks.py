@@ -77,7 +77,7 @@ class Legs:
         """Return the architecture for a task.
 
         Args:
-            task: whose observations they are.
+            task: task whose observations they are.
             critic_blocks: names of privileged blocks for networks of values.
             symmetric: whether to treat left and right alike, if the task is symmetric.
         """

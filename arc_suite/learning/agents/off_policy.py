@@ -265,7 +265,7 @@ def _draw_update(
         sources: sources of transitions.
         inputs: how networks see observations.
         with_policy: whether the policy learns too.
-        phase: that the update belongs to; None for none.
+        phase: phase that the update belongs to; None for none.
 
     Returns:
         The batch, the noise, and the policy's distributions at the next observations, None if they are not known.

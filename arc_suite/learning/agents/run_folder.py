@@ -191,7 +191,7 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
     Args:
         path: path of the folder.
         name: name of the table.
-        columns: that the table must have, if it has a line.
+        columns: columns that the table must have, if it has a line.
 
     Raises:
         ValueError: a damaged table.

@@ -12,7 +12,7 @@ class Share(NamedTuple):
     """A job: makes a share of a study; after a timeout or preemption it is queued again and resumes.
 
     Attributes:
-        command: that makes it.
+        command: command that makes it.
     """
 
     command: tuple[str, ...]
@@ -36,7 +36,7 @@ def submit(
     """Submit an array of jobs.
 
     Args:
-        command: that makes the study; each job adds its share.
+        command: command that makes the study; each job adds its share.
         shares: number of jobs, of one core each.
         hours: time limit of a job, which is queued again.
         logs: folder of the jobs' output.

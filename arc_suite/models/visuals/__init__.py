@@ -112,7 +112,7 @@ def _add_joint(part, name: str, link: Link, radius: float, light: str) -> None:
     Args:
         part: part of the link.
         name: name of the part.
-        link: whose joint it is.
+        link: link whose joint it is.
         radius: radius of the wider of the two links that meet at the joint, m.
         light: material of band and cap.
     """

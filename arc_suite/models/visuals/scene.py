@@ -108,9 +108,9 @@ def _add_light(torso, name: str, direction: tuple, strength: float, height: floa
     """Add a light that rides on the torso.
 
     Args:
-        torso: that it rides on.
+        torso: torso that it rides on.
         name: name of the light.
-        direction: (3,) in which it shines, of any length.
+        direction: (3,) direction in which it shines, of any length.
         strength: strength of its diffuse color, at most 1.
         height: height of the creature, m.
         casts_shadow: whether things cast shadows in it.
