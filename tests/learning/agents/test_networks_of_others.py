@@ -54,7 +54,7 @@ def test_guide(tmp_path):
 def test_a_function_that_makes_no_architecture_is_one_line(networks):
     networks.update(mine=lambda task, critic_blocks, symmetric: 3, lost="nowhere:Deep.of", half=Half.of)
     task = Setup.of("tick").definition
-    with refused("network 'mine': has no symmetric and no size and no own and ", begins=True):
+    with refused("network 'mine': has no symmetric and no size and no action_inputs and ", begins=True):
         architectures.of(task, "mine")
     with refused("network 'lost': cannot import nowhere:Deep.of: No module named 'nowhere'"):
         architectures.of(task, "lost")
