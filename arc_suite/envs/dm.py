@@ -120,13 +120,16 @@ class Environment(KnownAttributes, control.Environment):
         Modifiers draw friction, mass and other fields for each episode. A field that was set here keeps its value.
 
         Args:
-            fields: values by name of the field: one of `simulation.model.FIELDS`, which are fields of `MjModel` and
-                `gravity`. A value must broadcast to the field's shape.
+            fields: values by name. A name is one of `simulation.model.FIELDS`, which are fields of `MjModel` and
+                `gravity`, or of `CONTACT_PROPERTIES`: friction, solref, solimp or margin of all contacts. A value
+                must broadcast to the shape of the field or property.
 
         Raises:
             ValueError: an unknown field, one without effect, or a value that does not fit.
         """
-        self.physics.change_model(check_fields(self.physics.model.ptr, fields), lasting=True)
+        physics = self.physics
+        checked_fields = check_fields(physics.model.ptr, fields, compiled_field=physics.compiled_field)
+        physics.change_model(checked_fields, lasting=True)
 
     @one_thread_at_a_time
     def change_settings(self, settings: Mapping[str, Any]) -> None:

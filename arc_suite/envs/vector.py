@@ -350,8 +350,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         Modifiers draw friction, mass and other fields for each episode. A field that was set here keeps its value.
 
         Args:
-            fields: values by name of the field: one of `simulation.model.FIELDS`, which are fields of `MjModel` and
-                `gravity`. A value must broadcast to the field's shape, or to it with a leading axis of num_envs.
+            fields: values by name. A name is one of `simulation.model.FIELDS`, which are fields of `MjModel` and
+                `gravity`, or of `CONTACT_PROPERTIES`: friction, solref, solimp or margin of all contacts. A value
+                must broadcast to the shape of the field or property, or to it with a leading axis of num_envs.
             mask: (num_envs,) booleans, the environments whose models change; None for all.
 
         Raises:
@@ -363,7 +364,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.batch.change_model(self._checked_fields(fields), mask)
 
     def _checked_fields(self, fields: Any) -> dict[str, np.ndarray]:
-        return check_fields(self.batch.models[0], fields, self.num_envs)
+        return check_fields(self.batch.models[0], fields, self.num_envs, self.batch.compiled_field)
 
     @one_thread_at_a_time
     def change_settings(self, settings: Mapping[str, Any], mask=None) -> None:

@@ -159,6 +159,11 @@ class Batch:
         self.data.qpos[mask] = qpos
         self._simulations.forward(mask)
 
+    def compiled_field(self, name: str) -> np.ndarray:
+        """Return a field (count, *shape) of the models as they were compiled."""
+        compiled = self._compiled or [self._simulations.model] * self._simulations.nsim
+        return np.stack([field(model, name) for model in compiled])
+
     def change_model(self, fields: Mapping[str, np.ndarray], mask: np.ndarray) -> None:
         """Set fields of the models of some simulations from now on, over resets.
 

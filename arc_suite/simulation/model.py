@@ -2,8 +2,8 @@
 
 import copy
 import functools
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -37,6 +37,30 @@ FIELDS = {
     "pair_solimp": (0.0, _MAX_VALUE),
     "pair_margin": (0.0, _MAX_VALUE),
     "geom_friction": (0.0, _MAX_VALUE),
+    "geom_solref": (-_MAX_VALUE, _MAX_VALUE),
+    "geom_solimp": (0.0, _MAX_VALUE),
+    "geom_margin": (0.0, _MAX_VALUE),
+}
+
+
+class ContactProperty(NamedTuple):
+    """A property that all contacts of a model have, whether they are pairs of geoms or not.
+
+    Attributes:
+        shape: shape of a value.
+        low: lowest value.
+    """
+
+    shape: tuple[int, ...] = ()
+    low: float = 0.0
+
+
+# Properties that `check_fields` takes in addition to fields, and writes into all fields that contacts read.
+CONTACT_PROPERTIES = {
+    "friction": ContactProperty(),  # sliding friction
+    "solref": ContactProperty((2,), -_MAX_VALUE),
+    "solimp": ContactProperty((5,)),
+    "margin": ContactProperty(),  # m
 }
 
 _LARGE_GEOMS = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -92,51 +116,106 @@ def field(model: mujoco.MjModel, name: str) -> np.ndarray:
 
 
 def check_fields(
-    model: mujoco.MjModel, fields: Any, count: int | None = None, every: bool = False
+    model: mujoco.MjModel,
+    fields: Any,
+    count: int | None = None,
+    compiled_field: Callable[[str], np.ndarray] | None = None,
 ) -> dict[str, np.ndarray]:
     """Return values of a model's fields, each in the field's shape.
 
     Args:
-        model: the compiled model.
-        fields: values by name, which broadcast to the field's shape, with a leading axis for several models.
+        model: a model, whose fields may have been changed.
+        fields: values by name of `FIELDS`, which broadcast to the field's shape, with a leading axis for several
+            models. With `compiled_field` also values of `CONTACT_PROPERTIES`.
         count: number of models; None for one model without the leading axis.
-        every: whether fields without effect on this model are taken, too.
+        compiled_field: function of a name that returns the compiled values of a field, with the leading axis for
+            several models. None takes no contact properties, and takes fields without effect, as snapshots hold them.
 
     Raises:
         ValueError: no such field, one without effect on this model, or values that do not fit.
     """
-    has_no_effect = {
-        "geom_friction": not model.geom_contype.any(),
-        "jnt_actfrcrange": not model.jnt_actfrclimited.any(),
-        "actuator_biasprm": not model.actuator_biastype.any(),
-    }
-    valid = [name for name in FIELDS if every or not has_no_effect.get(name)]
-    if "geom_friction" in checks.mapping("model", fields) and "geom_friction" not in valid:
-        raise ValueError("model field 'geom_friction': contacts of this model read pair_friction; change that")
-    checked_values = {}
-    for name, values in checks.mapping("model", fields).items():
-        like = field(model, checks.name(name, valid, "model field"))
+    values_by_name = checks.mapping("model", fields)
+    if compiled_field is not None:
+        _check_effect(model, values_by_name)
+    known_names = [*FIELDS, *CONTACT_PROPERTIES] if compiled_field is not None else list(FIELDS)
+    checked_values: dict[str, np.ndarray] = {}
+    for name, values in values_by_name.items():
+        if checks.name(name, known_names, "model field") in CONTACT_PROPERTIES:
+            checked_values |= _contact_fields(name, values, count, compiled_field)
+            continue
+        like = field(model, name)
         if count is not None:
             like = np.broadcast_to(like, (count, *like.shape))
         checked_values[name] = _check_values(name, values, like)
     return checked_values
 
 
+def _check_effect(model: mujoco.MjModel, fields: Mapping[str, Any]) -> None:
+    """Check that simulations of a model read fields; in some scenes contacts read pairs, and others read geoms."""
+    if "jnt_actfrcrange" in fields and not model.jnt_actfrclimited.any():
+        raise ValueError("model field 'jnt_actfrcrange': torques of this model have no limits of joints")
+    if "actuator_biasprm" in fields and not model.actuator_biastype.any():
+        raise ValueError("model field 'actuator_biasprm': motors of this model have no bias; servos have")
+    contacts_read = {"pair": model.npair > 0, "geom": bool(model.geom_contype.any())}
+    for name in CONTACT_PROPERTIES:
+        for kind, other_kind in (("pair", "geom"), ("geom", "pair")):
+            field_name = f"{kind}_{name}"
+            other_field = f"{other_kind}_{name}"
+            if field_name not in fields:
+                continue
+            if name in fields:
+                raise ValueError(f"model field {field_name!r}: {name} changes it, too; leave one of them out")
+            if not contacts_read[kind]:
+                what = f"contacts of this model read {other_field}"
+                raise ValueError(f"model field {field_name!r}: {what}; change {name}")
+            if contacts_read[other_kind] and other_field not in fields:
+                what = f"contacts of this model read {other_field}, too"
+                raise ValueError(f"model field {field_name!r}: {what}; change {name}")
+
+
+def _contact_fields(
+    name: str, values: Any, count: int | None, compiled_field: Callable[[str], np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Return the fields of a model that give all contacts a property."""
+    contact_property = CONTACT_PROPERTIES[name]
+    shape = contact_property.shape if count is None else (count, *contact_property.shape)
+    value = _check_numbers(name, values, shape, contact_property.low, _MAX_VALUE)
+    pair_values = compiled_field(f"pair_{name}").copy()
+    geom_values = compiled_field(f"geom_{name}").copy()
+    if name == "friction":  # of pairs the first two, of geoms the first; the others are torsional and rolling friction
+        pair_values[..., :2] = value[..., None, None]
+        geom_values[..., 0] = value[..., None]
+    elif name == "margin":
+        pair_values[:] = value[..., None]
+        geom_values[:] = 0.5 * value[..., None]  # MuJoCo adds up the margins of two geoms
+    else:
+        pair_values[:] = value[..., None, :]
+        geom_values[:] = value[..., None, :]
+    return {f"pair_{name}": pair_values, f"geom_{name}": geom_values}
+
+
+def _check_numbers(name: str, values: Any, shape: tuple[int, ...], low: Any, high: float) -> np.ndarray:
+    """Return values as an array of a shape; `low` broadcasts to the shape."""
+    try:
+        array = np.broadcast_to(np.asarray(values, float), shape).copy()
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise ValueError(
+            f"model field {name!r}: expected numbers of shape {shape}, got {checks.preview(values)}"
+        ) from None
+    if not ((array >= low) & (array <= high)).all():
+        above = ", above 0 where the model's are" if name in _POSITIVE else ""
+        lowest = np.min(low) if name not in _POSITIVE else 0.0
+        raise ValueError(
+            f"model field {name!r}: expected numbers from {lowest:g} to {high:g}{above}, got {checks.preview(values)}"
+        )
+    return array
+
+
 def _check_values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
     """Return values of a field in the shape of the present ones, `like`."""
     low, high = FIELDS[name]
-    try:
-        array = np.broadcast_to(np.asarray(values, float), like.shape).copy()
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        raise ValueError(
-            f"model field {name!r}: expected numbers of shape {like.shape}, got {checks.preview(values)}"
-        ) from None
     lowest = np.where(like > 0.0, 1e-15, low) if name in _POSITIVE else low
-    if not ((array >= lowest) & (array <= high)).all():
-        above = ", above 0 where the model's are" if name in _POSITIVE else ""
-        raise ValueError(
-            f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {checks.preview(values)}"
-        )
+    array = _check_numbers(name, values, like.shape, lowest, high)
     if name == "body_iquat" and (abs(np.linalg.norm(array, axis=-1) - 1.0) > _TOLERANCE).any():
         raise ValueError(f"model field {name!r}: expected quaternions of length 1, got {checks.preview(values)}")
     return array

@@ -31,7 +31,8 @@ class Physics(dm_mujoco.Physics):
 
     In most arenas the model lists its contacts as pairs of geoms (`model.npair` > 0). There, at run
     time, write `pair_friction`, `pair_solref`, `pair_solimp`, `pair_margin` and `pair_gap`; fields of
-    geoms, `contype` and `conaffinity` have no effect. Steps leave `data.timer` at 0; see `timers`.
+    geoms, `contype` and `conaffinity` have no effect. `change_model` of the environments writes what
+    contacts read. Steps leave `data.timer` at 0; see `timers`.
 
     Attributes:
         body: the body.
@@ -95,6 +96,10 @@ class Physics(dm_mujoco.Physics):
         if lasting:
             self._lasting = {**self._lasting, **fields}
         self._write_fields({name: self._lasting.get(name, values) for name, values in fields.items()})
+
+    def compiled_field(self, name: str) -> np.ndarray:
+        """Return a field of the model as it was compiled."""
+        return self._unchanged[name] if name in self._unchanged else field(self.model.ptr, name)
 
     @property
     def lasting(self) -> Mapping[str, np.ndarray]:

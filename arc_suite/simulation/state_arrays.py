@@ -42,7 +42,7 @@ def check_snapshot(
         if name.startswith(LASTING):  # NaN stands for no change
             values = np.where(np.isnan(values), compiled, values)
         for model, model_values in zip(models, values, strict=True):
-            check_fields(model, {fields[name]: model_values}, every=True)
+            check_fields(model, {fields[name]: model_values})
     return arrays
 
 

@@ -13,12 +13,12 @@ import arc_suite
 from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.simulation.model import FIELDS, field
+from arc_suite.simulation.model import CONTACT_PROPERTIES, FIELDS, compile_model, field
 from arc_suite.tasks import TASKS
 
 NUM_ENVS, SHORT = 3, {"time_limit": 1.0}
 SOME = np.array([True, False, True])
-MODEL = {"gravity": (0.0, 0.0, -4.0), "pair_friction": 1e-3, "body_mass": 2.0}
+MODEL = {"gravity": (0.0, 0.0, -4.0), "friction": 1e-3, "body_mass": 2.0}
 
 
 def both(task, **settings):
@@ -80,28 +80,80 @@ def test_different_bodies_change_too():
     assert (rewards == plain).tolist() == [False, False, True, True]
 
 
-@pytest.mark.parametrize("name", FIELDS)
+GEOMS = [name for name in FIELDS if name.startswith("geom_")]
+
+
+@pytest.mark.parametrize("name", [name for name in FIELDS if name not in GEOMS])
 def test_every_field_moves_what_follows(name):
-    """What pairs of contacts do not read is refused in walk; pillars read it. Limits of torques are those of servos."""
+    """Limits and biases of actuators are those of servos."""
     observations, body = [], imports.hexapod() if name in ("jnt_actfrcrange", "actuator_biasprm") else "tick"
     for change in (False, True):
-        environment = Env(body, "navigate" if name == "geom_friction" else "walk", {"base_noise": 0.0})
+        environment = Env(body, "walk", {"base_noise": 0.0})
         environment.reset(seed=0)
         value = field(environment.unwrapped._env.physics.model.ptr, name)
-        if change and name == "geom_friction":
-            environment.change_model({name: value})
-            return
         other = (0.6, 0.0, 0.0, 0.8) if name == "body_iquat" else 0.5 * value + 0.01
         environment.change_model({name: other} if change else {})
         observations.append([environment.step(np.full(18, 0.1, np.float32))[0] for _ in range(10)])
     assert not np.array_equal(*observations)
 
 
+CONTACTS = {"friction": 0.05, "solref": (0.2, 1.0), "solimp": (0.1, 0.2, 0.01, 0.5, 2.0), "margin": 0.05}
+PARTLY = ("stairs", "gaps", "course", "leap", "navigate")  # tasks in which contacts with boxes or pillars read geoms
+
+
+@pytest.mark.parametrize("name", CONTACT_PROPERTIES)
+@pytest.mark.parametrize("task", TASKS)
+def test_properties_of_contacts_move_every_task(task, name):
+    """They write all that contacts read; a field of some contacts alone is refused, or of none."""
+    with_all, with_both, without = (arc_suite.load("tick", task, {"random": 2}) for _ in range(3))
+    observations = []
+    for environment in (with_all, with_both, without):
+        environment.reset()
+        if environment is with_all:
+            environment.change_model({name: CONTACTS[name]})
+        elif environment is with_both:
+            geoms = {f"geom_{name}": 0.5 * CONTACTS[name] if name == "margin" else CONTACTS[name]}
+            environment.change_model({f"pair_{name}": CONTACTS[name]} | (geoms if task in PARTLY else {}))
+        actions = np.random.default_rng(1).uniform(-0.5, 0.5, (15, 18))
+        observations.append([environment.step(action).observation["posture"] for action in actions])
+    assert not np.array_equal(observations[0], observations[2])
+    if name != "friction":  # fields of friction have torsional and rolling friction, too
+        np.testing.assert_array_equal(observations[0], observations[1])
+    if task in PARTLY:
+        with refused(f"model field 'pair_{name}': contacts of this model read geom_{name}, too; change {name}"):
+            without.change_model({f"pair_{name}": 0.5})
+        with refused(f"model field 'geom_{name}': contacts of this model read pair_{name}, too; change {name}"):
+            without.change_model({f"geom_{name}": 0.5})
+    else:
+        with refused(f"model field 'geom_{name}': contacts of this model read pair_{name}; change {name}"):
+            without.change_model({f"geom_{name}": 0.5})
+
+
+def test_friction_leaves_what_modifiers_draw_of_other_fields():
+    """Torsional and rolling friction are the compiled ones, in one environment and in a vector."""
+    vector, singles = both("gaps", friction=(0.5, 2.0), mass=(0.5, 2.0))
+    frictions = np.array([0.1, 0.2, 0.3])
+    vector.change_model({"friction": frictions})
+    for single, friction in zip(singles, frictions, strict=True):
+        single.change_model({"friction": friction})
+    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (60, NUM_ENVS, 18)).astype(np.float32)
+    assert_steps_are_equal(vector, singles, actions)
+    compiled = compile_model(vector.task.scene.body, vector.task.scene.arena)
+    for model, friction in zip(vector.batch.models, frictions, strict=True):
+        np.testing.assert_array_equal(model.pair_friction[:, :2], friction)
+        np.testing.assert_array_equal(model.pair_friction[:, 2:], compiled.pair_friction[:, 2:])
+        np.testing.assert_array_equal(model.geom_friction[:, 0], friction)
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
         ({"body_mas": 1.0}, "unknown model field 'body_mas'; did you mean 'body_mass'? (there are: gravity, "),
-        ({"geom_friction": 1.0}, "model field 'geom_friction': contacts of this model read pair_friction; change that"),
+        ({"geom_friction": 1.0}, "model field 'geom_friction': contacts of this model read pair_friction; change fric"),
+        ({"friction": 1.0, "pair_friction": 1.0}, "model field 'pair_friction': friction changes it, too; leave one "),
+        ({"friction": -1.0}, "model field 'friction': expected numbers from 0 to 1e+06, got -1.0"),
+        ({"jnt_actfrcrange": 1.0}, "model field 'jnt_actfrcrange': torques of this model have no limits of joints"),
+        ({"actuator_biasprm": 1.0}, "model field 'actuator_biasprm': motors of this model have no bias; servos have"),
         ({"gravity": (1.0, 2.0)}, "model field 'gravity': expected numbers of shape (3,), got (1.0, 2.0)"),
         ({"body_mass": 0.0}, "model field 'body_mass': expected numbers from 0 to 1e+06, above 0 where the model's"),
         ({"gravity": np.nan}, "model field 'gravity': expected numbers from -1e+06 to 1e+06, got nan"),
