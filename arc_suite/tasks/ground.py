@@ -327,11 +327,21 @@ class Lanes(Ground):
         sizes: dict[str, Any] = {}
         for name in size_names:
             sizes[name] = checks.number(name, values[name], *terrain.SIZES[name])
+        difficulty = checks.number("difficulty", values["difficulty"], 0.0, 1.0)
+        curriculum = checks.boolean("curriculum", values["curriculum"])
+        level = checks.integer("level", values["level"], 0, LEVELS - 1)
+        if curriculum and "difficulty" in overrides:
+            raise ValueError(
+                "difficulty: expected none with curriculum=True, as each level has its own, "
+                f"got {overrides['difficulty']}"
+            )
+        if level and not curriculum:
+            raise ValueError(f"level: expected with curriculum=True, got {overrides['level']}")
         return dataclasses.replace(
             self,
-            difficulty=checks.number("difficulty", values["difficulty"], 0.0, 1.0),
-            curriculum=checks.boolean("curriculum", values["curriculum"]),
-            level=checks.integer("level", values["level"], 0, LEVELS - 1),
+            difficulty=difficulty,
+            curriculum=curriculum,
+            level=level,
             terrain_seed=checks.integer("terrain_seed", values["terrain_seed"], 0, 2**32 - 1),
             **sizes,
         )

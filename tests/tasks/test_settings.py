@@ -13,6 +13,7 @@ import arc_suite
 from arc_suite.tasks import TASKS, parameters
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.modified_task import add_modifiers
+from arc_suite.tasks.modifiers import SUITE_MODIFIERS
 from arc_suite.tasks.suite import Steer
 
 # Another value of every setting.
@@ -32,10 +33,36 @@ OTHER = {
     "level": 5,
     "terrain_seed": 3,
     "rise": 0.05,
+    "slope": 0.3,
+    "width": 0.05,
+    "commands": {"forward": (-1.5, 1.5)},
+    "start": "belly",
+    "poses": 1.0,
+    "gaits": ("ripple",),
     "cost_limit": 0.3,
+    "friction": (0.2, 0.3),
+    "mass": (2.0, 2.5),
+    "payload": (1.0, 2.0),
+    "center_of_mass": 0.3,
+    "joint_offset": 0.3,
+    "gains": (0.3, 0.4),
+    "actions": "position",
+    "motor_strength": (0.2, 0.3),
+    "joint_strength": (0.2, 0.3),
+    "armature": (3.0, 4.0),
+    "actuator_failure": True,
+    "kicks": 2.0,
+    "force": 2.0,
+    "delay": (2, 3),
+    "exclude_blocks": ("posture",),
+    "observation_noise": {"posture": 1.0},
+    "history": 2,
     **dict.fromkeys((*parameters.SHARED_NOISE, *parameters.Noise._fields), 0.05),
 }
-WITH = {"level": {"curriculum": True}}
+WIDER = {"commands": {"forward": (-1.5, 1.5)}}
+WITH = {"level": {"curriculum": True}, "gains": {"actions": "position"}}  # settings without which others are refused
+ON_LEVEL_GROUND = {"curriculum": WIDER, "level": WIDER}  # others, on level ground
+SCENE = ("geom_pos", "geom_size", "hfield_data")  # what a body may not reach in a few steps
 
 
 def names(task):
@@ -43,20 +70,31 @@ def names(task):
     return TASKS[task].names()
 
 
-PAIRS = [(task, name) for task in ("walk", "steer", "rough", "navigate") for name in names(task)]
+MODIFIERS = [name for kind in SUITE_MODIFIERS for name in kind.defaults]
+PAIRS = [(task, name) for task in TASKS for name in names(task)]
+PAIRS += [(task, name) for task in ("walk", "steer", "navigate") for name in MODIFIERS]
+
+
+def prerequisites(task, name):
+    """The settings without which a task refuses a setting."""
+    on_level_ground = ON_LEVEL_GROUND if "start" in names(task) else {}
+    return WITH.get(name, {}) | on_level_ground.get(name, {})
 
 
 def told(task, settings):
-    """Everything that a task tells of 40 steps of random actions."""
+    """Everything that a task tells of two episodes of 40 steps of random actions, and its scene."""
     environment = arc_suite.load("tick", task, {"random": 5, **settings})
-    random, timestep = np.random.RandomState(2), environment.reset()
-    found = [flat(timestep)]
-    for _ in range(40):
-        if timestep.last():
-            break
-        timestep = environment.step(random.uniform(-1.0, 1.0, 18))
-        found += [flat(timestep), np.array([timestep.reward, timestep.discount])]
-    return np.concatenate(found)
+    random, found = np.random.RandomState(2), []
+    for _ in range(2):
+        timestep = environment.reset()
+        found += [flat(timestep)]
+        for _ in range(40):
+            if timestep.last():
+                break
+            timestep = environment.step(random.uniform(-0.6, 0.6, 18))
+            found += [flat(timestep), np.array([timestep.reward, timestep.discount])]
+    model = environment.physics.model.ptr
+    return np.concatenate([*found, *(getattr(model, name).ravel() for name in SCENE)])
 
 
 @pytest.mark.parametrize(
@@ -64,7 +102,7 @@ def told(task, settings):
     tiers(PAIRS, lambda task, name: task == "walk" or task == "rough" and name in ("gait", "level", "weights")),
 )
 def test_every_setting_changes_something(task, name):
-    given = WITH.get(name, {})
+    given = prerequisites(task, name)
     plain, changed = told(task, given), told(task, given | {name: OTHER[name]})
     assert plain.shape != changed.shape or not np.array_equal(plain, changed)
 
@@ -83,6 +121,26 @@ def test_tasks_that_differ_in_data_alone_have_the_same_settings():
     }
     for task, own in (sizes | {"roam": ["commands", "rise"]}).items():
         assert sorted(names(task)) == sorted((*names("course"), *own))
+
+
+LANES = [task for task in TASKS if "difficulty" in names(task)]
+LEVELED = [task for task in TASKS if "level" in names(task)]
+
+
+@pytest.mark.parametrize("task", LEVELED)
+def test_a_level_needs_a_curriculum(task):
+    with refused("level: expected with curriculum=True, got 5"):
+        arc_suite.load("tick", task, {"level": 5})
+
+
+@pytest.mark.parametrize("task", LANES)
+def test_a_difficulty_is_none_of_a_curriculum(task):
+    message = "difficulty: expected none with curriculum=True, as each level has its own, got 0.3"
+    with refused(message):
+        arc_suite.load("tick", task, {"curriculum": True, "difficulty": 0.3})
+    environment = arc_suite.load("tick", task, {"difficulty": 0.3})
+    with refused("level: expected with curriculum=True, got 3"):
+        environment.change_settings({"level": 3})
 
 
 @pytest.mark.parametrize("task", [name for name in TASKS if name != "walk"])

@@ -141,7 +141,9 @@ class Configuration:
             ValueError: a setting that does not fit, or one that changes observations or actions.
         """
         policy_setup = self.policy_setup
-        training_setup = policy_setup.with_settings(self.training)
+        # The difficulty is that of evaluations: levels of a curriculum have their own.
+        dropped = ("difficulty",) if self.training.get(CURRICULUM[0]) else ()
+        training_setup = policy_setup.with_settings(self.training, dropped)
         if training_setup != policy_setup:
             training_task = training_setup.definition
             policy_task = policy_setup.definition
