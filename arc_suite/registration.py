@@ -17,7 +17,6 @@ from arc_suite.registry import ADDITIONS, BODIES_ENV, FAMILIES, MODULE_OF_NAME
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
-from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.modifiers import MODIFIERS, Modifier
 from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
 
@@ -270,7 +269,6 @@ def register_ids() -> None:
                 env_id,
                 entry_point="arc_suite.envs.gym:Env",
                 vector_entry_point="arc_suite.envs.vector:VectorEnv",
-                max_episode_steps=STEPS,
                 kwargs={
                     "domain_name": registry.importable_name("robot", domain_name),
                     "task_name": registry.importable_name("task", task_name),

@@ -13,6 +13,7 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
 --verify imports no module that the dataset names: --task and --set name those that it needs, as in collecting.
 """
 
+import math
 import pathlib
 from collections.abc import Sequence
 
@@ -32,6 +33,7 @@ from arc_suite.cli.flags import (
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
 from arc_suite.cpg.selection import check_preset_name
+from arc_suite.envs.prepare import checked_limit
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
@@ -60,7 +62,7 @@ flags.DEFINE_integer(
     "episodes", 1000, "How many episodes the dataset is to have.", lower_bound=1, upper_bound=MAX_COUNT
 )
 flags.DEFINE_integer(
-    "steps", STEPS, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=STEPS
+    "steps", None, "Control steps after which an episode is truncated. [default: the task's limit]", lower_bound=1
 )
 flags.DEFINE_integer(
     "seed",
@@ -101,7 +103,7 @@ def main() -> None:
     policy, label = policy_and_label()
     for setup in setups.values():
         presets = tuple(presets_for(setup))
-        settings = data.DatasetSettings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
+        settings = data.DatasetSettings(setup, policy, presets, FLAGS.noise, FLAGS.seed, step_limit(setup))
         dataset_id = settings.dataset_id(label) if FLAGS.id is None else FLAGS.id
         collected_episodes = data.collect(
             dataset_id,
@@ -130,6 +132,20 @@ def describe_dataset(dataset) -> str:
         f"{len(dataset)} episodes, return {np.mean(returns):.1f} +- {np.std(returns):.1f}, "
         f"length {np.mean(lengths):.1f}, {dataset.metadata['dataset_size']} MB in {dataset.path}"
     )
+
+
+def step_limit(setup: Setup) -> int:
+    """Return the control steps after which an episode of a dataset is truncated.
+
+    Raises:
+        ValueError: more steps than an episode of the task has, or neither --steps nor a finite time limit.
+    """
+    limit = setup.definition.step_limit
+    if FLAGS.steps is None:
+        if math.isinf(limit):
+            raise ValueError("time_limit: expected a finite one, or --steps, as every episode of a dataset must end")
+        return max(STEPS, int(limit))  # an episode ends at a shorter limit of the task anyway
+    return checked_limit(FLAGS.steps, setup.definition)
 
 
 def presets_for(setup: Setup) -> Sequence[str]:

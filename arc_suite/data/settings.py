@@ -23,7 +23,7 @@ class DatasetSettings(NamedTuple):
             count. Empty for other policies.
         noise: standard deviation of the normal noise on actions, which are clipped after it.
         seed: seed of the first episode, of `seed_ranges.COLLECTING`.
-        steps: control steps after which an episode is truncated.
+        steps: control steps after which an episode is truncated, unless the task's limit is shorter.
     """
 
     setup: Setup

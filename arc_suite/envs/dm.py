@@ -55,7 +55,7 @@ def load(
             if the module has not been imported yet; or any body; see `registry.body_of`.
         task_name: walk, steer, or a task of another package as `module:name`.
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
-            or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
+            or `RandomState`) and `on_divergence` ("raise" an error or "truncate" the episode with
             reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers`;
             for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.WalkSettings`.
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Other settings of
@@ -111,7 +111,17 @@ class Environment(KnownAttributes, control.Environment):
         )
         self._sealed_by = __name__
 
-    step = one_thread_at_a_time(control.Environment.step)
+    @one_thread_at_a_time
+    def step(self, action) -> dm_env.TimeStep:
+        """Advance by one control step, or start an episode after the end of one; see dm_control.
+
+        A fall terminates the episode, in its last possible step, too: its discount is 0.
+        """
+        timestep = super().step(action)
+        # dm_control does not ask the task in the step of the time limit.
+        if timestep.last() and timestep.discount and self.task.has_failed(self.physics):
+            return timestep._replace(discount=0.0)
+        return timestep
 
     @one_thread_at_a_time
     def change_model(self, fields: Mapping[str, Any]) -> None:
@@ -263,7 +273,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         Args:
             task: the definition of the task.
             random: a `RandomState`, or a seed of one; None for a random seed.
-            on_divergence: what a step does if its physics diverges: "raise" an error, or "terminate"
+            on_divergence: what a step does if its physics diverges: "raise" an error, or "truncate"
                 the episode with reward 0.
             flat: whether observations are one vector.
 
@@ -282,7 +292,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._commands = LiveCommands()
         self.visualize_reward = False
         self.random = random
-        self._on_divergence = checks.name(on_divergence, ("raise", "terminate"), "on_divergence")
+        self._on_divergence = checks.name(on_divergence, ("raise", "truncate"), "on_divergence")
         self._flat = flat
         self._is_starting = False  # True between a reset and its observation
         self._action_shape = (len(task.scene.body.joint_names),)
@@ -444,14 +454,21 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         return self.definition.copy_blocks(blocks)
 
     def get_termination(self, physics):
-        """Return the discount at the end of an episode: 0 if terminated or diverged, 1 if truncated; else None."""
+        """Return the discount at the end of an episode: 0 if terminated, 1 if truncated or diverged; else None."""
         if physics.divergence is not None:
-            return 0.0
+            return 1.0
         terminated, truncated = self.definition.ended(self._now.memory, self._readings(physics))
         self._now.readings = None  # the simulation moves next
         if terminated:
             return 0.0
         return 1.0 if truncated else None
+
+    def has_failed(self, physics) -> bool:
+        """Return whether the task terminates the episode in the present state; a divergence does not."""
+        if physics.divergence is not None:
+            return False
+        terminated, _ = self.definition.ended(self._now.memory, self._readings(physics))
+        return bool(terminated)
 
     def markers(self, physics):
         """Return the debug markers of the task's present command, for pictures."""

@@ -34,7 +34,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
     An episode is truncated at the task's own time limit, 1000 steps unless `task_kwargs` has another.
     It is terminated when the dm_env's discount is 0, which never happens at the time
-    limit. Longer episodes need both `task_kwargs={"time_limit": seconds}` and `max_episode_steps`.
+    limit. `max_episode_steps` of `gymnasium.make` can truncate it earlier.
 
     `reset(seed=s)` starts the same episode as `load(..., task_kwargs={"random": s})`. Further resets
     continue its stream of random numbers, of which `np_random` is a view.

@@ -152,7 +152,7 @@ def checked_limit(max_episode_steps: Any, task: Task) -> int:
     Args:
         max_episode_steps: any value, which is checked.
         task: task of the environment. Its episodes must last until that step; a limit up to 1000 is valid in any case,
-            as it is the default of Gymnasium's ids.
+            as it is the default of datasets.
 
     Raises:
         ValueError: no integer from 1, or a step after the end of the task's episodes.

@@ -19,7 +19,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
-from arc_suite.tasks.contract import STEPS, Task
+from arc_suite.tasks.contract import Task
 
 # Name of an attribute that `envs.sb3.VecEnv` gives its observation space: `Setup.to_dict` of the environments. An agent
 # saves its observation space, and with it the setup of its training.
@@ -224,8 +224,12 @@ class Setup:
             return bodies_env_class(self.task, num_envs, self.bodies, flat=True, **options)
         return VectorEnv(self.domain, self.task, num_envs, **options)
 
-    def spec(self, max_episode_steps: int = STEPS) -> EnvSpec:
-        """Return the spec from which Gymnasium makes the environment, in other processes, too."""
+    def spec(self, max_episode_steps: int | None = None) -> EnvSpec:
+        """Return the spec from which Gymnasium makes the environment, in other processes, too.
+
+        Args:
+            max_episode_steps: control steps after which Gymnasium truncates an episode; None for the task's limit.
+        """
         kwargs: dict[str, Any] = {"domain_name": self.robot, "task_name": self.task}
         if self.task_kwargs:
             kwargs["task_kwargs"] = self.task_kwargs

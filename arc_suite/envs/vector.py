@@ -1,5 +1,6 @@
 """Many environments of one task as one Gymnasium vector environment, on `mujoco.batch`."""
 
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -94,7 +95,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
     Pickles and copies continue bit for bit. While one thread is in a call, calls of other threads raise RuntimeError,
     except `command`.
 
-    If the physics of an environment diverges, its episode is terminated with reward 0 and `info` has
+    If the physics of an environment diverges, its episode is truncated with reward 0 and `info` has
     `diverged`; this has no effect on the other environments.
 
     Attributes:
@@ -104,6 +105,8 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         step_limit: control steps after which every episode is over, may be infinite.
         task: the task of the environments; its `split` returns an observation's blocks by name.
     """
+
+    _max_episode_steps: float = math.inf  # in pickles of earlier versions, which have `step_limit` alone
 
     _FORMER_NAMES = {  # in pickles of earlier versions
         **KnownAttributes._FORMER_NAMES,
@@ -138,9 +141,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             autoreset_mode: when an environment whose episode has ended starts the next one: NextStep, in the next
                 step; SameStep, at once; Disabled, in a reset whose `reset_mask` has it, and until then it rests with
                 reward 0.
-            max_episode_steps: truncates episodes, as `gymnasium.make` does, in addition to the task's time limit.
+            max_episode_steps: control steps after which an episode is truncated; None for the task's limit.
             task_kwargs: as in `arc_suite.load`; `random=s` seeds environment i with s + i, and
-                `on_divergence` can only be "terminate".
+                `on_divergence` can only be "truncate".
             render_mode: None, rgb_array or depth_array (m).
             width: width of a picture, pixels.
             height: height of a picture, pixels.
@@ -156,7 +159,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
         seed = task_kwargs.pop("random", None)
-        checks.name(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of many environments")
+        checks.name(task_kwargs.pop("on_divergence", "truncate"), ["truncate"], "on_divergence of many environments")
         mode_name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
         valid_modes = [mode.value for mode in AutoresetMode]
         self.autoreset_mode = AutoresetMode(checks.name(mode_name, valid_modes, "autoreset_mode"))
@@ -172,10 +175,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._tasks, model = self._prepare_tasks()
         self._task = _join_tasks(self._tasks)
         pictures.check_camera(model if isinstance(model, mujoco.MjModel) else model[0], camera_id)
-        self.step_limit = self._task.step_limit
+        self._max_episode_steps = math.inf
         if max_episode_steps is not None:
-            limit = checked_limit(max_episode_steps, self._tasks[0])
-            self.step_limit = np.minimum(self.step_limit, limit)
+            self._max_episode_steps = checked_limit(max_episode_steps, self._tasks[0])
+        self.step_limit = np.minimum(self._task.step_limit, self._max_episode_steps)
 
         self.batch = Batch(model, self.num_envs, threads, self._task.reads)
         self.task = VectorTask(self)
@@ -289,9 +292,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         reward = np.where(is_stepping, reward, 0.0)
         observation = task.vector(task.observe(memory, readings), np.float32)
         has_failed, is_cut_off = task.ended(memory, readings)
-        time_is_up = self._steps >= task.step_limit
-        terminated = is_stepping & (has_diverged | has_failed) & ~time_is_up
-        truncated = is_stepping & ((is_cut_off & ~terminated) | time_is_up | (self._steps >= self.step_limit))
+        terminated = is_stepping & has_failed & ~has_diverged
+        is_cut_off = is_cut_off | has_diverged | (self._steps >= self.step_limit)
+        # At the limit of `max_episode_steps` a fall is both, as by Gymnasium's `TimeLimit`.
+        truncated = is_stepping & ((is_cut_off & ~terminated) | (self._steps >= self._max_episode_steps))
         self._ended = must_wait | terminated | truncated
 
         info = {}

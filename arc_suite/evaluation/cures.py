@@ -46,7 +46,7 @@ def walk(body: Body) -> FirstWalk:
     Raises:
         ValueError: a body that no demonstrator can walk.
     """
-    environment = Setup.of(body, "walk", {"on_divergence": "terminate"}).load()
+    environment = Setup.of(body, "walk", {"on_divergence": "truncate"}).load()
     steps = _STEPS_OF_IMPORTED if body.source else _STEPS
     watcher = WalkWatcher(environment)
     protocol.run(environment, Demonstrator(environment, "medium"), 0, steps, [watcher])

@@ -135,7 +135,7 @@ def episodes_in_batch(
         policy: made for as many environments.
         seeds: seeds of the episodes; by default from 0 on.
         watch: called after the reset and after each control step with two masks (num_envs,): of the environments
-            that played the step, none after the reset, and of those whose episodes it terminated.
+            that played the step, none after the reset, and of those in which it ended by a fall or a divergence.
 
     Raises:
         ValueError: episodes that need not end.
@@ -158,7 +158,8 @@ def episodes_in_batch(
         totals[is_playing] += rewards[is_playing]
         lengths += is_playing
         if watch is not None:
-            watch(is_playing, is_playing & terminated)
+            has_diverged = info.get("diverged", np.zeros(num_envs, bool))
+            watch(is_playing, is_playing & (terminated | has_diverged))
         has_ended = is_playing & (terminated | truncated)
         for index in np.flatnonzero(has_ended):
             metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}

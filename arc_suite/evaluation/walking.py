@@ -61,6 +61,7 @@ class WalkWatcher:
         """Prepare for the next episode."""
         self.ending = TIME
         self._task = environment.task.definition
+        self._physics = environment.physics
         self._data = environment.physics.data.ptr
         model = environment.physics.model.ptr
         self._torso_geoms = np.flatnonzero(model.geom_bodyid == model.body("torso").id)
@@ -83,7 +84,9 @@ class WalkWatcher:
             self._touching.append(False)
         else:
             self._touching.append(bool(np.isin(data.contact.geom, self._torso_geoms).any()))
-            if has_fallen(timestep.discount == 0.0, data.qpos[3:7]):
+            if self._physics.divergence is not None:
+                self.ending = DIVERGENCE
+            elif has_fallen(timestep.discount == 0.0, data.qpos[3:7]):
                 self.ending = FALL
         self._targets.append(target(self._task, timestep.observation, pose))
 

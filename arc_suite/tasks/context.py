@@ -1,5 +1,6 @@
 """Lengths and speeds of a body, which are the units of tasks with a command."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ class Context(NamedTuple):
         pace: displacement of a control step at the target velocity, m.
         leak: weight of the latest step in leaky means over a cycle of the gait.
         leaks: (3,) the same weight, for means of vectors.
-        steps: control steps over which an episode is judged.
+        steps: control steps over which an episode is judged: its limit, 1000 without one.
         tempo: sqrt(h / g), control steps.
         reference: what gait and pose by command measure the body by; None without them.
     """
@@ -59,7 +60,7 @@ class Context(NamedTuple):
             pace=float(units[0] * scene.control_timestep),
             leak=leak,
             leaks=np.full(3, leak),
-            steps=int(min(step_limit, STEPS)),
+            steps=int(step_limit) if math.isfinite(step_limit) else STEPS,
             tempo=float(np.sqrt(body.torso.standing_height / GRAVITY) / scene.control_timestep),
             reference=reference,
         )

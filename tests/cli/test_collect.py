@@ -71,3 +71,18 @@ def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
 def test_an_unknown_dataset_is_one_line_with_the_folder(root):
     line = f"arc-suite collect: unknown dataset 'arc_suite/queen/cpg-v0': there are none in {root}\n"
     programs.refused(run("--verify=arc_suite/queen/cpg-v0"), line)
+
+
+@pytest.mark.parametrize(("limit", "steps"), [(50.5, 1010), (0.25, 5)])
+def test_episodes_last_as_long_as_those_of_the_task(root, limit, steps):
+    own = ("--robot=tick", "--policy=zero", "--episodes=1", f"--set=time_limit={limit}", "--id=arc_suite/limit-v0")
+    done = programs.passed(run(*own, "--set=healthy_range=[0, 1]"))
+    assert f"length {steps:.1f}, " in done
+
+
+def test_no_more_steps_than_the_task_has(root):
+    needed = "longer ones need task_kwargs={'time_limit': 50.05}, too"
+    message = f"max_episode_steps: episodes of this task end after 1000 steps, got 1001; {needed}"
+    programs.refused(run("--steps=1001"), f"arc-suite collect: {message}\n")
+    message = "time_limit: expected a finite one, or --steps, as every episode of a dataset must end"
+    programs.refused(run("--set=time_limit=Infinity"), f"arc-suite collect: {message}\n")

@@ -13,7 +13,7 @@ from arc_suite.envs import sb3  # noqa: E402
 
 ID = "arc_suite/tick-walk-v0"
 SETTINGS = {
-    "task_kwargs": {"time_limit": 1.0, "on_divergence": "terminate"},
+    "task_kwargs": {"time_limit": 1.0, "on_divergence": "truncate"},
     "render_mode": "rgb_array",
     "width": 32,
     "height": 24,

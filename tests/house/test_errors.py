@@ -20,7 +20,7 @@ from arc_suite.tasks import TASKS
 ID = "arc_suite/bastion-walk-v0"
 ZEROS = np.zeros(12)
 EIGHTEEN = {"posture": np.zeros((2, 17)), "velocities": np.zeros((2, 24))}  # velocities of other joints
-MODES, TERMINATE = "(there are: NextStep, SameStep, Disabled)", "(there are: terminate)"
+MODES, TRUNCATE = "(there are: NextStep, SameStep, Disabled)", "(there are: truncate)"
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 TASK_NAMES = f"(there are: {', '.join(TASKS)})"
@@ -194,7 +194,7 @@ CASES = [
     (walk(healthy_range=(1, 2, 3)), "healthy_range: expected one finite number or 2 of them, got (1, 2, 3)"),
     (walk(joint_noise=float("inf")), "joint_noise: expected a number from 0 to 6.28319, got inf"),
     (walk(weights={"forward": None}), "weights['forward']: expected a number from -1e+06 to 1e+06, got None"),
-    (walk(on_divergence="ignore"), "unknown on_divergence 'ignore' (there are: raise, terminate)"),
+    (walk(on_divergence="ignore"), "unknown on_divergence 'ignore' (there are: raise, truncate)"),
     (walk(gait=7), f"unknown gait 7 {GAITS}"),
     (load("queen", "walk", [1]), "task_kwargs: expected a mapping of names to values, got [1]"),
     (load("queen", "walk", None, "flat"), "environment_kwargs: expected a mapping of names to values, got 'flat'"),
@@ -216,7 +216,7 @@ CASES = [
     (lambda w: w.envs.reset(options=[1]), "options: expected a mapping of names to values, got [1]"),
     (envs(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),
     (envs(autoreset_mode="SomeStep"), f"unknown autoreset_mode 'SomeStep'; did you mean 'SameStep'? {MODES}"),
-    (envs(task_kwargs={"on_divergence": "raise"}), f"unknown on_divergence of many environments 'raise' {TERMINATE}"),
+    (envs(task_kwargs={"on_divergence": "raise"}), f"unknown on_divergence of many environments 'raise' {TRUNCATE}"),
     (make(render_mode="ansi"), "unknown render_mode 'ansi' (there are: rgb_array, depth_array)"),
 ]
 

@@ -17,7 +17,7 @@ import arc_suite
 absl.logging.set_verbosity("error")  # of MuJoCo's warnings
 jobs = [(robot, "walk", {}) for robot in arc_suite.TASKS_BY_DOMAIN] + [("tick", "steer", {"arena": "bumps"})]
 for robot, task, settings in jobs:
-    environment = arc_suite.load(robot, task, settings | {"on_divergence": "terminate"})
+    environment = arc_suite.load(robot, task, settings | {"on_divergence": "truncate"})
     environment.reset()
     environment.physics.data.qvel[:] = np.nan
     assert environment.step(np.zeros(environment.action_spec().shape)).last()

@@ -130,7 +130,7 @@ def walk(body: Body, task: str, preset: str) -> Walk:
 
 def _tried(body: Body, task: str, preset: str, seed: int) -> tuple[float, bool, float]:
     """Return speed as a share of the target, whether it fell, and the share of samples at the torque limit."""
-    environment = Setup.of(body, task, {"time_limit": SECONDS, "on_divergence": "terminate"}).load()
+    environment = Setup.of(body, task, {"time_limit": SECONDS, "on_divergence": "truncate"}).load()
     steps = round(SECONDS / environment.control_timestep())
     limits = np.array([joint.torque for leg in body.legs for joint in leg.joints])
     names = body.joint_names

@@ -52,13 +52,13 @@ def test_single_environment_raises_one_line_with_robot_time_and_cause(accident):
 
 @every_accident
 def test_single_environment_may_end_the_episode_instead(accident):
-    environment, twin = load("tick", on_divergence="terminate"), load("tick")
+    environment, twin = load("tick", on_divergence="truncate"), load("tick")
     environment.reset(), twin.reset()
     actions = random_actions((18,), 4)
     environment.step(actions[0])
     spoil(environment.physics.data.ptr, accident)
     last = environment.step(actions[1])
-    assert last.last() and last.discount == 0.0 and last.reward == 0.0
+    assert last.last() and last.discount == 1.0 and last.reward == 0.0
     assert np.isfinite(last.observation["observations"]).all()
     assert set(environment.task.terms.values()) == {0.0}
     first = environment.step(actions[2])
@@ -79,7 +79,7 @@ def test_every_divergence_is_noticed_without_a_reset_between():
 
 
 def test_unknown_answer_to_divergence():
-    with pytest.raises(ValueError, match=r"^unknown on_divergence 'stop' \(there are: raise, terminate\)$"):
+    with pytest.raises(ValueError, match=r"^unknown on_divergence 'stop' \(there are: raise, truncate\)$"):
         load(on_divergence="stop")
 
 
@@ -91,7 +91,7 @@ def test_environments_diverge_as_single_environments_that_terminate_do(mode):
         num_envs=3,
         vectorization_mode="sync",
         vector_kwargs={"autoreset_mode": mode},
-        task_kwargs={"on_divergence": "terminate"},
+        task_kwargs={"on_divergence": "truncate"},
     )
     assert data_equivalence(batch.reset(seed=2), singles.reset(seed=2), exact=True)
     ends = 0
@@ -104,7 +104,7 @@ def test_environments_diverge_as_single_environments_that_terminate_do(mode):
         told = result[4].get("final_info", result[4])
         diverged, given = (told.pop(name, np.zeros(3, bool)) for name in ("diverged", "_diverged"))
         assert_array_equal(diverged, given)
-        assert_array_equal(np.flatnonzero(diverged), [which] if count % 3 == 0 and result[2][which] else [])
+        assert_array_equal(np.flatnonzero(diverged), [which] if count % 3 == 0 and result[3][which] else [])
         assert data_equivalence(result, expected, exact=True)
         ends += diverged.sum()
     assert ends >= 10

@@ -26,7 +26,7 @@ _MEANINGS_WITHOUT_FIELD = {
     "cost_limit": "bound of the weighted sum of the costs of a step",
     "time_limit": f"of an episode, s; {STEPS} control steps without it",
     "arena": f"another ground: {', '.join(ARENAS)}",
-    "on_divergence": "raise, or terminate: what a step does whose physics diverges; terminate in vector environments",
+    "on_divergence": "raise, or truncate: what a step does whose physics diverges; truncate in vector environments",
     "random": "seed of the episodes, for `load`; Gymnasium takes it in `reset`",
 }
 

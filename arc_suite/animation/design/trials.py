@@ -17,7 +17,7 @@ from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import energy
 
-_DIVERGENCE_SETTINGS = {"on_divergence": "terminate"}  # an end that counts as a fall
+_DIVERGENCE_SETTINGS = {"on_divergence": "truncate"}  # the end of an episode, which counts as a fall
 _NUM_TERRAIN_SEEDS = 2**32
 
 
@@ -218,7 +218,8 @@ def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: in
             work = energy.begin(work, joint_angles)
         else:
             steps_taken += 1
-            fell |= walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
+            has_diverged = environment.physics.divergence is not None
+            fell |= has_diverged or walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
             work = energy.after(work, torques, data.ctrl, joint_angles)
     progress = environment.task.progress  # the task's metrics of the episode
     displacement = data.qpos[0] - start_x

@@ -56,7 +56,7 @@ def open_creature(sketch: Sketch) -> Creature:
     """
     setup = sketches.make_setup(sketch)
     parts, materials = describe_body(setup.body)
-    environment = load_environment(setup, time_limit=math.inf, on_divergence="terminate")
+    environment = load_environment(setup, time_limit=math.inf, on_divergence="truncate")
     act = alone(load_policy(sketch, environment))  # a function of a `TimeStep`
     act(load_environment(setup).reset())  # raises an error now if the policy does not take the observation
     return Creature(

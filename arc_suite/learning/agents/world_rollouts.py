@@ -83,7 +83,7 @@ class WorldRollouts:
         state_after = jax.vmap(self.env.step)(state, actions)
         steps = steps + 1
         time_is_up = steps >= self.task.step_limit
-        terminated = (state_after.done > 0.0) & (state_after.info["truncation"] == 0.0) & ~time_is_up
+        terminated = (state_after.done > 0.0) & (state_after.info["truncation"] == 0.0)
         has_ended = (state_after.done > 0.0) | time_is_up
         has_new_command = self.task.resampled(state_after.info["memory"]) & ~has_ended
         transitions = {

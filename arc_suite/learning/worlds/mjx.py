@@ -44,7 +44,7 @@ class WorldState:
     - `memory`: of the task, and `first_memory`: that of the episode's start;
     - `model`: the fields of the model that the episode has drawn;
     - `privileged`: the privileged observation (size,), if the environment was loaded with it;
-    - `truncation`: 1.0 where the task ended the episode without failure, otherwise 0.0;
+    - `truncation`: 1.0 where the task ended the episode without failure, or the simulation diverged, otherwise 0.0;
     - each live command of the task by its name; NaN leaves the command to the task.
 
     Attributes:
@@ -306,7 +306,7 @@ class Env:
         next_info = {
             **info,
             "memory": next_memory,
-            "truncation": _to_float(truncated & ~(terminated | diverged)),
+            "truncation": _to_float(diverged | (truncated & ~terminated)),
         }
         if "privileged" in info:
             vector = self._privileged_vector(info["model"], task.privileged(next_memory, fields))
