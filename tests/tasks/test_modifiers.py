@@ -27,7 +27,7 @@ from arc_suite.models.outline import torso_box
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import load_body
-from arc_suite.tasks import TASKS, modified_task, noise
+from arc_suite.tasks import TASKS, modified_task, modifiers, noise
 from arc_suite.tasks.modifiers import (
     MODIFIERS,
     Control,
@@ -639,3 +639,25 @@ def test_a_history_holds_earlier_observations_and_the_actions_after_them():
             assert_array_equal(entries[:, place, :size], seen[before], err_msg="with its noise")
             assert_allclose(entries[:, place, size:], actions[before], atol=1e-7, err_msg="as it was sent")
         seen.append(observation[:, :size])
+
+
+@pytest.mark.parametrize("name", [name for kind in modifiers.SUITE_MODIFIERS for name in kind.defaults])
+def test_a_default_leaves_the_first_episode_of_a_seed_as_it_is(name):
+    default = modifiers.MODIFIERS[name].defaults[name]
+    if name == "actions":
+        default = "torque"
+    plain = arc_suite.load("tick", "steer", {"random": 3})
+    modified = arc_suite.load("tick", "steer", {"random": 3, name: default})
+    stronger = arc_suite.load("tick", "steer", {"random": 3, "kicks": 1.5, "time_limit": 1.0})
+    starts = [environment.reset().observation["posture"] for environment in (plain, modified, stronger)]
+    np.testing.assert_array_equal(starts[0], starts[1])
+    np.testing.assert_array_equal(starts[0], starts[2])
+    for action in np.random.default_rng(0).uniform(-0.5, 0.5, (20, 18)):
+        one, other = plain.step(action), modified.step(action)
+        assert one.reward == other.reward
+        for block, expected in one.observation.items():
+            np.testing.assert_array_equal(other.observation[block], expected)
+    # Modifiers draw from the stream: from the second episode on, those of all strengths start alike, and no others.
+    starts = [environment.reset().observation["posture"] for environment in (plain, modified, stronger)]
+    assert not np.array_equal(starts[0], starts[1])
+    np.testing.assert_array_equal(starts[1], starts[2])
