@@ -5,6 +5,8 @@ additions: the suite's own entries of these kinds stand in the modules that use 
 """
 
 import collections
+import functools
+import hashlib
 import importlib
 import itertools
 import os
@@ -19,7 +21,7 @@ from arc_suite import checks
 from arc_suite.arenas import ARENAS, Arena
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import EXAMPLES, body_from_json, load_body
+from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json, load_body
 from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.modifiers import MODIFIERS
 
@@ -101,6 +103,30 @@ def bodies_of(robot, suggestions: Iterable[str] = ()) -> tuple[Body, ...]:
         OSError: as `body_of`.
     """
     return tuple(_generate_bodies(robot, suggestions))
+
+
+@functools.lru_cache(maxsize=1024)
+def distinct_name(body: Body) -> str:
+    """Return the name of a body for ids, tables and files, with a hash if the suite has another body of that name."""
+    named_body = _find_body(body.name)
+    if named_body is None or named_body == body:
+        return body.name
+    return f"{body.name}_{hashlib.sha256(body_to_json(body).encode()).hexdigest()[:6]}"
+
+
+def _find_body(name: str) -> Body | None:
+    """Return the robot, the packaged spec, or the body `family_seed` of a name; None if there is none."""
+    if name in ROBOTS:
+        return ROBOTS[name]
+    if name in EXAMPLES:
+        return load_body(EXAMPLES[name])
+    family, _, seed = name.rpartition("_")
+    if family not in FAMILIES or not seed.isdecimal():
+        return None
+    try:
+        return _draw_body(family, int(seed))
+    except ValueError:  # no body of this seed
+        return None
 
 
 def robot_words() -> list[str]:

@@ -73,7 +73,7 @@ def print_reports(players: list[reports.Player], seeds: range) -> list[evaluatio
     label_width = max(reports.MIN_LABEL_WIDTH, *(len(label) for label in labels))  # of the first column
     reports_of_robots: list[evaluation.Report] = []
     for player in players:
-        bar = functools.partial(progress, desc=player.setup.body.name, unit="episode", leave=False)
+        bar = functools.partial(progress, desc=player.setup.name, unit="episode", leave=False)
         report = reports.report(player, seeds, bar)
         is_first = not reports_of_robots
         if is_first:

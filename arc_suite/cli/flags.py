@@ -162,11 +162,11 @@ def bodies_from_flags(suggestions: Iterable[str] = ("all",)) -> dict[str, Body]:
         if may_have_flaws:
             for flaw in flaws(body):
                 warnings.warn(f"{checks.quote(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=2)
-        return {body.name: body}
+        return {registry.distinct_name(body): body}
     if FLAGS.robot == "all":
         return dict(ROBOTS)
     bodies = registry.bodies_of(FLAGS.robot, suggestions)
-    bodies_by_name = {body.name: body for body in bodies}
+    bodies_by_name = {registry.distinct_name(body): body for body in bodies}
     if len(bodies_by_name) < len(bodies):
         raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected a name for each body, got two of one name")
     return bodies_by_name
@@ -216,7 +216,7 @@ def setups_from_flags(stored: Setup | None = None, suggestions: Iterable[str] = 
     origin = trained if stored is None else stored  # of what the flags leave open
     bodies = choose_bodies(origin, bodies)
     task, settings = complete_task(origin, task, settings)
-    setups = {body.name: Setup.of(body, task, settings) for body in bodies.values()}
+    setups = {name: Setup.of(body, task, settings) for name, body in bodies.items()}
     if trained is not None:
         _print_training_setup(trained, setups)
     return setups
@@ -259,7 +259,7 @@ def choose_bodies(origin: Setup | None, bodies: dict[str, Body]) -> dict[str, Bo
     """
     if origin is None or origin.several or FLAGS["robot"].present or custom_body():
         return bodies
-    return {origin.body.name: origin.body}
+    return {origin.name: origin.body}
 
 
 def complete_task(origin: Setup | None, task: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from arc_suite import registry
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import measure_standing
@@ -40,7 +41,9 @@ def body_summary(body: Body) -> str:
 
 def transport_footnote(bodies: Iterable[Body]) -> str:
     """Return the line under a table with costs of transport; "" if no body has strong motors."""
-    torque_by_name = {body.name: torques(body).max() / measure_standing(body).height for body in bodies}
+    torque_by_name = {
+        registry.distinct_name(body): torques(body).max() / measure_standing(body).height for body in bodies
+    }
     strong_bodies = [
         f"{name} ({torque:.0f} times weight times height)"
         for name, torque in torque_by_name.items()

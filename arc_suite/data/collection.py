@@ -157,7 +157,7 @@ def _play(
         bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)
 
     with progress(
-        desc=settings.setup.body.name,
+        desc=settings.setup.name,
         leave=False,
         total=total * settings.steps,
         initial=first_count * settings.steps,

@@ -51,7 +51,7 @@ class DatasetSettings(NamedTuple):
         if self.setup.task_kwargs:
             parts.append(f"set{_sha256(self.setup.settings_json)[:8]}")
         name = re.sub(r"[^-a-zA-Z0-9]+", "_", "-".join(parts))
-        return f"arc_suite/{self.setup.body.name}/{self.setup.kind.name}/{name}-v0"
+        return f"arc_suite/{self.setup.name}/{self.setup.kind.name}/{name}-v0"
 
     def environment(self, num_envs: int, threads: int | None = None) -> VectorEnv:
         """Return a vector environment in which the episodes can be played."""

@@ -118,13 +118,13 @@ class Setup:
 
     @property
     def name(self) -> str:
-        """Name of the bodies for the names of files."""
+        """Name of the bodies for tables and the names of files; see `registry.distinct_name`."""
         return self._label.replace(":", ".").replace(",", "+")
 
     @property
     def _label(self) -> str:
         """Name of the bodies for people."""
-        return self.domain if isinstance(self.domain, str) else self.domain.name
+        return self.domain if isinstance(self.domain, str) else registry.distinct_name(self.domain)
 
     @property
     def task_kwargs(self) -> dict[str, Any]:
@@ -145,7 +145,7 @@ class Setup:
     @property
     def env_id(self) -> str:
         """Gymnasium's id, `arc_suite/<robot>-<task>-v<version>`."""
-        return registry.env_id(self.body.name, self.kind)
+        return registry.env_id(registry.distinct_name(self.body), self.kind)
 
     @property
     def definition(self) -> Task:

@@ -209,7 +209,7 @@ def report(
 
 def label(setup: Setup, preset: str | None) -> str:
     """Return the label of a row: the body, and the preset if there is one."""
-    return setup.body.name if preset is None else f"{setup.body.name}, {preset}"
+    return setup.name if preset is None else f"{setup.name}, {preset}"
 
 
 def _line(first: str, metrics: Mapping[str, str], cells: Iterable[str]) -> str:

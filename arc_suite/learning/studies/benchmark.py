@@ -96,7 +96,7 @@ def _run_score(
     """
     score = anchors.anchors(setup).score(mean_return)
     return RunScore(
-        robot=setup.body.name,
+        robot=setup.name,
         task=setup.kind.name,
         seed=seed,
         result=float(mean_return),

@@ -181,7 +181,7 @@ def _paper_return(result: RunResult, steps: int) -> str:
     if not results.is_in_paper(result):
         return "-"
     configuration = result.run.configuration
-    paper_return = published.at(configuration.setup.body.name, configuration.algorithm, steps)
+    paper_return = published.at(configuration.setup.name, configuration.algorithm, steps)
     return "-" if paper_return is None else f"{paper_return:.0f}"
 
 

@@ -170,7 +170,7 @@ def is_in_paper(result: RunResult) -> bool:
     setup = result.run.configuration.setup
     algorithm = result.run.configuration.algorithm
     is_default_walk = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
-    return is_default_walk and algorithm in CURVES.get(setup.body.name, {})
+    return is_default_walk and algorithm in CURVES.get(setup.name, {})
 
 
 def note_few_episodes(returns: np.ndarray) -> tuple[str, ...]:

@@ -61,7 +61,7 @@ class Run(NamedTuple):
     def name(self) -> str:
         """Name of its folder."""
         setup = self.configuration.setup
-        return folder_name(f"{setup.body.name}-{setup.kind.name}-{self.kind}-{self.configuration.seed}")
+        return folder_name(f"{setup.name}-{setup.kind.name}-{self.kind}-{self.configuration.seed}")
 
     @property
     def place(self) -> str:
