@@ -84,7 +84,7 @@ MUTANTS = {
     "blocks cut one too early": "slice«(end - size, end→(max(end - size - 1, 0), end - 1»)",
     "blocks joined unchecked": "for name, block in «blocks.items()] != self._sizes_in_order→()]»",
     "feet stay in the ground": "«→0.0 * »(self.clearances - readings.foot_heights).max",
-    "a memory written in place": "«(1.0 - context.leaks) * core.motion→core.motion.__imul__(1.0 - context.leaks)»",
+    "a memory written in place": "«(1.0 - leaks) * core.motion→core.motion.__imul__(1.0 - leaks)»",
     "a command that is ignored": "xp.where(xp.isnan(memory.live), scheduled, «memory.live→0.0»)",
     "a schedule that does not end": "step = steps« % ends[..., -1]→»\n    ended_values",
     "a live command counts as a new one": "return begins« & schedule_holds→»",

@@ -95,7 +95,8 @@ def _touchdown_steps(track) -> list[np.ndarray]:
     touchdowns = []
     for leg in range(len(track.legs)):
         steps = np.flatnonzero(begins_stance[:, leg]) + 1
-        lifted_steps_before = np.diff(lifted_steps[steps, leg], prepend=0)  # since the last start of a stance
+        # Number of lifted steps between a start of stance and the one before, or the start of the track.
+        lifted_steps_before = np.diff(lifted_steps[steps, leg], prepend=0)
         touchdowns.append(steps[lifted_steps_before > 0])
     return touchdowns
 
@@ -119,8 +120,9 @@ def foot_clearance(track: Track) -> np.ndarray:
     """
     cycle_starts = np.flatnonzero(np.diff(track.phases) < 0.0) + 1
     cycles = np.split(_heights(track), cycle_starts)
-    complete_cycles = cycles[1:-1]
-    return np.mean([cycle.max(axis=0) for cycle in complete_cycles or cycles], axis=0)
+    if len(cycles) > 2:
+        cycles = cycles[1:-1]
+    return np.mean([cycle.max(axis=0) for cycle in cycles], axis=0)
 
 
 def _heights(track) -> np.ndarray:
@@ -194,14 +196,15 @@ def asymmetry(track: Track) -> np.ndarray:
     """
     offsets = track.foot_positions - track.positions[:, None]  # from the torso, in the world
     positions = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), offsets)  # in the torso's frame
-    bins = (track.leg_phases / TWO_PI % 1.0 * _BINS).astype(int) % _BINS  # a cycle that is rounded to 1 is 0
-    mean_paths = np.full((len(track.legs), _BINS, 3), np.nan)
+    cycle_shares = track.leg_phases / TWO_PI % 1.0
+    bins = (cycle_shares * _BINS).astype(int) % _BINS  # a share may be rounded to 1, which is the first bin again
+    mean_paths = np.full((len(track.legs), _BINS, 3), np.nan)  # NaN for bins without a step, which do not count
     for leg in range(len(track.legs)):
         for occupied_bin in np.unique(bins[:, leg]):
             mean_paths[leg, occupied_bin] = positions[bins[:, leg] == occupied_bin, leg].mean(axis=0)
     reflected_paths = mean_paths[track.mirrors] * (1.0, -1.0, 1.0)
     squared_distances = ((mean_paths - reflected_paths) ** 2).sum(axis=-1)  # (feet, bins)
-    has_counterpart = (track.mirrors >= 0)[:, None]
+    has_counterpart = (track.mirrors >= 0)[:, None]  # `mirrors` has -1 for a leg without one
     return np.sqrt(_mean_where(squared_distances, ~np.isnan(squared_distances) & has_counterpart))
 
 

@@ -323,6 +323,7 @@ class CommandTask(Task):
     def _start_command(self, random: np.random.RandomState, schedule: Scheduled) -> Any:
         command = self.settings.command
         memory = command.start(self.context, random, schedule)
+        # `WithLive` is the protocol of memories with a field `live`.
         if command.live(self.scene.body) and not isinstance(memory, WithLive):
             kind = type(command).__name__
             raise ValueError(f"command {kind}: expected a memory with a field 'live', or no live commands, got neither")
@@ -333,11 +334,11 @@ class CommandTask(Task):
         layout = self.scene.layout
         heading = rotations.yaw(data.qpos[..., 3:7])
         heading_of_parts = heading[..., None]
-        world_forces = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit
-        xp = world_forces.__array_namespace__()
-        torque = rotations.to_heading_frame(world_forces[..., 0:2], heading_of_parts)
-        force = rotations.to_heading_frame(world_forces[..., 3:5], heading_of_parts)
-        forces = xp.concatenate([torque, world_forces[..., 2:3], force, world_forces[..., 5:6]], axis=-1)
+        wrenches = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit  # torque (3,), then force (3,), world
+        xp = wrenches.__array_namespace__()
+        horizontal_torque = rotations.to_heading_frame(wrenches[..., 0:2], heading_of_parts)
+        horizontal_force = rotations.to_heading_frame(wrenches[..., 3:5], heading_of_parts)
+        forces = xp.concatenate([horizontal_torque, wrenches[..., 2:3], horizontal_force, wrenches[..., 5:6]], axis=-1)
         readings = reading.read(data, layout, self.scene.arena, forces)
         touches = self.settings.ground.touches(data)
         if self.settings.gait_and_pose is None:
@@ -370,7 +371,7 @@ class CommandTask(Task):
         place = _read_place(readings)
         xp = place.__array_namespace__()
         steps = core.steps + 1
-        is_going = core.desired.any(axis=-1)
+        is_going = core.desired.any(axis=-1)  # by the velocity that was desired during the step
         tick = core.tick + is_going
         gait_and_pose = self.settings.gait_and_pose
         gait_memory = memory.gait_and_pose
@@ -418,8 +419,10 @@ class CommandTask(Task):
         world_displacement = place - core.place
         displacement = rotations.to_heading_frame(world_displacement[..., :2], core.place[..., 2])
         turn = rotations.wrap_angle(world_displacement[..., 2])
-        step_motion = xp.concatenate([displacement, turn[..., None]], axis=-1)
-        return (1.0 - context.leaks) * core.motion + context.leaks * step_motion / context.step_units
+        step_displacement = xp.concatenate([displacement, turn[..., None]], axis=-1)
+        step_motion = step_displacement / context.step_units  # in units of the command
+        leaks = context.leaks  # (3,) shares of the mean that a step replaces
+        return (1.0 - leaks) * core.motion + leaks * step_motion
 
     def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
         """Return the memory with a live command."""
@@ -483,7 +486,7 @@ class CommandTask(Task):
             **gait_blocks,
             **self.settings.ground.observe(context, memory.ground, core.place, readings),
         }
-        return {name: block + 0.0 for name, block in observation.items()}
+        return {name: block + 0.0 for name, block in observation.items()}  # adding 0 makes -0 a 0
 
     def ended(self, memory: CommandTaskMemory, readings: Sensed) -> tuple:
         """Return whether the body fell, which terminates the episode; the ground may end the episode, too."""
@@ -534,9 +537,9 @@ class CommandTask(Task):
         steps = memory.core.steps
         terminated, truncated = self.ended(memory, None)
         has_ended = terminated or truncated or steps >= self.step_limit
-        has_full_cycle = steps * self.context.leak >= 1.0
+        has_full_cycle = steps * self.context.leak >= 1.0  # the leak is the share of a cycle in a step
         if not has_ended and not has_full_cycle:
-            return self.settings.ground.stream_state(memory.ground, np.nan, False)
+            return self.settings.ground.stream_state(memory.ground, outcome=np.nan, fell=False)
         outcome = self.settings.command.outcome(
             self.context, memory.command, memory.core.all_tracking, self.judged_steps(memory)
         )
@@ -570,8 +573,9 @@ class CommandTask(Task):
         radius = _ARROW_RADIUS * self.context.reach
         points = start + _ARROW_SAMPLES[:, None] * (end - start)
         ground_heights = self.scene.arena.height(*points.T)
-        straight = ground_heights[0] + _ARROW_SAMPLES * (ground_heights[-1] - ground_heights[0])
-        heights = straight + (ground_heights - straight).max() + radius
+        chord = ground_heights[0] + _ARROW_SAMPLES * (ground_heights[-1] - ground_heights[0])  # between both ends
+        clearance = (ground_heights - chord).max()  # by which the ground rises over the chord
+        heights = chord + clearance + radius
         first_point = np.array((*points[0], heights[0]))
         last_point = np.array((*points[-1], heights[-1]))
         return Marker("arrow", first_point, last_point, radius, color)

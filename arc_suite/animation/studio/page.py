@@ -32,7 +32,7 @@ from arc_suite.cpg.selection import presets_of
 from arc_suite.robots import gaits
 from arc_suite.robots.spec_files import MAX_IMPORTED
 
-_CHARTS_INTERVAL = 0.25  # s, between two updates of the charts
+_REFRESH_INTERVAL = 0.25  # s, between two updates of the status and the charts
 _PANEL_WIDTH = 330  # pixels of the panel with the charts
 _MIN_WIDTH_FOR_CHARTS = 1000  # pixels of a window, in which charts leave room for the picture
 _KEY_CHANGE = 0.25  # of the body's own speed, by which a key changes the command
@@ -102,7 +102,7 @@ class Page:
         self._view = View(server)
         self._shown_creature: Creature | None = None
         self._shown_companion: Creature | None = None
-        self._charts_time = -math.inf  # s, when the charts were updated last
+        self._refresh_time = -math.inf  # s, of the latest update of the status and the charts
         self._widgets: dict[str, Any] = {}  # by the fields of a `PageState` that they show
         self._fixed_pose_fields: frozenset[str] = frozenset()  # numbers of a pose that the body cannot change
         self._flaw_widgets: list[Any] = []
@@ -145,8 +145,8 @@ class Page:
         markers = walker.episodes.markers(walker.share)
         companion_qpos = None if companion is None else companion.episodes.qpos(companion.share)
         self._view.pose(qpos, markers, companion_qpos)
-        if time.monotonic() - self._charts_time > _CHARTS_INTERVAL:
-            self._charts_time = time.monotonic()
+        if time.monotonic() - self._refresh_time > _REFRESH_INTERVAL:
+            self._refresh_time = time.monotonic()
             self._status.content = texts.status(session)
             if self._panel.visible:
                 leg_names = tuple(leg.name for leg in session.creature.setup.body.legs)
@@ -261,10 +261,11 @@ class Page:
         self._show_state()
 
     def _show_state(self) -> None:
-        """Have the widgets show the state as far as they can, and hide those without effect."""
+        """Show the state in the widgets, and hide those without effect; a slider shows a value within its range."""
         with self._editor.lock:
             state = self._editor.state
             creature = self._session.creature
+            # Fields without effect now, whose widgets are hidden.
             idle = idle_fields(creature, state.command) | self._fixed_pose_fields
             self._widgets["source"].options = layout.list_with(state.sketch.source, sketches.sources())
             for field, widget in self._widgets.items():
@@ -342,9 +343,9 @@ class Page:
         state = from_json(text)
         for field in ("task", "policy"):
             checks.name(state.value(field), self._widgets[field].options, field)  # raises a ValueError for other names
-        # The session replaces a gait that does not suit the body, and reduces a pose to the body's room.
         commands = [field.name for field in dataclasses.fields(VisitorCommand)]
         for name in commands:
+            # Gait and pose depend on the body: the session replaces a gait that does not suit it, and limits a pose.
             if name == "gait_now" or name in POSE:
                 continue
             if not offers(self._widgets[name], state.value(name)):

@@ -71,7 +71,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         progress = min(step / context.steps, 1.0)
         std = hp.initial_std * (hp.final_std / hp.initial_std) ** progress
         desired_kl = hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** progress
-        with_policy = iterations * hp.horizon >= hp.value_warm_up
+        learns_policy = iterations * hp.horizon >= hp.value_warm_up  # before, only values are learned
 
         # Act for the horizon.
         rollout = collector.roll_out(state.policy, normalize, std, iterations, step)
@@ -80,7 +80,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
         orders = _draw_orders(hp, generator(seed, "orders", iterations), len(batch.returns))
         schedules = (np.float32(std), np.float32(desired_kl))
-        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, schedules, with_policy)
+        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, schedules, learns_policy)
         iterations += 1
 
         # Update the normalizer.
@@ -125,7 +125,10 @@ def _make_collector(hp: ProximalPolicy, context: RunContext):
 
 
 def _draw_orders(hp: ProximalPolicy, random: np.random.Generator, count: int) -> np.ndarray:
-    """Draw the indices (updates, minibatch) of transitions; a permutation of all `count` transitions in each epoch."""
+    """Draw the indices (updates, minibatch) of transitions.
+
+    An epoch is a permutation of all `count` transitions, without the rest that fills no minibatch.
+    """
     permutations = np.stack([random.permutation(count) for _ in range(hp.epochs)])
     transitions_of_epoch = count // hp.minibatch * hp.minibatch  # in complete minibatches
     return permutations[:, :transitions_of_epoch].reshape(-1, hp.minibatch)
@@ -152,11 +155,11 @@ def batch_of(
     next_observations = normalize(rollout["next_observations"])
     values_after = xp.asarray(ppo.predict_values(architecture, values, next_observations))
     rewards = (1.0 - hp.discount) * rollout["rewards"]  # so that returns are about as large as rewards
-    advantages = ppo.estimate_advantages(
+    raw_advantages = ppo.estimate_advantages(
         hp, rewards, values_before, values_after, rollout["terminated"], rollout["ended"]
     )
-    returns = (advantages + values_before).ravel()
-    advantages = ((advantages - advantages.mean()) / (advantages.std() + _TINY_STD)).ravel()
+    returns = (raw_advantages + values_before).ravel()
+    advantages = ((raw_advantages - raw_advantages.mean()) / (raw_advantages.std() + _TINY_STD)).ravel()
     observations = observations.reshape(-1, size)
     actions = rollout["actions"].reshape(len(returns), -1)
     means = rollout["means"].reshape(len(returns), -1)
@@ -164,8 +167,9 @@ def batch_of(
         mirror_observation, mirror_action = symmetry
         mirrored_observations = normalize(mirror_observation(rollout["observations"]).reshape(-1, size))
         observations = xp.concatenate([observations, mirrored_observations])
-        # The mirrored action is as probable as the action was. Under the policy's own mean for the mirrored
-        # observation, where the policy is not symmetric, its probability would be almost 0 and its gradient huge.
+        # The mean is mirrored, too: the mirrored action is as probable as the action was. A policy without symmetry
+        # may have another mean for the mirrored observation. With it the probability could be almost 0, and the
+        # gradient huge.
         actions = xp.concatenate([actions, mirror_action(actions)])
         means = xp.concatenate([means, mirror_action(means)])
         advantages = xp.tile(advantages, 2)
@@ -212,9 +216,10 @@ def _read_start(hp: ProximalPolicy, context: RunContext, task, architecture: Arc
 
 
 def _extend_normalizer(start: Normalizer, fresh: Normalizer) -> Normalizer:
-    """Return the normalizer of a start policy, extended by the privileged numbers that follow its own.
+    """Return the normalizer of a start policy, extended by the privileged numbers that critics see.
 
-    The privileged numbers, which are in units of about 1, keep the mean and the factor of the fresh normalizer.
+    These follow the numbers of the observation. They are of the order of 1, and keep mean and factor of the fresh
+    normalizer.
     """
     size = len(start.mean)
     mean = np.append(start.mean, fresh.mean[size:])

@@ -82,7 +82,7 @@ def adapt_model(model: mujoco.MjModel, impl: str) -> mujoco.MjModel:
     if impl == "jax":
         model.opt.iterations = SOLVER_ITERATIONS
         model.opt.ls_iterations = LINE_SEARCH_ITERATIONS
-        model.opt.disableflags |= _DISABLE_SENSORS  # `advance` computes contact forces
+        model.opt.disableflags |= _DISABLE_SENSORS  # not needed, as `advance` computes the contact forces
     else:
         _move_margins_into_geoms(model)
         _limit_cell_depth(model)
@@ -100,7 +100,8 @@ def _move_margins_into_geoms(model: mujoco.MjModel) -> None:
     other_geoms = np.where(is_field[model.pair_geom1], model.pair_geom2, model.pair_geom1)
     geoms = other_geoms[is_pair_with_field]
     margins = model.pair_margin[is_pair_with_field]
-    margin_of_geom = dict(zip(geoms, margins, strict=True))  # each geom once, though it may be in several pairs
+    # A geom may be in several pairs with fields, all of one margin: it grows once.
+    margin_of_geom = dict(zip(geoms, margins, strict=True))
     for geom, margin in margin_of_geom.items():
         growing_sizes = _GROWING_SIZES[int(model.geom_type[geom])]
         model.geom_size[geom, :growing_sizes] += margin
@@ -112,7 +113,8 @@ def _move_margins_into_geoms(model: mujoco.MjModel) -> None:
 def _limit_cell_depth(model: mujoco.MjModel) -> None:
     """Make cells of height fields at most as deep as wide: in deeper ones Warp finds wrong contacts now and then."""
     cell_widths = 2.0 * model.hfield_size[:, 0] / np.maximum(model.hfield_ncol - 1, 1)
-    model.hfield_size[:, 3] = np.minimum(model.hfield_size[:, 3], cell_widths)
+    depths = model.hfield_size[:, 3]  # of the base below the lowest point
+    model.hfield_size[:, 3] = np.minimum(depths, cell_widths)
 
 
 def put_model(model: mujoco.MjModel, impl: str) -> mjx.Model:
@@ -152,12 +154,14 @@ def make_data(model: mujoco.MjModel, impl: str, num_envs: int) -> mjx.Data:
 def table_sizes(model: mujoco.MjModel) -> tuple[int, int]:
     """Return how many contacts and constraints a world of Warp has place for.
 
-    It is half of the points that could touch planes, as bodies fall on one side. For height fields it is all points,
-    since a geom may touch several triangles.
+    Planes get half as many contacts as points could touch them, as bodies fall on one side. Height fields get as many
+    as points, since a geom may touch several triangles.
     """
     geom_types = np.stack([model.geom_type[model.pair_geom1], model.geom_type[model.pair_geom2]])  # (2, pairs)
     has_plane = (geom_types == mujoco.mjtGeom.mjGEOM_PLANE).any(axis=0)
-    points = [max(_PLANE_CONTACTS.get(int(kind), 1) for kind in pair_types) for pair_types in geom_types.T]
+    points = []  # of each pair, that can touch a plane or a height field
+    for first_type, second_type in geom_types.T.tolist():
+        points.append(max(_PLANE_CONTACTS.get(first_type, 1), _PLANE_CONTACTS.get(second_type, 1)))
     contacts = max(_MIN_CONTACTS, int(np.dot(points, np.where(has_plane, 0.5, 1.0))))
     contact_constraints = 4 * contacts  # edges of the friction pyramid
     limit_constraints = int(model.jnt_limited.sum())
@@ -166,11 +170,11 @@ def table_sizes(model: mujoco.MjModel) -> tuple[int, int]:
 
 def advance(model: mjx.Model, data: mjx.Data, substeps: int) -> mjx.Data:
     """Return data after substeps, with derived quantities one substep behind the state, as `mj_step` leaves them."""
-    if data.impl == mjx.Impl.WARP:  # Warp adds up overflows
+    if data.impl == mjx.Impl.WARP:  # Warp keeps the bits of earlier overflows
         data = data.tree_replace({"_impl.overflow": jnp.zeros_like(data._impl.overflow)})
     data = jax.lax.fori_loop(0, substeps, lambda _, substep_data: mjx.step(model, substep_data), data)
     if data.impl == mjx.Impl.JAX:
-        # Contact forces of the last substep, before anything computes kinematics anew. Sensors of Warp compute them.
+        # The contact forces of the last substep, which sensors compute in Warp. Kinematics must not be computed before.
         data = mjx.rne_postconstraint(model, data)
     return data
 
