@@ -419,10 +419,10 @@ class CommandTask(Task):
         world_displacement = place - core.place
         displacement = rotations.to_heading_frame(world_displacement[..., :2], core.place[..., 2])
         turn = rotations.wrap_angle(world_displacement[..., 2])
-        step_displacement = xp.concatenate([displacement, turn[..., None]], axis=-1)
-        step_motion = step_displacement / context.step_units  # in units of the command
+        step_motion = xp.concatenate([displacement, turn[..., None]], axis=-1)
         leaks = context.leaks  # (3,) shares of the mean that a step replaces
-        return (1.0 - leaks) * core.motion + leaks * step_motion
+        # The division by the units of the command comes last: the order decides the last bits.
+        return (1.0 - leaks) * core.motion + leaks * step_motion / context.step_units
 
     def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
         """Return the memory with a live command."""
