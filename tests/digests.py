@@ -1,7 +1,8 @@
 """Digests of every task: bit-exact observations, rewards and metrics, and bit-exact actions of demonstrators.
 
-`python tests/digests.py` prints the cases that differ from `tests/golden/digests.json`; `--accept` stores the
-present ones. A difference is a change of dynamics, reward or observation: it belongs in the changelog.
+`python tests/digests.py` prints the cases that differ from `tests/golden/digests.json`; its exit code is then 1.
+`--accept` stores the present ones. A difference is a change of dynamics, reward or observation: it belongs in the
+changelog.
 
 Bits depend on the processor: NumPy and the C library round sines and matrix products differently on
 different ones. The file names the arithmetic on which it was made. Where the arithmetic differs, the rewards
@@ -13,6 +14,7 @@ import hashlib
 import itertools
 import json
 import pathlib
+import sys
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -164,15 +166,19 @@ def main() -> None:
         print("this machine's arithmetic is another than the file's")
     now = {name: case for name, case in cases().items() if name.startswith(tuple(given.names) or "")}
     now = {name: digested(case) for name, case in tqdm(now.items(), disable=None)}
+    is_equal = True
     for name, found in now.items():
         old = before["cases"].get(name, {})
         if changed := [key for key in found if found[key] != old.get(key)]:
+            is_equal = False
             print(f"{name}: {', '.join(changed)}")
     if given.accept:
         kept = before["cases"] if given.names else {}
         content = {"arithmetic": arithmetic(), "cases": dict(sorted({**kept, **now}.items()))}
         lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(found)}" for name, found in content["cases"].items())
         FILE.write_text(f'{{"arithmetic": "{content["arithmetic"]}", "cases": {{\n{lines}\n}}}}\n')
+    elif not is_equal:
+        sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -61,19 +61,26 @@ def stored(robot: str) -> dict[str, np.ndarray]:
 
 
 def main() -> None:
-    """Prints every difference, and stores the present numbers if asked to."""
+    """Print every difference, and store the present numbers if asked to; with differences the exit code is 1."""
+    is_equal = True
     for robot in ROBOTS:
         now, path = present(robot), FOLDER / f"{robot}.npz"
         before = stored(robot) if path.exists() else {}
         for name in sorted(now.keys() | before.keys()):
+            difference = ""
             if name not in now or name not in before:
-                print(f"{robot} {name}: {'gone' if name in before else 'new'}")
+                difference = "gone" if name in before else "new"
             elif now[name].shape != before[name].shape:
-                print(f"{robot} {name}: shape {before[name].shape} -> {now[name].shape}")
+                difference = f"shape {before[name].shape} -> {now[name].shape}"
             elif not np.array_equal(now[name], before[name]):
-                print(f"{robot} {name}: differs by up to {np.abs(now[name] - before[name]).max():.3g}")
+                difference = f"differs by up to {np.abs(now[name] - before[name]).max():.3g}"
+            if difference:
+                is_equal = False
+                print(f"{robot} {name}: {difference}")
         if "--accept" in sys.argv[1:]:
             np.savez_compressed(path, **now)
+    if not is_equal and "--accept" not in sys.argv[1:]:
+        sys.exit(1)
 
 
 if __name__ == "__main__":
