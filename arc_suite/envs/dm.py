@@ -167,7 +167,7 @@ class Environment(KnownAttributes, control.Environment):
         """
         if self.task.memory is None:
             raise RuntimeError("cannot take a snapshot: no episode has begun; call reset first")
-        return snapshots.to_arrays(self._state())
+        return snapshots.to_arrays(self._state(), [self.task.opened])
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.envs import trees
+from arc_suite.envs import setup_facts, trees
 from arc_suite.envs.prepare import with_changes
 from arc_suite.simulation.state_arrays import check_finite, check_same_form
 from arc_suite.tasks import Task
@@ -42,6 +42,10 @@ _RANDOM_ARRAYS = {
     "random/halves": _RandomArray(np.int64, 0, 1),
     "random/normals": _RandomArray(np.float64, -64, 64),
 }
+# Bytes (setups, bytes) of the JSON of each setup, see `setup_facts`, and the setup's index of each environment.
+# Snapshots of earlier versions have neither.
+_SETUPS = "setup/facts"
+_SETUP_INDICES = "setup/indices"
 _SETTINGS_ARRAYS = ("settings/present", "settings/next")  # snapshots have them only if a setting was changed
 
 
@@ -65,9 +69,10 @@ class State(NamedTuple):
     settings: tuple[list[str], list[str]]
 
 
-def to_arrays(state: State) -> dict[str, np.ndarray]:
-    """Return the snapshot of a state."""
+def to_arrays(state: State, opened_tasks: Sequence[Task]) -> dict[str, np.ndarray]:
+    """Return the snapshot of a state, given the task of each environment with the settings of its opening."""
     arrays = {f"batch/{name}": array for name, array in state.simulations.items()}
+    arrays |= _setup_arrays(opened_tasks)
     for leaf_index, leaf in enumerate(trees.leaves(state.memory)):
         arrays[f"memory/{leaf_index}"] = leaf.copy()
     arrays |= state.environment_arrays
@@ -103,9 +108,10 @@ def from_arrays(
         settings: these settings.
 
     Raises:
-        ValueError: an array is missing or does not fit.
+        ValueError: another setup, or an array is missing or does not fit.
     """
     try:
+        _check_setups(opened_tasks, arrays)
         simulations = _with_prefix("batch/", arrays)
         check_simulations(simulations)
         memory = _read_memory(like.memory, task, arrays)
@@ -120,7 +126,7 @@ def from_arrays(
         present_tasks = _change_tasks(opened_tasks, settings, present_texts)
         next_tasks = _change_tasks(opened_tasks, settings, next_texts)
     except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise ValueError(f"snapshot: of another task or number of environments: {checks.quote(error)}") from None
+        raise ValueError(f"snapshot: of another setup or number of environments: {checks.quote(error)}") from None
     state = State(simulations, memory, streams, randoms, environment_arrays, (present_texts, next_texts))
     return state, [present_tasks, next_tasks]
 
@@ -130,6 +136,39 @@ def number(value: np.ndarray, like) -> Any:
     if isinstance(like, np.ndarray):
         return value
     return type(like)(value[()])
+
+
+def _setup_arrays(opened_tasks: Sequence[Task]) -> dict[str, np.ndarray]:
+    """Return the arrays with the facts of the environments' setups."""
+    facts = [setup_facts.describe(task) for task in opened_tasks]
+    different_facts = list(dict.fromkeys(facts))
+    indices = [different_facts.index(text) for text in facts]
+    encoded_facts = [text.encode() for text in different_facts]
+    width = max(map(len, encoded_facts))
+    rows = [np.frombuffer(text.ljust(width), np.uint8) for text in encoded_facts]
+    return {_SETUPS: np.stack(rows), _SETUP_INDICES: np.array(indices)}
+
+
+def _check_setups(opened_tasks: Sequence[Task], arrays: Mapping[str, np.ndarray]) -> None:
+    """Refuse a snapshot of other setups than those of the environments.
+
+    Raises:
+        ValueError: another body, task, arena or setting.
+        KeyError: one of the two arrays is missing.
+    """
+    if _SETUPS not in arrays and _SETUP_INDICES not in arrays:  # of an earlier version
+        return
+    rows = np.asarray(arrays[_SETUPS])
+    if rows.ndim != 2 or rows.dtype != np.uint8:
+        raise ValueError(f"{_SETUPS}: expected uint8 (setups, bytes), got {rows.dtype} {rows.shape}")
+    texts = [row.tobytes().decode() for row in rows]
+    facts_here = [setup_facts.describe(task) for task in opened_tasks]
+    indices = check_same_form(_SETUP_INDICES, arrays[_SETUP_INDICES], np.zeros(len(facts_here), int))
+    if not ((indices >= 0) & (indices < len(texts))).all():
+        raise ValueError(f"{_SETUP_INDICES}: expected numbers from 0 to {len(texts) - 1}")
+    pairs = zip(facts_here, indices.tolist(), strict=True)
+    for facts, index in dict.fromkeys(pairs):  # equal pairs once
+        setup_facts.check_equal(facts, texts[index])
 
 
 def _with_prefix(prefix: str, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

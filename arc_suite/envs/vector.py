@@ -443,7 +443,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         if self._memory is None:
             raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
         self._consume_commands()
-        return snapshots.to_arrays(self._state())
+        return snapshots.to_arrays(self._state(), self._opened_tasks)
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:

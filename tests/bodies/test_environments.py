@@ -241,7 +241,7 @@ def test_a_snapshot_of_other_bodies_is_refused_and_none_of_it_used():
     env.reset(seed=1), other.reset(seed=1)
     arrays = other.snapshot() | {name: array for name, array in env.snapshot().items() if name.startswith("2/")}
     before = env.snapshot()
-    with pytest.raises(ValueError, match="^snapshot: of another task or number of environments: "):
+    with pytest.raises(ValueError, match="^snapshot: of another setup or number of environments: "):
         env.restore(arrays)
     assert same(env.snapshot(), before)
 

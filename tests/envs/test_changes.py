@@ -292,7 +292,7 @@ def test_settings_of_a_snapshot_are_checked(text):
     single = Env("tick", "walk")
     single.reset(seed=0)
     names = "settings/present", "settings/next"
-    with pytest.raises(ValueError, match="^snapshot: of another task or number of environments: "):
+    with pytest.raises(ValueError, match="^snapshot: of another setup or number of environments: "):
         single.restore(single.snapshot() | {name: np.array([text]) for name in names})
 
 

@@ -1,17 +1,23 @@
 """Snapshots: another environment continues from them bit-exactly, through a file without pickles."""
 
+import dataclasses
 import io
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from refusals import refused
 from tiers import tiers, turn
 
+import arc_suite
+from arc_suite import registry
+from arc_suite.bodies.environments import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import TASKS
 
 NUM_ENVS, LIMIT = 3, 1.5  # s: episodes end within a test
+ID = "arc_suite/tick-walk-v0"
 MODES = ("SameStep", "NextStep")
 
 
@@ -94,9 +100,68 @@ def test_before_a_reset_there_is_none():
 def test_of_another_task_or_body(other):
     environment = envs()
     environment.reset()
-    with pytest.raises(ValueError, match=r"^snapshot: of another task or number of environments: ") as caught:
+    with pytest.raises(ValueError, match=r"^snapshot: of another setup or number of environments: ") as caught:
         envs(**other).restore(environment.snapshot())
     assert "\n" not in str(caught.value)
+
+
+def other_body():
+    tick = registry.body_of("tick")
+    return dataclasses.replace(tick, density=1.1 * tick.density)
+
+
+# Environments whose arrays have the shapes of `here`, and the fact that differs.
+OTHER_SETUPS = {
+    "body": ("steer", {}, "steer", {"robot": "queen"}, "body 'queen "),
+    "one mass": ("walk", {}, "walk", {"robot": other_body()}, "body 'tick_"),
+    "gait": ("walk", {}, "walk", {"gait": "wave"}, "parameters.duty_factor '"),
+    "command": ("steer", {}, "steer", {"commands": {"forward": (0.0, 0.5)}}, "command.commands '"),
+    "task": ("steer", {}, "shoved", {"kicks": 0.0}, "task 'shoved-v0', where this environment has 'steer-v0'"),
+    "terrain": ("rough", {}, "rough", {"terrain_seed": 1}, "ground.terrain_seed '1', where this environment has '0'"),
+    "difficulty": ("stairs", {}, "stairs", {"difficulty": 0.5}, "ground.difficulty '0.5', where"),
+    "arena": ("walk", {}, "walk", {"arena": "bumps"}, "arena 'Bumps', where this environment has 'Flat'"),
+    "weights": ("walk", {}, "walk", {"weights": {"forward": 2.0}}, "weights.forward '2.0', where"),
+    "modifier": ("walk", {"kicks": 1.0}, "walk", {"kicks": 2.0}, "kicks.kicks '2.0', where this environment has '1.0'"),
+    "time limit": ("walk", {}, "walk", {"time_limit": 3.0}, "step limit '"),
+}
+
+
+@pytest.mark.parametrize("kind", OTHER_SETUPS)
+def test_of_another_setup_with_the_same_shapes(kind):
+    task, settings, other_task, other_settings, message = OTHER_SETUPS[kind]
+    here, other = envs(task, **settings), envs(other_task, **other_settings)
+    other.reset()
+    with refused(f"snapshot: of another setup or number of environments: {message}", begins=True):
+        here.restore(other.snapshot())
+    here.reset()
+    here.restore(here.snapshot())
+
+
+def test_single_environments_refuse_another_setup_too():
+    waving, tripod = (gymnasium.make(ID, task_kwargs={"gait": gait}).unwrapped for gait in ("wave", "tripod"))
+    tripod.reset(seed=0)
+    with refused("snapshot: of another setup or number of environments: parameters.duty_factor '0.6'", begins=True):
+        waving.restore(tripod.snapshot())
+    waving.reset(seed=0)
+    dm = arc_suite.load("tick", "walk", {"gait": "tripod"})
+    with refused("snapshot: of another setup or number of environments: parameters.duty_factor '0.8", begins=True):
+        dm.restore(waving.snapshot())
+    dm.restore(tripod.snapshot())
+
+
+def test_one_of_several_bodies_differs():
+    several, others = (BodiesEnv("walk", 2, bodies) for bodies in (("tick", "leaper"), ("tick", "bastion")))
+    others.reset()
+    with refused("snapshot: of another setup or number of environments: body 'bastion ", begins=True):
+        several.restore(others.snapshot())
+
+
+def test_a_snapshot_of_an_earlier_version_has_no_setup():
+    environment, other = envs(), envs(gait="wave")
+    environment.reset()
+    arrays = environment.snapshot()
+    del arrays["setup/facts"], arrays["setup/indices"]
+    other.restore(arrays)
 
 
 def test_something_is_missing():
@@ -104,7 +169,7 @@ def test_something_is_missing():
     environment.reset()
     arrays = environment.snapshot()
     del arrays["random/keys"]
-    with pytest.raises(ValueError, match=r"^snapshot: of another task or number of environments: 'random/keys'$"):
+    with pytest.raises(ValueError, match=r"^snapshot: of another setup or number of environments: 'random/keys'$"):
         envs().restore(arrays)
 
 
@@ -141,7 +206,7 @@ def test_a_snapshot_from_elsewhere_is_refused_before_anything_changes(change, me
     arrays = environment.snapshot()
     environment.step(np.ones((NUM_ENVS, 18)))
     before = environment.snapshot()
-    with refused(f"snapshot: of another task or number of environments: {message}", begins=True):
+    with refused(f"snapshot: of another setup or number of environments: {message}", begins=True):
         environment.restore(change(arrays))
     after = environment.snapshot()
     assert all(np.array_equal(array, after[name], equal_nan=True) for name, array in before.items())
@@ -156,7 +221,7 @@ def test_a_snapshot_of_directed_with_gait_and_pose_in_the_command_is_refused():
     *others, upright, fell, counts = range(len(memory) - 13)
     order = [*others, *range(len(memory) - 13, len(memory)), upright, fell, counts]
     former = arrays | {f"memory/{place}": arrays[f"memory/{index}"] for place, index in enumerate(order)}
-    with refused("snapshot: of another task or number of environments: memory: expected", begins=True):
+    with refused("snapshot: of another setup or number of environments: memory: expected", begins=True):
         environments.restore(former)
 
 
@@ -168,6 +233,6 @@ def test_a_snapshot_imports_no_module_that_its_settings_name():
     texts = {name: array for name, array in arrays.items() if array.dtype.kind == "U"}
     assert texts
     hostile = arrays | {name: np.array(['{"strolling:wind": 1.0}'] * NUM_ENVS) for name in texts}
-    line = "snapshot: of another task or number of environments: modifier 'strolling:wind': files import nothing;"
+    line = "snapshot: of another setup or number of environments: modifier 'strolling:wind': files import nothing;"
     with refused(line, begins=True):
         environments.restore(hostile)
