@@ -31,8 +31,6 @@ _TABLES: dict[str, dict[str, Any]] = {
     **ADDITIONS,
 }
 
-_SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")
-
 
 def register(
     *,
@@ -188,11 +186,7 @@ def _modifier_settings(modifier) -> Mapping[str, Any]:
         raise ValueError(f"modifiers: expected {expected}, got {checks.preview(modifier)}")
     if not modifier.defaults:
         raise ValueError(f"modifier {modifier.__name__}: expected settings in its `defaults`, got none")
-    task_settings = set(_SETTINGS_OF_EVERY_TASK)
-    for task in TASKS.values():
-        names_of_settings = getattr(task, "names", tuple)  # a method; tasks of other packages may lack it
-        task_settings.update(names_of_settings())
-    shared_names = sorted(modifier.defaults.keys() & task_settings)
+    shared_names = sorted(modifier.defaults.keys() & registry.task_setting_names())
     if shared_names:
         raise ValueError(f"modifier {modifier.__name__}: {shared_names[0]} is a setting of tasks; choose another name")
     return modifier.defaults

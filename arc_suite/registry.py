@@ -47,6 +47,8 @@ ADDITIONS: dict[str, dict[str, Any]] = {"law": {}, "network": {}, "algorithm": {
 # (kind, name) of what other packages register -> the module whose import registers it.
 MODULE_OF_NAME = {}
 
+SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")
+
 MAX_BODIES = 1 << 16  # the most bodies that one text may name
 
 _MAX_QUOTE = 80  # characters of a name in an error
@@ -304,6 +306,15 @@ def modifier_setting(name: str) -> str | None:
         _look_up(name, MODIFIERS, "modifier")
         return bare_name(name)
     return name if name in MODIFIERS else None
+
+
+def task_setting_names() -> set[str]:
+    """Return the names of the settings of all tasks, without those of modifiers."""
+    names = set(SETTINGS_OF_EVERY_TASK)
+    for task in TASKS.values():
+        names_of_settings = getattr(task, "names", tuple)  # a method; tasks of other packages may lack it
+        names.update(names_of_settings())
+    return names
 
 
 def check_stored_settings(settings: Mapping[str, Any]) -> None:

@@ -104,7 +104,7 @@ MUTANTS = {
     "            simulations.step(mask)",
     # Environments.
     "dropped clip of the action": "return array«.clip(-1.0, 1.0)→»",
-    "NaN let through": "is_nan = np.«isnan(array→zeros(array.shape, bool»)",
+    "NaN let through": "is_finite = np.«isfinite(array→ones(array.shape, bool»)",
     "ignored seed": "RandomState(«None if random is None else checks.seed(random)→»)",
     "fall reported as a time limit": "if terminated:\n            return «0.0→1.0»",
     "a new stream carries on the old one": "self._stream_begins = «True→False»  # with the next episode",

@@ -15,7 +15,7 @@ from arc_suite.bodies.groups import Group, Member, Place, group_by_batch, scatte
 from arc_suite.bodies.tokens import Description, Tokens
 from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
-from arc_suite.envs.prepare import prepare_task
+from arc_suite.envs.prepare import prepare_task, refuse_arguments
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import CURRICULUM
 
@@ -87,11 +87,12 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         max_episode_steps: int | None = None,
         task_kwargs: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
-        width: int = 640,
-        height: int = 480,
-        camera_id: int | str = "tracking",
+        width: int | None = None,
+        height: int | None = None,
+        camera_id: int | str | None = None,
         flat: bool = False,
         privileged: bool = False,
+        **others: Any,
     ):
         """Prepare the task of every body and allocate the environments.
 
@@ -104,11 +105,12 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             max_episode_steps: as in `VectorEnv`.
             task_kwargs: as in `VectorEnv`, the same for all bodies; without `actions`.
             render_mode: as in `VectorEnv`.
-            width: width of a picture, pixels.
+            width: width of a picture, pixels; only with a render mode, as the next two.
             height: height of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
             flat: whether observations and actions are vectors.
             privileged: as in `VectorEnv`; blocks of legs and joints are padded to 12 legs of 4 joints.
+            **others: none; they are refused with what takes their place.
 
         Raises:
             ValueError: an unknown name, a body with more than 12 legs or 4 joints a leg, or a value that does not fit.
@@ -116,6 +118,8 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self._lock = Lock()
         self._places: list[Place] = []
         self._begun = False
+        refuse_arguments(others, type(self).__init__)
+        has_flat_spaces = checks.boolean("flat", flat)
         different_bodies = _find_bodies(bodies)
         num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
         if not different_bodies:
@@ -152,7 +156,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self.tasks = tuple(member.task for member in members)
         self.task = BodiesTask(self.tasks[0].name, self.tasks[0].step_limit)
         self._tokens = Tokens.of(self.tasks)
-        self._flat = flat
+        self._flat = has_flat_spaces
         for indices in group_by_batch(members):
             group = Group([members[index] for index in indices], task_name, **options)
             self._places.append(Place(group, np.array(indices), self._tokens.select(indices)))
@@ -164,7 +168,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         description_of_body = {body: tokens.body_description(member.task) for body, member in member_of_body.items()}
         columns = zip(*(description_of_body[body] for body in body_of_env), strict=True)
         self.description = Description(*map(np.stack, columns))
-        self.single_observation_space, self.single_action_space = _spaces(flat)
+        self.single_observation_space, self.single_action_space = _spaces(has_flat_spaces)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         if seed is not None:

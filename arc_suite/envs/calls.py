@@ -138,7 +138,7 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
         shape: (..., motors)
 
     Raises:
-        ValueError: another shape, not numbers, or NaN.
+        ValueError: another shape, not numbers, NaN or infinity.
     """
     array = _to_floats(action)
     if array is None:
@@ -149,10 +149,11 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
         raise ValueError(f"action: expected {numbers} numbers, got {kind}")
     if array.shape != shape:
         raise ValueError(f"action: expected shape {shape}, got {array.shape}")
-    is_nan = np.isnan(array)
-    if np.count_nonzero(is_nan):
-        index = np.argwhere(is_nan)[0]
-        raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
+    is_finite = np.isfinite(array)
+    if not is_finite.all():
+        index = tuple(np.argwhere(~is_finite)[0])
+        position = ", ".join(map(str, index))
+        raise ValueError(f"action[{position}]: expected a number from -1 to 1, got {array[index]}")
     return array.clip(-1.0, 1.0)
 
 

@@ -21,7 +21,7 @@ from arc_suite.envs.calls import (
     checked_command,
     one_thread_at_a_time,
 )
-from arc_suite.envs.prepare import checked_changes, prepare_task
+from arc_suite.envs.prepare import checked_changes, prepare_task, refuse_arguments
 from arc_suite.envs.task_view import TaskView
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import check_fields
@@ -47,6 +47,7 @@ def load(
     task_kwargs: Mapping[str, Any] | None = None,
     environment_kwargs: Mapping[str, Any] | None = None,
     visualize_reward: bool = False,
+    **others: Any,
 ) -> "Environment":
     """Open an environment, as `dm_control.suite.load` does.
 
@@ -62,6 +63,7 @@ def load(
             dm_control's environments are refused: steps and substeps are part of the benchmark, and `time_limit` is a
             setting of the task.
         visualize_reward: whether rendered pictures show the reward as a color.
+        **others: none; they are refused with what takes their place.
 
     Returns:
         An `Environment`, which is a `dm_control.rl.control.Environment`.
@@ -70,6 +72,7 @@ def load(
         ValueError: an unknown name, or a value that does not fit.
         OSError: a file that cannot be read.
     """
+    refuse_arguments(others, load)
     settings = dict(checks.mapping("task_kwargs", task_kwargs))
     options = checks.mapping("environment_kwargs", environment_kwargs)
     random = settings.pop("random", None)
@@ -79,8 +82,9 @@ def load(
         if name in _REFUSED_SETTINGS:
             raise ValueError(f"environment setting {name!r}: {_REFUSED_SETTINGS[name]}")
         checks.name(name, ["flat_observation"], "environment setting")
-    run = TaskRun(task, random, on_divergence, options.get("flat_observation", False))
-    run.visualize_reward = visualize_reward
+    is_flat = checks.boolean("flat_observation", options.get("flat_observation", False))
+    run = TaskRun(task, random, on_divergence, is_flat)
+    run.visualize_reward = checks.boolean("visualize_reward", visualize_reward)
     return Environment(Physics.from_body(task.scene.body, task.scene.arena), run, settings)
 
 

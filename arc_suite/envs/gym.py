@@ -15,7 +15,7 @@ from shimmy.utils.dm_env import dm_env_step2gym_step
 from arc_suite import checks
 from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
 from arc_suite.envs.dm import load
-from arc_suite.envs.prepare import checked_limit
+from arc_suite.envs.prepare import checked_limit, refuse_arguments
 from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.window import Window
 from arc_suite.simulation import opengl, pictures
@@ -60,10 +60,11 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         task_kwargs: Mapping[str, Any] | None = None,
         visualize_reward: bool = False,
         render_mode: str | None = None,
-        width: int = 640,
-        height: int = 480,
-        camera_id: int | str = "tracking",
+        width: int | None = None,
+        height: int | None = None,
+        camera_id: int | str | None = None,
         privileged: bool = False,
+        **others: Any,
     ):
         """Load the task.
 
@@ -71,16 +72,18 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             domain_name: a robot; see `arc_suite.load`.
             task_name: as in `arc_suite.load`.
             task_kwargs: see `arc_suite.load`.
-            visualize_reward: see `arc_suite.load`.
+            visualize_reward: see `arc_suite.load`; only with a render mode.
             render_mode: None, rgb_array, depth_array (m) or, where there is a display, human.
-            width: width of a picture, pixels; a window has its own size.
+            width: width of a picture, pixels; only with a render mode, as the next two. A window has its own size.
             height: height of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
             privileged: whether infos contain the privileged observation, `privileged` (size,) float32.
+            **others: none; they are refused with what takes their place.
 
         Raises:
             ValueError: an unknown name, or a value that does not fit.
         """
+        refuse_arguments(others, type(self).__init__)
         modes = [*_HEADLESS_MODES]
         if opengl.has_display():
             modes.append("human")
@@ -88,15 +91,17 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             raise ValueError(f"render_mode 'human' needs a display, and there is none; use {' or '.join(modes)}")
         if render_mode is not None:
             checks.name(render_mode, modes, "render_mode")
-        pictures.check_size(height, width)
+        picture_options = pictures.options(render_mode, width, height, camera_id)
+        if checks.boolean("visualize_reward", visualize_reward) and render_mode is None:
+            raise ValueError("visualize_reward=True: goes with a render_mode, such as 'rgb_array'")
         environment = load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
         limit = _step_limit_of_make(caller=sys._getframe(1))
         if limit is not None:
             checked_limit(limit, environment.task.definition)
-        pictures.check_camera(environment.physics.model.ptr, camera_id)
+        pictures.check_camera(environment.physics.model.ptr, picture_options["camera_id"])
         self.metadata = {"render_modes": modes}  # else shimmy would write a rate into the class's dictionary
         # From here on the dm_env is `self._env`.
-        super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
+        super().__init__(environment, render_kwargs=picture_options)
         self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
         self.render_mode = render_mode
         self._has_privileged_info = checks.boolean("privileged", privileged)

@@ -1,8 +1,9 @@
 """Preparation of tasks for environments: the task with its body and arena, and the compiled model of both."""
 
+import inspect
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
@@ -14,6 +15,7 @@ from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import modified_task, parameters
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.mirrors import Symmetry
+from arc_suite.tasks.modifiers import MODIFIERS
 from arc_suite.tasks.readings import layout
 from arc_suite.tasks.scene import CHANGEABLE, Scene
 
@@ -62,6 +64,49 @@ def prepare_task(
     if modifier_settings:
         task = modified_task.add_modifiers(task, modifier_settings)
     return task, model
+
+
+# Arguments that some calls have -> what other calls have in their place.
+_CURES = {
+    "num_envs": "gymnasium.make_vec makes several environments",
+    "num_threads": "gymnasium.make_vec makes environments that threads simulate",
+    "autoreset_mode": "gymnasium.make_vec makes environments that reset themselves",
+    "bodies": "gymnasium.make_vec of arc_suite/bodies-<task>-v0 makes environments of different bodies",
+    "flat": "gymnasium.make_vec of arc_suite/bodies-<task>-v0 has it; other observations of Gymnasium are flat",
+    "environment_kwargs": "arc_suite.load has it; task.split names the blocks of Gymnasium's flat observations",
+    "flat_observation": "arc_suite.load has it in environment_kwargs; observations of Gymnasium are flat",
+    "max_episode_steps": "task_kwargs={'time_limit': seconds} limits episodes",
+    "seed": "reset(seed=...) begins a stream",
+    "render_mode": "physics.render of a dm_env draws a picture",
+    "width": "physics.render of a dm_env draws a picture; the width of stairs is a setting in task_kwargs",
+    "height": "physics.render of a dm_env draws a picture",
+    "camera_id": "physics.render of a dm_env draws a picture",
+    "visualize_reward": "arc_suite.load and gymnasium.make have it",
+    "privileged": "task.privileged of a dm_env has the blocks",
+    "robot": "the body is domain_name",
+    "body": "the body is domain_name",
+    "task": "the task is task_name",
+}
+
+
+def refuse_arguments(arguments: Mapping[str, Any], function: Callable) -> None:
+    """Raise ValueError for arguments that a function does not have; the error names what takes their place.
+
+    Args:
+        arguments: arguments that no parameter of the function takes, by name.
+        function: function that opens an environment.
+    """
+    valid_names = [name for name in inspect.signature(function).parameters if name not in ("self", "others")]
+    setting_names = registry.task_setting_names() | MODIFIERS.keys()
+    for name, value in arguments.items():
+        if name in _CURES:
+            raise ValueError(f"argument {name!r}: {_CURES[name]}")
+        if name in setting_names:
+            setting = f"{{{name!r}: {checks.preview(value)}}}"
+            raise ValueError(f"argument {name!r}: it is a setting of the task; write task_kwargs={setting}")
+        hint = checks.hint(name, [*valid_names, *setting_names])
+        arguments_text = ", ".join(valid_names)
+        raise ValueError(f"unknown argument {name!r}{hint} (there are: {arguments_text}; task_kwargs has the settings)")
 
 
 def _take_modifier_settings(settings: dict[str, Any]) -> dict[str, Any]:

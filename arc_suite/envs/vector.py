@@ -23,7 +23,7 @@ from arc_suite.envs.calls import (
     checked_command,
     one_thread_at_a_time,
 )
-from arc_suite.envs.prepare import checked_changes, checked_limit, prepare_task
+from arc_suite.envs.prepare import checked_changes, checked_limit, prepare_task, refuse_arguments
 from arc_suite.envs.task_view import TaskView
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
@@ -126,10 +126,11 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         max_episode_steps: int | None = None,
         task_kwargs: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
-        width: int = 640,
-        height: int = 480,
-        camera_id: int | str = "tracking",
+        width: int | None = None,
+        height: int | None = None,
+        camera_id: int | str | None = None,
         privileged: bool = False,
+        **others: Any,
     ):
         """Load the task and allocate the environments.
 
@@ -145,10 +146,11 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             task_kwargs: as in `arc_suite.load`; `random=s` seeds environment i with s + i, and
                 `on_divergence` can only be "truncate".
             render_mode: None, rgb_array or depth_array (m).
-            width: width of a picture, pixels.
+            width: width of a picture, pixels; only with a render mode, as the next two.
             height: height of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
             privileged: whether infos contain the privileged observations, `privileged` (num_envs, size) float32.
+            **others: none; they are refused with what takes their place.
 
         Raises:
             ValueError: an unknown name, or a value that does not fit.
@@ -156,6 +158,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         # Set first, as Gymnasium also closes an environment whose `__init__` has raised.
         self._lock = Lock()
         self.batch = None
+        refuse_arguments(others, type(self).__init__)
 
         task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
         seed = task_kwargs.pop("random", None)
@@ -167,14 +170,15 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             checks.name(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
         self._has_privileged_info = checks.boolean("privileged", privileged)
-        pictures.check_size(height, width)
+        picture_options = pictures.options(render_mode, width, height, camera_id)
         threads = min(usable_cores(), _MAX_THREADS) if num_threads is None else num_threads
         threads = checks.integer("num_threads", threads, 1, _MAX_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
         self._tasks, model = self._prepare_tasks()
         self._task = _join_tasks(self._tasks)
-        pictures.check_camera(model if isinstance(model, mujoco.MjModel) else model[0], camera_id)
+        any_model = model if isinstance(model, mujoco.MjModel) else model[0]
+        pictures.check_camera(any_model, picture_options["camera_id"])
         self._max_episode_steps = math.inf
         if max_episode_steps is not None:
             self._max_episode_steps = checked_limit(max_episode_steps, self._tasks[0])
@@ -207,12 +211,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
-        self._picture_options: dict[str, Any] = {
-            "width": width,
-            "height": height,
-            "camera_id": camera_id,
-            "depth": render_mode == "depth_array",
-        }
+        self._picture_options: dict[str, Any] = {**picture_options, "depth": render_mode == "depth_array"}
         self._observation = np.zeros((self.num_envs, self._task.size), np.float32)  # the latest
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self._task.size,), np.float32)
         joints = len(self._tasks[0].scene.body.joint_names)

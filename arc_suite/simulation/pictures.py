@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -48,6 +48,7 @@ QUALITIES = {
 }
 MAX_SCALE = 2  # of the largest picture
 
+_DEFAULT_OPTIONS = {"width": 640, "height": 480, "camera_id": "tracking"}  # of pictures of environments; pixels
 _FAILED_LEG_COLOR = (0.07, 0.07, 0.08, 1.0)
 
 
@@ -252,6 +253,34 @@ def shrink(picture: np.ndarray, scale: int) -> np.ndarray:
         for column in range(scale):
             total += picture[row::scale, column::scale]
     return ((total + pixels // 2) // pixels).astype(np.uint8)
+
+
+def options(
+    render_mode: str | None, width: int | None, height: int | None, camera_id: int | str | None
+) -> dict[str, Any]:
+    """Return size and camera of an environment's pictures as arguments of `render`, with defaults where they are None.
+
+    Args:
+        render_mode: the checked mode; None for an environment without pictures, which takes none of the others.
+        width: width of a picture, pixels; a window, mode human, has its own size.
+        height: height of a picture, pixels; see `width`.
+        camera_id: a camera, which `check_camera` checks.
+
+    Raises:
+        ValueError: an argument that has no effect in this mode, no integer, or a picture that is too large.
+    """
+    size = {"width": width, "height": height}
+    arguments = {**size, "camera_id": camera_id}
+    for name, value in arguments.items():
+        if value is not None and render_mode is None:
+            raise ValueError(f"{name}={checks.preview(value)}: goes with a render_mode, such as 'rgb_array'")
+    for name, value in size.items():
+        if value is not None and render_mode == "human":
+            raise ValueError(f"{name}={checks.preview(value)}: expected none, as the window has its own size")
+    given_arguments = {name: value for name, value in arguments.items() if value is not None}
+    picture_options = {**_DEFAULT_OPTIONS, **given_arguments}
+    check_size(picture_options["height"], picture_options["width"])
+    return picture_options
 
 
 def check_size(height: int, width: int) -> None:

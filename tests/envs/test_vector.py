@@ -387,7 +387,7 @@ def test_calls_at_the_wrong_time():
         ),
         ({"render_mode": "rgb"}, "unknown render_mode 'rgb' (there are: rgb_array, depth_array)"),
         ({"render_mode": "rgb_aray"}, "unknown render_mode 'rgb_aray'; did you mean 'rgb_array'?"),
-        ({"camera_id": "tracing"}, "unknown camera 'tracing'; did you mean 'tracking'?"),
+        ({"render_mode": "rgb_array", "camera_id": "tracing"}, "unknown camera 'tracing'; did you mean 'tracking'?"),
         ({"task_kwargs": {"weigths": {}}}, "unknown setting of walk 'weigths'; did you mean 'weights'?"),
         ({"task_kwargs": {"random": -1}}, "seed: expected an integer from 0 to 4294967295, got -1"),
         ({"task_kwargs": {"on_divergence": "raise"}}, "unknown on_divergence of many environments 'raise'"),

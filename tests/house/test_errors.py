@@ -102,9 +102,25 @@ def envs(**kwargs):
     return lambda world: gymnasium.make_vec(ID, **{"num_envs": 2} | kwargs)
 
 
+def bodies(**kwargs):
+    return lambda world: gymnasium.make_vec("arc_suite/bodies-walk-v0", **kwargs)
+
+
+def opened(**kwargs):
+    return lambda world: arc_suite.load("queen", "walk", **kwargs)
+
+
+SIZE = {"width": 64, "height": 480, "camera_id": "eye"}
+WITH_MODE = "goes with a render_mode, such as 'rgb_array'"
+SETTING = "argument '{}': it is a setting of the task; write"
+FACES = (make, envs, bodies, opened)
 CASES = [
     # Actions.
     (lambda w: w.dm.step(NAN), "action[7]: expected a number from -1 to 1, got nan"),
+    (lambda w: w.dm.step(np.full(12, np.inf)), "action[0]: expected a number from -1 to 1, got inf"),
+    (lambda w: w.env.step(NAN - np.inf), "action[0]: expected a number from -1 to 1, got -inf"),
+    (lambda w: w.envs.step([ZEROS, [*ZEROS[1:], 10**400], ZEROS]), "action: expected 3 x 12 numbers, got list"),
+    (lambda w: w.envs.step([ZEROS, ZEROS + np.inf, ZEROS]), "action[1, 0]: expected a number from -1 to 1, got inf"),
     (lambda w: w.dm.step([]), "action: expected shape (12,), got (0,)"),
     (lambda w: w.dm.step({"hip": 0.0}), "action: expected 12 numbers, got dict"),
     (lambda w: w.dm.step([ZEROS, ZEROS[:3]]), "action: expected 12 numbers, got list"),
@@ -158,13 +174,13 @@ CASES = [
     # Cameras and sizes.
     (render(24, 32, -2), f"no camera -2: expected -1 (free) to 3, or one of {CAMERAS}"),
     (render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 3, or one of {CAMERAS}"),
-    (make(camera_id="prtrait"), f"unknown camera 'prtrait'; did you mean 'portrait'? {NAMED}"),
-    (envs(camera_id=9), f"no camera 9: expected -1 (free) to 3, or one of {CAMERAS}"),
+    (make(**PICTURE, camera_id="prtrait"), f"unknown camera 'prtrait'; did you mean 'portrait'? {NAMED}"),
+    (envs(**PICTURE, camera_id=9), f"no camera 9: expected -1 (free) to 3, or one of {CAMERAS}"),
     (render(0, 32), "height: expected an integer from 1 to 2160, got 0"),
     (render(24, 99999), "width: expected an integer from 1 to 3840, got 99999"),
     (render(24, "32"), "width: expected an integer from 1 to 3840, got '32'"),
-    (make(width=-1), "width: expected an integer from 1 to 3840, got -1"),
-    (envs(height=2.5), "height: expected an integer from 1 to 2160, got 2.5"),
+    (make(render_mode="rgb_array", width=-1), "width: expected an integer from 1 to 3840, got -1"),
+    (envs(render_mode="depth_array", height=2.5), "height: expected an integer from 1 to 2160, got 2.5"),
     (lambda w: w.envs.render([5]), "indices: expected integers from 0 to 2, got 5"),
     (lambda w: w.envs.render(["a"]), "indices: expected integers from 0 to 2, got 'a'"),
     # Presets and policies.
@@ -217,6 +233,35 @@ CASES = [
     (envs(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),
     (envs(autoreset_mode="SomeStep"), f"unknown autoreset_mode 'SomeStep'; did you mean 'SameStep'? {MODES}"),
     (envs(task_kwargs={"on_divergence": "raise"}), f"unknown on_divergence of many environments 'raise' {TRUNCATE}"),
+    *(
+        (call(**{name: value}), f"{name}={value!r}: {WITH_MODE}")
+        for call in (make, envs)
+        for name, value in SIZE.items()
+    ),
+    (make(visualize_reward=True), f"visualize_reward=True: {WITH_MODE}"),
+    (make(visualize_reward="no"), "visualize_reward: expected true or false, got 'no'"),
+    (load("queen", "walk", None, None, "no"), "visualize_reward: expected true or false, got 'no'"),
+    (load("queen", "walk", None, {"flat_observation": "no"}), "flat_observation: expected true or false, got 'no'"),
+    (bodies(flat="no"), "flat: expected true or false, got 'no'"),
+    (bodies(privileged=1), "privileged: expected true or false, got 1"),
+    # Settings and other arguments in the place of arguments.
+    *((call(kicks=2.0), f"{SETTING.format('kicks')} task_kwargs={{'kicks': 2.0}}") for call in FACES),
+    *((call(difficulty=1), f"{SETTING.format('difficulty')} task_kwargs={{'difficulty': 1}}") for call in FACES),
+    *((call(random=1), f"{SETTING.format('random')} task_kwargs={{'random': 1}}") for call in FACES),
+    *((call(seed=1), "argument 'seed': reset(seed=...) begins a stream") for call in FACES),
+    (make(num_envs=2), "argument 'num_envs': gymnasium.make_vec makes several environments"),
+    (
+        envs(bodies="random:0"),
+        "argument 'bodies': gymnasium.make_vec of arc_suite/bodies-<task>-v0 makes environments of different bodies",
+    ),
+    (envs(flat_observation=True), "argument 'flat_observation': arc_suite.load has it in environment_kwargs; obs"),
+    (opened(max_episode_steps=9), "argument 'max_episode_steps': task_kwargs={'time_limit': seconds} limits episodes"),
+    (opened(render_mode="human"), "argument 'render_mode': physics.render of a dm_env draws a picture"),
+    (
+        opened(kick=1),
+        "unknown argument 'kick'; did you mean 'kicks'? (there are: domain_name, task_name, task_kwargs, ",
+    ),
+    (make(wdith=1), "unknown argument 'wdith'; did you mean 'width'? (there are: domain_name, task_name, task_kwargs"),
     (make(render_mode="ansi"), "unknown render_mode 'ansi' (there are: rgb_array, depth_array)"),
 ]
 
@@ -226,7 +271,8 @@ CASES = [
 def test_bad_input(world, use, message, monkeypatch):
     monkeypatch.setattr("arc_suite.simulation.opengl.has_display", lambda: False)
     before = world.state()
-    with refused(message, (ValueError, OSError)):
+    lists_arguments = message.startswith(("unknown argument", "argument 'flat"))  # in an order that does not matter
+    with refused(message, (ValueError, OSError), begins=lists_arguments):
         use(world)
     assert world.state() == before
 
