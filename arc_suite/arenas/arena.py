@@ -2,7 +2,7 @@
 
 import dataclasses
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from dm_control import mjcf
 
@@ -20,6 +20,10 @@ class Arena(ABC):
 
     is_level: ClassVar[bool] = False
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone for pickles; cached heights can be computed again."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
     @abstractmethod
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
         """Add the ground to a model that holds a body.
@@ -32,6 +36,13 @@ class Arena(ABC):
     @abstractmethod
     def height(self, x, y):
         """Return the height of the ground (...) under points x (...) and y (...), m."""
+
+    def has_left(self, x, y):
+        """Return whether (...) torsos over points x (...) and y (...), m, have left the ground or are near its edge.
+
+        Tasks truncate an episode there. Grounds without an edge return False, as this one does.
+        """
+        return False
 
     def torso_clearance(self, positions):
         """Return the heights (...) of torsos at positions (..., 3) over the ground near them, m."""

@@ -13,8 +13,9 @@ from arc_suite.robots.spec import Body
 
 # Lengths in standing heights.
 _CELL = 0.5  # feet sink into smaller cells
-_LENGTH = 80.0  # of the field, to the front and to the back: the way of 1000 control steps
-_WIDTH = 40.0  # of the field
+_LENGTH = 120.0  # of the field, to the front and to the back: more than the way of 1000 control steps
+_WIDTH = 120.0  # of the field: more than commands lead to the sides in 1000 control steps
+_EDGE = 2.0  # distance of the torso from the edge at which an episode is truncated
 _THICKNESS = 2.0  # of the ground below its lowest point
 _WAVELENGTH = 4.0  # from bump to bump
 _MAX_HEIGHT = 0.15
@@ -22,7 +23,7 @@ _MAX_HEIGHT = 0.15
 
 @dataclasses.dataclass(frozen=True)
 class Bumps(Arena):
-    """Bumps on a field around the start; beyond its edge, the ground has the height of the edge.
+    """Bumps on a field around the start. Beyond its edge is no ground; `height` returns the height of the edge there.
 
     Attributes:
         unit: the standing height of the body, m; other lengths are multiples of it.
@@ -43,6 +44,12 @@ class Bumps(Arena):
         u = (x + half_x) / (2.0 * half_x) * (columns - 1)
         v = (y + half_y) / (2.0 * half_y) * (rows - 1)
         return self.highest * self.unit * field.height(self._shares, u, v)
+
+    def has_left(self, x, y):
+        """Return whether (...) torsos over points x (...) and y (...), m, are nearer to an edge than 2 units."""
+        half_x, half_y = self._halves
+        edge = _EDGE * self.unit
+        return (abs(x) > half_x - edge) | (abs(y) > half_y - edge)
 
     @property
     def _halves(self) -> tuple[float, float]:

@@ -22,9 +22,13 @@ DIFFICULTY = 2.0 / 3.0  # default
 WIDTH = 24.0  # of a lane
 BACK = 4.0  # level ground behind the start
 LEVEL = 3.0  # level ground ahead of the start
+END_MARGIN = 1.0  # distance of the torso from either end of the lanes at which an episode is truncated
+SIDE_MARGIN = 2.0  # distance of the torso from the edge of the outermost lanes at which an episode is truncated
 
-_LENGTH = 80.0  # of the lanes of an arena without a task, ahead of the start
-_LANES = 3  # of an arena without a task
+# Size of an arena without a task: commands lead nowhere else in 1000 control steps.
+_LENGTH = 120.0  # of the lanes, ahead of the start
+_BACK = 60.0  # level ground behind the start
+_LANES = 5
 _CELL = 0.5  # of the height field
 _GRAIN = 1.0 / 16.0  # length of a cell of stairs and trenches; it is adapted so that a width is a multiple
 _THICKNESS = 2.0  # of the ground
@@ -131,19 +135,22 @@ KINDS = (*FIELDS, *STEPS)
 class Terrain(Arena):
     """Lanes side by side; a body starts in the middle of lane i, at y = `start(i)`.
 
-    Outside the lanes there is only the plane below stairs and trenches; there, `height` returns that of the edge.
+    Outside the lanes there is only the plane below stairs and trenches; there, `height` returns that of the edge. So
+    tasks truncate episodes before a torso gets there.
 
     Attributes:
         unit: the standing height of the body, m; other lengths are multiples of it.
         length: length of the lanes ahead of the start, in units.
         lanes: kind and obstacle of each, in the order of `KINDS`; widths of stairs and trenches are equal.
         seed: seed of the random ground; a lane does not depend on its neighbors.
+        back: length of the level ground behind the start, in units.
     """
 
     unit: float
     length: float
     lanes: tuple[tuple[str, Obstacle], ...]
     seed: int = 0
+    back: float = BACK
 
     def start(self, lane):
         """Return y (...) of the middle of lanes (...), m; x of the start is 0."""
@@ -157,7 +164,7 @@ class Terrain(Arena):
             half_length = 0.5 * (nodes.shape[1] - 1) * _CELL
             half_width = 0.5 * WIDTH * self._num_fields
             size = np.array((half_length, half_width, self._highest, _THICKNESS)) * unit
-            center = ((half_length - BACK) * unit, self.start(0.5 * (self._num_fields - 1)), 0.0)
+            center = ((half_length - self.back) * unit, self.start(0.5 * (self._num_fields - 1)), 0.0)
             field.add(root, nodes, size, center, **contact)
         boxes = []
         for lane, heights in enumerate(self._profiles, self._num_fields):
@@ -180,13 +187,13 @@ class Terrain(Arena):
             edges = np.flatnonzero(np.diff(heights >= top, prepend=False, append=False))
             for first, last in edges.reshape(-1, 2) * self._grain:
                 size = np.array((0.5 * (last - first), 0.5 * WIDTH, 0.5 * _THICKNESS)) * self.unit
-                center = np.array((0.5 * (first + last) - BACK, 0.0, top - 0.5 * _THICKNESS)) * self.unit
+                center = np.array((0.5 * (first + last) - self.back, 0.0, top - 0.5 * _THICKNESS)) * self.unit
                 yield size, center + (0.0, self.start(lane), 0.0)
 
     def height(self, x, y):
         """Return the height (...) of the collision geometry under points, m."""
         xp = x.__array_namespace__()
-        along = x / self.unit + BACK  # from the beginning of the lanes, in units
+        along = x / self.unit + self.back  # from the beginning of the lanes, in units
         across = y / self.unit + (len(self.lanes) // 2 + 0.5) * WIDTH  # from the edge of the first lane, in units
         if not self._num_fields:
             return self.unit * self._height_of_boxes(along, across)
@@ -204,6 +211,19 @@ class Terrain(Arena):
         lane = xp.floor(across / WIDTH).astype(int).clip(0, lanes - 1)
         cell = xp.floor(along / self._grain).astype(int).clip(0, cells - 1)
         return xp.asarray(self._profiles).ravel()[lane * cells + cell]
+
+    def has_left(self, x, y):
+        """Return whether (...) torsos over points x (...) and y (...), m, have left the lanes or are near an edge."""
+        (lowest_x, highest_x), (lowest_y, highest_y) = self._bounds
+        return (x < lowest_x) | (x > highest_x) | (y < lowest_y) | (y > highest_y)
+
+    @functools.cached_property
+    def _bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Lowest and highest x, and lowest and highest y, that a torso may have, m."""
+        half_width = (0.5 * WIDTH - SIDE_MARGIN) * self.unit  # of the outermost lanes, as far as a torso may go
+        x_bounds = ((END_MARGIN - self.back) * self.unit, (self.length - END_MARGIN) * self.unit)
+        y_bounds = (self.start(0) - half_width, self.start(len(self.lanes) - 1) + half_width)
+        return x_bounds, y_bounds
 
     def torso_clearance(self, positions):
         """Return the heights (...) of torsos over the highest ground within half a standing height around them, m."""
@@ -237,7 +257,7 @@ class Terrain(Arena):
     @functools.cached_property
     def _field_heights(self) -> list[np.ndarray]:
         """Heights of the height field's nodes, in units, (rows, columns) for each lane."""
-        x = np.arange(0.0, BACK + self.length + _CELL, _CELL) - BACK
+        x = np.arange(0.0, self.back + self.length + _CELL, _CELL) - self.back
         rows = round(WIDTH / _CELL)
         return [
             FIELDS[kind](self._random(lane), obstacle, x, rows)
@@ -256,8 +276,8 @@ class Terrain(Arena):
     @functools.cached_property
     def _profiles(self) -> np.ndarray:
         """Heights of stairs and trenches, in units, (lanes, cells)."""
-        level_cells = math.ceil((BACK + LEVEL) / self._grain)
-        cells = np.arange(math.ceil((BACK + self.length) / self._grain)) - level_cells
+        level_cells = math.ceil((self.back + LEVEL) / self._grain)
+        cells = np.arange(math.ceil((self.back + self.length) / self._grain)) - level_cells
         profiles = [
             STEPS[kind](self._random(lane), obstacle, cells, self._grain)
             for lane, (kind, obstacle) in enumerate(self.lanes[self._num_fields :], self._num_fields)
@@ -294,6 +314,7 @@ def make_lanes(
     levels=(DIFFICULTY,),
     seed: int = 0,
     sizes_in_meters: Mapping[str, float] | None = None,
+    back: float = BACK,
 ) -> Terrain:
     """Return lanes of the size of a body.
 
@@ -304,6 +325,7 @@ def make_lanes(
         levels: difficulties, from 0 to 1.
         seed: seed of the random lanes.
         sizes_in_meters: sizes of obstacles by name, m and rad, in place of those of the difficulties.
+        back: length of the level ground behind the start, in standing heights.
 
     Returns:
         The lanes, sorted by kind, in the order of `KINDS`, then by difficulty.
@@ -322,9 +344,9 @@ def make_lanes(
         for level in levels:
             obstacle = Obstacle(**(_DIFFICULTIES[kind](level) | fixed_sizes))
             lanes += [(kind, obstacle)] * kinds[kind]
-    return Terrain(unit, length, tuple(lanes), seed)
+    return Terrain(unit, length, tuple(lanes), seed, back)
 
 
 def lanes_of_kind(kind: str):
     """Return a function that returns lanes of a kind for a body."""
-    return lambda body: make_lanes(body, {kind: _LANES})
+    return lambda body: make_lanes(body, {kind: _LANES}, back=_BACK)

@@ -489,8 +489,10 @@ class CommandTask(Task):
         return {name: block + 0.0 for name, block in observation.items()}  # adding 0 makes -0 a 0
 
     def ended(self, memory: CommandTaskMemory, readings: Sensed) -> tuple:
-        """Return whether the body fell, which terminates the episode; the ground may end the episode, too."""
-        return self.settings.ground.ended(memory.ground, memory.health.fell)
+        """Return whether the body fell, which terminates the episode; the ground may end it, and its edge truncates."""
+        terminated, truncated = self.settings.ground.ended(memory.ground, memory.health.fell)
+        place = memory.core.place
+        return terminated, truncated | self.scene.arena.has_left(place[..., 0], place[..., 1])
 
     def progress(self, memory: CommandTaskMemory) -> dict:
         """Return the mean `tracking`, whether the body `fell`, `gait_compliance`, and what command and ground add.

@@ -28,6 +28,7 @@ An episode, as a driver runs it, for one environment or with a leading axis for 
 import collections
 import dataclasses
 import functools
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping
 from typing import Any, ClassVar
@@ -52,6 +53,17 @@ STEPS = 1000  # control steps of an episode
 CURRICULUM = ("curriculum", "level")
 
 _CLEARANCE = 0.01  # standing heights; feet start at least so far above the ground
+_RINGS = (0.35, 0.7, 0.9)  # distances from a foot's center at which the ground is measured, shares of the ball's radius
+_DIRECTIONS = 8  # points on each ring
+# These points (points, 2), and the heights (points,) of the center over the ball's lower side there, both in radii.
+_POINTS_AROUND_FOOT = np.array(
+    [
+        (distance * math.cos(angle), distance * math.sin(angle))
+        for distance in _RINGS
+        for angle in np.arange(_DIRECTIONS) * (2.0 * math.pi / _DIRECTIONS)
+    ]
+)
+_BALL_HEIGHTS = np.sqrt(1.0 - np.repeat(_RINGS, _DIRECTIONS) ** 2)
 
 
 class Observed(ABC):
@@ -292,9 +304,21 @@ class Task(Observed):
         return None if self.scene.arena.is_level else self.raise_off_ground(readings)
 
     def raise_off_ground(self, readings: Readings) -> np.ndarray:
-        """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground."""
+        """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground.
+
+        A foot is a ball that the clearance enlarges. The ground is measured under its center and around it, as a slope
+        touches a ball on one side.
+        """
         xp = readings.foot_heights.__array_namespace__()
-        rise = (self.clearances - readings.foot_heights).max(axis=-1).clip(0.0)
+        rise = (self.clearances - readings.foot_heights).max(axis=-1)
+        if not self.scene.arena.is_level:
+            radii = xp.asarray(self.clearances)[..., None]
+            offsets = radii[..., None] * xp.asarray(_POINTS_AROUND_FOOT)
+            feet = readings.foot_positions
+            ground = self.scene.arena.height(feet[..., None, 0] + offsets[..., 0], feet[..., None, 1] + offsets[..., 1])
+            lowest_centers = ground + radii * xp.asarray(_BALL_HEIGHTS)  # where the ball touches the ground
+            rise = xp.maximum(rise, (lowest_centers - feet[..., None, 2]).max(axis=(-2, -1)))
+        rise = rise.clip(0.0)
         x, y, z = (readings.torso_position[..., axis] for axis in range(3))
         position = xp.stack([x, y, z + rise], axis=-1)
         return xp.concatenate([position, readings.qpos[..., 3:]], axis=-1)

@@ -5,6 +5,7 @@ torso's frame, m, and its yaw, rad.
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -30,7 +31,6 @@ LEVELS = 10  # of a curriculum, with difficulties from 0 to 1
 STAY_PROBABILITY = 0.75  # of the highest level after itself; else any level follows
 START_SPREAD = 6.0  # largest distance of the start from the middle of the lane, h
 OFF_LANE = 10.0  # distance from the middle of the lane at which an episode is truncated, h
-LANE_END = 1.0  # distance from either end of the lane at which an episode is truncated, h
 MAX_LANE_LENGTH = 300.0  # ahead of the start, h
 SUNK_DEPTH = 0.05  # of a foot's center under the ground, h; the center of a foot in contact is never so deep
 _LANE_MARGIN_FACTOR = 1.15  # of the length of a lane, over the distance at the target velocity
@@ -151,7 +151,7 @@ class Lane(NamedTuple):
         visits: (...) whether the episode visits this level, from the highest one.
         steps_under_ground: (...) consecutive control steps for which a foot has been at `SUNK_DEPTH`.
         is_stuck: (...) whether a foot is stuck under the ground, an artifact of contacts.
-        has_left: (...) whether the torso has left the lane, to a side or at an end.
+        has_left: (...) whether the torso has left the lane to a side.
     """
 
     middle: np.ndarray
@@ -292,6 +292,8 @@ class Lanes(Ground):
         level: level at which a curriculum begins.
         terrain_seed: seed of the random ground.
         rise, slope, width: size of obstacles, m, the slope in rad; None for the size that follows from the difficulty.
+        roams: whether commands lead to all sides. Then a body may change lanes, and further lanes lie on both sides of
+            those in which episodes start.
     """
 
     kinds: tuple[str, ...]
@@ -305,6 +307,7 @@ class Lanes(Ground):
     rise: float | None = None
     slope: float | None = None
     width: float | None = None
+    roams: bool = False
 
     own_arena: ClassVar[bool] = True
     blocks: ClassVar[Mapping[str, Block]] = {
@@ -362,7 +365,15 @@ class Lanes(Ground):
             difficulties = (float(self.difficulty),)
         copies = dict.fromkeys(self.kinds, self._copies)
         sizes = {name: getattr(self, name) for name in terrain.SIZES if getattr(self, name) is not None}
-        return terrain.make_lanes(body, copies, float(length), difficulties, self.terrain_seed, sizes)
+        lanes = terrain.make_lanes(body, copies, float(length), difficulties, self.terrain_seed, sizes)
+        if not self.roams:
+            return lanes
+        # A body starts in the middle of the length, and can go as far to either side.
+        side_lanes = math.ceil((0.5 * length + START_SPREAD - 0.5 * terrain.WIDTH) / terrain.WIDTH)
+        first_lane = lanes.lanes[0]
+        last_lane = lanes.lanes[-1]
+        all_lanes = (first_lane,) * side_lanes + lanes.lanes + (last_lane,) * side_lanes
+        return dataclasses.replace(lanes, lanes=all_lanes)
 
     def first(self) -> Stream:
         """Return the level at which a stream begins; without an outcome, the first episode has it."""
@@ -388,8 +399,10 @@ class Lanes(Ground):
             level, visits = next_level(stream, chance, level_to_visit, *self.thresholds)
             levels = LEVELS
         arena = context.arena
-        number = (kind * levels + int(level)) * self._copies + lane  # of the lane in the arena
-        middle = arena.start(number)  # m
+        number = (kind * levels + int(level)) * self._copies + lane  # of the lane among those with starts
+        starting_lanes = len(self.kinds) * levels * self._copies
+        side_lanes = (len(arena.lanes) - starting_lanes) // 2
+        middle = arena.start(side_lanes + number)  # m
         x = self.middle * arena.length * arena.unit
         y = middle + distance * arena.unit
         memory = Lane(
@@ -405,17 +418,13 @@ class Lanes(Ground):
     def after(self, context: Context, memory: Lane, place, readings: Readings, arrived) -> Lane:
         """Return the memory with the steps of a foot under ground, and whether the torso has left the lane."""
         unit = context.arena.unit  # m, the standing height h
-        length = context.arena.length  # h
         is_under_ground = (readings.foot_heights < -SUNK_DEPTH * unit).any(axis=-1)
         steps_under_ground = (memory.steps_under_ground + 1) * is_under_ground
-        x = place[..., 0]
-        y = place[..., 1]
-        is_at_end = (x > (length - LANE_END) * unit) | (x < (LANE_END - terrain.BACK) * unit)
-        is_off_lane = abs(y - memory.middle) > OFF_LANE * unit
+        is_off_lane = abs(place[..., 1] - memory.middle) > OFF_LANE * unit
         return memory._replace(
             steps_under_ground=steps_under_ground,
             is_stuck=steps_under_ground >= SUNK_STEPS,
-            has_left=is_at_end | is_off_lane,
+            has_left=is_off_lane & (not self.roams),
         )
 
     def ended(self, memory: Lane, fell) -> tuple:

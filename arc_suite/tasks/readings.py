@@ -45,6 +45,7 @@ class Readings(NamedTuple):
         frame_position: (..., 3) position of the torso's frame, world.
         foot_heights: (..., feet) over the ground.
         efforts: (..., joints) torques of servos, shares of the largest; None for motors, whose actions are the torques.
+        foot_positions: (..., feet, 3) in the world.
     """
 
     qpos: np.ndarray
@@ -57,6 +58,7 @@ class Readings(NamedTuple):
     frame_position: np.ndarray
     foot_heights: np.ndarray
     efforts: np.ndarray | None = None
+    foot_positions: np.ndarray | None = None
 
     @property
     def torso_height(self):
@@ -212,4 +214,5 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         frame_position=xpos[..., layout.torso, :],
         foot_heights=foot_heights,
         efforts=efforts,
+        foot_positions=feet,
     )

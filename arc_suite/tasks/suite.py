@@ -127,7 +127,7 @@ class Roam(CommandTask):
     name = "roam"
     modifiers = {"kicks": 1.5}
     command = Schedule()
-    ground = Lanes(("rough",), middle=0.5, thresholds=(0.25, 0.5))
+    ground = Lanes(("rough",), middle=0.5, thresholds=(0.25, 0.5), roams=True)
     from_body = _FROM_BODY
     demonstrators = ("balanced", "surefooted")
 

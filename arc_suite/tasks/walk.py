@@ -200,8 +200,9 @@ class Walk(Task):
         }
 
     def ended(self, memory: WalkMemory, readings: Readings) -> tuple:
-        """Return whether the torso has left its healthy range, which terminates the episode; nothing truncates it."""
-        return ~memory.healthy, False
+        """Return whether the torso has left its healthy range, which terminates, or the ground, which truncates."""
+        position = readings.torso_position
+        return ~memory.healthy, self.scene.arena.has_left(position[..., 0], position[..., 1])
 
     def progress(self, memory: WalkMemory) -> dict:
         """Return the mean `speed`, m/s, `gait_compliance`, the share of feet as prescribed, and `cost_of_transport`."""

@@ -1,5 +1,6 @@
 """Lanes of ground: what is drawn, seen and asked for, how an episode ends, and how a curriculum climbs."""
 
+import dataclasses
 import hashlib
 
 import gymnasium
@@ -14,7 +15,7 @@ from refusals import refused
 from tiers import never, tiers
 
 import arc_suite
-from arc_suite.arenas import terrain
+from arc_suite.arenas import ARENAS, Arena, terrain
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.prepare import prepare_task
@@ -22,6 +23,8 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import TASKS
+from arc_suite.tasks.command import scheduled_value
+from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.ground import LEVELS, Lanes, Stream, next_level
 from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
 
@@ -222,7 +225,8 @@ def test_how_an_episode_ends():
     def ended(x, y):
         place = np.array([x, memory.ground.middle + y, 0.0])
         after = task.ground.after(task.context, memory.ground, place, readings, False)
-        return tuple(bool(end) for end in task.ended(memory._replace(ground=after), readings))
+        core = memory.core._replace(place=place)
+        return tuple(bool(end) for end in task.ended(memory._replace(core=core, ground=after), readings))
 
     assert ended(0.0, 0.0) == (False, False)
     assert task.ended(memory._replace(health=memory.health._replace(fell=np.True_)), readings) == (True, False)
@@ -236,6 +240,96 @@ def test_how_an_episode_ends():
         assert (memory.ground.steps_under_ground, bool(task.ended(memory, deep)[0])) == (steps, steps == 5)
     assert task.progress(memory)["sank"] == 1.0
     assert task.after(memory, readings).ground.steps_under_ground == 0
+
+
+def obedient_places(task, count):
+    """Places (steps, count, 2) of torsos that move exactly as the schedules of as many episodes say."""
+    random, sizes = np.random.RandomState(0), task.context.step_units
+    schedules = [task.settings.command.schedule(random, 1.0) for _ in range(count)]
+    ends, commands = np.array([drawn.ends for drawn in schedules]), np.array([drawn.schedule for drawn in schedules])
+    heading, place, places = random.uniform(-np.pi, np.pi, count), np.zeros((count, 2)), []
+    for step in range(STEPS):
+        forward, left, turn = (scheduled_value(ends, commands, np.full(count, step)) * sizes).T
+        heading_x, heading_y = np.cos(heading), np.sin(heading)
+        place = place + np.stack([heading_x * forward - heading_y * left, heading_y * forward + heading_x * left], -1)
+        heading = heading + turn
+        places.append(place)
+    return np.array(places)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("settings", [{}, {"curriculum": True}])
+def test_no_command_leads_over_the_edge_of_the_ground_of_roam(robot, settings):
+    task, _ = prepare_task(robot, "roam", settings)
+    task, places = task.unwrapped, obedient_places(task.unwrapped, 500)
+    for level in (0, LEVELS - 1) if settings else (0,):
+        stream = Stream(level, np.nan, False)
+        starts = [task.ground.place(task.context, np.random.RandomState(seed), stream)[1] for seed in range(40)]
+        ys = [y for _, y in starts]
+        for start in (starts[int(np.argmin(ys))], starts[int(np.argmax(ys))]):
+            assert not task.scene.arena.has_left(*(places + start).T).any()
+
+
+@pytest.mark.parametrize("arena", [name for name in ARENAS if name != "flat"])
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_no_command_leads_over_the_edge_of_an_arena(robot, arena):
+    task, _ = prepare_task(robot, "steer", {"arena": arena})
+    assert not task.scene.arena.has_left(*obedient_places(task, 500).T).any()
+    way = np.linspace(0.0, STEPS * task.scene.control_timestep * prepare_task(robot, "walk")[0].target_velocity)
+    assert not task.scene.arena.has_left(way, np.zeros_like(way)).any()
+
+
+@pytest.mark.parametrize("task_name", ["walk", "steer", "directed"])
+@pytest.mark.parametrize("arena", ["bumps", "rough", "stairs"])
+def test_who_gets_to_the_edge_is_truncated_and_has_not_fallen(task_name, arena):
+    environment = arc_suite.load("tick", task_name, {"arena": arena, "random": 0})
+    environment.reset()
+    ground = environment.task.definition.scene.arena
+    for direction in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+        environment.reset()
+        steps = np.outer(np.arange(0.0, 200.0, 0.5) * ground.unit, direction)
+        last = steps[np.argmax(ground.has_left(*steps.T)) - 1]  # half a standing height before the edge counts
+        environment.physics.data.qpos[:2] = last + np.multiply(direction, 0.6 * ground.unit)
+        timestep = environment.step(np.zeros(18))
+        assert timestep.last() and timestep.discount == 1.0
+
+
+@pytest.mark.parametrize(
+    ("robot", "task_name", "settings"),
+    [
+        ("tick", "roam", {"difficulty": 1.0}),
+        ("bastion", "roam", {"difficulty": 1.0}),
+        ("leaper", "roam", {"curriculum": True, "level": 9}),
+        ("varied:7", "roam", {}),
+        ("tick", "steer", {"arena": "bumps"}),
+    ],
+)
+def test_a_start_stands_on_the_ground(robot, task_name, settings):
+    environment = arc_suite.load(robot, task_name, {"random": 0, **settings})
+    height = environment.task.definition.scene.body.torso.standing_height
+    for _ in range(60):
+        environment.reset()
+        assert min(environment.physics.data.contact.dist, default=0.0) > -0.005 * height
+
+
+def test_a_start_on_a_steep_plane_stands_on_it():
+    """An arena of another package, steeper than the suite's: a ball touches it beside its lowest point."""
+    environment = arc_suite.load("tick", "steer", {"arena": Incline(), "random": 0})
+    for _ in range(10):
+        environment.reset()
+        assert min(environment.physics.data.contact.dist, default=0.0) > -0.005 * 0.18
+
+
+@dataclasses.dataclass(frozen=True)
+class Incline(Arena):
+    """A plane with a slope of 0.5 rad along x."""
+
+    def add_to(self, root, **contact):
+        turn = (np.cos(0.25), 0.0, -np.sin(0.25), 0.0)
+        root.worldbody.add("geom", name="floor", type="plane", size=(0, 0, 1), quat=turn, conaffinity=1, **contact)
+
+    def height(self, x, y):
+        return x * np.tan(0.5)
 
 
 def test_distance_is_the_share_of_what_was_asked_for():

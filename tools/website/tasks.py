@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Mapping
 
 import arc_suite
+from arc_suite.arenas import terrain
 from arc_suite.cpg.selection import suited_presets
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies.text_tables import table
@@ -188,9 +189,10 @@ def _end(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
     ]
     if isinstance(task_class.ground, ground.Lanes):
         lines.append(("0", f"a foot stays under the ground for {ground.SUNK_STEPS} steps, a contact artifact"))
-        lines.append(
-            ("1", f"the torso is {ground.OFF_LANE:g} h from the lane's middle, or {ground.LANE_END:g} h from an end")
-        )
+        edge = f"{ground.OFF_LANE:g} h from the lane's middle"
+        if task_class.ground.roams:
+            edge = f"{terrain.SIDE_MARGIN:g} h from the outermost lane's edge"
+        lines.append(("1", f"the torso is {edge}, or {terrain.END_MARGIN:g} h from an end"))
     return table(("discount", "where"), [*lines, ("1", "the time limit is reached")])
 
 
