@@ -12,6 +12,7 @@ from arc_suite.policies import Script
 
 ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
 TERMS = "infos/reward_terms"  # as in the info of a step
+_RESET_TERM = 0.0  # of the info of a reset, which comes first and has no reward; Minari stores steps + 1 infos
 
 _ATTRIBUTES = {"id": int, "seed": int, "total_steps": int, "length": int, "return": float, "sha256": str}
 
@@ -83,7 +84,8 @@ def write(file, index: int, episode: Episode) -> None:
     """
     group = file.create_group(name(index))
     group.create_group(TERMS)
-    for path, array in episode.arrays().items():
+    for path, values in episode.arrays().items():
+        array = np.append(_RESET_TERM, values) if path.startswith(TERMS) else values
         # h5py's `create_dataset` takes twice as long, which matters for short episodes.
         kind = h5py.h5t.py_create(array.dtype, logical=True)
         space = h5py.h5s.create_simple(array.shape)
@@ -110,7 +112,14 @@ def read(file, index: int) -> Episode:
     if size > file_size:
         raise ValueError(f"{group.name}: its arrays claim {size} bytes, and the file has {file_size}")
     values = {path: array[()] for path, array in arrays.items()}
-    terms = {path.removeprefix(f"{TERMS}/"): values.pop(path) for path in list(values) if path.startswith(TERMS)}
+    steps = len(values["rewards"])
+    terms = {}
+    for path in [path for path in values if path.startswith(TERMS)]:
+        term = values.pop(path)
+        term_of_reset = term[:-steps]  # empty in files of earlier versions
+        if term_of_reset.any() or np.signbit(term_of_reset).any():
+            raise ValueError(f"{group.name}/{path}: expected {_RESET_TERM} for the reset, found {term[0]}")
+        terms[path.removeprefix(f"{TERMS}/")] = term[-steps:]
     episode = Episode(stored_attributes["seed"], stored_attributes.get("preset"), **values, terms=terms)
     for key, value in _attributes(index, episode).items():
         if stored_attributes[key] != value:
@@ -179,7 +188,12 @@ def _open_arrays(group) -> dict[str, h5py.Dataset]:
     terms = group
     for key in TERMS.split("/"):
         terms = _item(terms, key, h5py.Group)
-    return arrays | {f"{TERMS}/{term}": _open_array(terms, term, (steps,), float) for term in terms}
+    for term in terms:
+        # Files of earlier versions have no info of the reset.
+        is_earlier = _item(terms, term, h5py.Dataset).shape == (steps,)
+        length = steps if is_earlier else steps + 1
+        arrays[f"{TERMS}/{term}"] = _open_array(terms, term, (length,), float)
+    return arrays
 
 
 def _open_array(group, key: str, shape: tuple[int | None, ...], dtype) -> h5py.Dataset:

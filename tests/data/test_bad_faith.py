@@ -169,7 +169,7 @@ ALTERED = {
     "huge in two axes": (replaced(REWARDS, "create_dataset", (HUGE, HUGE >> 20), "f8"), "expected"),
     "huge term": (
         replaced("episode_0/infos/reward_terms/forward", "create_dataset", (HUGE,), "f4"),
-        "expected 20 of float64",
+        "expected 21 of float64",
     ),
     "chunked": (replaced(REWARDS, "create_dataset", (20,), "f8", chunks=(5,)), "in one piece"),
     "stored elsewhere": (replaced(REWARDS, "create_dataset", (20,), "f8", external=ELSEWHERE), "in one piece"),
