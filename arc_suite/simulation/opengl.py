@@ -21,6 +21,11 @@ from arc_suite import checks
 from arc_suite.simulation import forks
 
 _REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJOCO_GL=egl"
+# For errors that name a variable of the environment.
+_REMEDIES_BY_VARIABLE = {
+    "PYOPENGL_PLATFORM": "unset PYOPENGL_PLATFORM",
+    "MUJOCO_GL must": "unset it, or set MUJOCO_GL=egl",
+}
 _WINDOWED = ("darwin", "win32")  # platforms that always have a display, and no EGL
 _DEVICE = "MUJOCO_EGL_DEVICE_ID"
 _OFF = ("off", "disable", "disabled", "false", "0")  # values of MUJOCO_GL that both libraries take for no backend
@@ -304,7 +309,8 @@ def _explain(error: Exception) -> str:
     missing = isinstance(error, AttributeError)  # PyOpenGL's way to say that a library is not there
     reason = "the OpenGL library is missing" if missing else checks.quote(cause).rstrip(".")
     backend = f" with MUJOCO_GL={setting}" if setting else ""
-    return f"cannot render{backend}: {reason}; {_remedy()}"
+    remedy = _remedy(cause)
+    return f"cannot render{backend}: {reason}" + (f"; {remedy}" if remedy else "")
 
 
 def _wrong_device() -> str | None:
@@ -320,8 +326,20 @@ def _wrong_device() -> str | None:
     return f"{_DEVICE}: expected {expected}, got {checks.quote(device)!r}; unset it to take any device"
 
 
-def _remedy() -> str:
+def _remedy(cause: Exception) -> str | None:
+    """Return the remedy for the cause of an error; None for one that has nothing to do with the choice of OpenGL."""
+    for variable, remedy in _REMEDIES_BY_VARIABLE.items():
+        if variable in str(cause):
+            return remedy
+    if _lacks_resources(cause):
+        return None
     return "unset MUJOCO_GL: pictures are drawn by GLFW here" if sys.platform in _WINDOWED else _REMEDY
+
+
+def _lacks_resources(cause: Exception) -> bool:
+    """Return whether the machine has no memory, file or thread left."""
+    is_system_call = isinstance(cause, OSError) and cause.errno is not None  # a library that is missing has no number
+    return isinstance(cause, MemoryError) or is_system_call or "new thread" in str(cause)
 
 
 # A fork waits for a renderer that is being made, so that the child finds none or a whole one.

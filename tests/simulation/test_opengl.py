@@ -1,6 +1,7 @@
 """Rendering: one context for all, next to other users of OpenGL, and one line where OpenGL is missing."""
 
 import concurrent.futures
+import errno
 import os
 import sys
 
@@ -54,11 +55,15 @@ UNKNOWN = (
     "Environment variable MUJOCO_GL must be one of ['', '0', '1', 'disable', 'disabled', 'egl', 'enable', 'enabled', "
     "'false', 'glfw', 'off', 'on', 'osmesa', 'true']: got 'vulkan'"
 )
+OTHER_PLATFORM = (
+    "Cannot use EGL rendering platform. The PYOPENGL_PLATFORM environment variable is set to 'glx' "
+    "(should be either unset or 'egl')"
+)
 
 
-def cannot(cause, chosen=""):
+def cannot(cause, chosen="", remedy=REMEDY):
     """The error of a picture for a cause, with a value of MUJOCO_GL."""
-    return f"RenderingUnavailable: cannot render{chosen and f' with MUJOCO_GL={chosen}'}: {cause}; {REMEDY}"
+    return f"RenderingUnavailable: cannot render{chosen and f' with MUJOCO_GL={chosen}'}: {cause}; {remedy}"
 
 
 DISABLED = "RenderingUnavailable: cannot render: MUJOCO_GL=disable turns it off; unset it, or set MUJOCO_GL=egl"
@@ -77,7 +82,8 @@ DISABLED = "RenderingUnavailable: cannot render: MUJOCO_GL=disable turns it off;
         ("", NO_DRIVER | EGL, {}, cannot(NO_EGL, "egl")),
         ("", {"MUJOCO_GL": "disable"}, {}, DISABLED),
         ("", {"MUJOCO_GL": "glfw"}, {}, cannot(NO_DISPLAY, "glfw")),
-        ("", {"MUJOCO_GL": "vulkan"}, {}, cannot(UNKNOWN, "vulkan")),
+        ("", {"MUJOCO_GL": "vulkan"}, {}, cannot(UNKNOWN, "vulkan", "unset it, or set MUJOCO_GL=egl")),
+        ("", EGL | {"PYOPENGL_PLATFORM": "glx"}, {}, cannot(OTHER_PLATFORM, "egl", "unset PYOPENGL_PLATFORM")),
     ],
 )
 def test_egl_where_no_display_answers_and_what_is_missing(tmp_path, sitecustomize, variables, changed, outcome):
@@ -86,6 +92,20 @@ def test_egl_where_no_display_answers_and_what_is_missing(tmp_path, sitecustomiz
     options, variables = ("-W", "default::UserWarning"), UNSET | variables
     lines = interpreters.printed(SCRIPT, folder=tmp_path, options=options, **variables)
     assert lines == [f"changed {changed} removed []", "reward True", outcome, outcome, "reward True"]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("no memory for a framebuffer"),
+        OSError(errno.EMFILE, "Too many open files"),
+        RuntimeError("can't start new thread"),
+    ],
+)
+def test_what_no_package_cures_names_none(error):
+    with pytest.raises(opengl.RenderingUnavailable) as caught, opengl._errors():
+        raise error
+    assert str(caught.value).endswith(str(error)) and "apt-get" not in str(caught.value)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from tiers import tiers
 import arc_suite
 from arc_suite.tasks import TASKS, parameters
 from arc_suite.tasks.contract import Task
+from arc_suite.tasks.ground import Level
 from arc_suite.tasks.modified_task import add_modifiers
 from arc_suite.tasks.modifiers import SUITE_MODIFIERS
 from arc_suite.tasks.suite import Steer
@@ -174,3 +175,25 @@ def test_a_modified_task_is_copied_and_pickled():
     task = arc_suite.load("tick", "shoved").task.definition
     for again in (copy.deepcopy(task), pickle.loads(pickle.dumps(task))):
         assert (type(again), again.name, again.sizes) == (type(task), "shoved", task.sizes)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_short_episodes_have_finite_metrics(task):
+    """An episode may end before a step, after one, or before the first cycle of the gait, with a curriculum, too."""
+    task_class = TASKS[task]
+    for curriculum in (False, True):
+        settings = {"time_limit": 0.1, "random": 0}
+        if curriculum:
+            if not hasattr(task_class, "ground") or task == "navigate":
+                continue
+            settings["curriculum"] = True
+            if isinstance(task_class.ground, Level):
+                settings["commands"] = {"forward": (-1.0, 2.0)}
+        environment = arc_suite.load("tick", task, settings)
+        for steps in (0, 0, 1, 0, 2, 2):
+            environment.reset()
+            for _ in range(steps):
+                timestep = environment.step(np.ones(18))
+            assert np.isfinite(list(environment.task.progress.values())).all()
+            if steps:
+                assert np.isfinite(np.concatenate(list(timestep.observation.values()))).all()
