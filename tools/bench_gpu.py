@@ -1,10 +1,12 @@
 """Measures worlds of `arc_suite.learning.worlds.mjx` on this machine's accelerator, and writes tables into docs/gpu.md.
 
-Prints control steps a second, memory and compile time, whole episodes against a processor's, and the minutes until
-PPO has the return of the demonstrator `medium`. Needs the extras `learn` and `gpu`.
+Prints control steps a second, memory and compile time, the share of bare simulation in them, whole episodes against a
+processor's, and runs of `arc-suite train` from their start: seconds, share of the GPU, returns. Needs the extras
+`learn` and `gpu`.
 
 Example:
   python tools/bench_gpu.py --document docs/gpu.md
+  python tools/bench_gpu.py --robots queen --worlds "" --episodes 0 --tasks walk,steer --seeds 0
   python tools/bench_gpu.py --robots leaper --worlds 8 --impl jax --episodes 0 --learn ""
 """
 
@@ -12,7 +14,10 @@ import contextlib
 import os
 import pathlib
 import re
+import subprocess
+import sys
 import tempfile
+import threading
 import time
 
 os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # so that peaks are those of the program
@@ -28,10 +33,10 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.selection import law, presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import run_folder
-from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.learning.agents.training import train
 from arc_suite.learning.worlds import device, mjx
+from arc_suite.policies import network
 from arc_suite.robots import ROBOTS
+from arc_suite.simulation.cores import usable_cores
 
 FLAGS = flags.FLAGS
 flags.DEFINE_list("robots", list(ROBOTS), "Whose walks.")
@@ -40,15 +45,16 @@ flags.DEFINE_list("impl", list(device.IMPLEMENTATIONS), "Implementations.")
 flags.DEFINE_integer("steps", 50, "Control steps of a measurement.", lower_bound=1)
 flags.DEFINE_integer("episodes", 256, "Episodes that are compared with a processor's; 0 for none.", lower_bound=0)
 flags.DEFINE_list("learn", ["warp"], "Simulations in which PPO learns: mjx, warp, or none.")
+flags.DEFINE_list("tasks", ["walk", "steer"], "Tasks that PPO learns.")
+flags.DEFINE_list("seeds", ["0", "1", "2"], "Seeds with which PPO learns.")
+flags.DEFINE_multi_string("run_flag", [], "Further flag of arc-suite train for these runs.")
+flags.DEFINE_float("goal", 3700.0, "Return of an evaluation until which seconds are counted.")
+flags.DEFINE_string("runs", None, "Folder in which runs stay; by default they are deleted.")
 flags.DEFINE_string("document", None, "A Markdown file between whose <!-- gpu --> marks to put the tables.")
 
 _MARKED_TEXT = re.compile(r"(<!-- gpu -->\n).*?(<!-- end of gpu -->)", re.DOTALL)
-# Hyperparameters of PPO in thousands of worlds.
-HYPERPARAMETERS = {"num_envs": 4096, "horizon": 16, "minibatch": 16_384}
-
-
-class GoalReached(Exception):
-    """A learner has reached a return."""
+_POLL_INTERVAL = 0.2  # s between two looks at a run
+_NOT_MEASURED = "not measured"
 
 
 def prepare_walk(env, preset, steps):
@@ -90,7 +96,7 @@ def speed_row(robot, impl, worlds, steps):
         f"{worlds}",
         f"{steps_per_second:,.0f}",
         f"{compile_seconds:.0f} s",
-        f"{peak_bytes / 2**30:.1f} GiB" if peak_bytes else "not measured",
+        f"{peak_bytes / 2**30:.1f} GiB" if peak_bytes else _NOT_MEASURED,
         f"{int(overflows.sum())}",
     ]
 
@@ -110,30 +116,132 @@ def return_row(robot, impl, count):
     return [robot, impl, f"{mean_return:.1f}", f"{processor_return:.1f}", f"{difference:+.2f} %", f"{falls}"]
 
 
-def learning_row(robot, simulation):
-    """Return a row of cells: control steps and minutes until PPO has the return of `medium`, with evaluations."""
-    setup = Setup.of(robot)
-    with contextlib.closing(setup.make_vec(evaluation.CURVE_EPISODES, autoreset_mode="Disabled")) as environment:
-        medium = Demonstrator(environment, "medium")
-        goal = np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, medium)])
-    hyperparameters = {"simulation": simulation, **HYPERPARAMETERS}
-    run = Configuration.of(setup, "ppo", hyperparameters, steps=50_000_000, evaluate_every=10**6)
+def ratio_row(robot, impl, worlds, steps):
+    """Return a row of cells: bare simulation's time in that of the environment, with the same controls."""
+    env = mjx.load(robot, "walk", impl=impl, num_envs=worlds)
+    demonstrator = law(env.task, presets_of(env.task.scene.body)["medium"])
+    first_state = jax.jit(jax.vmap(env.start))(jnp.arange(worlds))
+
+    def record_step(states, _):
+        state, demonstrator_state = states
+        demonstrator_state, action = demonstrator(demonstrator_state, env.task.split(state.obs))
+        state = jax.vmap(env.step)(state, action)
+        return (state, demonstrator_state), (action, state.data.ctrl)
+
+    def step_environment(state, action):
+        return jax.vmap(env.step)(state, action), None
+
+    def step_simulation(data, controls):
+        data = data.replace(ctrl=controls)
+        return jax.vmap(lambda world: device.advance(env.mjx_model, world, env.n_substeps))(data), None
+
+    states = (first_state, jax.tree.map(jnp.asarray, demonstrator.initial(worlds)))
+    _, (actions, controls) = jax.jit(lambda states: jax.lax.scan(record_step, states, length=steps))(states)
+    step_all = jax.jit(lambda state: jax.lax.scan(step_environment, state, actions))
+    simulate_all = jax.jit(lambda data: jax.lax.scan(step_simulation, data, controls))
+    environment_seconds = best_seconds(step_all, first_state)
+    simulation_seconds = best_seconds(simulate_all, first_state.data)
+    return [robot, impl, f"{worlds}", f"{simulation_seconds / environment_seconds:.3f}"]
+
+
+def best_seconds(function, argument, repeats=3):
+    """Return the shortest time of a compiled function, s, after a first call."""
+    jax.block_until_ready(function(argument))
+    durations = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        jax.block_until_ready(function(argument))
+        durations.append(time.perf_counter() - start)
+    return min(durations)
+
+
+def training_row(robot, task, simulation, seed, folder):
+    """Return a row of cells: `arc-suite train` with defaults, from the start of its process.
+
+    Seconds are those to the first line of training.csv, to an evaluation with the return of `--goal`, and to the end.
+    """
+    flags_of_run = [f"--robot={robot}", f"--task={task}", f"--hp=simulation={simulation}", f"--seed={seed}"]
+    command = [sys.executable, "-m", "arc_suite", "train", *flags_of_run, *FLAGS.run_flag, f"--output={folder}"]
     start = time.perf_counter()
-    steps = run.steps
-    minutes = "not reached"
+    seconds_to_first = None
+    seconds_to_goal = None
+    with sample_gpu() as shares:
+        process = subprocess.Popen(command)
+        while process.poll() is None:
+            time.sleep(_POLL_INTERVAL)
+            seconds = time.perf_counter() - start
+            training_lines = run_folder.lines(folder, "training")
+            if training_lines and seconds_to_first is None:
+                seconds_to_first = seconds
+                shares.clear()
+            if seconds_to_goal is None and best_return(folder) >= FLAGS.goal:
+                seconds_to_goal = seconds
+    seconds = time.perf_counter() - start
+    if process.returncode:
+        raise ValueError(f"{' '.join(command)}: exit status {process.returncode}")
+    times = run_folder.table(folder, "times")
+    steps_per_second = (times["step"][-1] - times["step"][0]) / (times["wall_seconds"][-1] - times["wall_seconds"][0])
+    totals, falls = evaluate_run(folder, robot, task)
+    return [
+        robot,
+        task,
+        simulation,
+        f"{seed}",
+        f"{times['step'][-1] / 1e6:.1f} M",
+        f"{totals.mean():.0f}",
+        f"{totals.min():.0f}",
+        f"{falls}",
+        f"{seconds:.0f}",
+        _NOT_MEASURED if seconds_to_first is None else f"{seconds_to_first:.0f}",
+        "not reached" if seconds_to_goal is None else f"{seconds_to_goal:.0f}",
+        f"{steps_per_second:,.0f}",
+        f"{np.mean(shares):.1f} %" if shares else _NOT_MEASURED,
+    ]
 
-    def on_metrics(step, metrics):
-        nonlocal steps, minutes
-        if metrics.get("return", -np.inf) >= goal:
-            steps = step
-            minutes = f"{(time.perf_counter() - start) / 60.0:.1f}"
-            raise GoalReached
 
-    with tempfile.TemporaryDirectory() as folder:
-        with contextlib.suppress(GoalReached):
-            train(run, pathlib.Path(folder), progress=program.progress, on_metrics=on_metrics)
-        latest = run_folder.latest_returns(run_folder.table(folder, "evaluations")).mean()
-    return [robot, simulation, f"{goal:.0f}", f"{latest:.0f}", f"{steps / 1e6:.1f} M", minutes]
+@contextlib.contextmanager
+def sample_gpu():
+    """Yield a list to which the shares of time in which the GPU computes are appended, percent; none without one."""
+    shares = []
+    command = ["nvidia-smi", "--query-gpu=utilization.gpu", "--format=csv,noheader,nounits", "--loop-ms=200"]
+    try:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8")
+    except OSError:
+        yield shares
+        return
+
+    def read_shares():
+        for line in process.stdout:
+            with contextlib.suppress(ValueError):  # a GPU that does not tell
+                shares.append(float(line))
+
+    reader = threading.Thread(target=read_shares, daemon=True)
+    reader.start()
+    try:
+        yield shares
+    finally:
+        process.terminate()
+        reader.join()
+
+
+def best_return(folder):
+    """Return the best mean return of the evaluations of a run so far."""
+    lines = run_folder.lines(folder, "evaluations")
+    returns_by_step = {}
+    for line in lines:
+        returns_by_step.setdefault(line["step"], []).append(float(line["return"]))
+    return max((np.mean(returns) for returns in returns_by_step.values()), default=-np.inf)
+
+
+def evaluate_run(folder, robot, task):
+    """Return the returns of the protocol's episodes of a run's policy, and the number of those that end early."""
+    policy = network.load(folder)
+    setup = Setup.of(robot, task)
+    options = {"num_threads": usable_cores(), "autoreset_mode": "Disabled"}
+    with contextlib.closing(setup.make_vec(evaluation.EPISODES, **options)) as environment:
+        episodes = evaluation.episodes_in_batch(environment, policy)
+    falls = sum(episode.length < setup.definition.step_limit for episode in episodes)
+    return np.array([episode.total for episode in episodes]), falls
 
 
 def markdown_table(header, rows):
@@ -150,19 +258,45 @@ def main():
         raise ValueError(f"--document: JAX finds no GPU here, and tables of a {jax.default_backend()} are not written")
     packages = ("mujoco", "mujoco-mjx", "warp-lang", "jax")
     package_versions = ", ".join(f"{name} {versions.version_of(name)}" for name in packages)
-    worlds = [int(count) for count in FLAGS.worlds]
-    rows = [speed_row(robot, impl, count, FLAGS.steps) for robot in robots for impl in impls for count in worlds]
-    header = ["robot", "impl", "worlds", "control steps/s", "compiling", "peak memory", "overflows"]
-    parts = [f"{jax.devices()[0].device_kind}; {package_versions}.", "<!-- table -->", markdown_table(header, rows)]
+    worlds = [int(count) for count in FLAGS.worlds if count]
+    parts = [f"{jax.devices()[0].device_kind}; {package_versions}.", "<!-- table -->"]
+
+    def add_table(header, rows):
+        if rows:
+            parts.append(markdown_table(header, rows))
+            print(parts[-1], flush=True)
+
+    # Runs come first, since what others compile would make them faster.
+    simulations = [name for name in FLAGS.learn if name]
+    runs = [
+        (robot, task, simulation, seed)
+        for task in FLAGS.tasks
+        for robot in robots
+        for simulation in simulations
+        for seed in FLAGS.seeds
+    ]
+    with contextlib.ExitStack() as stack:
+        folder = pathlib.Path(FLAGS.runs or stack.enter_context(tempfile.TemporaryDirectory()))
+        rows = [training_row(*run, folder / "-".join(run)) for run in runs]
+    seconds = ["seconds", "to the first update", f"to {FLAGS.goal:g}"]
+    add_table(
+        [
+            *("robot", "task", "simulation", "seed", "control steps", "return", "worst", "falls"),
+            *seconds,
+            "steps/s",
+            "GPU",
+        ],
+        rows,
+    )
+    cases = [(robot, impl, count) for robot in robots for impl in impls for count in worlds]
+    rows = [speed_row(*case, FLAGS.steps) for case in cases]
+    add_table(["robot", "impl", "worlds", "control steps/s", "compiling", "peak memory", "overflows"], rows)
+    rows = [ratio_row(*case, FLAGS.steps) for case in cases]
+    add_table(["robot", "impl", "worlds", "bare simulation / environment"], rows)
     if FLAGS.episodes:
         rows = [return_row(robot, impl, FLAGS.episodes) for robot in robots for impl in impls]
-        parts.append(markdown_table(["robot", "impl", "return", "on a processor", "apart", "falls"], rows))
-    simulations = [name for name in FLAGS.learn if name]
-    if simulations:
-        rows = [learning_row(robot, simulation) for robot in robots for simulation in simulations]
-        parts.append(markdown_table(["robot", "simulation", "`medium`", "PPO", "control steps", "minutes"], rows))
+        add_table(["robot", "impl", "return", "on a processor", "apart", "falls"], rows)
     text = "\n\n".join([*parts, "<!-- end -->"])
-    print(text)
     if FLAGS.document:
         path = pathlib.Path(FLAGS.document)
         page = path.read_text(encoding="utf-8")

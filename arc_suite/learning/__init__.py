@@ -54,7 +54,7 @@ def train(
         OSError: as `agents.training.train`.
     """
     setup = Setup.of(robot, task, task_kwargs)
-    cores.use_one_thread()
+    cores.prepare_jax()
     from arc_suite.learning.agents import training as trainer  # not before: programs without learners are light
     from arc_suite.learning.agents.configuration import Configuration
 

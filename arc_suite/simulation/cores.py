@@ -1,5 +1,6 @@
 """Cores that this process may use: in containers and on clusters, fewer than the machine has."""
 
+import importlib.util
 import math
 import os
 from collections.abc import Iterator
@@ -7,14 +8,34 @@ from pathlib import Path
 
 _GROUPS = Path("/proc/self/cgroup")
 _MOUNT = Path("/sys/fs/cgroup")
+_DEVICES = Path("/dev")
 # A second thread hardly makes a run faster, so that two cores serve two runs better.
 _ONE_THREAD = {"NPROC": "1", "OMP_NUM_THREADS": "1", "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
+# With NPROC=1, JAX would compile for a GPU on one core. It takes memory of a GPU as it needs it, and leaves the rest to
+# Warp and to other programs.
+_GPU = {"OMP_NUM_THREADS": "1", "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}
 
 
-def use_one_thread() -> None:
-    """Let JAX compute on one thread, unless environment variables are set; call this before JAX is imported."""
-    for name, value in _ONE_THREAD.items():
+def prepare_jax() -> None:
+    """Let JAX compute on a GPU, or on one thread; call this before JAX is imported.
+
+    Environment variables that are set stay as they are.
+    """
+    for name, value in (_GPU if uses_gpu() else _ONE_THREAD).items():
         os.environ.setdefault(name, value)
+
+
+def uses_gpu(devices: Path = _DEVICES) -> bool:
+    """Return whether JAX will compute on an NVIDIA GPU: there is one, and JAX has a plugin for it, and may use it.
+
+    Args:
+        devices: folder of the devices of this machine.
+    """
+    platforms = os.environ.get("JAX_PLATFORMS", "")
+    is_allowed = not platforms or "cuda" in platforms or "gpu" in platforms
+    has_device = any(devices.glob("nvidia[0-9]*"))
+    has_plugin = importlib.util.find_spec("jax_plugins") is not None
+    return is_allowed and has_device and has_plugin
 
 
 def usable_cores(groups: Path = _GROUPS, mount: Path = _MOUNT) -> int:

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import collecting, critic_blocks, on_policy, world_rollouts
+from arc_suite.learning.agents import collecting, device_learner, learner, on_policy, run_folder, world_rollouts
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.normalizer import Moments
@@ -20,47 +20,64 @@ from arc_suite.policies import policy
 from arc_suite.tasks import command
 
 SMALL = {"num_envs": 4, "horizon": 4, "minibatch": 8, "epochs": 2, "hidden": 16}
+SHORT = {"time_limit": 0.5}  # s: episodes of 10 steps
 
 
 def leaves(tree):
     return np.concatenate([np.ravel(leaf) for leaf in jax.tree.leaves(tree)])
 
 
-def test_a_rollout_of_jax_gives_the_update_of_numpy():
-    """The same transitions, once as NumPy's arrays and once as JAX's: batch, update and moments."""
-    run = Configuration.of(Setup.of("leaper"), "ppo", SMALL)
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"network": "perceptron"}, {"network": "perceptron", "critic_blocks": ["velocity"]}],
+    ids=["legs", "mirrored", "critic_blocks"],
+)
+def test_the_device_learns_from_transitions_what_the_host_does(changes):
+    """From the same transitions and orders: batch, update, moments and normalizer."""
+    run = Configuration.of(Setup.of("leaper"), "ppo", SMALL | changes)
     hp, context = run.hyperparameters, run.context(pathlib.Path())
     environments = collecting.EnvironmentRollouts(hp, context)
     task, architecture = environments.task, environments.architecture
-    state = ppo.begin(hp, architecture, np.random.default_rng(0))
-    normalize = Moments.empty(task.size).with_vectors(environments.observation).normalizer()
-    rollout = environments.roll_out(state.policy, normalize, 0.3, 0, 0)
-    orders = np.random.default_rng(0).permutation(32)[None, :8]
-    found = []
-    for transitions in (rollout, {name: jnp.asarray(array) for name, array in rollout.items()}):
-        batch = on_policy.batch_of(
-            hp, architecture, transitions, state.values, normalize, critic_blocks.mirror_maps(task)
-        )
-        begun = ppo.begin(hp, architecture, np.random.default_rng(0))
-        updated, *_ = ppo.update(hp, architecture, begun, batch, orders, (np.float32(0.3), np.float32(0.01)), True)
-        moments = Moments.empty(task.size).with_vectors(transitions["observations"])
-        found.append((leaves(updated), leaves(moments)))
-    assert_allclose(found[1][0], found[0][0], atol=1e-5)
-    assert_allclose(found[1][1], found[0][1], rtol=1e-4, atol=1e-5)
+    symmetry = on_policy.mirror_maps(hp, task, architecture)
+    assert (symmetry is not None) == ("network" in changes)
+    _, empty, _ = on_policy.begin(hp, context, task, architecture)
+    normalize = architecture.normalize(
+        empty.with_vectors(architecture.moment_vectors(environments.observation)),
+    )
+    rollout = environments.roll_out(ppo.begin(hp, architecture, np.random.default_rng(0)).policy, normalize, 0.3, 0, 0)
+    count = 16 if symmetry is None else 32
+    orders = np.random.default_rng(0).permutation(count)[None, :8]
+
+    def learn(rollout, moments, normalize):
+        state = ppo.begin(hp, architecture, np.random.default_rng(0))
+        batch = on_policy.batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
+        numbers = (np.float32(0.3), np.float32(0.01))
+        state, *_ = ppo.update(hp, architecture, state, batch, orders, numbers, True)
+        moments = on_policy.update_moments(architecture, symmetry, moments, rollout["observations"])
+        return batch, state, moments, architecture.normalize(moments)
+
+    on_host = learn(rollout, empty, normalize)
+    on_device = jax.jit(learn)(*jax.tree.map(jnp.asarray, (rollout, empty, normalize)))
+    assert len(on_host[0].returns) == count
+    for host_part, device_part in zip(on_host, on_device, strict=True):
+        assert_allclose(leaves(device_part), leaves(host_part), rtol=1e-4, atol=1e-5)
+    assert_allclose(leaves(on_device[1]), leaves(on_host[1]), atol=1e-5)
 
 
 def test_a_new_command_cuts_the_returns(monkeypatch):
     """As in `collecting.EnvironmentRollouts`: the step that begins it has the observation before it as the next one."""
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
-    run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | {"horizon": 12, "simulation": "mjx"})
+    changes = {"horizon": 12, "simulation": "mjx", "network": "perceptron"}
+    run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | changes)
     hp, context = run.hyperparameters, run.context(pathlib.Path())
-    collector = world_rollouts.WorldRollouts(hp, context)
-    state = ppo.begin(hp, collector.architecture, np.random.default_rng(0))
-    normalize = Moments.empty(collector.task.size).normalizer()
-    rollout = jax.tree.map(np.asarray, collector.roll_out(state.policy, normalize, 0.01, 0, 0))
+    rollouts = world_rollouts.WorldRollouts(hp, context)
+    state = ppo.begin(hp, rollouts.architecture, np.random.default_rng(0))
+    normalize = Moments.empty(rollouts.task.size).normalizer()
+    _, rollout = jax.jit(rollouts.roll_out)(rollouts.begin(), state.policy, normalize, 0.01, jax.random.key(0))
+    rollout = jax.tree.map(np.asarray, rollout)
     here, there = (
-        collector.task.split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations")
+        rollouts.task.split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations")
     )
     new = (here[1:] != here[:-1]).any(axis=-1)
     drawn = new & ~rollout["terminated"][:-1]
@@ -73,25 +90,93 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     assert (before[moving] != after[moving]).any(axis=-1).all()
 
 
-def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path):
-    setup = Setup.of("leaper", "walk", {"time_limit": 0.5})
+def contents(folder):
+    """The content of a run's tables and checkpoint, without times."""
+    texts = {name: (folder / f"{name}.csv").read_text() for name in ("training", "evaluations")}
+    with np.load(folder / run_folder.CHECKPOINT) as stored:
+        return texts, {name: stored[name] for name in stored.files if name != "progress"}
+
+
+def check_same(found, expected):
+    assert found.keys() == expected.keys()
+    for name, array in expected.items():
+        assert_array_equal(found[name], array, err_msg=name)
+
+
+def stop_after_slice(run, folder):
+    steps = []
+    assert not train(run, folder, on_metrics=lambda step, metrics: steps.append(step), stop=lambda: bool(steps))
+
+
+def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path, monkeypatch):
+    """After each chunk, also while policies are evaluated beside it."""
+    monkeypatch.setattr(device_learner, "CHUNK", 2)
+    setup = Setup.of("leaper", "walk", SHORT)
     more = {"simulation": "mjx", "critic_blocks": ["velocity"]}
-    run = Configuration.of(setup, "ppo", SMALL | more, steps=48, evaluate_every=48)
+    run = Configuration.of(setup, "ppo", SMALL | more, steps=112, evaluate_every=48)
     assert train(run, tmp_path / "whole")
-    assert not train(run, tmp_path / "parts", minutes=1e-9)  # stops before the first slice
-    slices = on_policy.learn(run.hyperparameters, run.context(tmp_path))
-    first = next(slices)
-    assert_array_equal(first.step, 16)
-    context = run.context(tmp_path, checkpoint=first.checkpoint)
-    resumed = on_policy.learn(run.hyperparameters, context)
-    for _ in range(2):
-        ours, theirs = next(slices), next(resumed)
-        assert ours.checkpoint.keys() == theirs.checkpoint.keys()
-        for name, array in ours.checkpoint.items():
-            assert_array_equal(theirs.checkpoint[name], array)
+    whole_texts, whole_arrays = contents(tmp_path / "whole")
+    assert run_folder.table(tmp_path / "whole", "evaluations")["step"].tolist() == [48] * 10 + [96] * 10 + [112] * 10
+    assert run_folder.table(tmp_path / "whole", "training")["step"].tolist() == [32, 48, 80, 96, 112]
+
+    parts = tmp_path / "parts"
+    assert not train(run, parts, minutes=1e-9)  # stops before the first slice
+    for iterations, pending in ((2, []), (3, [48])):
+        stop_after_slice(run, parts)
+        assert int(contents(parts)[1]["iterations"]) == iterations
+        assert run_folder.read_progress(parts)["pending"] == pending
+    assert train(run, parts)
+    texts, arrays = contents(parts)
+    assert texts == whole_texts
+    check_same(arrays, whole_arrays)
     made = policy(tmp_path / "whole", "leaper")
     with contextlib.closing(setup.make_vec(2, autoreset_mode="Disabled")) as environment:
         assert all(np.isfinite(each.total) for each in evaluation.episodes_in_batch(environment, made, range(2)))
+
+
+def test_chunks_of_any_length_give_the_same_bits(tmp_path, monkeypatch):
+    run = Configuration.of(Setup.of("leaper", "walk", SHORT), "ppo", SMALL | {"simulation": "mjx"}, steps=64)
+    latest = []
+    for chunk in (4, 3):
+        monkeypatch.setattr(device_learner, "CHUNK", chunk)
+        *_, last = device_learner.learn(run.hyperparameters, run.context(tmp_path))
+        latest.append(last)
+    check_same(*(each.checkpoint for each in latest))
+    assert latest[0].step == 64
+
+
+def test_a_policy_is_finetuned_once_values_have_learned(tmp_path, monkeypatch):
+    """Its network stays as it is until then, as on the host, and its normalizer for ever."""
+    setup = Setup.of("leaper", "walk", SHORT)
+    changes = {"num_envs": 4, "round": 10, "left_out": 0, "hidden": 16, "batch": 64}
+    assert train(Configuration.of(setup, "dagger", changes, steps=80, evaluate_every=80), tmp_path / "start")
+    more = {"simulation": "mjx", "start": str(tmp_path / "start"), "value_warm_up": 8}
+    del (hyperparameters := dict(SMALL))["hidden"]
+    run = Configuration.of(setup, "finetune", hyperparameters | more, steps=64, evaluate_every=64)
+    slices = list(device_learner.learn(run.hyperparameters, run.context(tmp_path)))
+    assert [each.step for each in slices] == [32, 64]
+    warm, tuned = (each.checkpoint for each in slices)
+    begun = on_policy.begin(run.hyperparameters, run.context(tmp_path), *task_and_architecture(run)).arrays()
+    for name, array in begun.items():
+        if name.startswith(("state/policy", "normalizer")):
+            assert_array_equal(warm[name], array, err_msg=name)
+    assert any((warm[name] != tuned[name]).any() for name in begun if name.startswith("state/policy"))
+    assert all((warm[name] == tuned[name]).all() for name in begun if name.startswith("normalizer"))
+    assert any((warm[name] != begun[name]).any() for name in begun if name.startswith("state/values"))
+
+
+def task_and_architecture(run):
+    rollouts = world_rollouts.WorldRollouts(run.hyperparameters, run.context(pathlib.Path()))
+    return rollouts.task, rollouts.architecture
+
+
+def test_an_action_that_is_not_finite_ends_the_run(tmp_path):
+    run = Configuration.of(Setup.of("leaper", "walk", SHORT), "ppo", SMALL | {"simulation": "mjx"}, steps=64)
+    context = run.context(tmp_path)
+    first = next(device_learner.learn(run.hyperparameters, context._replace(evaluate_every=16)))
+    broken = dict(first.checkpoint) | {"normalizer/0": np.full_like(first.checkpoint["normalizer/0"], np.nan)}
+    with pytest.raises(learner.Diverged, match=r"an action is not finite at step 16;"):
+        next(device_learner.learn(run.hyperparameters, context._replace(checkpoint=broken)))
 
 
 @pytest.mark.release

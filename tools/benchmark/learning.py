@@ -4,9 +4,9 @@ import functools
 import time
 from collections.abc import Iterator
 
-from arc_suite.simulation.cores import use_one_thread
+from arc_suite.simulation.cores import prepare_jax
 
-use_one_thread()
+prepare_jax()
 
 import jax
 import jax.numpy as jnp

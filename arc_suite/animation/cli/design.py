@@ -34,7 +34,7 @@ from arc_suite.journal import Journal
 from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import MAX_LENGTH, MAX_NAME, Body
 from arc_suite.robots.spec_files import body_to_json
-from arc_suite.simulation.cores import use_one_thread
+from arc_suite.simulation.cores import prepare_jax
 
 DEFAULT_MASS = 12.0  # kg, of a budget
 DEFAULT_SPAN = 1.5  # m, of a budget
@@ -182,7 +182,7 @@ def run_search(folder: pathlib.Path, search: Search, settings: Mapping[str, Any]
 
 def main() -> None:
     """Search, write the files and print a row for each cell."""
-    use_one_thread()
+    prepare_jax()
     if not FLAGS.output:
         raise ValueError("no folder to write to; say --output=FOLDER")
     goal = GOALS[checks.name(FLAGS.goal, GOALS, "goal")]

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -10,8 +11,10 @@ from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.hyperparameters import (
     BLOCKS_LEFT_OUT,
+    DEVICE_DEFAULTS,
     BehaviorCloning,
     DAgger,
+    DeviceDefaults,
     ProximalPolicy,
     SoftActorCritic,
 )
@@ -45,32 +48,67 @@ class Algorithm(NamedTuple):
     several: bool = False
     acts: bool = True
 
+    @property
+    def device_defaults(self) -> DeviceDefaults | None:
+        """What a run has by default where its simulation fills a GPU; None for other simulations."""
+        return DEVICE_DEFAULTS.get(getattr(self.hyperparameters, "simulation", ""))
+
     def steps_of(self, setup: Setup) -> int:
         """Return the environment steps of a run, by default.
 
         Raises:
             ValueError: a setting of the task that does not fit.
         """
+        if self.device_defaults is not None:
+            task = setup.definition
+            is_long = bool(task.commands) or task.scene.arena != FLAT
+            return self.device_defaults.long_steps if is_long else self.device_defaults.steps
         if self.terrain_steps is None or setup.definition.scene.arena == FLAT:
             return self.steps
         return self.terrain_steps
 
+    def evaluate_every_of(self, steps: int) -> int:
+        """Return the environment steps between evaluations of a run of so many steps, by default."""
+        if self.device_defaults is not None:
+            return math.ceil(steps / self.device_defaults.evaluations)
+        return self.evaluate_every
+
     def with_hyperparameters(self, changes: Mapping[str, Any]) -> "Algorithm":
         """Return the algorithm with some hyperparameters changed.
+
+        A changed `simulation` changes those that it has defaults for, too.
 
         Raises:
             ValueError: no such hyperparameter, or a value of another type.
         """
         fields = dataclasses.asdict(self.hyperparameters)
         changed_fields = {}
-        for name, value in changes.items():
+        for name in changes:
             checks.name(name, fields, "hyperparameter")
+        for name, value in {**_device_changes(fields, changes), **changes}.items():
             changed_fields[name] = tuple(value) if isinstance(value, list) else value
             if not _has_type_of(changed_fields[name], fields[name]):
                 expected = f"{type(fields[name]).__name__} like {fields[name]!r}"
                 preview = checks.preview(changed_fields[name])
                 raise ValueError(f"hyperparameter {name}: expected {expected}, got {preview}")
         return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changed_fields))
+
+
+def _device_changes(fields: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the hyperparameters that a changed simulation changes by default.
+
+    Args:
+        fields: hyperparameters before the changes by name.
+        changes: what is changed.
+    """
+    simulation = changes.get("simulation")
+    if not isinstance(simulation, str) or simulation not in DEVICE_DEFAULTS:
+        return {}
+    defaults = dict(DEVICE_DEFAULTS[simulation].hyperparameters)
+    counts = {**fields, **defaults, **changes}
+    if all(isinstance(counts[name], int) for name in ("num_envs", "horizon")):
+        defaults["minibatch"] = min(defaults["minibatch"], counts["num_envs"] * counts["horizon"])
+    return defaults
 
 
 def _has_type_of(value, example) -> bool:
@@ -111,6 +149,10 @@ def _learn(hp, context) -> Iterator[Any]:
     """
     with versions.require_extra("training needs JAX", "learn"):
         from arc_suite.learning.agents import bc, dagger, off_policy, on_policy
+    if getattr(hp, "simulation", "mujoco") != "mujoco":
+        from arc_suite.learning.agents import device_learner  # needs the extra `gpu`
+
+        return device_learner.learn(hp, context)
     learners = {SoftActorCritic: off_policy, ProximalPolicy: on_policy, DAgger: dagger, BehaviorCloning: bc}
     return learners[type(hp)].learn(hp, context)
 

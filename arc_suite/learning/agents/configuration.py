@@ -102,10 +102,10 @@ class Configuration:
             _check_learns_several(setup, algorithm, definition)
         if steps is None:
             steps = definition.steps_of(setup)
-        if evaluate_every is None:
-            evaluate_every = definition.evaluate_every
-        checks.integer("seed", seed, 0, MAX_RUN_SEED)
         checks.integer("steps", steps, 1)
+        if evaluate_every is None:
+            evaluate_every = definition.evaluate_every_of(steps)
+        checks.integer("seed", seed, 0, MAX_RUN_SEED)
         checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
             raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
@@ -172,6 +172,11 @@ class Configuration:
         """The algorithm, with these hyperparameters."""
         return algorithms.algorithm(self.algorithm)._replace(hyperparameters=self.hyperparameters)
 
+    @property
+    def learns_on_device(self) -> bool:
+        """Whether simulation and learning stay on JAX's device; see `device_learner`."""
+        return getattr(self.hyperparameters, "simulation", "mujoco") != "mujoco"
+
     def context(
         self, folder: str | os.PathLike, threads: int = 1, checkpoint: Mapping[str, np.ndarray] | None = None
     ) -> RunContext:
@@ -205,9 +210,14 @@ class Configuration:
     @property
     def command(self) -> str:
         """Command line that trains the same policy; hyperparameters with the algorithm's defaults are left out."""
-        defaults = dataclasses.asdict(algorithms.algorithm(self.algorithm).hyperparameters)
+        algorithm = algorithms.algorithm(self.algorithm)
+        changes = {}
+        if self.learns_on_device:
+            changes["simulation"] = self.hyperparameters.simulation
+            algorithm = algorithm.with_hyperparameters(changes)
+        defaults = dataclasses.asdict(algorithm.hyperparameters)
         hyperparameters = dataclasses.asdict(self.hyperparameters)
-        changes = {name: value for name, value in hyperparameters.items() if value != defaults[name]}
+        changes |= {name: value for name, value in hyperparameters.items() if value != defaults[name]}
         words = [
             "arc-suite",
             "train",

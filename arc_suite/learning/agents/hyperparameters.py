@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from arc_suite import checks, registry
 
@@ -13,6 +14,28 @@ BLOCKS_LEFT_OUT = ("contact_forces",)
 NETWORKS = {
     "perceptron": "arc_suite.learning.agents.architectures:Perceptron.of",
     "legs": "arc_suite.learning.agents.leg_networks:Legs.of",
+}
+
+
+class DeviceDefaults(NamedTuple):
+    """What a run has by default, in place of its algorithm's, where its simulation fills a GPU.
+
+    Attributes:
+        hyperparameters: hyperparameters by name.
+        steps: environment steps of a run.
+        long_steps: environment steps of a run with commands, or in any arena except the flat one.
+        evaluations: evaluations of a run.
+    """
+
+    hyperparameters: Mapping[str, int]
+    steps: int
+    long_steps: int
+    evaluations: int
+
+
+# By the hyperparameter `simulation`. Fewer worlds cost as much time, more ones learn less from a step: docs/gpu.md.
+DEVICE_DEFAULTS = {
+    "warp": DeviceDefaults({"num_envs": 4096, "horizon": 16, "minibatch": 4096}, 6_500_000, 18_000_000, evaluations=10)
 }
 
 

@@ -160,16 +160,18 @@ class Legs:
         """Sources, factors and bias in the order of a view, kept as every step needs them."""
         return self._flatten(self.views.sources), self._flatten(self.views.factors), self._flatten(self.views.bias)
 
-    def _repeat_for_legs(self, vector: np.ndarray) -> np.ndarray:
+    def _repeat_for_legs(self, vector):
         """Return a vector (inputs,) of a leg as that of a view, the same for every leg."""
-        return self._flatten(np.tile(vector, (self.legs, 1)))
+        xp = vector.__array_namespace__()
+        return self._flatten(xp.tile(vector, (self.legs, 1)))
 
-    def _flatten(self, array: np.ndarray) -> np.ndarray:
+    def _flatten(self, array):
         """Return an array (..., legs, inputs) in the order of a view, (..., legs * inputs)."""
+        xp = array.__array_namespace__()
         lead_shape = array.shape[:-2]
         features = array[..., : self.features].reshape(*lead_shape, -1)
         privileged = array[..., self.features :].reshape(*lead_shape, -1)
-        return np.concatenate([features, privileged], axis=-1)
+        return xp.concatenate([features, privileged], axis=-1)
 
     def _by_leg(self, views):
         """Return what each leg sees (..., legs, features or inputs), the inverse of `_flatten`."""

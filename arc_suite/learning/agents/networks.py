@@ -7,6 +7,7 @@ Otherwise it is a layer norm. NumPy draws the weights, so they depend on a seed 
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -169,8 +170,13 @@ def body_outputs(outputs, legs: bool):
 
 def flatten_tree(prefix: str, tree) -> dict[str, np.ndarray]:
     """Return the arrays of a pytree by name, prefix/path/to/array, as a checkpoint holds them."""
+    return {name: np.asarray(leaf) for name, leaf in name_leaves({prefix: tree}).items()}
+
+
+def name_leaves(tree) -> dict[str, Any]:
+    """Return the leaves of a pytree as they are, by name: path/to/leaf."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
-    return {f"{prefix}{_path_text(path)}": np.asarray(leaf) for path, leaf in leaves}
+    return {_path_text(path): leaf for path, leaf in leaves}
 
 
 def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
@@ -182,7 +188,7 @@ def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
     template_leaves, structure = jax.tree_util.tree_flatten_with_path(template)
     leaves = []
     for path, template_leaf in template_leaves:
-        name = f"{prefix}{_path_text(path)}"
+        name = f"{prefix}/{_path_text(path)}"
         array = arrays[name]
         expected = np.asarray(template_leaf)
         if (array.shape, array.dtype) != (expected.shape, expected.dtype):
@@ -192,4 +198,4 @@ def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
 
 
 def _path_text(path) -> str:
-    return "/" + jax.tree_util.keystr(path, simple=True, separator="/")
+    return jax.tree_util.keystr(path, simple=True, separator="/")

@@ -27,7 +27,7 @@ class Normalizer(NamedTuple):
 
 
 class Moments(NamedTuple):
-    """Moments of vectors.
+    """Moments of vectors: in double precision with NumPy, in JAX's precision with JAX, also in a compiled function.
 
     Attributes:
         count: () number of the vectors.
@@ -35,21 +35,21 @@ class Moments(NamedTuple):
         squares: (size,) sum of the squared deviations from the mean.
     """
 
-    count: np.ndarray
-    mean: np.ndarray
-    squares: np.ndarray
+    count: Any
+    mean: Any
+    squares: Any
 
     @classmethod
     def empty(cls, size: int) -> Self:
         """Return the moments before the first vector."""
         return cls(np.zeros(()), np.zeros(size), np.zeros(size))
 
-    def with_vectors(self, vectors: np.ndarray) -> Self:
+    def with_vectors(self, vectors) -> Self:
         """Return the moments with more vectors (..., size) (Chan, Golub and LeVeque, 1979)."""
         vectors = vectors.reshape(-1, vectors.shape[-1])
         new_count = len(vectors)
-        new_mean = np.asarray(vectors.mean(axis=0, dtype=float), float)  # of NumPy or JAX
-        new_squares = np.asarray(((vectors - new_mean) ** 2).sum(axis=0), float)
+        new_mean = vectors.mean(axis=0, dtype=float)
+        new_squares = ((vectors - new_mean) ** 2).sum(axis=0, dtype=float)
         count = self.count + new_count
         difference = new_mean - self.mean
         return Moments(
@@ -60,6 +60,7 @@ class Moments(NamedTuple):
 
     def normalizer(self) -> Normalizer:
         """Return the normalizer of such vectors, float32; before the first vector its factors are 1."""
-        deviation = np.sqrt(self.squares / max(self.count, 1.0))
-        factor = 1.0 / np.maximum(deviation, _MIN_DEVIATION) if self.count else np.ones_like(deviation)
-        return Normalizer(self.mean.astype(np.float32), factor.astype(np.float32), np.array(LIMIT, np.float32))
+        xp = self.mean.__array_namespace__()
+        deviation = xp.sqrt(self.squares / xp.maximum(self.count, 1.0))
+        factor = xp.where(self.count > 0.0, 1.0 / xp.maximum(deviation, _MIN_DEVIATION), 1.0)
+        return Normalizer(self.mean.astype(xp.float32), factor.astype(xp.float32), xp.asarray(LIMIT, dtype=xp.float32))

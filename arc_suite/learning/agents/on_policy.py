@@ -1,4 +1,4 @@
-"""Proximal policy optimization in a vector environment, or in worlds on a GPU.
+"""Proximal policy optimization in a vector environment; `device_learner` is that in worlds on a GPU.
 
 With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`),
 unless the network treats left and right alike.
@@ -10,7 +10,7 @@ before it (`VectorEnv.resampled`).
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import jax
 import jax.numpy as jnp
@@ -25,8 +25,62 @@ from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.policies.network import Network
+from arc_suite.tasks import Task
+from arc_suite.tasks.mirrors import Symmetry
 
 _TINY_STD = 1e-8  # added to the standard deviation of advantages, which may be 0
+
+
+class Schedules(NamedTuple):
+    """What depends on how much of a run is done.
+
+    Attributes:
+        std: standard deviation of actions.
+        desired_kl: desired Kullback-Leibler divergence of an iteration's policy from the last.
+        learns_policy: whether the policy learns; before, only values are learned.
+        updates_normalizer: whether the normalizer of observations is updated.
+    """
+
+    std: float
+    desired_kl: float
+    learns_policy: bool
+    updates_normalizer: bool
+
+    @classmethod
+    def of(cls, hp: ProximalPolicy, steps: int, iterations: int) -> Self:
+        """Return the schedules of an iteration.
+
+        Args:
+            hp: hyperparameters.
+            steps: environment steps of the run.
+            iterations: number of iterations before it.
+        """
+        progress = min(iterations * hp.num_envs * hp.horizon / steps, 1.0)
+        return cls(
+            std=hp.initial_std * (hp.final_std / hp.initial_std) ** progress,
+            desired_kl=hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** progress,
+            learns_policy=iterations * hp.horizon >= hp.value_warm_up,
+            updates_normalizer=not hp.start and progress < hp.normalize_until,
+        )
+
+
+class LearnerState(NamedTuple):
+    """What an iteration changes, except the environments.
+
+    Attributes:
+        state: networks and their optimizers.
+        moments: moments of observations.
+        normalize: normalizer of observations.
+    """
+
+    state: ppo.PpoState
+    moments: Moments
+    normalize: Normalizer
+
+    def arrays(self) -> dict[str, Any]:
+        """Return the arrays of a checkpoint by name, as they are."""
+        parts = {"state": self.state, "moments": self.moments, "normalizer": tuple(self.normalize)}
+        return networks.name_leaves(parts)
 
 
 def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
@@ -38,22 +92,13 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         OSError: no such file.
         Diverged: an action is not finite.
     """
-    if hp.value_warm_up and not hp.start:
-        raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
+    check(hp, context)
     seed = context.seed
-    collector = _make_collector(hp, context)
+    collector = collecting.EnvironmentRollouts(hp, context)
     task = collector.task
     architecture = collector.architecture
-    symmetry = None
-    if hp.symmetry_augmentation and not architecture.symmetric:
-        symmetry = critic_blocks.mirror_maps(task, hp.critic_blocks)
-    moments = Moments.empty(architecture.inputs)
-    normalize = architecture.normalize(moments)
-    policy = None
-    if hp.start and context.checkpoint is None:
-        start_normalizer, policy = _read_start(hp, context, task, architecture)
-        normalize = _extend_normalizer(start_normalizer, normalize)
-    state = ppo.begin(hp, architecture, generator(seed, "networks", 0), policy)
+    symmetry = mirror_maps(hp, task, architecture)
+    state, moments, normalize = begin(hp, context, task, architecture)
     iterations = 0
 
     saved = context.checkpoint
@@ -66,62 +111,76 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             collector.restore(saved)
 
     while True:
-        # Schedules over the length of the run.
         step = iterations * hp.num_envs * hp.horizon
-        progress = min(step / context.steps, 1.0)
-        std = hp.initial_std * (hp.final_std / hp.initial_std) ** progress
-        desired_kl = hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** progress
-        learns_policy = iterations * hp.horizon >= hp.value_warm_up  # before, only values are learned
+        schedules = Schedules.of(hp, context.steps, iterations)
 
         # Act for the horizon.
-        rollout = collector.roll_out(state.policy, normalize, std, iterations, step)
+        rollout = collector.roll_out(state.policy, normalize, schedules.std, iterations, step)
 
         # Learn from it, in epochs of minibatches.
         batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
         orders = _draw_orders(hp, generator(seed, "orders", iterations), len(batch.returns))
-        schedules = (np.float32(std), np.float32(desired_kl))
-        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, schedules, learns_policy)
+        numbers = (np.float32(schedules.std), np.float32(schedules.desired_kl))
+        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, numbers, schedules.learns_policy)
         iterations += 1
 
-        # Update the normalizer.
-        if not hp.start and progress < hp.normalize_until:
-            moments = moments.with_vectors(architecture.moment_vectors(rollout["observations"]))
-            if symmetry is not None:
-                moments = moments.with_vectors(
-                    architecture.moment_vectors(symmetry.observation(rollout["observations"]))
-                )
+        if schedules.updates_normalizer:
+            moments = update_moments(architecture, symmetry, moments, rollout["observations"])
             normalize = architecture.normalize(moments)
 
         metrics = {
             "reward": float(rollout["rewards"].mean()),
             "falls": float(rollout["terminated"].sum()),
-            "std": float(std),
+            "std": float(schedules.std),
             "kl": float(kl),
             "policy_rate": float(state.rate),
             "value_loss": float(value_loss),
         }
         graph = architectures.policy_graph(architecture, normalize, state.policy)
-        checkpoint = {
-            **networks.flatten_tree("state", state),
-            **networks.flatten_tree("moments", moments),
-            **networks.flatten_tree("normalizer", tuple(normalize)),
-            "iterations": np.array(iterations),
-            **collector.arrays(),
-        }
+        arrays = jax.tree.map(np.asarray, LearnerState(state, moments, normalize).arrays())
+        checkpoint = {**arrays, "iterations": np.array(iterations), **collector.arrays()}
         yield Slice(iterations * hp.num_envs * hp.horizon, metrics, graph, checkpoint)
 
 
-def _make_collector(hp: ProximalPolicy, context: RunContext):
-    """Return what the policy acts in: `EnvironmentRollouts`, or `WorldRollouts` on JAX's device."""
-    if context.setup.several and hp.network != "legs":
-        raise ValueError(f"network: expected legs with several bodies, got {hp.network}")
-    if hp.critic_blocks and context.setup.several:
-        raise ValueError(f"critic_blocks: expected none with several bodies, got {', '.join(hp.critic_blocks)}")
-    if hp.simulation == "mujoco":
-        return collecting.EnvironmentRollouts(hp, context)
-    from arc_suite.learning.agents import world_rollouts  # needs the extra `gpu`
+def begin(hp: ProximalPolicy, context: RunContext, task: Task, architecture: Architecture) -> LearnerState:
+    """Return what learning begins with: drawn networks, or those of the policy that it starts from."""
+    moments = Moments.empty(architecture.inputs)
+    normalize = architecture.normalize(moments)
+    policy = None
+    if hp.start and context.checkpoint is None:
+        start_normalizer, policy = _read_start(hp, context, task, architecture)
+        normalize = _extend_normalizer(start_normalizer, normalize)
+    state = ppo.begin(hp, architecture, generator(context.seed, "networks", 0), policy)
+    return LearnerState(state, moments, normalize)
 
-    return world_rollouts.WorldRollouts(hp, context)
+
+def mirror_maps(hp: ProximalPolicy, task: Task, architecture: Architecture) -> Symmetry | None:
+    """Return the mirror maps that double the transitions of a horizon; None if they stay as they are."""
+    if hp.symmetry_augmentation and not architecture.symmetric:
+        return critic_blocks.mirror_maps(task, hp.critic_blocks)
+    return None
+
+
+def update_moments(architecture: Architecture, symmetry: Symmetry | None, moments: Moments, observations) -> Moments:
+    """Return moments with the observations (horizon, num_envs, ...) of a rollout, and maybe mirrored ones."""
+    moments = moments.with_vectors(architecture.moment_vectors(observations))
+    if symmetry is not None:
+        moments = moments.with_vectors(architecture.moment_vectors(symmetry.observation(observations)))
+    return moments
+
+
+def check(hp: ProximalPolicy, context: RunContext) -> None:
+    """Raise ValueError for hyperparameters that do not fit each other, or several bodies."""
+    if hp.value_warm_up and not hp.start:
+        raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
+    if not context.setup.several:
+        return
+    if hp.network != "legs":
+        raise ValueError(f"network: expected legs with several bodies, got {hp.network}")
+    if hp.critic_blocks:
+        raise ValueError(f"critic_blocks: expected none with several bodies, got {', '.join(hp.critic_blocks)}")
+    if hp.simulation != "mujoco":
+        raise ValueError(f"simulation: expected mujoco with several bodies, got {hp.simulation}")
 
 
 def _draw_orders(hp: ProximalPolicy, random: np.random.Generator, count: int) -> np.ndarray:

@@ -104,10 +104,20 @@ def estimate_advantages(hp: ProximalPolicy, rewards, values, next_values, termin
     """
     xp = rewards.__array_namespace__()
     errors = rewards + hp.discount * xp.where(terminated, 0.0, next_values) - values  # of temporal differences
+
+    def step_back(advantage, step):
+        error, has_ended = step
+        advantage = error + hp.discount * hp.gae_lambda * xp.where(has_ended, 0.0, advantage)
+        return advantage, advantage
+
+    no_advantage = xp.zeros_like(errors[0])  # after the last step
+    if isinstance(errors, jax.Array):
+        _, advantages = jax.lax.scan(step_back, no_advantage, (errors, ended), reverse=True)
+        return advantages
+    advantage = no_advantage
     advantages = []  # from the last step to the first
-    advantage = 0.0
-    for step in reversed(range(len(errors))):
-        advantage = errors[step] + hp.discount * hp.gae_lambda * xp.where(ended[step], 0.0, advantage)
+    for step in zip(errors[::-1], ended[::-1], strict=True):
+        advantage, _ = step_back(advantage, step)
         advantages.append(advantage)
     return xp.stack(advantages[::-1])
 

@@ -309,6 +309,8 @@ def _read_checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np
             checks.integer(f"length of {name}", lengths.get(name, 0), 0)
         for name in _NUMBERS_OF_PROGRESS & progress.keys():
             checks.number(name, progress[name])
+        for step in progress.get("pending", []):
+            checks.integer("pending", step, 1)
         return arrays, progress
-    except (OSError, ValueError, KeyError, RecursionError) as error:
+    except (OSError, TypeError, ValueError, KeyError, RecursionError) as error:
         raise ValueError(f"{path} is damaged: {checks.quote(error)}; delete it to start the run over") from None

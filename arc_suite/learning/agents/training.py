@@ -1,23 +1,26 @@
 """Training: from a configuration to a folder with a policy, resumed bit-exactly after a kill at any moment."""
 
 import contextlib
+import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import checks, evaluation, files, seed_ranges
 from arc_suite.learning.agents import priors, run_folder
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
+from arc_suite.learning.agents.evaluating import Evaluator, Lines, ProcessEvaluator
 from arc_suite.learning.agents.learner import UNLEARNED_PREFIXES, Damaged, Diverged, Slice
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
 from arc_suite.policies.network import Network
+
+_SAVE_INTERVAL = 30.0  # s between two checkpoints of a learner that stays on a device
 
 
 def train(
@@ -61,12 +64,16 @@ def train(
     evaluation.check_ends(configuration.setup.definition.step_limit)
     growing_fields = ("steps",) if algorithm.extends else ()
     with run_folder.open_run(folder, record, growing_fields) as run_files, contextlib.ExitStack() as stack:
-        progress_values = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
+        progress_values = {"evaluated": 0, "pending": [], "wall": 0.0, "cpu": 0.0} | run_files.progress
         run_folder.check_latest_evaluation(folder, progress_values["evaluated"])
         context = configuration.context(folder, threads, run_files.arrays)
         slices = stack.enter_context(contextlib.closing(algorithm.learn(algorithm.hyperparameters, context)))
-        evaluator = _Evaluator(configuration, threads, training_seeds)
+        evaluator = _make_evaluator(configuration, threads, folder)
         stack.enter_context(contextlib.closing(evaluator))
+        policy_step = progress_values["evaluated"]  # of the latest policy whose evaluation has begun
+        for policy_step in progress_values["pending"]:
+            evaluator.begin(policy_step, network.load(_checkpoint_folder(folder, policy_step)))
+        writer = _CheckpointWriter(run_files, _SAVE_INTERVAL if configuration.learns_on_device else 0.0)
         # Where the clocks stood when the run began, if it had never stopped.
         wall_start = time.monotonic() - progress_values["wall"]
         cpu_start = time.process_time() - progress_values["cpu"]
@@ -78,29 +85,63 @@ def train(
         while progress_values["evaluated"] < context.steps:
             is_time_up = minutes is not None and time.process_time() - cpu_start > 60.0 * minutes
             if (has_checkpoint and stop()) or is_time_up:
+                writer.flush()
                 return False
             learned_slice = _next_slice(slices, run_files)
             step = learned_slice.step
             metrics = learned_slice.metrics
             _check_finite(learned_slice)
             bar.update(step - bar.n)
-            is_evaluated = step >= context.next_evaluation(progress_values["evaluated"])
             if metrics is not None:
                 run_files.append("training", {"step": step, **metrics})
                 on_metrics(step, metrics)
                 bar.set_postfix_str(_postfix(metrics, progress_values), refresh=False)
+            is_evaluated = step >= context.next_evaluation(policy_step)
             if is_evaluated:
-                progress_values["return"] = evaluator.evaluate(learned_slice, run_files)
-                progress_values["evaluated"] = step
-                on_metrics(step, {"return": progress_values["return"]})
+                policy_step = step
+                policy_setup = configuration.policy_setup
+                policy = Network(learned_slice.policy, policy_setup, evaluator.block_sizes, training_seeds)
+                network.save(files.folder(_checkpoint_folder(folder, step)) / network.FILE, policy)
+                evaluator.begin(step, policy)
+            is_last = policy_step >= context.steps
+            for evaluated_step, lines in evaluator.pop_results(wait=is_last):
+                progress_values["return"] = _record_evaluation(configuration, run_files, evaluated_step, lines)
+                progress_values["evaluated"] = evaluated_step
+                on_metrics(evaluated_step, {"return": progress_values["return"]})
+            progress_values["pending"] = list(evaluator.pending)
             progress_values["wall"] = time.monotonic() - wall_start  # s, of all processes of a run
             progress_values["cpu"] = time.process_time() - cpu_start  # s, of all processes of a run
             if metrics is not None or is_evaluated:
                 seconds = {f"{name}_seconds": round(progress_values[name], 3) for name in ("wall", "cpu")}
                 run_files.append("times", {"step": step, **seconds})
-            run_files.save(learned_slice.checkpoint, progress_values)
+            writer.write(learned_slice.checkpoint, progress_values, at_once=is_last)
             has_checkpoint = True
     return True
+
+
+class _CheckpointWriter:
+    """Writes the checkpoints of a run, at most one in an interval of time."""
+
+    def __init__(self, run_files: RunFolder, interval: float):
+        """Remember the folder, and the seconds between two checkpoints; 0 writes each."""
+        self._run_files = run_files
+        self._interval = interval
+        self._next_time = 0.0  # s of the monotonic clock
+        self._unwritten = None
+
+    def write(self, arrays: Mapping[str, Any], progress_values: Mapping[str, Any], at_once: bool) -> None:
+        """Write a checkpoint if it is time, or at once; otherwise keep it for `flush`."""
+        self._unwritten = (arrays, dict(progress_values))
+        if at_once or time.monotonic() >= self._next_time:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the latest checkpoint if it has not been written."""
+        if self._unwritten is None:
+            return
+        self._run_files.save(*self._unwritten)
+        self._unwritten = None
+        self._next_time = time.monotonic() + self._interval
 
 
 def _next_slice(slices: Iterator[Slice], run_files: RunFolder) -> Slice:
@@ -155,37 +196,26 @@ def _training_seeds(configuration: Configuration, folder: Path) -> seed_ranges.R
     return tuple(dict.fromkeys((*start_ranges, *ranges)))
 
 
-class _Evaluator:
-    """Evaluates the policies of a run while it learns."""
+def _make_evaluator(configuration: Configuration, threads: int, folder: Path) -> Evaluator | ProcessEvaluator:
+    """Return what evaluates the policies of a run: in processes of its own for a learner that stays on a device."""
+    if configuration.learns_on_device:
+        return ProcessEvaluator(configuration, threads, folder)
+    return Evaluator(configuration, threads)
 
-    def __init__(self, configuration: Configuration, threads: int, training_seeds: seed_ranges.Ranges | None):
-        """Make the environments of evaluation."""
-        self._configuration = configuration
-        self._training_seeds = training_seeds
-        self._environment = configuration.validation.make_vec(
-            evaluation.CURVE_EPISODES, num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
-        )
-        # Tasks of one body are read as the policy has them, without the blocks that networks do not see.
-        task = self._environment.task if configuration.setup.several else configuration.policy_setup.definition
-        self._block_sizes = dict(task.sizes)
 
-    def close(self) -> None:
-        """Close the environments."""
-        self._environment.close()
+def _record_evaluation(configuration: Configuration, run_files: RunFolder, step: int, lines: Lines) -> float:
+    """Write the lines of an evaluation and its policy into the folder of a run, and return the mean return."""
+    checkpoint_folder = _checkpoint_folder(run_files.path, step)
+    for line in lines:
+        run_files.append("evaluations", line)
+    with files.writing(run_files.path / network.FILE) as temporary:
+        shutil.copyfile(checkpoint_folder / network.FILE, temporary)
+    mean_return = float(np.mean([line["return"] for line in lines]))
+    agent = Agent(configuration.algorithm, step, configuration.seed, mean_return)
+    checkpoints.save(checkpoint_folder, agent)
+    return mean_return
 
-    def evaluate(self, learned_slice: Slice, run_files: RunFolder) -> float:
-        """Evaluate the policy of a slice, write it and its returns into the folder, and return their mean."""
-        step = learned_slice.step
-        policy_setup = self._configuration.policy_setup
-        policy = Network(learned_slice.policy, policy_setup, self._block_sizes, self._training_seeds)
-        network.save(run_files.path / network.FILE, policy)
-        checkpoint_folder = files.folder(run_files.path / checkpoints.FOLDER / str(step))
-        network.save(checkpoint_folder / network.FILE, policy)
-        episodes = evaluation.episodes_in_batch(self._environment, policy)
-        for seed, episode in enumerate(episodes):
-            numbers = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
-            run_files.append("evaluations", {"step": step, **numbers})
-        mean_return = float(np.mean([episode.total for episode in episodes]))
-        agent = Agent(self._configuration.algorithm, step, self._configuration.seed, mean_return)
-        checkpoints.save(checkpoint_folder, agent)
-        return mean_return
+
+def _checkpoint_folder(folder: Path, step: int) -> Path:
+    """Return the folder of the policy of a step, in the folder of a run."""
+    return folder / checkpoints.FOLDER / str(step)

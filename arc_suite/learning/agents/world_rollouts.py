@@ -1,6 +1,7 @@
 """Rollouts in the worlds of `learning.worlds.mjx`: simulation, policy and transitions stay on JAX's device."""
 
 from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,22 +11,41 @@ from arc_suite.learning.agents import architectures, critic_blocks, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.collecting import initial_ages, network_views
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
-from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, Diverged, RunContext
+from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, RunContext
 from arc_suite.learning.agents.normalizer import Normalizer
 from arc_suite.learning.worlds import mjx
 
 _IMPLEMENTATIONS = {"mjx": "jax", "warp": "warp"}  # by the hyperparameter `simulation`
 
 
+class WorldsState(NamedTuple):
+    """The state of all worlds.
+
+    Attributes:
+        state: state of the worlds, with a leading axis (num_envs,).
+        steps: (num_envs,) control steps of their episodes.
+    """
+
+    state: mjx.WorldState
+    steps: Any
+
+
 class WorldRollouts:
     """Worlds that step together, in which a policy acts as in `collecting.EnvironmentRollouts`.
 
-    A world whose episode has ended starts another one of the table of starts in the same step.
+    A world whose episode has ended starts another one of the table of starts in the same step. Methods are pure: the
+    state of the worlds is a value.
+
+    Attributes:
+        env: the task as functions of JAX.
+        task: the task.
+        architecture: architecture of the networks.
     """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
-        """Begin the first episodes."""
+        """Load the task."""
         self._hp = hp
+        self._first_seed = context.first_seed
         setup = context.training
         self.env = mjx.load(
             setup.body,
@@ -39,42 +59,37 @@ class WorldRollouts:
         self.task = self.env.task
         self.architecture = architectures.of(self.task, hp.network, hp.critic_blocks, hp.symmetry_augmentation)
         self._columns = critic_blocks.privileged_columns(self.task, hp.critic_blocks)
-        self._key = jax.random.key(context.seed)
-        seeds = np.uint32(context.first_seed) + np.arange(hp.num_envs, dtype=np.uint32)
-        self._state = jax.jit(jax.vmap(self.env.start))(seeds)
-        self._steps = jnp.asarray(initial_ages(hp.num_envs, self.task.step_limit), int)
-        self._act = jax.jit(self._scan_steps)
 
-    def roll_out(self, policy, normalize: Normalizer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
-        """Act in all worlds for a horizon; see `collecting.EnvironmentRollouts.roll_out`."""
-        keys = jax.random.split(jax.random.fold_in(self._key, iteration), self._hp.horizon)
-        worlds = (self._state, self._steps)
-        (self._state, self._steps), rollout = self._act(worlds, policy, normalize, np.float32(std), keys)
-        if not jnp.isfinite(rollout["means"]).all():
-            raise Diverged("an action is not finite", step)
-        return rollout
+    def begin(self) -> WorldsState:
+        """Return the worlds at the start of their first episodes."""
+        seeds = np.uint32(self._first_seed) + np.arange(self._hp.num_envs, dtype=np.uint32)
+        state = jax.jit(jax.vmap(self.env.start))(seeds)
+        ages = initial_ages(self._hp.num_envs, self.task.step_limit)
+        return WorldsState(state, jnp.asarray(ages, int))
 
-    def _scan_steps(self, worlds, policy, normalize: Normalizer, std, keys):
-        """Step all worlds once for each key."""
+    def roll_out(
+        self, worlds: WorldsState, policy, normalize: Normalizer, std, key
+    ) -> tuple[WorldsState, dict[str, jax.Array]]:
+        """Act in all worlds for a horizon.
+
+        Args:
+            worlds: before the horizon.
+            policy: network of normalized observations to mean actions.
+            normalize: normalizer of observations.
+            std: standard deviation of actions.
+            key: key of JAX, for noise and for the starts of episodes.
+
+        Returns:
+            The worlds after the horizon, and arrays as of `collecting.EnvironmentRollouts.roll_out`.
+        """
 
         def step_worlds(worlds, key):
             return self._step(policy, normalize, std, worlds, key)
 
-        return jax.lax.scan(step_worlds, worlds, keys)
+        return jax.lax.scan(step_worlds, worlds, jax.random.split(key, self._hp.horizon))
 
-    def _step(self, policy, normalize: Normalizer, std, worlds, key):
-        """Step all worlds.
-
-        Args:
-            policy: network of normalized observations to mean actions.
-            normalize: normalizer of observations.
-            std: standard deviation of actions.
-            worlds: their state, and the steps (num_envs,) of their episodes.
-            key: key of JAX.
-
-        Returns:
-            The worlds after the step, in another episode where one has ended, and the transitions.
-        """
+    def _step(self, policy, normalize: Normalizer, std, worlds: WorldsState, key):
+        """Step all worlds, and return them, in another episode where one has ended, and the transitions."""
         state, steps = worlds
         action_key, restart_key = jax.random.split(key)
         view = self._view(state)
@@ -98,24 +113,27 @@ class WorldRollouts:
         first_state = jax.vmap(self.env.reset)(jax.random.split(restart_key, self._hp.num_envs))
         next_state = jax.vmap(mjx.restart_at_ends)(state_after, first_state, has_ended)
         next_steps = jnp.where(has_ended, 0, steps)
-        return (next_state, next_steps), transitions
+        return WorldsState(next_state, next_steps), transitions
 
     def _view(self, state: mjx.WorldState):
         """Return observations (num_envs, ...) as networks view them."""
         return network_views(self.architecture, state.obs, state.info.get("privileged"), self._columns)
 
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Return the state of the worlds as part of a checkpoint."""
-        return networks.flatten_tree(ENVIRONMENT_PREFIX.rstrip("/"), self._saved_tree())
+    def arrays(self, worlds: WorldsState) -> dict[str, jax.Array]:
+        """Return the state of worlds as part of a checkpoint."""
+        return networks.name_leaves({ENVIRONMENT_PREFIX.rstrip("/"): _saved_tree(worlds)})
 
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Restore the state of the worlds from the arrays of a checkpoint."""
-        tree = networks.restore_tree(ENVIRONMENT_PREFIX.rstrip("/"), self._saved_tree(), arrays)
-        simulation, state_fields, self._steps = tree
-        self._state = self._state.replace(data=self._state.data.replace(**simulation), **state_fields)
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> WorldsState:
+        """Return the worlds whose state the arrays of a checkpoint hold."""
+        worlds = self.begin()
+        tree = networks.restore_tree(ENVIRONMENT_PREFIX.rstrip("/"), _saved_tree(worlds), arrays)
+        simulation, state_fields, steps = tree
+        data = worlds.state.data.replace(**simulation)
+        return WorldsState(worlds.state.replace(data=data, **state_fields), steps)
 
-    def _saved_tree(self):
-        """Return what a checkpoint holds: fields of the simulation, fields of the state, and steps of the episodes."""
-        simulation = {name: getattr(self._state.data, name) for name in mjx.START_FIELDS}
-        state_fields = {"obs": self._state.obs, "info": self._state.info}
-        return simulation, state_fields, self._steps
+
+def _saved_tree(worlds: WorldsState):
+    """Return what a checkpoint holds: fields of the simulation, fields of the state, and steps of the episodes."""
+    simulation = {name: getattr(worlds.state.data, name) for name in mjx.START_FIELDS}
+    state_fields = {"obs": worlds.state.obs, "info": worlds.state.info}
+    return simulation, state_fields, worlds.steps

@@ -38,7 +38,7 @@ from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
-from arc_suite.simulation.cores import usable_cores, use_one_thread
+from arc_suite.simulation.cores import prepare_jax, usable_cores
 
 
 def group_algorithms(value: Callable[[algorithms.Algorithm], Any]) -> dict[Any, list[str]]:
@@ -138,7 +138,7 @@ _CONFIGURATION_FLAGS = (
 
 def main() -> int:
     """Train, print the return at the end, and return the exit status."""
-    use_one_thread()
+    prepare_jax()
     runs = configurations_from_flags()
     # Before the first step, as a score may be unreachable.
     threshold = None if FLAGS.until_score is None else outcomes.return_of_score(runs[0], FLAGS.until_score)

@@ -9,6 +9,7 @@ import copy
 import importlib.util
 import io
 import math
+import os
 import types
 from collections.abc import Iterable
 
@@ -16,6 +17,9 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks, versions
+
+# Warp takes memory of its own. JAX would take three quarters of a GPU's before.
+os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 
 try:
     import jax
@@ -123,6 +127,10 @@ def put_model(model: mujoco.MjModel, impl: str) -> mjx.Model:
     Raises:
         ValueError: the implementation cannot simulate it.
     """
+    if impl == "warp":
+        import warp
+
+        warp.config.log_level = warp.LOG_WARNING  # no line for each module that it loads
     try:
         return mjx.put_model(model, impl=impl)
     except NotImplementedError as error:
