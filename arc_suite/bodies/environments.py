@@ -339,6 +339,9 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             place.group._restore_state(*snapshot)
         self._begun = True
 
+    def _check_process(self) -> None:
+        self._places[0].group._check_process()
+
     @one_thread_at_a_time
     def render(self, indices: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
         """Return pictures of the present states; see `VectorEnv.render`."""

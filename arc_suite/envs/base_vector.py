@@ -67,9 +67,18 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv):
         setattr(self, name, values[0])
 
     def _check_open(self, action: str) -> None:
-        """Raise ClosedEnvironmentError after `close`; `action` says in the error what was called."""
+        """Raise ClosedEnvironmentError after `close`, and ForkError in a child process that was forked later.
+
+        Args:
+            action: says in the error what was called.
+        """
         if self.closed:
             raise ClosedEnvironmentError(f"cannot {action}: the environment is closed; make a new one")
+        self._check_process()
+
+    def _check_process(self) -> None:
+        """Raise ForkError in a child process that was forked after the environments were made."""
+        raise NotImplementedError
 
     def _checked_seeds(self, seed) -> list[int | None]:
         """Return a seed for each environment, given the seed of the first one or a list of all."""

@@ -142,6 +142,7 @@ class Environment(KnownAttributes, control.Environment):
             ValueError: an unknown field, one without effect, or a value that does not fit.
         """
         physics = self.physics
+        physics.check_process()
         checked_fields = check_fields(physics.model.ptr, fields, compiled_field=physics.compiled_field)
         physics.change_model(checked_fields, lasting=True)
 
@@ -158,6 +159,7 @@ class Environment(KnownAttributes, control.Environment):
         Raises:
             ValueError: an unknown name, or a setting that cannot be changed.
         """
+        self.physics.check_process()
         run = self.task  # dm_control calls a `TaskRun` the task
         changes, next_task = checked_changes(run.opened, self.task_kwargs, run.next_changes, settings)
         run.put_changes(changes, next_task, restart=_LEVEL in settings)
@@ -169,6 +171,7 @@ class Environment(KnownAttributes, control.Environment):
         Raises:
             RuntimeError: before the first reset.
         """
+        self.physics.check_process()
         if self.task.memory is None:
             raise RuntimeError("cannot take a snapshot: no episode has begun; call reset first")
         return snapshots.to_arrays(self._state(), [self.task.opened])
@@ -180,6 +183,7 @@ class Environment(KnownAttributes, control.Environment):
         Raises:
             ValueError: an array is missing or does not fit; the state has not changed.
         """
+        self.physics.check_process()
         run = self.task  # dm_control calls a `TaskRun` the task
         if run.memory is None:
             super().reset()
@@ -226,6 +230,7 @@ class Environment(KnownAttributes, control.Environment):
         Raises:
             ValueError: an unknown command, or a value of another size.
         """
+        self.physics.check_process()
         self.task.set_command(name, value)
 
     def observation_spec(self):

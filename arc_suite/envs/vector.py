@@ -490,6 +490,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """Free the simulations; `close` calls it."""
         self.batch = None
 
+    def _check_process(self) -> None:
+        self.batch.check_process()
+
     @property  # type: ignore[misc]  # Gymnasium's own has a setter, and is a single generator
     def np_random(self) -> tuple[np.random.Generator, ...]:
         """For each environment, a generator of the stream of random numbers from which its resets draw."""

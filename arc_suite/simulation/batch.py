@@ -101,7 +101,7 @@ class Batch:
         Raises:
             ForkError: made before a fork.
         """
-        self._check_process()
+        self.check_process()
         simulations = self._simulations
         simulations.warning[...] = 0
         with timers.off:
@@ -133,7 +133,7 @@ class Batch:
         Raises:
             ForkError: made before a fork.
         """
-        self._check_process()
+        self.check_process()
         self._simulations.set_models(self._compiled)
         self._simulations.reset(mask)  # runs mj_forward, from whose result the solver starts next
         if self._models is not self._compiled or any(models):
@@ -155,7 +155,7 @@ class Batch:
         Raises:
             ForkError: made before a fork.
         """
-        self._check_process()
+        self.check_process()
         self.data.qpos[mask] = qpos
         self._simulations.forward(mask)
 
@@ -174,7 +174,7 @@ class Batch:
         Raises:
             ForkError: made before a fork.
         """
-        self._check_process()
+        self.check_process()
         for name, values in fields.items():
             lasting = self._lasting.setdefault(name, np.full(values.shape, np.nan))
             lasting[mask] = values[mask]
@@ -250,7 +250,8 @@ class Batch:
         self.__init__(*arguments)
         self.restore(arrays)
 
-    def _check_process(self) -> None:
+    def check_process(self) -> None:
+        """Raise ForkError in a child process that was forked after this object was made."""
         if self._forks != forks.count:
             forks.refuse("vector environment")
 

@@ -72,7 +72,7 @@ class Physics(dm_mujoco.Physics):
 
     def reset(self, keyframe_id=None) -> None:
         """Restart from the default pose, as in dm_control, with the compiled model and its lasting changes."""
-        self._check_process()
+        self.check_process()
         if self._unchanged:
             self._write_fields(self._unchanged)
         super().reset(keyframe_id)
@@ -121,7 +121,7 @@ class Physics(dm_mujoco.Physics):
             ValueError: `nstep` is no integer from 1.
             ForkError: made before a fork.
         """
-        self._check_process()
+        self.check_process()
         model = self.model.ptr
         data = self.data.ptr
         option = self._option
@@ -146,7 +146,8 @@ class Physics(dm_mujoco.Physics):
         cause = mujoco.mju_warningText(kind, int(self.data.warning.lastinfo[kind])).split(". ")[0]
         return f"physics diverged in the step from {time:.3f} s: {cause}"
 
-    def _check_process(self) -> None:
+    def check_process(self) -> None:
+        """Raise ForkError in a child process that was forked after this object was made."""
         if self._forks != forks.count:
             forks.refuse("environment")
 
@@ -164,7 +165,7 @@ class Physics(dm_mujoco.Physics):
             RenderingUnavailable: no OpenGL here.
             ForkError: made before a fork.
         """
-        self._check_process()
+        self.check_process()
         options = self._pose() | kwargs
         return pictures.picture(self.body, self.arena, height=height, width=width, camera_id=camera_id, **options)
 
@@ -231,7 +232,7 @@ class Physics(dm_mujoco.Physics):
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue bit-identically from the arrays of `snapshot`."""
-        self._check_process()
+        self.check_process()
         fields_of_batch, lasting_of_batch = model_fields(arrays)
         fields = {name: values[0] for name, values in fields_of_batch.items()}
         lasting = {name: values[0] for name, values in lasting_of_batch.items()}

@@ -24,13 +24,28 @@ import arc_suite
 
 what, then = sys.argv[1:]
 if what == "vector environment":
-    thing = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=4, num_threads=4)
-    uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros((4, 18))), "close": thing.close}
+    thing = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=4, num_threads=4)
+    uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros((4, 18)))}
+elif what == "bodies":
+    thing = gymnasium.make_vec("arc_suite/bodies-steer-v0", num_envs=2, bodies=("tick", "queen"))
+    uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros(thing.action_space.shape))}
+elif what == "gymnasium environment":
+    thing = gymnasium.make("arc_suite/tick-steer-v0").unwrapped
+    uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros(18, np.float32))}
 else:
-    thing = arc_suite.load("tick", "walk")
+    thing = arc_suite.load("tick", "steer")
     uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros(18)), "render": thing.physics.render}
 thing.reset()
 uses["step"]()
+arrays = thing.snapshot()
+uses["snapshot"] = thing.snapshot
+uses["restore"] = lambda: thing.restore(arrays)
+uses["command"] = lambda: thing.command("command", (0.5, 0.0, 0.0))
+uses["change_model"] = lambda: thing.change_model({"friction": 0.5})
+uses["change_settings"] = lambda: thing.change_settings({"kicks": 0.0})
+if what in ("vector environment", "bodies"):
+    uses["rest"] = lambda: thing.rest(np.ones(thing.num_envs, bool))
+    uses["close"] = thing.close
 if what == "renderer":
     thing.physics.render(32, 32)
     def picture_of_a_new_one():
@@ -65,12 +80,22 @@ OPENED_BEFORE = (
     "new RenderingUnavailable: cannot render: OpenGL was opened before this process was forked; "
     "make no picture before the fork, or start processes with multiprocessing's spawn"
 )
+CALLS = ("snapshot", "restore", "command", "change_model", "change_settings")
+
+
+def refused_calls(what, *calls):
+    return [f"{call} {MADE_BEFORE.format(what)}" for call in calls]
+
+
 REFUSED = {
-    "environment": [f"{call} {MADE_BEFORE.format('environment')}" for call in ("reset", "step", "render")],
-    "renderer": [f"{call} {MADE_BEFORE.format('environment')}" for call in ("reset", "step", "render")]
-    + [OPENED_BEFORE],
-    "vector environment": [f"{call} {MADE_BEFORE.format('vector environment')}" for call in ("reset", "step")]
-    + ["close returned None"],
+    "environment": refused_calls("environment", "reset", "step", "render", *CALLS),
+    "gymnasium environment": refused_calls("environment", "reset", "step", *CALLS),
+    "renderer": [*refused_calls("environment", "reset", "step", "render", *CALLS), OPENED_BEFORE],
+    "vector environment": [
+        *refused_calls("vector environment", "reset", "step", *CALLS, "rest"),
+        "close returned None",
+    ],
+    "bodies": [*refused_calls("vector environment", "reset", "step", *CALLS, "rest"), "close returned None"],
 }
 
 SLOW, LONG = pytest.mark.slow, pytest.mark.long
