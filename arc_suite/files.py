@@ -3,10 +3,12 @@
 import contextlib
 import errno
 import glob
+import io
 import json
 import math
 import os
 import platform
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +23,7 @@ except ImportError:  # Windows
 MAX_JSON = 1 << 24  # bytes
 _LOCKED_BYTE = 1 << 30  # position in the file, on Windows; far behind all content, as others cannot read a locked byte
 _LOCK_RETRY_INTERVAL = 0.1  # s
+_MIN_AGE = 3600.0  # s, of a temporary file of another target
 _MAX_STEM = 32  # characters of a target's name in the names of its temporary files
 
 
@@ -44,8 +47,8 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
 
     The temporary file lies in the target's folder and has its extension. When the block ends, the temporary file
     replaces the target, unless the block has deleted it. If the block raises, the temporary file is deleted.
-    Temporary files that killed processes of this machine left for the target are deleted, too. Open the block
-    before any long work: a target that cannot be written raises at once.
+    Temporary files that killed processes of this machine left for the target are deleted, too, and old ones of other
+    targets in its folder. Open the block before any long work: a target that cannot be written raises at once.
 
     Args:
         path: the target; an existing file is replaced.
@@ -138,12 +141,29 @@ def _temporary_prefix(target: Path) -> str:
 
 
 def _delete_old_temporaries(target: Path) -> None:
-    """Delete temporary files for a target whose processes on this machine no longer run."""
+    """Delete temporary files in a target's folder whose processes on this machine no longer run.
+
+    Those of other targets must be old: a container that shares the folder may have the name of this machine, and
+    processes that are not seen from here.
+    """
+    name_pattern = re.compile(rf"\..*\.{re.escape(platform.node())}\.(\d{{1,10}})(\.[^.]*)?")
     prefix = _temporary_prefix(target)
-    for temporary in target.parent.glob(f"{glob.escape(prefix)}*{glob.escape(target.suffix)}"):
-        process_id = temporary.name.removeprefix(prefix).removesuffix(target.suffix)
-        if process_id.isdecimal() and not _may_run(int(process_id)):
-            temporary.unlink(missing_ok=True)
+    for temporary in target.parent.glob(f".*.{glob.escape(platform.node())}.*"):
+        match = name_pattern.fullmatch(temporary.name)
+        if match is None or _may_run(int(match[1])):
+            continue
+        is_of_target = temporary.name == f"{prefix}{match[1]}{target.suffix}"
+        if is_of_target or _age(temporary) > _MIN_AGE:
+            with contextlib.suppress(OSError):  # another process deletes it, or it belongs to another user
+                temporary.unlink()
+
+
+def _age(path: Path) -> float:
+    """Return the time since a file was written, s; 0 where it is gone."""
+    try:
+        return time.time() - path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def _may_run(process_id: int) -> bool:
@@ -172,6 +192,33 @@ def reading(path: str | os.PathLike) -> Iterator[None]:
         raise OSError(f"cannot read {path}: expected text in UTF-8") from None
     except OSError as error:
         raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def read_bytes(path: str | os.PathLike, max_bytes: int) -> bytes:
+    """Return the bytes of a file that others may have written, at most one more than it may have.
+
+    Raises:
+        OSError: the file cannot be read, or the path is a pipe or the like, which might block.
+    """
+    path = Path(path)
+    with reading(path):
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise OSError("expected a file")
+        with path.open("rb") as file:
+            return file.read(max_bytes + 1)
+
+
+def read_text(path: str | os.PathLike, max_bytes: int) -> str:
+    """Return the text of a file that others may have written, with line ends as `open` reads them.
+
+    Raises:
+        OSError: as `read_bytes`, or the file is too large, or no text in UTF-8.
+    """
+    data = read_bytes(path, max_bytes)
+    with reading(path):
+        if len(data) > max_bytes:
+            raise OSError(f"expected at most {max_bytes} bytes")
+        return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8").read()
 
 
 def plain(path: str | os.PathLike) -> Path:

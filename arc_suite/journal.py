@@ -8,6 +8,8 @@ from typing import Any
 
 from arc_suite import checks, files
 
+_MAX_BYTES = 1 << 30  # of a file
+
 
 class Journal:
     """A file whose first line contains the settings of a search, and each further line a generation.
@@ -31,6 +33,8 @@ class Journal:
         """
         path = Path(path)
         header = _to_line(settings)
+        if path.exists() and not path.is_file():
+            raise OSError(f"cannot write {path}: expected a file")
         try:
             self._file = path.open("a+b")
         except OSError as error:
@@ -38,7 +42,9 @@ class Journal:
         if not files.lock(self._file):
             raise ValueError(f"{path}: another process goes on with this search")
 
-        text = _complete_lines(path.read_bytes(), header)
+        text = _complete_lines(files.read_bytes(path, _MAX_BYTES), header)
+        if len(text) > _MAX_BYTES:
+            raise ValueError(f"{path}: expected at most {_MAX_BYTES} bytes")
         self.generations = _read_generations(path, text, header, generation) if text else []
         self._file.truncate(len(text))
         if not text:
@@ -85,7 +91,7 @@ def _read_generations(path: Path, text: bytes, header: bytes, generation: Callab
         settings = json.loads(header)
         different_names = [name for name in settings if stored_settings[name] != settings[name]]
         generations = [generation(**fields) for fields in lines]
-    except (ValueError, LookupError, TypeError, RecursionError):
+    except Exception:  # `generation` takes fields of any kind
         raise ValueError(f"{path}: no journal of a search; {advice}") from None
     if different_names:
         name = different_names[0]

@@ -2,10 +2,15 @@
 
 import contextlib
 import sys
+import sysconfig
+import traceback
 from pathlib import Path
 
 # As in setup.cfg. A new MuJoCo needs a new dm_control.
 REQUIREMENTS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
+
+# Packages that the suite imports, or that those import; `gym` is of shimmy.
+_IMPORTED_PACKAGES = ("absl", "dm_control", "dm_env", "gym", "gymnasium", "mujoco", "numpy", "shimmy", "tqdm")
 
 _RECORDED_PACKAGES = ("arc_suite", "mujoco", "dm_control", "numpy")
 
@@ -83,17 +88,35 @@ def problems() -> list[str]:
     return lines
 
 
+def _hiding_files(error: Exception) -> list[str]:
+    """Return a line for every file of the user that hides a package of the same name, and led to an error."""
+    library_folders = {sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+    imported_files = {getattr(sys.modules.get(name), "__file__", None) for name in _IMPORTED_PACKAGES}
+    traceback_text = "".join(traceback.format_exception(error))
+    lines = []
+    for folder in dict.fromkeys((Path(sys.path[0] or ".").absolute(), Path.cwd())):
+        for name in (*_IMPORTED_PACKAGES, *sys.stdlib_module_names):
+            for file in (folder / f"{name}.py", folder / name / "__init__.py"):
+                is_of_library = bool(library_folders & {str(parent) for parent in file.parents})
+                led_to_error = str(file) in imported_files or f'"{file}"' in traceback_text
+                if led_to_error and not is_of_library:
+                    lines.append(f"{file} hides a package of the same name: rename it")
+    return list(dict.fromkeys(lines))
+
+
 @contextlib.contextmanager
 def explain_import_errors():
-    """Turn an error in this context into one line that names the packages which are missing or have a wrong version.
+    """Turn an error in this context into one line that names its cause in the surroundings.
+
+    It names packages that are missing or have a wrong version, and the user's own files that hide a package.
 
     Raises:
-        ImportError: in place of the error, if there is such a package.
+        ImportError: in place of the error, if there is such a cause.
     """
     try:
         yield
     except Exception as error:
-        lines = problems()
+        lines = [*_hiding_files(error), *problems()]
         if lines:
             raise ImportError(f"cannot import arc_suite: {'; '.join(lines)}") from error
         raise

@@ -1,8 +1,9 @@
-"""Damages files at random and reads them: specs, policies, runs, studies, datasets, ...; `make check-fuzz`, minutes.
+"""Damages files and reads them: robots, specs, policies, runs, studies, datasets, ...; `make check-fuzz`, minutes.
 
 `python tests/fuzz.py` prints, for each kind of file, how many damaged ones were read all the same,
-refused in one line, ended in a traceback, crashed, or took too long. Each is read in a process of its
-own that ends after some seconds, as HDF5 itself may loop for ever over one changed byte. Exit
+refused in one line, ended in a traceback, crashed, or took too long or too much memory. First comes the
+table of damages of the kind, `tests/fixtures/damages.py`, then damage at random. Each file is read in a process
+of its own that ends after some seconds, as HDF5 itself may loop for ever over one changed byte. Exit
 status 1 if anything but that happened. The same seed damages the same places. Linux and macOS only.
 """
 
@@ -18,39 +19,45 @@ import signal
 import sys
 import tempfile
 import traceback
+import zipfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from dm_control.rl.control import PhysicsError
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import data, evaluation, policies, style
+from arc_suite import archives, data, evaluation, policies, style
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes
 from arc_suite.animation.design.search import Candidates, Search
 from arc_suite.animation.design.trials import Trial, evaluate
 from arc_suite.envs.setup import Setup
+from arc_suite.importing import import_robot
 from arc_suite.journal import Journal
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.training import train
 from arc_suite.learning.studies import benchmark, publication, results, tables
-from arc_suite.policies import network
-from arc_suite.robots.spec_files import EXAMPLES, load_body
+from arc_suite.policies import network, zips
+from arc_suite.robots.spec_files import EXAMPLES, body_to_json, load_body
 
 ROOT = pathlib.Path(__file__).parents[1]
 sys.path.append(str(ROOT / "tests" / "fixtures"))
 
+import damages  # noqa: E402
 import tiny_studies  # noqa: E402, F401  # registers the learner of the runs: a file that names it imports nothing
 
-LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
+LIMIT = 10.0  # s; the slowest sound file takes a tenth of one
+MAX_MEMORY = 2 << 30  # bytes
 ID = "arc_suite/test/fuzz-v0"
 SETTINGS = data.DatasetSettings(Setup.of("tick"), "random", (), steps=5)
 QUIET = functools.partial(tqdm, disable=True)
 SPEC = EXAMPLES["spider"]
 
-READ, REFUSED, TRACEBACK, CRASHED, TOO_LONG = OUTCOMES = ("read", "refused", "traceback", "crashed", "too long")
+OUTCOMES = ("read", "refused", "traceback", "crashed", "too long", "too large")
+READ, REFUSED, TRACEBACK, CRASHED, TOO_LONG, TOO_LARGE = OUTCOMES
 _ODD = (None, True, -1, 0, 1e308, -0.0, 2**70, float("nan"), "", "queen", "x" * 10_000, [], {}, [[]], {"": {}})
 
 
@@ -62,12 +69,79 @@ class Kind(NamedTuple):
         make: leaves it in the working folder.
         uses: all that reads what is in the working folder.
         may_loop: whether a library that reads it is known to loop.
+        table: kinds of damage by name, functions from the sound file to a damaged one.
     """
 
     file: str
     make: Callable[[], object]
     uses: tuple[Callable[[], object], ...]
     may_loop: bool = False
+    table: Mapping[str, Callable[[bytes], bytes]] = {}
+
+
+def _copy_robot(name: str, extension: str) -> None:
+    """Leave a robot's file, and what names of files in damaged ones may stand for: pipes, and a folder."""
+    shutil.copy(ROOT / "tests" / "fixtures" / "robots" / name, f"robot{extension}")
+    pathlib.Path("folder.stl").mkdir(exist_ok=True)
+    for pipe in damages.PIPES:
+        if not os.path.exists(pipe):
+            os.mkfifo(pipe)
+
+
+def _make_meshes() -> None:
+    """Leave a robot whose torso collides by a mesh of each format."""
+    _copy_robot("go2_like.xml", ".xml")
+    names = damages.write_meshes(pathlib.Path())
+    put_meshes = damages.with_colliders(names)
+    robot = pathlib.Path("robot.xml")
+    robot.write_bytes(put_meshes(robot.read_bytes()))
+
+
+def _make_imported_body() -> None:
+    _copy_robot("go2_like.xml", ".xml")
+    pathlib.Path("imported.json").write_text(body_to_json(import_robot("robot.xml").body))
+
+
+def _import_mjcf() -> None:
+    import_robot("robot.xml")
+
+
+def _import_urdf() -> None:
+    import_robot("robot.urdf")
+
+
+def _read_imported_body() -> None:
+    environment = arc_suite.load("imported.json", "walk", {"random": 0})
+    environment.reset()
+    environment.step(np.zeros(environment.action_spec().shape))
+
+
+def _make_snapshot() -> None:
+    np.savez("snapshot.npz", **_open_environment().snapshot())
+
+
+def _restore() -> None:
+    _open_environment().restore(archives.read("snapshot.npz", 1 << 28))
+
+
+def _open_environment():
+    environment = arc_suite.load("tick", "steer", {"random": 0})
+    environment.reset()
+    return environment
+
+
+def _make_zip() -> None:
+    """Leave the member of a zip of stable-baselines3 that is JSON."""
+    pathlib.Path("data.json").write_text(
+        json.dumps({"observation_space": {"arc_suite": Setup.of("tick").to_dict()}, "_last_obs": None})
+    )
+
+
+def _read_zip() -> None:
+    with zipfile.ZipFile("policy.zip", "w") as archive:
+        archive.write("data.json", "data")
+    zips.setup(pathlib.Path("policy.zip"))
+    zips.statistics(pathlib.Path("policy.zip"))
 
 
 def _make_tracks() -> None:
@@ -180,23 +254,40 @@ TABLES = (*run_folder.TABLES, "style", "final")
 RUN, STUDY = "tick-walk-tiny_studies.climb-0", "samples-sac"
 _USES_OF_RUNS = (_resume_run, _publish, _act_by_run)
 KINDS = {
-    "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,)),
-    "tracks": Kind("tracks.npz", _make_tracks, (lambda: style.load("tracks.npz"),)),
-    "policy": Kind("policy.npz", _make_policy, (_act,)),
-    "header of a policy": Kind("header.json", _make_policy, (_act_by_header,)),
-    "journal of a search": Kind("journal.jsonl", _search, (_search,)),
-    "journal of a design": Kind("bodies.jsonl", _design, (_design,)),
+    "robot in MJCF": Kind(
+        "robot.xml", lambda: _copy_robot("go2_like.xml", ".xml"), (_import_mjcf,), table=damages.MJCF
+    ),
+    "robot in URDF": Kind(
+        "robot.urdf", lambda: _copy_robot("a1_like.urdf", ".urdf"), (_import_urdf,), table=damages.URDF
+    ),
     **{
-        f"{name} of a run": Kind(f"runs/{RUN}/{name}", _begin_run, _USES_OF_RUNS)
+        f"mesh in {name.rpartition('.')[2].upper()}": Kind(name, _make_meshes, (_import_mjcf,), table=damages.MESHES)
+        for name in damages.MESH_FILES
+    },
+    "imported body": Kind("imported.json", _make_imported_body, (_read_imported_body,), table=damages.IMPORTED),
+    "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,), table=damages.JSON),
+    "tracks": Kind("tracks.npz", _make_tracks, (lambda: style.load("tracks.npz"),), table=damages.ARCHIVES),
+    "policy": Kind("policy.npz", _make_policy, (_act,), table=damages.ARCHIVES | damages.GRAPHS),
+    "header of a policy": Kind("header.json", _make_policy, (_act_by_header,), table=damages.JSON),
+    "zip of another library": Kind("data.json", _make_zip, (_read_zip,), table=damages.JSON),
+    "snapshot": Kind("snapshot.npz", _make_snapshot, (_restore,), table=damages.ARCHIVES | damages.SNAPSHOTS),
+    "journal of a search": Kind("journal.jsonl", _search, (_search,), table=damages.LINES),
+    "journal of a design": Kind("bodies.jsonl", _design, (_design,), table=damages.LINES),
+    **{
+        f"{name} of a run": Kind(
+            f"runs/{RUN}/{name}", _begin_run, _USES_OF_RUNS, table=damages.TABLES[pathlib.Path(name).suffix]
+        )
         for name in ("config.json", "checkpoint.npz", "policy.npz", *(f"{table}.csv" for table in TABLES))
     },
     **{
-        f"{name} of a study": Kind(f"studies/{STUDY}/{name}", _copy_studies, (_read_study,))
+        f"{name} of a study": Kind(f"studies/{STUDY}/{name}", _copy_studies, (_read_study,), table=damages.CSV)
         for name in (results.RUNS, results.EVALUATIONS, results.DEMONSTRATORS)
     },
-    "scores of a benchmark": Kind(f"studies/{benchmark.SCORES}", _copy_studies, (_read_scores,)),
-    "metadata of a dataset": Kind(f"datasets/{ID}/data/metadata.json", _collect, _USES),
-    "episodes of a dataset": Kind(f"datasets/{ID}/data/main_data.hdf5", _collect, _USES, may_loop=True),
+    "scores of a benchmark": Kind(f"studies/{benchmark.SCORES}", _copy_studies, (_read_scores,), table=damages.CSV),
+    "metadata of a dataset": Kind(f"datasets/{ID}/data/metadata.json", _collect, _USES, table=damages.JSON),
+    "episodes of a dataset": Kind(
+        f"datasets/{ID}/data/main_data.hdf5", _collect, _USES, may_loop=True, table=damages.EPISODES
+    ),
 }
 
 
@@ -250,17 +341,23 @@ def outcome(*uses: Callable[[], object], limit: float = LIMIT) -> str:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process wherever it is, in a library too
         signal.setitimer(signal.ITIMER_REAL, limit)
         os._exit(max(OUTCOMES.index(_tried(use)) for use in uses))
-    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    _, wait_status, usage = os.wait4(child, 0)
+    status = os.waitstatus_to_exitcode(wait_status)
     if status < 0:
         return TOO_LONG if status == -signal.SIGALRM else CRASHED
-    return OUTCOMES[status]
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes, of the largest memory
+    return TOO_LARGE if usage.ru_maxrss * unit > MAX_MEMORY else OUTCOMES[status]
 
 
 def _tried(use: Callable[[], object]) -> str:
     try:
         use()
     except BaseException as error:
-        if isinstance(error, ValueError | OSError) and "\n" not in str(error) and 0 < len(str(error)) < 2000:
+        if (
+            isinstance(error, ValueError | OSError | PhysicsError)
+            and "\n" not in str(error)
+            and 0 < len(str(error)) < 2000
+        ):
             return REFUSED
         traceback.print_exc()
         return TRACEBACK
@@ -273,12 +370,18 @@ def fuzz(kind: Kind, cases: int, seed: int, label: str) -> Counter:
         raise RuntimeError(f"{label}: cannot make or read a sound file")
     path, outcomes = pathlib.Path(kind.file), Counter()
     sound = path.read_bytes()
-    for case in tqdm(range(cases), desc=label, unit="file", leave=False, disable=None):
-        path.write_bytes(damaged(sound, np.random.default_rng((seed, case))))
+
+    def read(name: str, content: bytes) -> None:
+        path.write_bytes(content)
         result = outcome(*kind.uses)
         outcomes[result] += 1
         if result not in (READ, REFUSED):
-            print(f"{label}: {result}: --seed {seed}, case {case}", file=sys.stderr)
+            print(f"{label}: {result}: {name}", file=sys.stderr)
+
+    for name, damage in kind.table.items():
+        read(name, damage(sound))
+    for case in tqdm(range(cases), desc=label, unit="file", leave=False, disable=None):
+        read(f"--seed {seed}, case {case}", damaged(sound, np.random.default_rng((seed, case))))
     path.write_bytes(sound)
     return outcomes
 
@@ -288,6 +391,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=500, help="damaged files of each kind")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--kind", choices=list(KINDS), help="of files; all by default")
     arguments = parser.parse_args()
     print(f"{'file':<24}" + "".join(f"{name:>11}" for name in OUTCOMES))
     failed = False
@@ -295,8 +399,12 @@ def main() -> int:
         os.environ["MINARI_DATASETS_PATH"] = os.path.join(folder, "datasets")
         os.chdir(folder)
         for label, kind in KINDS.items():
+            if arguments.kind not in (None, label):
+                continue
             found = fuzz(kind, arguments.cases, arguments.seed, label)
-            failed |= bool(found[TRACEBACK] or found[CRASHED] or (found[TOO_LONG] and not kind.may_loop))
+            failed |= bool(
+                found[TRACEBACK] or found[CRASHED] or found[TOO_LARGE] or (found[TOO_LONG] and not kind.may_loop)
+            )
             print(f"{label:<24}" + "".join(f"{found[name]:>11}" for name in OUTCOMES), flush=True)
             shutil.rmtree("datasets", ignore_errors=True)
         os.chdir("/")

@@ -131,7 +131,7 @@ MUTANTS = {
     "mirror image of a foot's path forgotten": "« * (1.0, -1.0, 1.0)→»",
     "motors win back what they brake": "np.diff(track.joint_angles, axis=0)).«clip(0.0).→»sum()",
     "a foot that bounces strides": "«0.5 * foot_clearance(track)→0.0»",
-    "order of tracks in a file": "_track(setup, arrays, index) for index in range(count)«→[::-1]»]",
+    "order of tracks in a file": "for index in range(len(arrays_by_index))«→[::-1]»]",
     "a replay that differs let through": "«np.array_equal(track.rewards, episode.rewards)→"
     "len(track.rewards) == episode.length»",
     # Searches and datasets.

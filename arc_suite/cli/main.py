@@ -6,7 +6,7 @@ from types import ModuleType
 
 from arc_suite import checks, registry, versions
 from arc_suite.cli import program
-from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, installed_programs, usage
+from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, docstring_of, installed_programs, usage
 
 
 def main(*arguments: str) -> None:
@@ -54,7 +54,7 @@ def _program_of_another_package(name: str) -> ModuleType:
         else:
             full_name = checks.name(name, [*PROGRAMS, *entry_points], "program")
         module = registry.find("program", full_name, PROGRAMS)
-        if not callable(getattr(module, "main", None)) or not module.__doc__:
+        if not callable(getattr(module, "main", None)) or not docstring_of(module):
             raise ValueError(f"program {full_name!r}: expected a module with a docstring and a function main")
     except ValueError as error:
         sys.exit(f"arc-suite: {error}")

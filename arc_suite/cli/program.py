@@ -15,11 +15,13 @@ from types import ModuleType
 from typing import NoReturn
 
 from absl import flags
+from dm_control.rl.control import PhysicsError
 from tqdm import tqdm
 
 import arc_suite
 from arc_suite import checks, policies, registry
 from arc_suite.cli.help_text import help_text
+from arc_suite.cli.programs import docstring_of
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
 
@@ -107,7 +109,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
     def parse_and_call():
         _, *positional_arguments = _parse([script, *arguments], module)
         if _HELP.value:
-            print(help_text(module.__doc__, _flags_of(module)))
+            print(help_text(docstring_of(module), _flags_of(module)))
             return None
         if _VERSION.value:
             print(VERSION)
@@ -125,8 +127,9 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
 def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     """Call `work` and exit the process with the status that it returns.
 
-    - A wrong flag, a ValueError, an OSError and a RenderingUnavailable become one line on standard error and exit
-      status 1. Ctrl-C becomes one line and exit status 130; SIGTERM in `resumable` work becomes one line and 143.
+    - A wrong flag, a ValueError, an OSError, a RenderingUnavailable and a PhysicsError, of a body that cannot be
+      simulated, become one line on standard error and exit status 1. Ctrl-C becomes one line and exit status 130;
+      SIGTERM in `resumable` work becomes one line and 143.
     - Any other exception is a mistake of the suite, and keeps its traceback.
     - A warning becomes one line on standard error.
     - Where nobody reads the output any more, as in `program | head`, the work goes on without it, so that its files are
@@ -147,7 +150,7 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
         warnings.showwarning = print_reason
         try:
             status = work()
-        except (flags.Error, ValueError, OSError, RenderingUnavailable) as error:
+        except (flags.Error, ValueError, OSError, RenderingUnavailable, PhysicsError) as error:
             print_reason(error)
             status = 1
         except KeyboardInterrupt as interrupt:

@@ -3,6 +3,7 @@
 import ast
 from importlib import metadata
 from pathlib import Path
+from types import ModuleType
 
 # Group of entry points, by which installed packages name a program and the module whose import registers it.
 ENTRY_POINT_GROUP = "arc_suite.programs"
@@ -65,5 +66,16 @@ def program_summary(name: str) -> str:
     """Return the first line of a program's docstring, read from its source without importing it."""
     top_folder = Path(__file__).parents[2]  # that of the package arc_suite
     folder = top_folder.joinpath(*PROGRAMS[name].split("."))
-    source = (folder / f"{name}.py").read_text(encoding="utf-8")
-    return ast.get_docstring(ast.parse(source)).splitlines()[0]
+    return _read_docstring(folder / f"{name}.py").splitlines()[0]
+
+
+def docstring_of(module: ModuleType) -> str:
+    """Return the docstring of a program's module, "" for none; from its file where Python dropped it."""
+    if module.__doc__ is None and getattr(module, "__file__", None):
+        return _read_docstring(Path(module.__file__))
+    return module.__doc__ or ""
+
+
+def _read_docstring(path: Path) -> str:
+    """Return the docstring of a module's source; "" for none."""
+    return ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""

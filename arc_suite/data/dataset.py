@@ -9,7 +9,7 @@ from typing import Any
 
 import h5py
 
-from arc_suite import checks, files
+from arc_suite import checks, files, parsers
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import DatasetSettings
@@ -17,18 +17,6 @@ from arc_suite.envs.setup import Setup
 
 METADATA = "metadata.json"
 MAIN = "main_data.hdf5"
-
-# Errors that h5py, json and our own checks raise for damaged files.
-_ERRORS_OF_DAMAGE = (
-    ArithmeticError,
-    AttributeError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
 
 
 def open(dataset_id: str) -> "Dataset":
@@ -127,17 +115,9 @@ class Dataset:
             yield file
 
 
-@contextlib.contextmanager
-def damages(dataset_id: str, file: Path):
-    """Turn errors of a damaged file into one line that names dataset and file.
-
-    Raises:
-        ValueError: the file is damaged.
-    """
-    try:
-        yield
-    except _ERRORS_OF_DAMAGE as error:
-        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {checks.quote(error)}") from None
+def damages(dataset_id: str, file: Path) -> contextlib.AbstractContextManager[None]:
+    """Turn errors of a damaged file into one line that names dataset and file; see `parsers.guard`."""
+    return parsers.guard(f"dataset {dataset_id!r} is damaged: {file}")
 
 
 def _check_type(name: str, value, kind: type):

@@ -41,9 +41,29 @@ def _is_valid(dataset_id: str) -> bool:
     return not any(_VERSION_SUFFIX.search(part) for part in namespace.split("/"))
 
 
+def root() -> Path:
+    """Return the folder of all datasets, which Minari makes where it is missing.
+
+    Raises:
+        OSError: the folder cannot be made, as where there is no home.
+    """
+    try:
+        return get_dataset_path()
+    except (OSError, RuntimeError) as error:  # Python raises a RuntimeError for a user without a home
+        raise OSError(
+            f"cannot make the folder of datasets: {checks.quote(error)}; set MINARI_DATASETS_PATH to another folder"
+        ) from None
+
+
 def folder(dataset_id: str) -> Path:
-    """Return the folder in which a dataset of this id lies, or would lie."""
-    return get_dataset_path(check(dataset_id))
+    """Return the folder in which a dataset of this id lies, or would lie.
+
+    Raises:
+        ValueError: no id of a dataset.
+        OSError: as `root`.
+    """
+    check(dataset_id)
+    return root() / dataset_id
 
 
 def parts(dataset_id: str) -> Path:
@@ -54,8 +74,8 @@ def parts(dataset_id: str) -> Path:
 
 def existing() -> list[str]:
     """Return the ids of all datasets on this machine; hidden folders do not count."""
-    root = get_dataset_path()
-    folders = sorted(path.parent.parent.relative_to(root) for path in root.rglob("data/metadata.json"))
+    top = root()
+    folders = sorted(path.parent.parent.relative_to(top) for path in top.rglob("data/metadata.json"))
     return [path.as_posix() for path in folders if not any(part.startswith(".") for part in path.parts)]
 
 
@@ -70,6 +90,6 @@ def find(dataset_id: str) -> Path:
             raise ValueError(f"dataset {checks.preview(dataset_id)} is unfinished: collect it again to continue it")
         dataset_ids = existing()
         if not dataset_ids:
-            raise ValueError(f"unknown dataset {checks.preview(dataset_id)}: there are none in {get_dataset_path()}")
+            raise ValueError(f"unknown dataset {checks.preview(dataset_id)}: there are none in {root()}")
         checks.name(dataset_id, dataset_ids, "dataset")
     return folder(dataset_id)

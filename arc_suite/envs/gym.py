@@ -9,16 +9,18 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
-from shimmy.dm_control_compatibility import DmControlCompatibilityV0
-from shimmy.utils.dm_env import dm_env_step2gym_step
 
-from arc_suite import checks
+from arc_suite import checks, versions
 from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
 from arc_suite.envs.dm import load
 from arc_suite.envs.prepare import checked_limit, refuse_arguments
 from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.window import Window
 from arc_suite.simulation import opengl, pictures
+
+with versions.explain_import_errors():  # shimmy imports `gym`, and a user's own file may have that name
+    from shimmy.dm_control_compatibility import DmControlCompatibilityV0
+    from shimmy.utils.dm_env import dm_env_step2gym_step
 
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import checks
+from arc_suite import parsers
 from arc_suite.envs import setup_facts, trees
 from arc_suite.envs.prepare import with_changes
 from arc_suite.simulation.state_arrays import check_finite, check_same_form
@@ -110,7 +110,7 @@ def from_arrays(
     Raises:
         ValueError: another setup, or an array is missing or does not fit.
     """
-    try:
+    with parsers.guard("snapshot: of another setup or number of environments"):
         _check_setups(opened_tasks, arrays)
         simulations = _with_prefix("batch/", arrays)
         check_simulations(simulations)
@@ -125,8 +125,6 @@ def from_arrays(
         present_texts, next_texts = (_read_texts(arrays.get(name), len(opened_tasks)) for name in _SETTINGS_ARRAYS)
         present_tasks = _change_tasks(opened_tasks, settings, present_texts)
         next_tasks = _change_tasks(opened_tasks, settings, next_texts)
-    except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise ValueError(f"snapshot: of another setup or number of environments: {checks.quote(error)}") from None
     state = State(simulations, memory, streams, randoms, environment_arrays, (present_texts, next_texts))
     return state, [present_tasks, next_tasks]
 

@@ -17,7 +17,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import checks, policies
+from arc_suite import parsers, policies
 from arc_suite.cpg.selection import suited_preset, suited_presets
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
@@ -142,12 +142,9 @@ def read(path: Path) -> dict[str, dict[str, np.ndarray]]:
         ValueError: a damaged table.
     """
     returns: dict[str, dict[str, list[float]]] = {}
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            for line in csv.DictReader(file):
-                returns.setdefault(line["place"], {}).setdefault(line["policy"], []).append(float(line["return"]))
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        raise ValueError(f"{path}: no table of returns: {checks.quote(error)}") from None
+    with parsers.guard(f"{path}: no table of returns"), path.open(encoding="utf-8", newline="") as file:
+        for line in csv.DictReader(file):
+            returns.setdefault(line["place"], {}).setdefault(line["policy"], []).append(float(line["return"]))
     return {
         place_name: {policy: np.array(values) for policy, values in returns_by_policy.items()}
         for place_name, returns_by_policy in returns.items()

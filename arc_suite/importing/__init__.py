@@ -1,7 +1,6 @@
 """Robots of others: from an MJCF or URDF file to a body whose physics are those of the file."""
 
 import contextlib
-import functools
 import hashlib
 import math
 import os
@@ -12,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite import files, parsers
 from arc_suite.importing import motors, notes, opening, poses, sketch, tree, urdf, writing
 from arc_suite.importing.naming import choose_names, clean_name
 from arc_suite.importing.opening import RobotFile
@@ -27,6 +27,7 @@ _MIN_CONTACT_TIME = 0.02  # s
 _GRAVITY_RANGE = (0.1, 1000.0)  # m/s^2, downwards
 _MASS_RANGE = (1e-6, 1e9)  # kg
 _DEFAULT_NAME = "MuJoCo Model"  # which MuJoCo gives MJCF without a name
+_MAX_CACHED_BODIES = 64
 _IMPORTED = "_imported"  # ends the name of a body that would have a robot's name
 
 
@@ -40,6 +41,21 @@ class ImportedRobot(NamedTuple):
 
     body: Body
     notes: tuple[str, ...]
+
+
+class _CachedBody(NamedTuple):
+    """A body from a file.
+
+    Attributes:
+        body: the body.
+        digests: hashes of all files that it depends on; None for those that were looked for and are missing.
+    """
+
+    body: Body
+    digests: dict[Path, bytes | None]
+
+
+_cached_bodies: dict[str, _CachedBody] = {}  # by path, the last one used last
 
 
 class _StandingRobot(NamedTuple):
@@ -62,33 +78,47 @@ def import_robot(path: str | os.PathLike, home: str | None = None, feet: Sequenc
         SpecError: it cannot come in; one line that names the file.
         OSError: the file cannot be read.
     """
-    path = Path(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # MuJoCo warns about attributes that are dropped here
-            return _import_file(path, home, feet)
-    except SpecError as error:
-        raise SpecError(f"{path}: {error}") from None
+    imported_robot, _ = _import_file(Path(path), home, feet)
+    return imported_robot
 
 
 def body_of(path: str | os.PathLike) -> Body:
-    """Return the body of `import_robot`; the same one as long as the file stays as it is.
+    """Return the body of `import_robot`; the same one as long as all files that were read for it stay as they are.
 
     Raises:
         SpecError: as `import_robot`.
         OSError: as `import_robot`.
     """
-    digest = hashlib.sha256(opening.content(Path(path))).digest()
-    return _cached_body(os.path.realpath(path), digest)
+    key = os.path.realpath(path)
+    cached_body = _cached_bodies.pop(key, None)
+    if cached_body is None or any(_digest(part) != digest for part, digest in cached_body.digests.items()):
+        imported_robot, parts = _import_file(Path(path), home=None, feet=())
+        cached_body = _CachedBody(imported_robot.body, {part: _digest(part) for part in parts})
+    while len(_cached_bodies) >= _MAX_CACHED_BODIES:
+        oldest_key = next(iter(_cached_bodies))
+        _cached_bodies.pop(oldest_key, None)
+    _cached_bodies[key] = cached_body
+    return cached_body.body
 
 
-@functools.lru_cache(maxsize=64)
-def _cached_body(path: str, _digest: bytes) -> Body:
-    return import_robot(path).body
+def _digest(path: Path) -> bytes | None:
+    """Return the hash of a file's content; None where there is no file."""
+    if not path.is_file():
+        return None
+    with files.reading(path), path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").digest()
 
 
-def _import_file(path: Path, home: str | None, feet: Sequence[str]) -> ImportedRobot:
-    file, robot, stance = _find_standing_robot(path, home, feet)
+def _import_file(path: Path, home: str | None, feet: Sequence[str]) -> tuple[ImportedRobot, tuple[Path, ...]]:
+    """Return the robot of a file, and all files that it depends on; errors name the file."""
+    with warnings.catch_warnings(), parsers.guard(str(path), passes=(OSError,), raises=SpecError):
+        warnings.simplefilter("ignore")  # MuJoCo warns about attributes that are dropped here
+        file, robot, stance = _find_standing_robot(path, home, feet)
+        return _describe_robot(path, file, robot, stance), file.parts
+
+
+def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance) -> ImportedRobot:
+    """Return the body of a robot that stands, and notes."""
     _check_world(robot)
     _check_hinges(robot, stance)
     names = choose_names(robot, stance.legs)

@@ -8,18 +8,15 @@ from typing import NamedTuple, TypeVar
 
 import mujoco
 
-from arc_suite import checks, files
-from arc_suite.importing import urdf
+from arc_suite import parsers
+from arc_suite.importing import bounds, urdf
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.importing.tree import FREE
-from arc_suite.robots import sources
 from arc_suite.robots.spec import SpecError
 
-MAX_BYTES = 1 << 24  # of a file; the largest of 45 has 200 kB
-
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
+_HEIGHT_FIELD = mujoco.mjtGeom.mjGEOM_HFIELD
 _LINE_NUMBER = re.compile(r",? line \d+")  # in MuJoCo's errors
-_XML_DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
 
 _Result = TypeVar("_Result")
 
@@ -33,6 +30,7 @@ class RobotFile(NamedTuple):
         meshes: meshes of geoms whose shape is a mesh, by geom.
         order: names of joints in the order of the file; empty if the model has that order.
         notes: one line for each thing that is left out or repaired.
+        parts: all files that it depends on, with those that were looked for and are missing.
     """
 
     model: mujoco.MjModel
@@ -40,6 +38,7 @@ class RobotFile(NamedTuple):
     meshes: dict[int, Mesh]
     order: tuple[str, ...]
     notes: tuple[str, ...]
+    parts: tuple[Path, ...]
 
 
 class _Spec(NamedTuple):
@@ -49,11 +48,13 @@ class _Spec(NamedTuple):
         spec: spec of MuJoCo.
         order: as in `RobotFile`.
         notes: as in `RobotFile`.
+        mesh_files: files of meshes, with those that were looked for and are missing.
     """
 
     spec: mujoco.MjSpec
     order: tuple[str, ...]
     notes: tuple[str, ...]
+    mesh_files: tuple[Path, ...]
 
 
 def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
@@ -67,53 +68,28 @@ def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
         SpecError: the file is neither, or MuJoCo cannot compile it.
         OSError: the file cannot be read.
     """
-    root_element = _parse(content(path))
-    spec, order, notes = _read_spec(path, root_element, turn)
+    root_element, parts = bounds.parse(path)
+    if root_element.tag not in ("mujoco", "robot"):
+        raise SpecError(f"expected MJCF (mujoco) or URDF (robot), got an element {root_element.tag[:40]!r}")
+    spec, order, notes, mesh_files = _read_spec(path, root_element, turn)
+    bounds.check_mesh_files(mesh_files)
     model, mesh_notes = _compile(spec)
     model, torso, torso_notes = _free_torso(spec, model)
-    return RobotFile(model, torso, meshes_of(spec, model), order, (*notes, *mesh_notes, *torso_notes))
-
-
-def content(path: Path) -> bytes:
-    """Return the bytes of a file, at most one more than it may have.
-
-    Raises:
-        OSError: the file cannot be read.
-    """
-    with files.reading(path), path.open("rb") as file:
-        return file.read(MAX_BYTES + 1)
-
-
-def _parse(data: bytes) -> ElementTree.Element:
-    """Return the root element of XML without entities."""
-    if len(data) > MAX_BYTES:
-        raise SpecError(f"expected at most {MAX_BYTES} bytes")
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        raise SpecError("expected text in UTF-8") from None
-    if sources.ENTITY.search(text):
-        raise SpecError("expected XML without a document type and entities")
-    try:
-        # Some exporters write an empty line before the declaration, which XML forbids.
-        element = ElementTree.fromstring(_XML_DECLARATION.sub("", text))
-    except ElementTree.ParseError as error:
-        raise SpecError(f"expected XML: {error}") from None
-    if element.tag not in ("mujoco", "robot"):
-        raise SpecError(f"expected MJCF (mujoco) or URDF (robot), got an element {element.tag[:40]!r}")
-    return element
+    all_notes = (*notes, *mesh_notes, *torso_notes)
+    return RobotFile(model, torso, meshes_of(spec, model), order, all_notes, (*parts, *mesh_files))
 
 
 def _read_spec(path: Path, root_element: ElementTree.Element, turn: str) -> _Spec:
     """Return the spec of a file."""
     if root_element.tag == "robot":
-        text, order, notes = urdf.repair_urdf(root_element, path.parent, turn)
+        text, order, notes, mesh_files = urdf.repair_urdf(root_element, path.parent, turn)
         # The text is not the file: numbers of its lines would mislead.
         spec = _with_short_errors(lambda: mujoco.MjSpec.from_string(text), shows_line_numbers=False)
-        return _Spec(spec, order, notes)
+        return _Spec(spec, order, notes, mesh_files)
     spec = _with_short_errors(lambda: mujoco.MjSpec.from_file(str(path)))
     _delete_visuals(spec)
-    return _Spec(spec, order=(), notes=())
+    mesh_files = tuple(file_of(spec, mesh) for mesh in spec.meshes if mesh.file)
+    return _Spec(spec, order=(), notes=(), mesh_files=mesh_files)
 
 
 def _with_short_errors(function: Callable[[], _Result], shows_line_numbers: bool = True) -> _Result:
@@ -125,15 +101,20 @@ def _with_short_errors(function: Callable[[], _Result], shows_line_numbers: bool
     """
     try:
         return function()
-    except ValueError as error:
-        reason = checks.quote(error)
+    except Exception as error:  # MuJoCo has errors of its own, besides those of Python
+        reason = parsers.describe(error)
         if not shows_line_numbers:
             reason = _LINE_NUMBER.sub("", reason)
         raise SpecError(f"MuJoCo cannot read it: {reason}") from None
 
 
 def _delete_visuals(spec: mujoco.MjSpec) -> None:
-    """Delete textures, materials, skins and visual meshes, so that no file is read for them."""
+    """Delete textures, materials, skins, height fields and visual meshes, so that no file is read for them."""
+    for geom in list(spec.geoms):
+        if geom.type == _HEIGHT_FIELD:
+            spec.delete(geom)
+    for field in list(spec.hfields):
+        spec.delete(field)
     for element in (*spec.geoms, *spec.sites, *spec.skins):
         element.material = ""
     for element in (*spec.materials, *spec.textures, *spec.skins):
@@ -165,10 +146,10 @@ def _compile(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     """Return the compiled model, and notes; meshes that cannot be read are deleted from the spec."""
     try:
         return spec.compile(), ()
-    except ValueError as error:
+    except Exception as error:
         unreadable_meshes = sorted(mesh.name for mesh in spec.meshes if not _compiles_alone(spec, mesh))
         if not unreadable_meshes:
-            raise SpecError(f"MuJoCo cannot compile it: {checks.quote(error)}") from None
+            raise SpecError(f"MuJoCo cannot compile it: {parsers.describe(error)}") from None
     for geom in list(spec.geoms):
         if geom.meshname in unreadable_meshes:
             spec.delete(geom)
@@ -177,13 +158,9 @@ def _compile(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
             spec.delete(mesh)
     count = len(unreadable_meshes)
     note = f"left out: {count} meshes that cannot be read, such as {unreadable_meshes[0]}"
-    try:
+    place = f"MuJoCo cannot compile it without {count} meshes that cannot be read ({unreadable_meshes[0]})"
+    with parsers.guard(place, raises=SpecError):
         return spec.compile(), (note,)
-    except ValueError as error:
-        raise SpecError(
-            f"MuJoCo cannot compile it without {count} meshes that cannot be read ({unreadable_meshes[0]}): "
-            f"{checks.quote(error)}"
-        ) from None
 
 
 def _compiles_alone(spec: mujoco.MjSpec, mesh) -> bool:
@@ -194,7 +171,7 @@ def _compiles_alone(spec: mujoco.MjSpec, mesh) -> bool:
         spec_of_mesh.meshes[0].inertia = mesh.inertia
         spec_of_mesh.worldbody.add_geom(type=_MESH, meshname=mesh.name)
         spec_of_mesh.compile()
-    except (ValueError, IndexError):
+    except Exception:
         return False
     return True
 

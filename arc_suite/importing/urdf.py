@@ -50,8 +50,10 @@ Elements = dict[str, ElementTree.Element]
 
 def repair_urdf(
     robot: ElementTree.Element, folder: Path, turn: str = LEVEL
-) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-    """Return a URDF that MuJoCo reads, its moving joints in the order of the file, and notes.
+) -> tuple[str, tuple[str, ...], tuple[str, ...], tuple[Path, ...]]:
+    """Return a URDF that MuJoCo reads, its moving joints in the order of the file, notes, and files of meshes.
+
+    The files of meshes are those that it names, with those that were looked for and are missing.
 
     Args:
         robot: the root element, which is changed.
@@ -70,8 +72,9 @@ def repair_urdf(
     joints = _elements_by_name(robot, "joint")
     for name, joint in joints.items():
         _check_joint(name, joint, links)
+    mesh_files: list[Path] = []
     notes = (
-        *_repair_shapes(links, folder),
+        *_repair_shapes(links, folder, mesh_files),
         *_repair_inertias(links),
         *_add_missing_masses(links, joints),
         *_mimic_notes(joints),
@@ -79,7 +82,7 @@ def repair_urdf(
     _add_floating_root(robot, links, joints, turn)
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _COMPILER)
     order = tuple(name for name, joint in joints.items() if joint.get("type") not in ("fixed", "floating"))
-    return ElementTree.tostring(robot, encoding="unicode"), order, notes
+    return ElementTree.tostring(robot, encoding="unicode"), order, notes, tuple(mesh_files)
 
 
 def _elements_by_name(robot: ElementTree.Element, tag: str) -> Elements:
@@ -134,8 +137,11 @@ def _check_joint(name: str, joint: ElementTree.Element, links: Elements) -> None
             _parse_numbers(f"joint {name!r}: {tag} {key}", element.get(key, default), count)
 
 
-def _repair_shapes(links: Elements, folder: Path) -> Iterator[str]:
-    """Remove visual shapes, and colliders that cannot be read; yield a note on these colliders."""
+def _repair_shapes(links: Elements, folder: Path, mesh_files: list[Path]) -> Iterator[str]:
+    """Remove visual shapes, and colliders that cannot be read; yield a note on these colliders.
+
+    The files of meshes are added to `mesh_files`, with those that were looked for and are missing.
+    """
     links_with_losses = []
     for name, link in links.items():
         for visual in link.findall("visual"):
@@ -145,7 +151,10 @@ def _repair_shapes(links: Elements, folder: Path) -> Iterator[str]:
             sphere = collision.find("geometry/sphere")
             is_readable = True
             if mesh is not None:
-                file = _find_mesh_file(mesh.get("filename", ""), folder)
+                candidates = _mesh_file_candidates(mesh.get("filename", ""), folder)
+                file = next((candidate for candidate in candidates if candidate.is_file()), None)
+                last = len(candidates) if file is None else candidates.index(file) + 1
+                mesh_files += candidates[:last]
                 mesh.set("filename", str(file))
                 is_readable = file is not None
             if sphere is not None and not _is_positive(sphere.get("radius")):
@@ -164,19 +173,20 @@ def _is_positive(text: str | None) -> bool:
         return False
 
 
-def _find_mesh_file(name: str, folder: Path) -> Path | None:
-    """Return the file of a mesh: below the folder of the URDF or one above it; None if MuJoCo cannot read it."""
+def _mesh_file_candidates(name: str, folder: Path) -> list[Path]:
+    """Return where the file of a mesh may lie: below the folder of the URDF or one above it.
+
+    Nowhere if MuJoCo cannot read files of this kind.
+    """
     path = name
     for scheme in _MESH_SCHEMES:
         path = path.removeprefix(scheme)
-    if not path.lower().endswith(_MESH_EXTENSIONS):
-        return None
+    if not path.lower().endswith(_MESH_EXTENSIONS) or "\0" in path:
+        return []
     _, _, path_in_package = path.partition("/")  # the name of a package need not be that of its folder
-    for base in (folder.absolute(), *folder.absolute().parents):
-        for relative_path in (path, path_in_package):
-            if relative_path and (base / relative_path).is_file():
-                return base / relative_path
-    return None
+    bases = (folder.absolute(), *folder.absolute().parents)
+    relative_paths = [relative_path for relative_path in (path, path_in_package) if relative_path]
+    return [base / relative_path for base in bases for relative_path in relative_paths]
 
 
 def _repair_inertias(links: Elements) -> Iterator[str]:

@@ -9,7 +9,7 @@ The folder `RUN/checkpoints` itself is a policy, too: its checkpoints take turns
 from pathlib import Path
 from typing import NamedTuple
 
-from arc_suite import checks, files
+from arc_suite import checks, files, parsers
 
 FOLDER = "checkpoints"
 AGENT = "agent.json"
@@ -49,11 +49,9 @@ def agents(path: Path) -> list[Agent]:
     Raises:
         ValueError: a damaged file.
     """
-    try:
+    with parsers.guard(f"{path}: damaged"):
         paths = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
         return sorted((Agent(**files.read_json(file)) for file in paths), key=lambda agent: agent.steps)
-    except (OSError, TypeError, ValueError) as error:
-        raise ValueError(f"{path}: damaged: {checks.quote(error)}") from None
 
 
 def at(run: Path, step: int) -> Path:

@@ -10,13 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import checks
+from arc_suite import checks, parsers
 
 INPUT = "observations"
 EPSILON = 1e-5  # of a layer norm, as in PyTorch
 
 _MAX_NODES = 1 << 10
+_MAX_NAME = 40  # characters of an operator in an error
 _MAX_NUMBERS = 1 << 22  # of all results, for one environment
+_MAX_PRODUCTS = 1 << 26  # of two numbers, in all matrix products, for one environment
 
 Shape = tuple[int, ...]
 
@@ -175,21 +177,33 @@ def check_graph(graph: Graph, size: int) -> Graph:
     sample[1:] = np.random.default_rng(0).standard_normal((2, size))
     shapes: dict[Any, Shape] = {name: array.shape for name, array in graph.arrays.items()} | {INPUT: (1, size)}
     values: dict[Any, np.ndarray] = {**graph.arrays, INPUT: sample}
+    numbers = 0
+    products = 0
     for index, node in enumerate(graph.nodes):
-        try:
+        with parsers.guard(f"node {index}, {checks.quote(node.operator)[:_MAX_NAME]}"):
             shapes[index] = shape_of(node, shapes)
-            numbers = sum(math.prod(shapes[result]) for result in range(index + 1))
+            numbers += math.prod(shapes[index])
             if numbers > _MAX_NUMBERS:
                 raise ValueError(f"expected at most {_MAX_NUMBERS} numbers of an environment, got {numbers}")
+            products += _count_products(node, shapes)
+            if products > _MAX_PRODUCTS:
+                raise ValueError(f"expected at most {_MAX_PRODUCTS} products of an environment, got {products}")
             with np.errstate(all="ignore"):
                 values[index] = OPERATORS[node.operator].function(*(values[name] for name in node.inputs))
             if values[index].dtype != np.float32:
                 raise ValueError(f"expected float32, got {values[index].dtype}")
-        except (ValueError, IndexError, TypeError) as error:
-            raise ValueError(f"node {index}, {node.operator}: {checks.quote(error)}") from None
     if len(shapes[index]) != 2 or values[index].shape != (len(sample), shapes[index][1]):
         raise ValueError(f"node {index}, {node.operator}: expected actions of every environment, got {shapes[index]}")
     return graph
+
+
+def _count_products(node: Node, shapes: Mapping[str | int, Shape]) -> int:
+    """Return how many products of two numbers a node computes for one environment."""
+    if node.operator not in ("Linear", "Product"):
+        return 0
+    x, weight = node.inputs[:2]
+    _, outputs = shapes[weight]
+    return math.prod(shapes[x]) * outputs
 
 
 def shape_of(node: Node, shapes: Mapping[str | int, Shape]) -> Shape:

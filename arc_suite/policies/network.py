@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import archives, checks, files, registry, seed_ranges
+from arc_suite import archives, checks, files, parsers, registry, seed_ranges
 from arc_suite.envs.setup import Setup
 from arc_suite.policies.graph import Graph, Node, check_graph
 
@@ -116,34 +116,38 @@ def load(path: str | os.PathLike) -> Network:
     path = Path(path)
     if path.is_dir():
         path = path / FILE
-    try:
-        arrays = archives.read(path, _MAX_BYTES)
-        record = checks.mapping("policy", json.loads(str(arrays.pop("policy"))))
-        blocks = {
-            name: checks.integer(f"block {name}", size, 0)
-            for name, size in checks.mapping("blocks", record["blocks"]).items()
-        }
-        if "layers" in record:
-            raise ValueError("holds layers, as policies did before they were graphs: train it again")
-        nodes = tuple(Node(operator, tuple(inputs)) for operator, *inputs in record["nodes"])
-        for name, array in arrays.items():
-            if array.dtype == np.float16:  # as packaged policies are stored
-                arrays[name] = array.astype(np.float32)
-        graph = check_graph(Graph(nodes, arrays), sum(blocks.values()))
-        setup = Setup.from_dict(record)
-        _ = setup.excluded_blocks  # raises an error if they are no names
-        return Network(graph, setup, blocks, seed_ranges.from_json(record.get("training_seeds")))
-    except FileNotFoundError:
+    if not path.exists():
         is_of_run = path.name == FILE and path.parent.is_dir()
         if is_of_run:
             cure = "; a run writes it at its first evaluation"
         else:
             cure = checks.hint(str(path), map(str, path.parent.glob("*")))
-        raise OSError(f"cannot read {path}: no such file{cure}") from None
+        raise OSError(f"cannot read {path}: no such file{cure}")
+    try:
+        with parsers.guard(f"{path}: no policy, or a damaged one", passes=(registry.NotImported,)):
+            return _read(path)
     except registry.NotImported as error:
         raise ValueError(f"policy {path}: {error}") from None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ValueError(f"{path}: no policy, or a damaged one: {checks.quote(error)}") from None
+
+
+def _read(path: Path) -> Network:
+    """Return the policy of a file; a damaged one raises anything."""
+    arrays = archives.read(path, _MAX_BYTES)
+    record = checks.mapping("policy", json.loads(str(arrays.pop("policy"))))
+    blocks = {
+        name: checks.integer(f"block {name}", size, 0)
+        for name, size in checks.mapping("blocks", record["blocks"]).items()
+    }
+    if "layers" in record:
+        raise ValueError("holds layers, as policies did before they were graphs: train it again")
+    nodes = tuple(Node(operator, tuple(inputs)) for operator, *inputs in record["nodes"])
+    for name, array in arrays.items():
+        if array.dtype == np.float16:  # as packaged policies are stored
+            arrays[name] = array.astype(np.float32)
+    graph = check_graph(Graph(nodes, arrays), sum(blocks.values()))
+    setup = Setup.from_dict(record)
+    _ = setup.excluded_blocks  # raises an error if they are no names
+    return Network(graph, setup, blocks, seed_ranges.from_json(record.get("training_seeds")))
 
 
 def checkpoint_files(folder: Path) -> list[Path]:

@@ -6,11 +6,10 @@ A name is `ppo.zip`, or `ppo.zip+stats.pkl` with a file of statistics. A zip of 
 
 import json
 import re
-import zipfile
 from pathlib import Path
 from typing import Any
 
-from arc_suite import checks, registry, versions
+from arc_suite import archives, files, parsers, registry, versions
 from arc_suite.envs.setup import ATTRIBUTE, Setup
 from arc_suite.policies.other_libraries import Loaded
 
@@ -27,11 +26,8 @@ def content(path: Path) -> dict[str, Any]:
     """
     if not path.is_file():
         raise OSError(f"cannot read {path}: no such file")
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return dict(json.loads(archive.read("data")))
-    except (zipfile.BadZipFile, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quote(error)}") from None
+    with parsers.guard(f"policy {path}: no policy of stable-baselines3"):
+        return dict(json.loads(archives.read_text(path, "data", files.MAX_JSON)))
 
 
 def setup(path: Path) -> Setup | None:

@@ -5,6 +5,7 @@ values are valid; `arc_suite.importing` writes no others.
 """
 
 import collections
+import dataclasses
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
@@ -15,19 +16,34 @@ from arc_suite.robots.spec import Body, SpecError
 
 MAX_DEPTH = 200  # of elements within elements
 _MAX_NUMBER = 1e15  # above what any robot has, below what overflows in products
-_MAX_INTEGER = 10_000  # of iterations of solvers, and of a hull's vertices
+MAX_INTEGER = 10_000  # of iterations of solvers, and of a hull's vertices
 _MAX_QUOTE = 40  # characters of a name or value in an error
+
+
+@dataclasses.dataclass(frozen=True)
+class _Range:
+    """Valid numbers of an attribute."""
+
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"numbers from {self.low:g} to {self.high:g}"
+
 
 # What an attribute may contain: one of these, or a tuple of the valid texts. Errors contain them.
 _NAME = "a name"
-_NUMBERS = "numbers"
-_INTEGER = f"an integer up to {_MAX_INTEGER}"
+_NUMBERS = _Range(-_MAX_NUMBER, _MAX_NUMBER)
+_PLACE = _Range(-100.0, 100.0)  # m, as of the parts of bodies
+_SIZE = _Range(0.0, 100.0)  # m
+_AMOUNT = _Range(0.0, _MAX_NUMBER)  # of what pulls where it should resist if it is below 0
+_INTEGER = f"an integer up to {MAX_INTEGER}"
 _SWITCH = ("enable", "disable")
 _BOOLEAN = ("true", "false")
 
 # Attributes that several elements have.
 _SOLVER_PARAMETERS = {"solref": _NUMBERS, "solimp": _NUMBERS}
-_NAME_AND_POSE = {"name": _NAME, "pos": _NUMBERS, "quat": _NUMBERS}
+_NAME_AND_POSE = {"name": _NAME, "pos": _PLACE, "quat": _NUMBERS}
 
 OPTIONS = {
     **dict.fromkeys(("timestep", "impratio", "tolerance", "ls_tolerance", "noslip_tolerance"), _NUMBERS),
@@ -92,9 +108,7 @@ _ELEMENTS = {
     ),
     "worldbody": _Element(("mujoco",), 1, {}),
     "body": _Element(("worldbody", "body"), 2048, {**_NAME_AND_POSE, "gravcomp": _NUMBERS}),
-    "inertial": _Element(
-        ("body",), 2048, {"pos": _NUMBERS, "quat": _NUMBERS, "mass": _NUMBERS, "diaginertia": _NUMBERS}
-    ),
+    "inertial": _Element(("body",), 2048, {"pos": _PLACE, "quat": _NUMBERS, "mass": _AMOUNT, "diaginertia": _AMOUNT}),
     "joint": _Element(
         ("body",),
         1024,
@@ -104,8 +118,9 @@ _ELEMENTS = {
             "limited": _BOOLEAN,
             "actuatorfrclimited": _BOOLEAN,
             "actuatorgravcomp": _BOOLEAN,
-            **dict.fromkeys(("pos", "axis", "range", "actuatorfrcrange", "margin", "ref", "springref"), _NUMBERS),
-            **dict.fromkeys(("armature", "frictionloss", "stiffness", "damping"), _NUMBERS),
+            "pos": _PLACE,
+            **dict.fromkeys(("axis", "range", "actuatorfrcrange", "margin", "ref", "springref"), _NUMBERS),
+            **dict.fromkeys(("armature", "frictionloss", "stiffness", "damping"), _AMOUNT),
             **{f"{name}{what}": _NUMBERS for name in _SOLVER_PARAMETERS for what in ("limit", "friction")},
         },
     ),
@@ -119,13 +134,15 @@ _ELEMENTS = {
             "mesh": _NAME,
             "contype": ("1",),
             "conaffinity": ("0",),
-            **dict.fromkeys(("size", "mass", "condim", "priority", "solmix", "margin", "gap", "friction"), _NUMBERS),
+            "size": _SIZE,
+            **dict.fromkeys(("mass", "friction"), _AMOUNT),
+            **dict.fromkeys(("condim", "priority", "solmix", "margin", "gap"), _NUMBERS),
             **dict.fromkeys(("adhesion", "surfacevel"), _NUMBERS),
         },
     ),
-    "site": _Element(("body",), 1024, {"name": _NAME, "size": _NUMBERS, "group": ("4",)}),
+    "site": _Element(("body",), 1024, {"name": _NAME, "size": _SIZE, "group": ("4",)}),
     "keyframe": _Element(("mujoco",), 1, {}),
-    "key": _Element(("keyframe",), 1, {"name": ("home",), "qpos": _NUMBERS}),
+    "key": _Element(("keyframe",), 1, {"name": ("home",), "qpos": _Range(-1000.0, 1000.0)}),
 }
 
 ENTITY = re.compile(r"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
@@ -188,21 +205,23 @@ def _check_attribute(element: ElementTree.Element, name: str, value: str) -> Non
         _fail(f"{label}: {name}: expected {expected}, got {value[:_MAX_QUOTE]!r}")
 
 
-def _is_valid(value: str, content: str | tuple[str, ...]) -> bool:
+def _is_valid(value: str, content: str | _Range | tuple[str, ...]) -> bool:
     """Return whether an attribute's value is valid content; see `_NAME`."""
+    if isinstance(content, _Range):
+        return _are_numbers(value, content)
     if isinstance(content, tuple):
         return value in content
     if content == _NAME:
         return _VALID_NAME.fullmatch(value) is not None
     if content == _INTEGER:
-        has_valid_digits = value.isascii() and value.isdecimal() and len(value) <= len(str(_MAX_INTEGER))
-        return has_valid_digits and int(value) <= _MAX_INTEGER
-    return _are_numbers(value)
+        has_valid_digits = value.isascii() and value.isdecimal() and len(value) <= len(str(MAX_INTEGER))
+        return has_valid_digits and int(value) <= MAX_INTEGER
+    raise ValueError(f"unknown content {content}")
 
 
-def _are_numbers(text: str) -> bool:
+def _are_numbers(text: str, valid: _Range) -> bool:
     try:
-        return all(abs(float(word)) <= _MAX_NUMBER for word in text.split())  # a comparison with NaN is false
+        return all(valid.low <= float(word) <= valid.high for word in text.split())  # a comparison with NaN is false
     except ValueError:
         return False
 

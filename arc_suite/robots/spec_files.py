@@ -41,8 +41,7 @@ def load_body(path: str | os.PathLike) -> Body:
     """
     if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
         path = EXAMPLES[checks.name(path, EXAMPLES, "spec", suggestions=("FILE.json",))]
-    with files.reading(path), Path(path).open("rb") as file:
-        data = file.read(MAX_IMPORTED + 1)
+    data = files.read_bytes(path, MAX_IMPORTED)
     max_bytes = MAX_IMPORTED if b'"source"' in data else MAX_BYTES
     try:
         if len(data) > max_bytes:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import archives, checks, files, registry, versions
+from arc_suite import archives, checks, files, parsers, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import UNTIMED, Track
@@ -34,6 +34,10 @@ _FIELDS = {
 }
 _PARAMETERS = dict.fromkeys(Parameters._fields, float) | {"phase_offsets": ("feet",)}
 _KINDS = {"contacts": "b"}  # of dtype; others are numbers
+
+
+class _OtherFormat(ValueError):
+    """A file of another format."""
 
 
 def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
@@ -82,39 +86,47 @@ def load(path: str | os.PathLike) -> list[Track]:
             been imported.
         OSError: the file cannot be read.
     """
-    with files.reading(path), open(path, "rb"):
-        pass  # the file can be read; later errors mean that it is damaged
+    files.read_bytes(path, 0)  # the file can be read; later errors mean that it is damaged
     try:
-        arrays = archives.read(path, _MAX_BYTES)
-        file_format = str(arrays.get("format", "no tracks"))[:80]
-        if file_format == FORMAT:
-            setup = Setup.from_dict(json.loads(_check_value("setup", arrays["setup"], str)))
-            count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
-            tracks = [_track(setup, arrays, index) for index in range(count)]
-            if any(_names(track) != _names(tracks[0]) for track in tracks):
-                raise ValueError("expected the same progress and gait in all tracks")
-            return tracks
+        with parsers.guard(
+            f"{path}: not a file of tracks, or a damaged one", passes=(registry.NotImported, _OtherFormat)
+        ):
+            return _read(path)
     except registry.NotImported as error:
         raise ValueError(f"{path}: {error}") from None
-    except Exception as error:  # a damaged archive may raise anything
-        raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quote(error)}") from None
-    raise ValueError(f"{path}: expected {FORMAT!r}, got {file_format!r}; record them anew")
+
+
+def _read(path: str | os.PathLike) -> list[Track]:
+    """Return the tracks of a file; a damaged one raises anything."""
+    arrays = archives.read(path, _MAX_BYTES)
+    file_format = str(arrays.get("format", "no tracks"))[:80]
+    if file_format != FORMAT:
+        raise _OtherFormat(f"{path}: expected {FORMAT!r}, got {file_format!r}; record them anew")
+    setup = Setup.from_dict(json.loads(_check_value("setup", arrays["setup"], str)))
+    arrays_by_index: dict[str, dict[str, np.ndarray]] = {}
+    for name, array in arrays.items():
+        index, slash, path_in_track = name.partition("/")
+        if slash:
+            arrays_by_index.setdefault(index, {})[path_in_track] = array
+    tracks = [_track(setup, arrays_by_index[str(index)]) for index in range(len(arrays_by_index))]
+    if any(_names(track) != _names(tracks[0]) for track in tracks):
+        raise ValueError("expected the same progress and gait in all tracks")
+    return tracks
 
 
 def _names(track: Track) -> tuple:
     return track.terms.keys(), track.progress.keys(), track.parameters is None
 
 
-def _track(setup: Setup, arrays: Mapping[str, np.ndarray], index: int) -> Track:
-    """Return the track of an index; arrays without axes become numbers."""
+def _track(setup: Setup, arrays: Mapping[str, np.ndarray]) -> Track:
+    """Return the track of arrays by their paths in it; arrays without axes become numbers."""
     fields: dict[str, Any] = {}
     for name, array in arrays.items():
-        first_key, *keys = name.split("/")
-        if first_key == str(index):
-            mapping = fields
-            for key in keys[:-1]:
-                mapping = mapping.setdefault(key, {})
-            mapping[keys[-1]] = array if array.ndim > 0 else array.item()
+        *keys, last_key = name.split("/")
+        mapping = fields
+        for key in keys:
+            mapping = mapping.setdefault(key, {})
+        mapping[last_key] = array if array.ndim > 0 else array.item()
     _check(fields, setup.body)
     if "parameters" in fields:
         fields["parameters"] = Parameters(**fields["parameters"])

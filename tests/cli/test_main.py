@@ -57,6 +57,32 @@ def test_every_program_is_listed():
     assert programs == {"main": "arc_suite.cli"} | main.PROGRAMS
 
 
+# Python drops docstrings; each program is a fork, as programs define the same flags.
+_HELP_WITHOUT_DOCSTRINGS = """
+import os, sys
+import arc_suite.cli.flags
+from arc_suite.cli import main
+for name in sys.argv[1:]:
+    child = os.fork()
+    if not child:
+        main.main(name, "--help")
+    _, status = os.waitpid(child, 0)
+    assert status == 0, name
+main.main("--help")
+"""
+
+
+@pytest.mark.slow
+def test_help_needs_no_docstrings():
+    programs_that_import = [name for name in main.PROGRAMS if name not in ("studio", "view")]
+    code = _HELP_WITHOUT_DOCSTRINGS.replace("sys.argv[1:]", repr(programs_that_import))
+    code = f"import sys; sys.argv = sys.argv[:1]\n{code}"
+    lines = interpreters.printed(code, options=["-OO"], PYTHONDONTWRITEBYTECODE="1")
+    assert lines.count("Help:") == len(programs_that_import)
+    for name in programs_that_import:
+        assert program_summary(name) in lines
+
+
 def test_version():
     assert programs.passed(run("--version")) == VERSION
 

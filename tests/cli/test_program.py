@@ -230,6 +230,25 @@ def test_what_a_kill_left_is_deleted_by_the_next_that_writes_the_file(tmp_path):
     assert sorted(tmp_path.glob(".*")) == sorted(others)
 
 
+@pytest.mark.parametrize("name", [".w.{node}.{dead}.mp4", ".walk.{node}.{dead}.glb", ".walk.{node}.{dead}.json"])
+def test_what_a_kill_left_for_other_files_is_deleted_when_it_is_old(name, tmp_path):
+    dead = programs.subprocess.Popen(["true"])
+    dead.wait()
+    left = tmp_path / name.format(node=platform.node(), dead=dead.pid)
+    alive = tmp_path / name.format(node=platform.node(), dead=os.getppid())
+    elsewhere = tmp_path / name.format(node="elsewhere", dead=dead.pid)
+    own_files = [tmp_path / ".w.mp4", tmp_path / f".{platform.node()}.12", tmp_path / f".a.{platform.node()}.b.mp4"]
+    for path in (left, alive, elsewhere, *own_files):
+        path.touch()
+    with writing(tmp_path / "other.png"):
+        assert left.exists()  # it may be of a process that is not seen from here
+    for path in (left, alive, elsewhere, *own_files):
+        os.utime(path, (0, 0))
+    with writing(tmp_path / "other.png"):
+        assert not left.exists()
+    assert all(path.exists() for path in (alive, elsewhere, *own_files))
+
+
 def test_long_work_writes_a_line_in_half_a_minute_into_a_log(monkeypatch, capsys):
     monkeypatch.setattr(program, "_LOG_INTERVAL", 0.0)  # in place of 30 s
     with program.progress(total=4, desc="training", unit="step") as bar:

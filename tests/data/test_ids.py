@@ -1,5 +1,7 @@
 """Ids of datasets."""
 
+import pwd
+
 import minari
 import pytest
 from datasets import ID, QUEEN, SHORT, collect
@@ -21,6 +23,19 @@ def test_unknown_ids():
         line = f"expected {names}, and a version at the end alone, such as {example!r}"
         with refused(f"dataset id {wrong!r}: {line}"):
             data.open(wrong)
+
+
+@pytest.mark.parametrize("home", ["/proc/none", None])
+def test_without_a_home_one_line_names_the_variable(home, monkeypatch):
+    def find_no_user(uid):
+        raise KeyError(f"getpwuid(): uid not found: {uid}")
+
+    monkeypatch.delenv("MINARI_DATASETS_PATH")
+    monkeypatch.setattr(pwd, "getpwuid", find_no_user)
+    monkeypatch.setenv("HOME", home) if home else monkeypatch.delenv("HOME")
+    for use in (lambda: data.open(ID), lambda: collect(ID, data.DatasetSettings(QUEEN, **SHORT), 1), ids.existing):
+        with pytest.raises(OSError, match=r"folder of datasets: .*; set MINARI_DATASETS_PATH to another folder$"):
+            use()
 
 
 def test_names_of_one_letter():

@@ -1,6 +1,8 @@
 """The suite keeps to itself: no files, no network, no side effects."""
 
 import os
+import subprocess
+import sys
 
 import interpreters
 import pytest
@@ -65,3 +67,31 @@ print([name for name, value in state().items() if value != before[name]])
 
 def test_import_has_no_side_effect_but_registration():
     assert interpreters.printed(IMPORT, MUJOCO_GL="egl") == ["[]"]
+
+
+MAKES = "import gymnasium, arc_suite; gymnasium.make('arc_suite/tick-walk-v0')"
+
+
+@pytest.mark.parametrize(
+    ("script", "file", "text"),
+    [
+        ("play.py", "gym.py", "def f(:"),
+        ("gym.py", "gym.py", MAKES),
+        ("play.py", "gym/__init__.py", "raise RuntimeError('mine')"),
+        ("play.py", "shimmy.py", ""),
+        ("play.py", "mujoco.py", ""),
+    ],
+)
+def test_a_users_file_that_hides_a_package_is_named(script, file, text, tmp_path):
+    (tmp_path / script).write_text(MAKES)
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text(text)
+    environ = os.environ | {"PYTHONPATH": str(interpreters.ROOT)}
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, env=environ, capture_output=True, text=True)
+    line = f"ImportError: cannot import arc_suite: {tmp_path / file} hides a package of the same name: rename it"
+    assert done.stderr.splitlines()[-1] == line
+
+
+def test_a_users_file_that_hides_nothing_is_not_named(tmp_path):
+    (tmp_path / "gym.py").write_text("")
+    assert interpreters.printed(f"{MAKES}; print('made')", folder=tmp_path) == ["made"]

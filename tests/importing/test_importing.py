@@ -238,6 +238,61 @@ def test_paths_are_bodies_everywhere_and_follow_the_file(tmp_path):
         registry.body_of(str(tmp_path / "none.urdf"))
 
 
+def test_all_files_that_a_robot_is_made_of_are_followed(tmp_path):
+    """A file that is included, one that is included there, a mesh, one that was missing, and the mesh of a URDF."""
+    main, include, deeper, mesh, late = (
+        tmp_path / name for name in ("robot.xml", "part.xml", "deeper.xml", "shell.stl", "late.stl")
+    )
+    text = GO2.read_text()
+    trunk = '<geom type="box" size="0.19 0.0468 0.057"/>'
+    assert trunk in text
+    shapes = '<geom type="mesh" mesh="shell" pos="0 0 0.1"/><geom type="mesh" mesh="late" pos="0 0 0.1"/>'
+    text = text.replace(trunk, trunk + shapes)
+    main.write_text(text.replace("<asset>", '<include file="part.xml"/><asset>', 1))
+    include.write_text('<mujoco><include file="deeper.xml"/></mujoco>')
+    deeper.write_text(
+        '<mujoco><asset><mesh name="shell" file="shell.stl"/><mesh name="late" file="late.stl"/></asset></mujoco>'
+    )
+    write_ball(mesh, 0.05)
+    first = registry.body_of(main)
+    assert registry.body_of(main) is first
+    write_ball(mesh, 0.06)
+    with_mesh = registry.body_of(main)
+    assert with_mesh != first
+    write_ball(late, 0.05)
+    with_late_mesh = registry.body_of(main)
+    assert with_late_mesh != with_mesh
+    deeper.write_text(deeper.read_text().replace('file="late.stl"', 'file="late.stl" scale="2 2 2"'))
+    with_scale = registry.body_of(main)
+    assert with_scale != with_late_mesh
+    include.write_text('<mujoco><include file="deeper.xml"/><option timestep="0.001"/></mujoco>')
+    assert registry.body_of(main) != with_scale
+    assert registry.body_of(main) is registry.body_of(str(main))
+
+
+def test_the_meshes_of_a_urdf_are_followed(tmp_path):
+    robot, mesh = tmp_path / "urdf" / "robot.urdf", tmp_path / "meshes" / "shell.stl"
+    robot.parent.mkdir(), mesh.parent.mkdir()
+    box = '<box size="0.267 0.194 0.114"/>'
+    text = A1.read_text()
+    assert box in text
+    robot.write_text(text.replace(box, '<mesh filename="package://a1/meshes/shell.stl"/>'))
+    without = registry.body_of(robot)
+    write_ball(mesh, 0.05)
+    first = registry.body_of(robot)
+    assert first != without
+    write_ball(mesh, 0.06)
+    assert registry.body_of(robot) != first
+
+
+def write_ball(path, radius):
+    """Write a mesh of four points."""
+    points = np.array([(-1, -1, -1), (1.2, -1, -1), (0, 1, -1), (0.1, 0, 0.5)], np.float32) * radius
+    faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+    rows = [struct.pack("<12fH", 0, 0, 0, *points[list(face)].ravel(), 0) for face in faces]
+    path.write_bytes(bytes(80) + struct.pack("<I", len(faces)) + b"".join(rows))
+
+
 def test_a_mesh_that_touches_by_a_contact_pair_alone_is_a_collider(tmp_path):
     text = GO2.read_text()
     text = text.replace("<asset>", '<asset><mesh name="tip" vertex="0 0 0 0.03 0 0 0 0.03 0 0 0 0.03"/>', 1)

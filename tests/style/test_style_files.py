@@ -119,14 +119,17 @@ archive = functools.partial(written, np.savez)
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"", "not a file of tracks, or a damaged one: File is not a zip file"),
+        (b"", "not a file of tracks, or a damaged one: no archive: File is not a zip file"),
         (b"walk", "not a file of tracks, or a damaged one: "),
         (written(np.save, np.zeros(3)), "not a file of tracks, or a damaged one: "),
         (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 4', got 'no tracks'; record them anew"),
         (archive(format="arc_suite tracks 1"), "expected 'arc_suite tracks 4', got 'arc_suite tracks 1'"),
         (archive(format="arc_suite tracks 4"), "not a file of tracks, or a damaged one: 'setup'"),
         (archive(format="arc_suite tracks 4", setup="{}"), "not a file of tracks, or a damaged one: expected robot"),
-        (archive(format=np.array([print], dtype=object)), "not a file of tracks, or a damaged one: Object arrays"),
+        (
+            archive(format=np.array([print], dtype=object)),
+            "not a file of tracks, or a damaged one: format.npy: expected numbers",
+        ),
     ],
 )
 def test_foreign_files_are_one_line(tmp_path, data, message):

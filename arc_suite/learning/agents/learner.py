@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from arc_suite import checks, seed_ranges
+from arc_suite import parsers, seed_ranges
 from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -99,8 +99,8 @@ def restoring() -> Iterator[None]:
     """Raise `Damaged` in place of the errors of a checkpoint that lacks something or does not fit."""
     try:
         yield
-    except (KeyError, ValueError) as error:
-        raise Damaged(checks.quote(error)) from None
+    except Exception as error:
+        raise Damaged(parsers.describe(error)) from None
 
 
 def generator(seed: int, purpose: str, count: int) -> np.random.Generator:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from arc_suite import checks, files, seed_ranges
-from arc_suite.learning.agents.learner import Damaged, RunContext
+from arc_suite import checks, files, parsers, seed_ranges
+from arc_suite.learning.agents.learner import RunContext
 from arc_suite.learning.agents.replay import Replay
 from arc_suite.tasks import Task
 
@@ -82,7 +82,7 @@ def open_replay(context: RunContext, task: Task) -> Replay:
             _add_episodes(replay, dataset, is_in_task)
             with files.writing_json(folder / _COUNTERS) as file:
                 file.update(total=replay.total, ends=replay.ends, checksum=replay.checksum, dataset=context.prior)
-    try:
+    with parsers.guard(f"prior {checks.preview(context.prior)}: {folder} is damaged", cure="; delete it"):
         replay = Replay(folder, count, size, joints, mode="r")
         counters = checks.mapping(_COUNTERS, files.read_json(folder / _COUNTERS))
         replay.restore(
@@ -91,9 +91,6 @@ def open_replay(context: RunContext, task: Task) -> Replay:
             checksum=checks.integer("checksum", counters["checksum"], 0),
         )
         return replay
-    except (Damaged, ValueError, KeyError, TypeError) as error:
-        damage = f"{folder} is damaged: {checks.quote(error)}"
-        raise ValueError(f"prior {checks.preview(context.prior)}: {damage}; delete it") from None
 
 
 def _open_dataset(prior: str):

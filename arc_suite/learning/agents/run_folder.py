@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import archives, checks, files
+from arc_suite import archives, checks, files, parsers
 
 CONFIG = "config.json"
 CHECKPOINT = "checkpoint.npz"
@@ -31,6 +31,7 @@ LEG_VIEWS = "leg_views"  # name of a field of records: the version of what legs 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
 _NUMBERS_OF_PROGRESS = {"evaluated", "wall", "cpu", "return"}  # those that a checkpoint may have
 _IGNORED_FIELDS = ("learner",)  # fields of records of earlier versions, which may differ
+_MAX_TABLE = 1 << 30  # bytes
 _MAX_CHECKPOINT_BYTES = 1 << 34  # unpacked; the labels of imitation are the largest part
 
 
@@ -133,10 +134,8 @@ def read_config(path: str | os.PathLike) -> dict[str, Any]:
     Raises:
         ValueError: no folder of a run.
     """
-    try:
+    with parsers.guard(f"{path}: no folder of a run"):
         config = files.read_json(Path(path) / CONFIG)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: no folder of a run: {checks.quote(error)}") from None
     if not isinstance(config, dict):
         raise ValueError(f"{path}: no folder of a run")
     return config
@@ -175,6 +174,12 @@ def check_same_run(path: str | os.PathLike, config: Mapping[str, Any], left_out:
             raise ValueError(
                 f"{path}: of another version, whose legs saw some blocks as the body has them; write to another folder"
             )
+        if name == "steps" and name not in left_out and folder_value < value:
+            algorithm = "finetune_bodies" if str(config.get("algorithm", "")).endswith("_bodies") else "finetune"
+            raise ValueError(
+                f"{path}: of a run of {folder_value} steps, which cannot be extended; to train its policy further, "
+                f"write to another folder with --algorithm {algorithm} --hp start={path}"
+            )
         field, _, _ = name.partition(".")
         if field not in (*left_out, *_IGNORED_FIELDS):
             raise ValueError(
@@ -197,8 +202,8 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
         ValueError: a damaged table.
     """
     path = Path(path) / f"{name}.csv"
-    try:
-        text = path.read_text(encoding="utf-8") if path.exists() else ""
+    with parsers.guard(f"{path}: no table of a run"):
+        text = files.read_text(path, _MAX_TABLE) if path.exists() else ""
         text_of_complete_lines = text[: text.rfind("\n") + 1]
         header, *table_lines = text_of_complete_lines.splitlines() or [""]
         table_columns = header.split(",")
@@ -206,8 +211,6 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
         if table_lines and missing:
             raise ValueError(f"expected a column {missing[0]}")
         return [dict(zip(table_columns, line.split(","), strict=True)) for line in table_lines]
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: no table of a run: {checks.quote(error)}") from None
 
 
 def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
@@ -218,10 +221,8 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     """
     table_lines = lines(path, name)
     columns = table_lines[0].keys() if table_lines else ()
-    try:
+    with parsers.guard(f"{Path(path) / name}.csv: no table of a run"):
         return {column: np.array([line[column] for line in table_lines], float) for column in columns}
-    except ValueError as error:
-        raise ValueError(f"{Path(path) / name}.csv: no table of a run: {checks.quote(error)}") from None
 
 
 def check_latest_evaluation(path: str | os.PathLike, step: int) -> None:
@@ -301,7 +302,7 @@ def _read_checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np
     """Return the arrays and the progress of a checkpoint; None and an empty progress where there is no file."""
     if not path.exists():
         return None, {}
-    try:
+    with parsers.guard(f"{path} is damaged", cure="; delete it to start the run over"):
         arrays = archives.read(path, _MAX_CHECKPOINT_BYTES, None if with_arrays else _PROGRESS)
         progress = json.loads(str(arrays.pop(_PROGRESS)))
         lengths = checks.mapping("tables", checks.mapping(_PROGRESS, progress).get("tables"))
@@ -312,5 +313,3 @@ def _read_checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np
         for step in progress.get("pending", []):
             checks.integer("pending", step, 1)
         return arrays, progress
-    except (OSError, TypeError, ValueError, KeyError, RecursionError) as error:
-        raise ValueError(f"{path} is damaged: {checks.quote(error)}; delete it to start the run over") from None

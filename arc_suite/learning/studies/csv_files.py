@@ -1,10 +1,13 @@
 """Tables of studies in files of CSV: lines are dictionaries of text by column."""
 
 import csv
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from arc_suite import files
+from arc_suite import files, parsers
+
+_MAX_BYTES = 1 << 28  # of a file
 
 
 def read(path: Path, columns: Sequence[str] | None = None) -> list[dict[str, str]]:
@@ -20,8 +23,9 @@ def read(path: Path, columns: Sequence[str] | None = None) -> list[dict[str, str
     """
     if not path.exists():
         return []
-    with files.reading(path), path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
+    text = files.read_text(path, _MAX_BYTES)
+    with parsers.guard(f"{path}: no table"):
+        reader = csv.DictReader(io.StringIO(text, newline=""))
         lines = list(reader)
         columns_in_file = reader.fieldnames or []
     expected_columns = list(columns or columns_in_file)

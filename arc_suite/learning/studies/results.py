@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, evaluation
+from arc_suite import evaluation, parsers
 from arc_suite.evaluation import anchors, provenance
 from arc_suite.evaluation.published import CURVES
 from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, PROVENANCE_FIELDS, TRAINING_SEEDS
@@ -89,10 +89,8 @@ def read_results(runs: Sequence[Run], published: Path) -> list[RunResult]:
     episodes_by_run = read_episodes(published)
     row_by_run = {row["run"]: row for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
     published_runs = [run for run in runs if run.name in episodes_by_run]
-    try:
+    with parsers.guard(f"{published / EVALUATIONS}: damaged"):
         return [_result(run, episodes_by_run[run.name], row_by_run[run.name]) for run in published_runs]
-    except (KeyError, ValueError) as error:
-        raise ValueError(f"{published / EVALUATIONS}: damaged: {checks.quote(error)}") from None
 
 
 def read_episodes(published: Path) -> dict[str, list[dict[str, str]]]:
