@@ -40,7 +40,7 @@ def read(path: str | os.PathLike, max_bytes: int, only: str | None = None) -> di
     return arrays
 
 
-def read_text(path: str | os.PathLike, member: str, max_bytes: int) -> str:
+def read_member(path: str | os.PathLike, member: str, max_bytes: int) -> str:
     """Return the text of a member of an archive.
 
     Args:

@@ -208,7 +208,7 @@ def read_bytes(path: str | os.PathLike, max_bytes: int) -> bytes:
             return file.read(max_bytes + 1)
 
 
-def read_text(path: str | os.PathLike, max_bytes: int) -> str:
+def read_utf8(path: str | os.PathLike, max_bytes: int) -> str:
     """Return the text of a file that others may have written, with line ends as `open` reads them.
 
     Raises:

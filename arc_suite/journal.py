@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from arc_suite import checks, files
+from arc_suite import checks, files, parsers
 
 _MAX_BYTES = 1 << 30  # of a file
 
@@ -86,13 +86,11 @@ def _read_generations(path: Path, text: bytes, header: bytes, generation: Callab
         ValueError: the text is no journal, or has another header.
     """
     advice = "delete it or write to another folder"
-    try:
+    with parsers.guard(f"{path}: no journal of a search", cure=f"; {advice}"):
         stored_settings, *lines = map(json.loads, text.splitlines())
         settings = json.loads(header)
         different_names = [name for name in settings if stored_settings[name] != settings[name]]
         generations = [generation(**fields) for fields in lines]
-    except Exception:  # `generation` takes fields of any kind
-        raise ValueError(f"{path}: no journal of a search; {advice}") from None
     if different_names:
         name = different_names[0]
         stored_value = checks.quote(stored_settings[name])

@@ -1,5 +1,6 @@
 """Ids of datasets, and where Minari keeps them."""
 
+import os
 import re
 from pathlib import Path
 
@@ -48,8 +49,10 @@ def root() -> Path:
         OSError: the folder cannot be made, as where there is no home.
     """
     try:
+        if "MINARI_DATASETS_PATH" not in os.environ:
+            Path.home()  # raises a RuntimeError for a user without a home, where Minari would make a folder `~`
         return get_dataset_path()
-    except (OSError, RuntimeError) as error:  # Python raises a RuntimeError for a user without a home
+    except (OSError, RuntimeError) as error:
         raise OSError(
             f"cannot make the folder of datasets: {checks.quote(error)}; set MINARI_DATASETS_PATH to another folder"
         ) from None

@@ -27,6 +27,7 @@ PACKAGED = Path(__file__).with_name("packaged")  # policy files that come with t
 EXTENSION = ".npz"
 FILE = f"policy{EXTENSION}"  # in the folder of a run
 
+_MAX_NAMES = 16  # of blocks in an error
 _MAX_BYTES = 1 << 28  # of a file, unpacked
 
 
@@ -79,10 +80,13 @@ class Network(NamedTuple):
         sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
             names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
-            wrong = ", ".join(f"{name} has {sizes.get(name, 0)}, not {self.blocks.get(name, 0)}" for name in names)
+            wrong = ", ".join(
+                f"{checks.quote(name)} has {sizes.get(name, 0)}, not {self.blocks.get(name, 0)}"
+                for name in names[:_MAX_NAMES]
+            )
             are_all_additional = set(names).isdisjoint(self.blocks)
             if are_all_additional:
-                cure = f"exclude_blocks={json.dumps(names)} leaves out what it does not read"
+                cure = f"exclude_blocks={checks.quote(json.dumps(names))} leaves out what it does not read"
             else:
                 cure = "train with this body and task"
             setup_text = f"{self.setup.name}, {self.setup.kind.name}"

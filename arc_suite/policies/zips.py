@@ -27,7 +27,7 @@ def content(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise OSError(f"cannot read {path}: no such file")
     with parsers.guard(f"policy {path}: no policy of stable-baselines3"):
-        return dict(json.loads(archives.read_text(path, "data", files.MAX_JSON)))
+        return dict(json.loads(archives.read_member(path, "data", files.MAX_JSON)))
 
 
 def setup(path: Path) -> Setup | None:

@@ -19,7 +19,7 @@ from arc_suite.tasks.parameters import Parameters
 
 FORMAT = "arc_suite tracks 4"  # another number for every change of what a file holds
 
-_MAX_BYTES = 1 << 32  # bytes of all arrays
+_MAX_BYTES = 1 << 30  # bytes of all arrays
 
 # Types of single values, and shapes of arrays.
 _FIELDS = {

@@ -39,6 +39,6 @@ def test_a_journal_of_something_else_is_refused_and_left_alone(tmp_path):
     assert path.read_bytes() == whole
     for text in ("notes\n", "[]\n", '{"robot": "bastion"}\n', whole.decode() + "notes\n", whole.decode() + "{}\n"):
         path.write_text(text)
-        with pytest.raises(ValueError, match=r"^.*journal.jsonl: no journal of a search; delete it or write"):
+        with pytest.raises(ValueError, match=r"^.*journal.jsonl: no journal of a search: .*; delete it or write"):
             Journal(path, SETTINGS, Generation)
         assert path.read_text() == text

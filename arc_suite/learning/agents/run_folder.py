@@ -16,7 +16,7 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class RunFolder:
         self.arrays = arrays
         self.progress = progress
         lengths = progress.get("tables", {})  # of the tables at the checkpoint, bytes
-        self._files = {name: (path / f"{name}.csv").open("ab", buffering=0) for name in TABLES}
+        self._files = {name: _open_table(path / f"{name}.csv") for name in TABLES}
         self._columns = {}
         for name, file in self._files.items():
             length = lengths.get(name, 0)
@@ -96,6 +96,12 @@ class RunFolder:
         """Close the tables."""
         for file in self._files.values():
             file.close()
+
+
+def _open_table(path: Path) -> IO[bytes]:
+    if path.exists() and not path.is_file():  # a pipe would block
+        raise OSError(f"cannot write {path}: expected a file")
+    return path.open("ab", buffering=0)
 
 
 def _cell_text(value) -> str:
@@ -203,7 +209,7 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
     """
     path = Path(path) / f"{name}.csv"
     with parsers.guard(f"{path}: no table of a run"):
-        text = files.read_text(path, _MAX_TABLE) if path.exists() else ""
+        text = files.read_utf8(path, _MAX_TABLE) if path.exists() else ""
         text_of_complete_lines = text[: text.rfind("\n") + 1]
         header, *table_lines = text_of_complete_lines.splitlines() or [""]
         table_columns = header.split(",")
@@ -303,7 +309,8 @@ def _read_checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np
     if not path.exists():
         return None, {}
     with parsers.guard(f"{path} is damaged", cure="; delete it to start the run over"):
-        arrays = archives.read(path, _MAX_CHECKPOINT_BYTES, None if with_arrays else _PROGRESS)
+        max_bytes = min(_MAX_CHECKPOINT_BYTES, files.plain(path).stat().st_size)  # `save` packs nothing
+        arrays = archives.read(path, max_bytes, None if with_arrays else _PROGRESS)
         progress = json.loads(str(arrays.pop(_PROGRESS)))
         lengths = checks.mapping("tables", checks.mapping(_PROGRESS, progress).get("tables"))
         for name in TABLES:

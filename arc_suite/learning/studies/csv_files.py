@@ -23,7 +23,7 @@ def read(path: Path, columns: Sequence[str] | None = None) -> list[dict[str, str
     """
     if not path.exists():
         return []
-    text = files.read_text(path, _MAX_BYTES)
+    text = files.read_utf8(path, _MAX_BYTES)
     with parsers.guard(f"{path}: no table"):
         reader = csv.DictReader(io.StringIO(text, newline=""))
         lines = list(reader)

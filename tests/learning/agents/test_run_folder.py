@@ -180,6 +180,14 @@ def test_pipes_are_not_waited_for(path):
             run_folder.read_progress(path) if name == "checkpoint.npz" else run_folder.read_config(path)
 
 
+def test_a_table_that_is_a_pipe_is_not_waited_for(path):
+    (path / "training.csv").unlink()
+    os.mkfifo(path / "training.csv")
+    for read in (lambda: run_folder.table(path, "training"), lambda: open_run(path, CONFIG).__enter__()):
+        with pytest.raises((ValueError, OSError), match=r"training\.csv: .*expected a file$"):
+            read()
+
+
 def test_a_table_that_has_lost_lines(path):
     (path / "training.csv").write_text("step,loss\n")
     one_line(path, r"training\.csv: shorter than at the checkpoint; delete checkpoint\.npz to start over$")
