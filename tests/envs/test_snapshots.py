@@ -169,7 +169,9 @@ def test_something_is_missing():
     environment.reset()
     arrays = environment.snapshot()
     del arrays["random/keys"]
-    with pytest.raises(ValueError, match=r"^snapshot: of another setup or number of environments: 'random/keys'$"):
+    with pytest.raises(
+        ValueError, match=r"^snapshot: of another setup or number of environments: 'random/keys' is missing$"
+    ):
         envs().restore(arrays)
 
 

@@ -1,6 +1,7 @@
 """Pipes, devices and folders in place of files: one line at once, as nobody may ever write to a pipe."""
 
 import os
+from pathlib import Path
 
 import pytest
 
@@ -30,7 +31,7 @@ def test_a_pipe_is_refused_at_once(name, tmp_path):
 
 def test_a_device_is_no_file():
     with pytest.raises(OSError, match=r"^cannot read /dev/zero: expected a file$"):
-        load_body("/dev/zero")
+        load_body(Path("/dev/zero"))
 
 
 def test_a_text_that_is_too_large_is_not_read(tmp_path):
