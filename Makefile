@@ -23,6 +23,7 @@
 #   robots              robots of others, in wheels (320 MB): they come in, with the same bits, and walk; minutes
 #   bodies, survey, following, directing, leaps, clip-sets    many bodies: bit-equality, walks, commands, clips; half an hour
 #   soak, fuzz, loopholes, mutants    memory over two million steps; damaged files; policies that cheat; planted mistakes (hours)
+#   absurd              ten thousand absurd values of settings: each is refused, or has an effect; minutes
 
 SHELL := /bin/bash
 # Tests start some hundred programs; without bytecode each compiles the package anew.
@@ -238,6 +239,7 @@ check-clip-sets: RUN = $(PYTHON) tests/clip_sets.py
 check-soak: RUN = $(PYTHON) tests/soak.py
 check-loopholes: RUN = $(PYTHON) tests/loopholes.py
 check-fuzz: RUN = $(PYTHON) tests/fuzz.py
+check-absurd: RUN = $(PYTHON) tests/absurd.py
 check-mutants: RUN = $(PYTHON) tests/mutants.py
 
 clean:

@@ -6,7 +6,7 @@ import math
 import operator
 import os
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ MAX_SEED = 2**32 - 1  # the largest seed of a NumPy `RandomState`
 
 # Lower bounds between 0 and this number only exclude 0, so errors say "above 0" in place of the bound.
 _MIN_NAMED_BOUND = 1e-6
+_MAX_DIGITS = 20  # of an integer in a text
 _MAX_QUOTE = 300  # characters
 _MAX_PATH = 80  # characters of a path `module:name` in an error
 
@@ -33,12 +34,11 @@ def name(value, valid: Iterable[str], kind: str, suggestions: Iterable[str] = ()
         ValueError: the name is not valid. The message suggests a similar valid name and lists all of them.
     """
     valid_names = list(valid)
-    if value in valid_names:
+    if isinstance(value, Hashable) and value in valid_names:  # arrays, which are not hashable, compare by element
         return value
     listed_names = [*valid_names, *suggestions]
-    raise ValueError(
-        f"unknown {kind} {preview(value)}{hint(value, listed_names)} (there are: {', '.join(listed_names)})"
-    )
+    list_text = f"there are: {', '.join(listed_names)}" if listed_names else "there are none"
+    raise ValueError(f"unknown {kind} {preview(value)}{hint(value, listed_names)} ({list_text})")
 
 
 def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
     items = (value,) if isinstance(value, str) else value
     if not isinstance(items, tuple | list):
         raise ValueError(f"{what}: expected names of {kind}s, got {preview(value)}")
-    return tuple(name(item, valid, kind) for item in items)
+    return tuple(name(item, valid, f"{kind} of {what}") for item in items)
 
 
 def hint(value, valid: Iterable[str]) -> str:
@@ -107,6 +107,14 @@ def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
         bounds = f"from {low}" if high is None else f"from {low} to {high}"
         raise ValueError(f"{what}: expected an integer {bounds}, got {preview(value)}")
     return result
+
+
+def digits(text: str) -> int | None:
+    """Return the integer that decimal digits of a text write; None for another text, and for more than 20 digits.
+
+    Python itself refuses to convert texts of thousands of digits, in words that name no setting.
+    """
+    return int(text) if text.isdecimal() and len(text) <= _MAX_DIGITS else None
 
 
 def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:

@@ -21,6 +21,10 @@ except ImportError:  # Windows
     import msvcrt
 
 MAX_JSON = 1 << 24  # bytes
+
+# Errors of a disk that is full, of limits on the size of files and of a broken disk; they name no file.
+_STORAGE_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+
 _LOCKED_BYTE = 1 << 30  # position in the file, on Windows; far behind all content, as others cannot read a locked byte
 _LOCK_RETRY_INTERVAL = 0.1  # s
 _MIN_AGE = 3600.0  # s, of a temporary file of another target
@@ -71,15 +75,27 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
     except OSError as error:
         raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
     try:
-        yield temporary
-        if temporary.exists():
-            temporary.replace(target)
-    except OSError as error:
-        if error.errno != errno.ENOSPC:
-            raise
-        raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+        with naming(path):
+            yield temporary
+            if temporary.exists():
+                temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def naming(path: str | os.PathLike) -> Iterator[None]:
+    """Name a file, or another place that is written to, in errors of its disk, which name none.
+
+    Raises:
+        OSError: the disk is full or broken, or the file is too large.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _STORAGE_ERRORS:
+            raise
+        raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
 
 
 def write(path: str | os.PathLike, text: str) -> None:

@@ -60,8 +60,9 @@ class Journal:
         self._file.close()
 
     def _write(self, line: bytes) -> None:
-        self._file.write(line)
-        self._file.flush()
+        with files.naming(self._file.name):
+            self._file.write(line)
+            self._file.flush()
 
 
 def _to_line(fields: Mapping[str, Any]) -> bytes:

@@ -77,6 +77,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         ValueError: a policy or preset that a page cannot run, or that does not fit the body.
         OSError: a policy's file cannot be read.
     """
+    policies.check_preset(policy, preset)
     setup = Setup.of(body, _DEMONSTRATOR_TASK if policy == "cpg" else _NETWORK_TASK)
     command_task = setup.definition
     if policy == "cpg":

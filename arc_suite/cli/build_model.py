@@ -21,7 +21,15 @@ from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
-from arc_suite.cli.flags import DEFAULT_LINKS, custom_body, define_body, define_task, task_from_flags
+from arc_suite.cli.flags import (
+    DEFAULT_LINKS,
+    adjust_body,
+    custom_body,
+    define_body,
+    define_task,
+    refuse_flags,
+    task_from_flags,
+)
 from arc_suite.cli.summary import body_summary
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import spec_files
@@ -56,6 +64,7 @@ def main() -> None:
     """Build the body and write it."""
     if FLAGS.render is not None:
         checks.extension(FLAGS.render, [".png"])
+    _check_flags()
     body = _body_from_flags()
     arena = _arena_from_flags(body)
     with contextlib.ExitStack() as stack:
@@ -76,6 +85,19 @@ def main() -> None:
             print(f"wrote {path}")
 
 
+def _check_flags() -> None:
+    """Raise ValueError for a flag that has no effect with the others."""
+    writes_text = FLAGS.output is not None or not (FLAGS.summary or FLAGS.render is not None)
+    if not writes_text:
+        refuse_flags(("json", "visuals", "no_arena"), "goes with --output, as no model is written")
+        if FLAGS.render is None:
+            refuse_flags(("task", "set"), "goes with --output or --render, as no model is written")
+    if FLAGS.json:
+        refuse_flags(("visuals", "no_arena"), "goes without --json, as a spec has no decorations and no arena")
+        if FLAGS.render is None:
+            refuse_flags(("task", "set"), "goes without --json, as a spec has no arena")
+
+
 def _body_from_flags() -> Body:
     """Return the body that flags name or describe.
 
@@ -92,10 +114,10 @@ def _body_from_flags() -> Body:
                 raise ValueError(f"--{name}={FLAGS[name].value}: goes with --legs or --seed, not with --{sources[0]}")
         body = custom_body() or registry.body_of(FLAGS.robot)
     elif "seed" in sources:
-        body = sound_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
+        body = adjust_body(sound_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout))
     else:
         links = DEFAULT_LINKS if FLAGS.links is None else FLAGS.links
-        body = generator.generate(FLAGS.legs, links, FLAGS.layout)
+        body = adjust_body(generator.generate(FLAGS.legs, links, FLAGS.layout))
     if FLAGS.scale is None:
         return body
     return generator.scaled(body, FLAGS.scale)
@@ -108,7 +130,25 @@ def _arena_from_flags(body: Body) -> Arena:
     if FLAGS.no_arena:
         raise ValueError("--no_arena: goes without --task and --set, which bring an arena")
     task, settings = task_from_flags()
-    return Setup.of(body, task, settings).definition.scene.arena
+    setup = Setup.of(body, task, settings)
+    arena = setup.definition.scene.arena
+    _check_settings_shape_arena(setup, arena)
+    return arena
+
+
+def _check_settings_shape_arena(setup: Setup, arena: Arena) -> None:
+    """Raise ValueError for a setting that the model does not show.
+
+    The model has the settings of the task's ground, and every other setting without which the arena is another one.
+    """
+    ground = getattr(setup.kind, "ground", None)
+    names_of_ground = ("arena", *getattr(ground, "settings", ()))
+    for name in setup.task_kwargs:
+        if name in names_of_ground:
+            continue
+        arena_without = setup.with_settings({}, dropped=[name]).definition.scene.arena
+        if arena_without == arena:
+            raise ValueError(f"--set {name}: a model holds body and ground, and this setting changes neither")
 
 
 def _text(body: Body, arena: Arena) -> str:

@@ -18,7 +18,7 @@ Exit status 1 if there is any flaw, fall, slow walk or difference.
 from absl import flags
 
 from arc_suite import registry
-from arc_suite.cli.flags import ROBOT_HELP, define_task, task_from_flags
+from arc_suite.cli.flags import ROBOT_HELP, define_task, refuse_flags, task_from_flags
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance, cures
 from arc_suite.models.soundness import flaws
@@ -39,6 +39,8 @@ def main(spec: str | None = None) -> int:
         raise ValueError("expected a spec file or --task; see --help")
     if FLAGS.walk and spec is None:
         raise ValueError("--walk: expected a spec file, got --task")
+    if spec is not None:
+        refuse_flags(("set", "robot"), "goes with --task, not with a spec file")
     is_sound = _check_task() if spec is None else _check_body(spec)
     return 0 if is_sound else 1
 

@@ -28,6 +28,7 @@ from arc_suite.cli.flags import (
     define_policy,
     define_task,
     policy_name,
+    refuse_flags,
     setups_from_flags,
 )
 from arc_suite.cli.program import progress
@@ -81,6 +82,23 @@ flags.DEFINE_integer(
     "threads", None, "Threads to simulate on; the data do not depend on it. [default: all]", lower_bound=1
 )
 
+# Flags that determine a dataset, or what becomes of it.
+_COLLECTION_FLAGS = (
+    "policy",
+    "vecnormalize",
+    "checkpoint",
+    "quality",
+    "preset",
+    "noise",
+    "episodes",
+    "steps",
+    "seed",
+    "id",
+    "overwrite",
+    "author",
+    "code_permalink",
+)
+
 
 def main() -> None:
     """Collect or verify."""
@@ -88,6 +106,8 @@ def main() -> None:
         from arc_suite import data
     except ImportError as error:
         raise ValueError(str(error)) from None
+    if FLAGS.verify is not None:
+        refuse_flags(_COLLECTION_FLAGS, "expected none with --verify, as the dataset holds what it was collected by")
     setups = setups_from_flags()
     if FLAGS.verify is not None:
         any_setup = next(iter(setups.values()))
@@ -99,6 +119,7 @@ def main() -> None:
     if FLAGS.id is not None and len(setups) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(setups)}")
     for name in FLAGS.preset or ():
+        policies.check_preset(FLAGS.policy, name)
         check_preset_name(name)
     policy, label = policy_and_label()
     for setup in setups.values():

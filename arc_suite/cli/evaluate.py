@@ -17,7 +17,7 @@ import functools
 from absl import flags
 
 from arc_suite import checks, evaluation, files, seed_ranges, versions
-from arc_suite.cli.flags import MAX_COUNT, define_walk, policy_name, setups_from_flags
+from arc_suite.cli.flags import MAX_COUNT, define_walk, policy_name, preset_from_flags, setups_from_flags
 from arc_suite.cli.program import progress
 from arc_suite.cli.summary import transport_footnote
 from arc_suite.evaluation import provenance, reports
@@ -37,8 +37,9 @@ def main() -> None:
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     policy = policy_name(FLAGS.policy)
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
+    preset = preset_from_flags()
     training_seeds = provenance.training_seeds(policy, seeds)
-    players = [reports.player(policy, setup, FLAGS.preset) for setup in setups.values()]
+    players = [reports.player(policy, setup, preset) for setup in setups.values()]
     with files.writing_json(FLAGS.json) as json_content:
         reports_of_robots = print_reports(players, seeds)
         any_report = reports_of_robots[0]  # all are of one task

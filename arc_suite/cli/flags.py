@@ -84,6 +84,16 @@ def define_vecnormalize() -> None:
     )
 
 
+def preset_from_flags() -> str | None:
+    """Return the preset of --preset; None without the flag.
+
+    Raises:
+        ValueError: --policy is not the demonstrator, or no preset has this name.
+    """
+    policies.check_preset(FLAGS.policy, FLAGS.preset)
+    return FLAGS.preset
+
+
 def policy_name(name: str) -> str:
     """Return the name of a policy with the statistics of --vecnormalize, if there are any.
 
@@ -111,14 +121,19 @@ def custom_body() -> Body | None:
     if FLAGS.links is not None and FLAGS.legs is None:
         raise ValueError(f"--links={FLAGS.links}: goes with --legs")
     if FLAGS.spec is None and FLAGS.legs is None:
-        for name in ("length", "palette"):
-            if FLAGS[name].present:
-                raise ValueError(f"--{name}: goes with --spec or --legs")
+        refuse_flags(("length", "palette"), "goes with --spec or --legs")
         return None
     if FLAGS.spec is not None:
-        body = registry.body_of(FLAGS.spec)
-    else:
-        body = generator.generate(FLAGS.legs, DEFAULT_LINKS if FLAGS.links is None else FLAGS.links)
+        return adjust_body(registry.body_of(FLAGS.spec))
+    return adjust_body(generator.generate(FLAGS.legs, DEFAULT_LINKS if FLAGS.links is None else FLAGS.links))
+
+
+def adjust_body(body: Body) -> Body:
+    """Return a body with the lengths of --length and the colors of --palette.
+
+    Raises:
+        ValueError: an unknown link, or a value that does not fit.
+    """
     if FLAGS.length:
         body = shaping.shaped(body, links=named_values("length", FLAGS.length))
     if FLAGS.palette is not None:
@@ -306,6 +321,18 @@ def task_from_flags() -> tuple[str, dict[str, Any]]:
     return FLAGS.task, settings
 
 
+def refuse_flags(names: Iterable[str], reason: str) -> None:
+    """Raise ValueError for the first of these flags that the command line has: it would have no effect.
+
+    Args:
+        names: names of flags.
+        reason: what the flags go with, or what there is in place of them.
+    """
+    for name in names:
+        if FLAGS[name].present:
+            raise ValueError(f"--{name}: {reason}")
+
+
 def check_flags_suit_file(extension: str, extensions_of_flags: Mapping[str, Iterable[str]]) -> None:
     """Check that all flags of the command line suit the file to write.
 
@@ -329,13 +356,15 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
         texts: texts of the command line; values are JSON where they parse, else text.
 
     Raises:
-        ValueError: a text without a name or without =.
+        ValueError: a text without a name or without =, or a name twice.
     """
     values: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name and equals):
             raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value")
+        if name in values:
+            raise ValueError(f"--{flag} {checks.quote(text)}: {checks.quote(name)} has a value already")
         try:
             values[name] = json.loads(value)
         except ValueError:

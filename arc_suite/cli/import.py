@@ -14,7 +14,7 @@ import contextlib
 
 from absl import flags
 
-from arc_suite import checks, files
+from arc_suite import checks, files, registry
 from arc_suite.importing import import_robot
 from arc_suite.robots.spec_files import body_to_json
 
@@ -28,13 +28,16 @@ def main(robot: str | None = None) -> None:
     """Import the robot, write the body, and print a line for each thing to know."""
     if robot is None:
         raise ValueError("expected a file in MJCF or URDF; see --help")
-    feet = [name for name in FLAGS.feet if name]
+    if robot in registry.robot_words():
+        raise ValueError(f"{robot} is a body of the suite: every program takes it as --robot={robot}")
+    if not all(FLAGS.feet):
+        raise ValueError(f"--feet={','.join(FLAGS.feet)}: expected names with commas between them")
     with contextlib.ExitStack() as stack:
         output_path = None
         if FLAGS.output is not None:
             checks.extension(FLAGS.output, [".json"])
             output_path = stack.enter_context(files.writing(FLAGS.output))
-        body, notes = import_robot(robot, FLAGS.home, feet)
+        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet)
         if output_path is not None:
             output_path.write_text(body_to_json(body), encoding="utf-8")
     print(f"{robot}: {body.name}")

@@ -19,7 +19,7 @@ from dm_control.rl.control import PhysicsError
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import checks, policies, registry
+from arc_suite import checks, files, policies, registry
 from arc_suite.cli.help_text import help_text
 from arc_suite.cli.programs import docstring_of
 from arc_suite.simulation.opengl import RenderingUnavailable
@@ -150,6 +150,7 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
         warnings.showwarning = print_reason
         try:
             status = work()
+            output.flush()  # in which a full disk may raise
         except (flags.Error, ValueError, OSError, RenderingUnavailable, PhysicsError) as error:
             print_reason(error)
             status = 1
@@ -167,12 +168,12 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
     A flag of several words may be written with dashes, too.
 
     Raises:
-        ValueError: a flag that the program does not have, or a value that its flag does not take.
+        ValueError: a flag that the program does not have, a value that its flag does not take, or an empty one.
         flags.Error: a flag without its value.
     """
     with_underscores = [_FLAG_NAME.sub(lambda match: match[0].replace("-", "_"), text) for text in arguments]
     try:
-        return flags.FLAGS(with_underscores)
+        positional_arguments = flags.FLAGS(with_underscores)
     except flags.UnrecognizedFlagError as error:
         names = sorted({flag.name for flag in _flags_of(module)})
         checks.name(error.flagname, names, "flag")  # raises a ValueError that suggests a name
@@ -184,6 +185,10 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
         choices = getattr(parser, "enum_values", ("true", "false"))
         expected = parser.syntactic_help or " or ".join(choices)
         raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}") from None
+    for flag in _flags_of(module):
+        if flag.present and flag.value in ("", []):
+            raise ValueError(f"--{flag.name}=: expected a value, got none")
+    return positional_arguments
 
 
 def _suggest_flag(argument: str) -> str:
@@ -234,20 +239,26 @@ class _Output:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        with self._without_broken_pipe():
+        with files.naming("the output"), self._without_broken_pipe():
             self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
-        with self._without_broken_pipe():
+        with files.naming("the output"), self._without_broken_pipe():
             self._stream.flush()
 
     @contextlib.contextmanager
     def _without_broken_pipe(self):
-        """Send the stream to the null device if nobody reads it any more."""
+        """Send the stream to the null device if nobody reads it any more, or if it cannot be written.
+
+        Raises:
+            OSError: the output cannot be written.
+        """
         try:
             yield
-        except BrokenPipeError:
+        except OSError as error:
             null_device = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null_device, self._stream.fileno())  # drops the buffer of the stream, too, at exit
             os.close(null_device)
+            if not isinstance(error, BrokenPipeError):
+                raise

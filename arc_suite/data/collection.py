@@ -62,6 +62,8 @@ def collect(
         KeyboardInterrupt: the same.
     """
     _check(settings, episodes)
+    checks.boolean("overwrite", overwrite)
+    checks.boolean("wait", wait)
     further_metadata = {}
     if author is not None:
         further_metadata["author"] = [author]  # Minari makes a set of it

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from arc_suite import checks, registry
 from arc_suite.models.sizing import simulation
@@ -123,7 +124,7 @@ def _step_limit(time_limit, control_timestep: float) -> float:
     """Return how many control steps fill a time limit, s: at least 1."""
     if time_limit is None:
         return STEPS
-    if time_limit == math.inf:
+    if isinstance(time_limit, float | np.floating) and time_limit == math.inf:
         return math.inf
     steps = parameters.positive("time_limit", time_limit) / control_timestep
     return max(1, math.ceil(steps - _ROUNDING))

@@ -166,6 +166,7 @@ def player(policy: str | os.PathLike | Policy | Callable, setup: Setup, preset: 
         ValueError: as `evaluate`.
         OSError: as `evaluate`.
     """
+    policies.check_preset(policy, preset)
     environment = setup.load()
     if policy == "cpg" and preset is None:
         preset = suited_preset(environment.task.definition)

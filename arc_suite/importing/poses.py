@@ -152,6 +152,10 @@ def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
 def _stance_of_keyframe(robot: Robot, home: str, named_feet: dict[Chain, list[int]] | None) -> Stance:
     """Return the stance of a keyframe, without checks except that it has legs."""
     keyframes = [robot.model.key(key).name for key in range(robot.model.nkey)]
+    if not any(keyframes):
+        raise SpecError(
+            f"keyframe {checks.preview(home)}: the file names none; without --home a standing pose is found"
+        )
     key = keyframes.index(_check_name(home, keyframes, "keyframe"))
     try:
         return _stance_of_pose(robot, robot.model.key_qpos[key], f"keyframe {home}", named_feet, is_checked=False)

@@ -5,6 +5,7 @@ from arc_suite.policies.named import (
     POLICIES,
     PRESET_HELP,
     acting,
+    check_preset,
     digest,
     function_file,
     is_file,
@@ -35,5 +36,6 @@ __all__ = [
     "Script",
     "Sum",
     "acting",
+    "check_preset",
     "alone",
 ]

@@ -146,6 +146,19 @@ def policy(
     return Sum(made_policy, _noise(body, noise, num_envs)) if noise else made_policy
 
 
+def check_preset(policy_name: Any, preset: str | None) -> None:
+    """Raise ValueError for a preset of a policy other than the demonstrator: it has no effect.
+
+    Args:
+        policy_name: name of a policy, or the policy.
+        preset: preset of the demonstrator; None for none.
+    """
+    if preset is not None and policy_name != "cpg":
+        raise ValueError(
+            f"preset {checks.preview(preset)}: goes with the policy cpg, got {checks.preview(policy_name)}"
+        )
+
+
 def acting(source, task: Task, presets: str | Sequence[str] | None = None) -> Policy:
     """Return a policy for one environment.
 

@@ -3,6 +3,7 @@
 import colorsys
 import random
 
+from arc_suite import checks
 from arc_suite.robots.spec import PALETTES
 
 Color = tuple[float, float, float]  # sRGB, 0 to 1
@@ -33,7 +34,8 @@ def colors(palette: str | int) -> dict[str, Color]:
 
 def parse(text: str) -> str | int:
     """Return the palette that a text names: digits are a seed."""
-    return int(text) if text.isdecimal() else text
+    seed = checks.digits(text)
+    return text if seed is None else seed
 
 
 def _draw_colors(seed: int) -> tuple[Color, ...]:

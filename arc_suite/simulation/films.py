@@ -1,5 +1,6 @@
 """Episodes in pictures: single views, one gait cycle at a glance, films."""
 
+import errno
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,6 +19,8 @@ from arc_suite.simulation.episode_loop import play_episode
 _TOLERANCE = 1e-6  # control steps, of times
 _MIN_FRAME_SECONDS = 0.02  # players change the pace of a GIF with shorter frames
 _WEBP_METHOD = 4  # of the encoder, 0 to 6
+_BOX_HEADER = 16  # bytes at the beginning of a box of MP4: size, kind, and the size once more where it is long
+_MIN_BOX = 8  # bytes
 _GIF_COLORS = 128
 _GIF_SAMPLES = 4  # frames from which the palette is made
 
@@ -228,6 +231,30 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
     ) as writer:
         for frame in frames:
             writer.append_data(frame)  # type: ignore[attr-defined]  # imageio names the base of writers and readers
+    _check_mp4(path)
+
+
+def _check_mp4(path: Path) -> None:
+    """Raise OSError for a film without its end, as ffmpeg leaves one where the disk is full, and says nothing.
+
+    The file is a row of boxes: each begins with its size, bytes, and its kind. `moov` holds the places of the frames.
+    """
+    file_size = path.stat().st_size
+    kinds = []
+    place = 0
+    with path.open("rb") as file:
+        while place < file_size:
+            file.seek(place)
+            header = file.read(_BOX_HEADER)
+            size = int.from_bytes(header[:4], "big")
+            if size == 1:  # the size follows as a long number
+                size = int.from_bytes(header[8:], "big")
+            if size < _MIN_BOX:
+                break
+            kinds.append(header[4:8])
+            place += size
+    if place != file_size or not {b"moov", b"mdat"} <= set(kinds):
+        raise OSError(errno.EIO, "ffmpeg has not written all of it")
 
 
 def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:

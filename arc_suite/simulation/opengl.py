@@ -320,8 +320,11 @@ def _wrong_device() -> str | None:
     if device is None or egl is None:
         return None
     last = len(egl.eglQueryDevicesEXT()) - 1
-    if last < 0 or (device.strip().isdecimal() and int(device) <= last):
+    index = checks.digits(device.strip())
+    if last < 0 or (index is not None and index <= last):
         return None
+    if not device.strip():
+        return f"{_DEVICE} is set, but empty; unset it to take any device"
     expected = f"an integer from 0 to {last}" if last else "0, as there is one device"
     return f"{_DEVICE}: expected {expected}, got {checks.quote(device)!r}; unset it to take any device"
 

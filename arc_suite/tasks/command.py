@@ -267,7 +267,7 @@ class Schedule(Command):
         """Return the schedule with checked ranges in place of its own."""
         ranges = dict(zip(DIRECTIONS, self.commands, strict=True))
         for name, span in checks.mapping("commands", overrides.get("commands")).items():
-            checks.name(name, DIRECTIONS, "command")
+            checks.name(name, DIRECTIONS, "direction of commands")
             ranges[name] = checks.span(f"commands[{name!r}]", span, -MAX_COMMAND, MAX_COMMAND)
         return dataclasses.replace(self, commands=tuple(ranges.values()))
 

@@ -256,6 +256,6 @@ def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, cha
     weights_by_term = {name: of_body.get(name, weight) for name, weight in of_task.items()}
     for name, weight in (changed or {}).items():
         number = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)
-        checks.name(name, weights_by_term, "weight")
+        checks.name(name, weights_by_term, "term of weights")
         weights_by_term[name] = number
     return weights_by_term

@@ -68,7 +68,7 @@ def reward(terms: Mapping, weights: Mapping, cost_limit=None) -> tuple[dict, Any
 def _raise_mismatch(terms: Mapping, weights: Mapping) -> None:
     """Raise the error of a weight without a term, or of a term without a weight."""
     for name in weights:
-        checks.name(name, terms, "weight")
+        checks.name(name, terms, "term of weights")
     unknown_term = next(name for name in terms if name not in weights)
     hint = checks.hint(unknown_term, weights)
     raise ValueError(f"term {checks.preview(unknown_term)} has no weight{hint} (there are: {', '.join(weights)})")

@@ -56,10 +56,11 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
         (["--robot=all", "--id=some-v0"], f"--id=some-v0: names one dataset, and --robot=all makes {len(ROBOTS)}"),
         (["--episodes=4294967296"], "flag --episodes=4294967296: expected an integer in the range [1, 100000]"),
         (
-            ["--id="],
-            "dataset id '': expected names of letters, digits, '-' and '_' with '/' between, two characters at least "
-            "before the last '/', and a version at the end alone, such as 'arc_suite/queen/walk/cpg-medium-v0'",
+            ["--id=queen/cpg"],
+            "dataset id 'queen/cpg': expected names of letters, digits, '-' and '_' with '/' between, two characters "
+            "at least before the last '/', and a version at the end alone, such as 'queen/cpg-v0'",
         ),
+        (["--id="], "--id=: expected a value, got none"),
         (["--noise=-1"], "flag --noise=-1: expected a non-negative number"),
     ],
 )

@@ -82,10 +82,10 @@ define_task()
 flags.FLAGS(["program", *sys.argv[1:]])
 print(task_from_flags())
 """
-    settings = ["a=1", "b=2.5", "c=ripple", 'd="ripple"', 'e={"x": [1, null]}', "f=x=y", "g=", "a=true", "h=Infinity"]
+    settings = ["a=1", "b=2.5", "c=ripple", 'd="ripple"', 'e={"x": [1, null]}', "f=x=y", "g=", "h=Infinity", "i=true"]
     printed = interpreters.printed(code, *(f"--set={setting}" for setting in settings))
-    expected = {"a": True, "b": 2.5, "c": "ripple", "d": "ripple", "e": {"x": [1, None]}, "f": "x=y", "g": ""}
-    assert printed == [f"{('walk', expected | {'h': float('inf')})}"]
+    expected = {"a": 1, "b": 2.5, "c": "ripple", "d": "ripple", "e": {"x": [1, None]}, "f": "x=y", "g": ""}
+    assert printed == [f"{('walk', expected | {'h': float('inf'), 'i': True})}"]
 
 
 @pytest.mark.parametrize("body", [generator.generate(5, 2), SPIDER, str(SPIDER)], ids=["body", "path", "string"])

@@ -5,7 +5,7 @@ import pathlib
 import programs
 
 from arc_suite.importing import import_robot
-from arc_suite.robots.spec_files import load_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 FOLDER = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"
 GO2 = FOLDER / "go2_like.xml"
@@ -47,6 +47,17 @@ def test_bad_arguments_are_one_line_and_write_nothing(tmp_path):
         (("none.xml",), "cannot read none.xml: no such file or directory\n"),
         ((GO2, "-o", tmp_path / "a.xml"), "unknown extension '.xml' (there are: .json)\n"),
         ((GO2, "--home=sit", "-o", tmp_path / "a.json"), f"{GO2}: unknown keyframe 'sit' (there are: lying, home)\n"),
+        (
+            (GO2.with_name("a1_like.urdf"), "--home=sit"),
+            f"{GO2.with_name('a1_like.urdf')}: keyframe 'sit': the file names none; without --home a standing pose is ",
+        ),
+        (
+            (EXAMPLES["crab"],),
+            f"{EXAMPLES['crab']}: expected XML: not well-formed (invalid token): line 1, column 0; a body in JSON "
+            "needs no import: every program takes it as --spec\n",
+        ),
+        (("crab",), "crab is a body of the suite: every program takes it as --robot=crab\n"),
+        (("queen",), "queen is a body of the suite: every program takes it as --robot=queen\n"),
     ):
         programs.refused(run(*arguments), f"arc-suite import: {line}")
     assert list(tmp_path.iterdir()) == []

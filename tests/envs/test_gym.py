@@ -340,7 +340,10 @@ def there(names):
         ({**RGB, "camera_id": "trackin"}, f"unknown camera 'trackin'; did you mean 'tracking'? ({there(CAMERAS)})"),
         ({**RGB, "camera_id": 4}, f"no camera 4: expected -1 (free) to 3, or one of {CAMERAS}"),
         ({**RGB, "camera_id": 1.5}, f"no camera 1.5: expected -1 (free) to 3, or one of {CAMERAS}"),
-        ({"task_kwargs": WRONG}, f"unknown weight 'controll'; did you mean 'control'? ({there(Walk.weights)})"),
+        (
+            {"task_kwargs": WRONG},
+            f"unknown term of weights 'controll'; did you mean 'control'? ({there(Walk.weights)})",
+        ),
         ({"domain_name": "quen"}, f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.robot_words())})"),
         ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)})"),
     ],

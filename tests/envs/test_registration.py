@@ -267,7 +267,7 @@ class Misnamed(Walk):
         ({"body": TICK.replace(density=7.0)}, "robot 'tick' is already registered"),
         (walk({"base_noise": 0.1, **ROW, "duty_factor": 2}), "duty_factor: expected a number from 0 to 1, got 2"),
         (walk(WITHOUT_BANDS), "parameters of walk: other has no healthy_range and no velocity_band"),
-        (walk(ROW | {"weights": {"contrl": 1.0}}), "unknown weight 'contrl'; did you mean 'control'?"),
+        (walk(ROW | {"weights": {"contrl": 1.0}}), "unknown term of weights 'contrl'; did you mean 'control'?"),
         ({"body": OTHER, "parameters": {"wlak": ROW}}, "unknown task of parameters 'wlak'; did you mean 'walk'?"),
         (presets(**PRESETS["leaper"]), "preset 'slow': preset: other has 6 legs, and phase_offsets is for 4"),
         (presets(**PRESETS["bastion"]), "preset 'slow': preset: does not fit other: KeyError: 'knee'"),

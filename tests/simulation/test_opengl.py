@@ -248,8 +248,15 @@ def test_a_further_rendering_environment_costs_little():
     assert (many - few) / 10 < 8
 
 
-@pytest.mark.parametrize("device", ["99", "abc", "-1"])
+@pytest.mark.parametrize("device", ["99", "abc", "-1", "9" * 5000])
 def test_devices_out_of_range(device):
     _, _, first, again, _ = interpreters.printed(SCRIPT, **EGL, MUJOCO_EGL_DEVICE_ID=device)
     assert first.startswith("RenderingUnavailable: cannot render: MUJOCO_EGL_DEVICE_ID: expected ")
-    assert first.endswith(f", got {device!r}; unset it to take any device") and again == first
+    assert first.endswith(f", got {device[:300]!r}; unset it to take any device") and again == first
+
+
+@pytest.mark.parametrize("device", ["", " "])
+def test_an_empty_device_is_to_be_unset(device):
+    _, _, first, again, _ = interpreters.printed(SCRIPT, **EGL, MUJOCO_EGL_DEVICE_ID=device)
+    line = "cannot render: MUJOCO_EGL_DEVICE_ID is set, but empty; unset it to take any device"
+    assert first == again == f"RenderingUnavailable: {line}"

@@ -124,7 +124,7 @@ def test_commands_that_do_not_fit(name, value, message):
     ("settings", "message"),
     [
         ({"poses": 2.0}, "poses: expected a number from 0 to 1, got 2.0"),
-        ({"gaits": ("trot",)}, "unknown gait 'trot'"),
+        ({"gaits": ("trot",)}, "unknown gait of gaits 'trot'"),
         ({"gaits": 3}, "gaits: expected names of gaits, got 3"),
         ({"start": "back"}, "unknown start 'back'"),
     ],

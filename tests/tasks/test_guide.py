@@ -117,7 +117,7 @@ CHECKED = 'parameters.weights(cls.weights, changed=overrides.get("weights"))'
 UNCHECKED = CROUCHING.replace(CHECKED, 'cls.weights | overrides.get("weights", {})')
 OBSERVE = re.compile(r"    def observe\(.*?\n\n", re.DOTALL)
 MISSPELLED = ("--set", 'weights={"heigt": 1.0}')
-UNKNOWN = "unknown weight 'heigt'; did you mean 'height'? (there are: height, upright, control)"
+UNKNOWN = "unknown term of weights 'heigt'; did you mean 'height'? (there are: height, upright, control)"
 
 
 @pytest.mark.parametrize(

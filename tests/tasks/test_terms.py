@@ -50,7 +50,10 @@ def test_a_term_from_outside_counts_and_costs_are_limited_after_it():
 @pytest.mark.parametrize(
     ("weights", "message"),
     [
-        (Steer.weights | {"lowre": 0.5}, "unknown weight 'lowre'; did you mean 'lower'? (there are: gait_cost, "),
+        (
+            Steer.weights | {"lowre": 0.5},
+            "unknown term of weights 'lowre'; did you mean 'lower'? (there are: gait_cost, ",
+        ),
         (Steer.weights, "term 'lower' has no weight (there are: progress, tracking, "),
     ],
     ids=["a weight without a term", "a term without a weight"],

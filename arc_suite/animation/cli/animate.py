@@ -20,7 +20,7 @@ from absl import flags
 
 from arc_suite.animation import clips as catalog
 from arc_suite.animation.clips import clip_files
-from arc_suite.cli.flags import define_walk, only_setup, policy_name
+from arc_suite.cli.flags import define_walk, only_setup, policy_name, preset_from_flags
 from arc_suite.cli.program import progress
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
@@ -76,7 +76,7 @@ def main() -> None:
         task=setup.task,
         task_kwargs=setup.task_kwargs,
         policy=policy_name(FLAGS.policy),
-        preset=FLAGS.preset,
+        preset=preset_from_flags(),
         fps=FLAGS.fps,
         straight=FLAGS.straight,
         plant=FLAGS.plant,

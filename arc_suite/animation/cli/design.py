@@ -28,7 +28,7 @@ from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, extent
 from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, measure_walk
-from arc_suite.cli.flags import MAX_COUNT, ROBOT_HELP, named_values
+from arc_suite.cli.flags import MAX_COUNT, ROBOT_HELP, named_values, refuse_flags
 from arc_suite.cli.program import progress, resumable, say
 from arc_suite.journal import Journal
 from arc_suite.models.standing import measure_standing
@@ -188,6 +188,7 @@ def main() -> None:
     goal = GOALS[checks.name(FLAGS.goal, GOALS, "goal")]
     around = None if FLAGS.around is None else registry.body_of(FLAGS.around)
     if around is None:
+        refuse_flags(["amount"], "goes with --around")
         space = ProportionGenes()
         default_axes = ("legs", "links")
         stem = "design"

@@ -24,6 +24,7 @@ from arc_suite.cli.flags import (
     define_preset,
     policy_name,
     policy_setup,
+    preset_from_flags,
 )
 from arc_suite.cli.program import progress
 
@@ -42,10 +43,11 @@ def main() -> None:
     bodies = bodies_from_flags()  # first: this imports the modules that flags name
     bodies = choose_bodies(policy_setup(), bodies)
     policy = policy_name(FLAGS.policy)
+    preset = preset_from_flags()
     with files.writing(FLAGS.output) as temporary:
         creatures = []
         for body in progress(bodies.values(), "fitting", leave=False):
-            creatures.append(play_pages.creature(body, policy, FLAGS.preset))
+            creatures.append(play_pages.creature(body, policy, preset))
         page = play_pages.page(creatures)
         temporary.write_text(page, encoding="utf-8")
     print(f"wrote {FLAGS.output}, {len(page.encode()) / 1e6:.1f} MB")

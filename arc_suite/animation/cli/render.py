@@ -23,7 +23,13 @@ from absl import flags
 
 from arc_suite import checks, files, style
 from arc_suite.animation import pages
-from arc_suite.cli.flags import check_flags_suit_file, define_walk, policy_name, setups_from_flags
+from arc_suite.cli.flags import (
+    check_flags_suit_file,
+    define_walk,
+    policy_name,
+    preset_from_flags,
+    setups_from_flags,
+)
 from arc_suite.cli.program import progress
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
@@ -33,7 +39,14 @@ from arc_suite.simulation import films
 _DEFAULT_STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".webp": 80, ".html": 400}  # control steps
 _DEFAULT_SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180), ".webp": (480, 360)}  # pixels
 _FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
-_EXTENSIONS_OF_FLAG = {"fps": _FILM_EXTENSIONS, "loop": _FILM_EXTENSIONS}  # flags for some files only
+_VIEW_EXTENSIONS = (".png", *_FILM_EXTENSIONS)  # a page has a camera and a size of its own
+_EXTENSIONS_OF_FLAG = {  # flags for some files only
+    "fps": _FILM_EXTENSIONS,
+    "loop": _FILM_EXTENSIONS,
+    "camera": _VIEW_EXTENSIONS,
+    "width": _VIEW_EXTENSIONS,
+    "height": _VIEW_EXTENSIONS,
+}
 _CYCLE_VIEWS = 6  # of a picture of one gait cycle
 _CYCLE_COLUMNS = 3
 _SETTLING_STEPS = 60  # control steps, after which the gait does not depend on the start of the episode
@@ -81,9 +94,10 @@ def main() -> None:
     setups = setups_from_flags()
     default_camera = "profile" if len(setups) == 1 else "portrait"
     camera = checks.name(default_camera if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
+    preset = preset_from_flags()
     environments = {name: setup.load(FLAGS.seed) for name, setup in setups.items()}
     policies = {
-        name: policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=environments[name].task.definition)
+        name: policy(policy_name(FLAGS.policy), setup.body, preset, task=environments[name].task.definition)
         for name, setup in setups.items()
     }
     if not FLAGS.output:

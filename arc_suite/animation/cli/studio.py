@@ -19,7 +19,7 @@ from absl import flags
 from arc_suite import versions
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, sources
-from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name
+from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name, preset_from_flags
 from arc_suite.cpg.selection import check_preset_name
 
 FLAGS = flags.FLAGS
@@ -44,8 +44,9 @@ def _print_address(url: str) -> None:
 def _sketch_from_flags() -> Sketch:
     """Return the sketch of the body, task and policy that flags name."""
     setup = only_setup()
-    if FLAGS.preset is not None:
-        check_preset_name(FLAGS.preset)
+    preset = preset_from_flags()
+    if preset is not None:
+        check_preset_name(preset)
     settings = setup.task_kwargs
     ground = settings.pop("arena", "flat")
     kicks = settings.pop("kicks", 0.0)
@@ -57,7 +58,7 @@ def _sketch_from_flags() -> Sketch:
         kicks=kicks,
         settings=json.dumps(settings),
         policy=policy,
-        preset=FLAGS.preset or DEFAULT_CHOICE,
+        preset=preset or DEFAULT_CHOICE,
         lengths=tuple(named_values("length", FLAGS.length).items()),
         palette=FLAGS.palette or DEFAULT_CHOICE,
     )

@@ -19,13 +19,15 @@ from typing import Any, NamedTuple
 
 from absl import flags
 
-from arc_suite import evaluation, files, style, versions
+from arc_suite import checks, evaluation, files, style, versions
 from arc_suite.animation import pages
 from arc_suite.cli.flags import (
     MAX_COUNT,
     bodies_from_flags,
     define_walk,
     policy_name,
+    preset_from_flags,
+    refuse_flags,
     setups_from_flags,
     task_from_flags,
 )
@@ -37,7 +39,9 @@ from arc_suite.style import sources
 FLAGS = flags.FLAGS
 define_walk(more=", or all; without it, the one of stored tracks", policy=sources.HELP)
 flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
-flags.DEFINE_string("compare_preset", None, "Preset of --compare, if that is cpg. [default: as of --preset]")
+flags.DEFINE_string(
+    "compare_preset", None, "Preset of --compare, if that is cpg. [default: the one that suits the task and the body]"
+)
 flags.DEFINE_integer(
     "episodes",
     evaluation.CURVE_EPISODES,
@@ -58,6 +62,8 @@ def main() -> None:
     bodies_from_flags()
     task_from_flags()
     sources_by_label = find_sources()
+    if all(source.setup for source in sources_by_label.values()):
+        refuse_flags(["seed"], "expected none, as stored tracks have their seeds")
     setups = setups_from_flags(find_stored_setup(sources_by_label))
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     recorders_by_robot = {
@@ -103,9 +109,15 @@ def main() -> None:
 
 def find_sources() -> dict[str, style.Source]:
     """Return the sources of tracks that --policy and --compare name, by label of their columns."""
-    first = style.source(policy_name(FLAGS.policy), FLAGS.preset)
+    first = style.source(policy_name(FLAGS.policy), preset_from_flags())
     if FLAGS.compare is None:
+        refuse_flags(["compare_preset"], "goes with --compare=cpg")
         return {first.label: first}
+    if FLAGS.compare_preset is not None and FLAGS.compare != "cpg":
+        raise ValueError(
+            f"--compare_preset={checks.quote(FLAGS.compare_preset)}: goes with --compare=cpg, "
+            f"got {checks.preview(FLAGS.compare)}"
+        )
     second = style.source(FLAGS.compare, FLAGS.compare_preset)
     if first.label != second.label:
         return {first.label: first, second.label: second}

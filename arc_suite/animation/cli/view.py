@@ -18,7 +18,7 @@ from absl import flags
 import arc_suite
 from arc_suite import policies
 from arc_suite.animation.cli.live import Live, play
-from arc_suite.cli.flags import define_walk, only_setup, policy_name
+from arc_suite.cli.flags import define_walk, only_setup, policy_name, preset_from_flags
 from arc_suite.envs.window import Window
 
 _ALTERNATIVE = "`arc-suite render -o walk.html` writes a page that plays in any browser"
@@ -33,7 +33,7 @@ def main() -> None:
     settings = {"time_limit": math.inf} | setup.task_kwargs
     environment = arc_suite.load(setup.body, setup.task, settings)
     task = environment.task.definition
-    policy = policies.policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=task)
+    policy = policies.policy(policy_name(FLAGS.policy), setup.body, preset_from_flags(), task=task)
     live = Live(environment, policies.alone(policy))
     keys = queue.SimpleQueue()
     window = Window(live.shown, pressed=keys.put, instead=_ALTERNATIVE)

@@ -124,6 +124,8 @@ def _check_arguments(path: Path, names: Sequence[str], fps: float, options: Mapp
         if options[option] is not None:
             least, greatest = OPTION_BOUNDS[option]
             checks.integer(option, options[option], least, greatest)
+    for option in ("uv", "reduce", "transparent", "turntable"):
+        checks.boolean(option, options.get(option, False))
     checks.name(options.get("rig", RIGS[0]), RIGS, "rig")
     checks.name(options.get("root_motion", "both"), ROOT_MOTIONS, "root_motion")
     return extension

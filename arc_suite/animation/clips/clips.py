@@ -95,6 +95,8 @@ def clips(
         OSError: a file cannot be read.
     """
     checks.number("fps", fps, 1.0, 1000.0)
+    checks.boolean("straight", straight)
+    checks.boolean("plant", plant)
     if not names:
         raise ValueError(f"clips: expected one or more of {', '.join(catalog.clip_names())}, got none")
     for name in names:

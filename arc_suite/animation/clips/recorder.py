@@ -10,6 +10,7 @@ from arc_suite.animation.clips.recordings import Recording, record
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
+from arc_suite.policies import check_preset
 from arc_suite.policies import policy as named_policy
 from arc_suite.tasks.fitting import velocity_units
 
@@ -116,6 +117,7 @@ class Recorder:
             OSError: a file cannot be read.
         """
         task = setup.definition
+        check_preset(policy, preset)
         named_policy(policy, setup.body, preset, task=task)  # raises errors of the policy, which are none of a clip
         self.body = setup.body
         self._policy = policy

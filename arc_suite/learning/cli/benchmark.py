@@ -17,6 +17,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks
+from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable
 from arc_suite.learning.studies import benchmark, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
@@ -34,11 +35,14 @@ flags.DEFINE_string("name", None, "Of these policies in the table. [default: the
 flags.DEFINE_string("runs", "runs", "Folder of the runs.")
 flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
 
+_FLAGS_OF_RUNS = ("algorithm", "seeds", "places", "jobs", "runs")
+
 
 def main(division: str | None = None) -> int:
     """Run a division, and print the table; the exit status is 0 if no run has failed."""
     places = [checks.name(place, _PLACE_NAMES, "place") for place in FLAGS.places]
     status = 0
+    _check_flags(division)
     if division is not None:
         checks.name(division, DIVISIONS, "division")
         if FLAGS.policies:
@@ -47,6 +51,16 @@ def main(division: str | None = None) -> int:
             status = run_division(division, places)
     print(benchmark.text(Path(FLAGS.results)))
     return status
+
+
+def _check_flags(division: str | None) -> None:
+    """Raise ValueError for a flag that has no effect with the others."""
+    if division is None:
+        refuse_flags((*_FLAGS_OF_RUNS, "policies", "name"), "goes with a division, such as samples")
+    elif FLAGS.policies:
+        refuse_flags(_FLAGS_OF_RUNS, "goes without --policies, which stand in place of runs")
+    else:
+        refuse_flags(["name"], "goes with --policies")
 
 
 def run_division(division: str, places: list[str]) -> int:

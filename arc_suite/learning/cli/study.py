@@ -18,7 +18,8 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import versions
+from arc_suite import checks, versions
+from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable
 from arc_suite.learning.studies import publication, report, runner, tables
 from arc_suite.simulation.cores import usable_cores
@@ -34,6 +35,9 @@ flags.DEFINE_string("partition", None, "Of the cluster. [default: the cluster's]
 flags.DEFINE_bool("report", False, "Write the report in place of making runs.")
 flags.DEFINE_string("runs", None, "Folder of the runs. [default: runs/NAME]")
 flags.DEFINE_string("results", None, "Folder of the tables and the report. [default: studies/NAME]")
+
+
+_FLAGS_OF_RUNS = ("jobs", "shard", "submit", "hours", "partition")  # flags without effect on a report
 
 
 def main(name: str | None = None) -> int:
@@ -61,6 +65,10 @@ def make_or_report(
     Raises:
         ValueError: flags that do not fit each other or the study.
     """
+    if FLAGS.report:
+        refuse_flags(_FLAGS_OF_RUNS, "goes without --report, which makes no runs")
+    if FLAGS.submit is None:
+        refuse_flags(("hours", "partition"), "goes with --submit")
     part, parts = shard(FLAGS.shard)
     runs = study.runs[part::parts]
     if not runs:
@@ -104,7 +112,9 @@ def shard(text: str) -> tuple[int, int]:
     Raises:
         ValueError: it is no such text, or i is not below n.
     """
-    part, _, parts = text.partition("/")
-    if not (part.isdecimal() and parts.isdecimal() and int(part) < int(parts)):
-        raise ValueError(f"--shard={text}: expected i/n with i from 0 to n - 1, such as 0/4")
-    return int(part), int(parts)
+    part_text, _, parts_text = text.partition("/")
+    part = checks.digits(part_text)
+    parts = checks.digits(parts_text)
+    if part is None or parts is None or part >= parts:
+        raise ValueError(f"--shard={checks.quote(text)}: expected i/n with i from 0 to n - 1, such as 0/4")
+    return part, parts

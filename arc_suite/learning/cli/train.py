@@ -29,7 +29,15 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, evaluation, files, registry, versions
-from arc_suite.cli.flags import custom_body, define_body, define_task, named_values, only_body, task_from_flags
+from arc_suite.cli.flags import (
+    custom_body,
+    define_body,
+    define_task,
+    named_values,
+    only_body,
+    refuse_flags,
+    task_from_flags,
+)
 from arc_suite.cli.program import TERMINATED, progress, resumable, say, watch_for_termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
@@ -125,6 +133,8 @@ _CONFIGURATION_FLAGS = (
     "spec",
     "legs",
     "links",
+    "length",
+    "palette",
     "task",
     "set",
     "train_set",
@@ -140,6 +150,9 @@ def main() -> int:
     """Train, print the return at the end, and return the exit status."""
     prepare_jax()
     runs = configurations_from_flags()
+    is_one_of_several = FLAGS["seed"].present > 1  # `train_seeds` adds a seed to flags that may have --jobs
+    if len(runs) == 1 and not is_one_of_several:
+        refuse_flags(["jobs"], "goes with several seeds, such as --seed=0,1,2")
     # Before the first step, as a score may be unreachable.
     threshold = None if FLAGS.until_score is None else outcomes.return_of_score(runs[0], FLAGS.until_score)
     return train_seeds(runs) if len(runs) > 1 else train_run(runs[0], threshold)
@@ -255,9 +268,9 @@ def configurations_from_flags() -> list[Configuration]:
     for module in FLAGS.modules:
         registry.import_module(module, "--modules")
     if FLAGS.config is not None:
-        for name in (*_CONFIGURATION_FLAGS, "evaluate_every"):
-            if FLAGS[name].present:
-                raise ValueError(f"--{name}: expected none with --config, which has the whole configuration")
+        refuse_flags(
+            (*_CONFIGURATION_FLAGS, "evaluate_every"), "expected none with --config, which has the whole configuration"
+        )
         try:
             return [configuration.read(Path(FLAGS.config))]
         except registry.NotImported as error:
@@ -287,7 +300,7 @@ def parse_seeds(texts: Sequence[str]) -> list[int]:
     Raises:
         ValueError: a text that is no integer, or a seed twice.
     """
-    seeds = [int(text) for text in texts if text.isdecimal()]
+    seeds = [seed for text in texts if (seed := checks.digits(text)) is not None]
     if not texts or len(set(seeds)) < len(texts):
         raise ValueError(f"--seed={checks.quote(','.join(texts))}: expected different integers, such as 0,1,2")
     return seeds

@@ -19,7 +19,7 @@ from absl import flags
 
 from arc_suite import checks, policies
 from arc_suite.bodies import universal
-from arc_suite.cli.flags import complete_task, define_task, task_from_flags
+from arc_suite.cli.flags import complete_task, define_task, refuse_flags, task_from_flags
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.learning.studies import bodies
@@ -39,6 +39,8 @@ def main() -> None:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
+    else:
+        refuse_flags(["name"], "goes with --output")
     # A policy of many bodies is the same in the task of any body; Queen's stands for all.
     network = universal.load(FLAGS.policy, Setup.of("queen", task, settings).definition)
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.TransferResult._fields))

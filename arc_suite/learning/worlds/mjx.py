@@ -118,6 +118,7 @@ class Env:
         """Draw the starts and put the model on the device; see `load`."""
         if "random" in checks.mapping("task_kwargs", task_kwargs):
             raise ValueError("random: expected none, as `reset` takes a key, and `start` a seed")
+        checks.boolean("privileged", privileged)
         self.impl = device.choose_implementation(impl)
         self.num_envs = checks.integer("num_envs", num_envs, 1, _MAX_ENVS)
         self.num_starts = num_starts

@@ -65,7 +65,7 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
     def _check_levels(cls, value, noisy: Mapping[str, Block]) -> dict[str, float]:
         levels = value if isinstance(value, Mapping) else dict.fromkeys(noisy, value)
         return {
-            checks.name(name, list(noisy), "block with noise"): checks.number(
+            checks.name(name, list(noisy), "block of observation_noise"): checks.number(
                 "observation_noise", level, *cls.bounds["observation_noise"]
             )
             for name, level in levels.items()

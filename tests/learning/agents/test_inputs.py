@@ -54,7 +54,7 @@ def test_privileged_blocks_of_critics_are_mirrored_behind_the_observation():
     assert_array_equal(found[:, -6:], vectors[:, -6:] * [1, -1, 1, -1, 1, -1])
     assert_array_equal(np.sort(found[:, -12:-6]), np.sort(vectors[:, -12:-6]))
     assert_array_equal(maps.observation(found), vectors)
-    with pytest.raises(ValueError, match=r"^unknown block 'speed' \(there are: velocity, ground\)$"):
+    with pytest.raises(ValueError, match=r"^unknown block of critic_blocks 'speed' \(there are: velocity, ground\)$"):
         privileged_columns(TASK, ("speed",))
 
 

@@ -165,7 +165,7 @@ def test_a_privileged_critic_resumes_bit_exactly(begun):
         (
             STEER,
             ["velocities"],
-            r"^unknown block 'velocities'; did you mean 'velocity'\? \(there are: velocity, ground, ",
+            r"^unknown block of critic_blocks 'velocities'; did you mean 'velocity'\? \(there are: velocity, ground, ",
         ),
         (Setup.of("random:0-1"), ["velocity"], "^critic_blocks: expected none with several bodies, got velocity$"),
     ],
