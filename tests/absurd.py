@@ -10,6 +10,7 @@ A line of standard error names each fault with its case; `--case` repeats one. E
 import argparse
 import datetime
 import decimal
+import faulthandler
 import fractions
 import functools
 import math
@@ -37,7 +38,7 @@ BODIES = ("tick", "leaper")
 SEEDS = (5, 6, 7)  # of episodes; what has no effect under the first may draw by chance what the default draws
 STEPS = 40  # control steps of the first episode; in the middle the body is thrown up, so that it falls
 LONG = 400  # control steps of the second episode, in which motors fail and kicks come
-LIMIT = 30  # s, for one case
+LIMIT = 20  # s of CPU time, for one case
 MAX_LINE = 1500  # characters of an error
 CLOSE = 1e-6  # relative difference up to which a number is the default
 
@@ -365,6 +366,11 @@ def judge_line(case: Case, error: Exception) -> str:
     return NAMELESS
 
 
+def raise_timeout(*_) -> None:
+    """Raise TimeoutError, as the handler of a signal."""
+    raise TimeoutError(f"expected an end within {LIMIT} s of CPU time")
+
+
 def main() -> int:
     """Print the table and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -373,14 +379,16 @@ def main() -> int:
     parser.add_argument("--case", type=int, help="try this one alone")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the program wherever it is; the last line names the case
+    signal.signal(signal.SIGPROF, raise_timeout)
     indices = range(arguments.cases) if arguments.case is None else [arguments.case]
     outcomes: Counter = Counter()
     for index in tqdm(indices, unit="value", leave=False, disable=None):
         case = draw_case(arguments.seed, index)
-        signal.alarm(LIMIT)
+        signal.setitimer(signal.ITIMER_PROF, LIMIT)
+        faulthandler.dump_traceback_later(20 * LIMIT, exit=True)  # a library that does not come back
         result = outcome(case)
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        faulthandler.cancel_dump_traceback_later()
         outcomes[result] += 1
         if result in FAULTS:
             text = f"{result}: {case.task} of {case.body}, {case.setting}={checks.preview(case.value)[:200]}"
