@@ -29,7 +29,11 @@ def run_in_little_room(command, folder):
     """Run a program that may write files of 1 KiB; its output goes to one of them."""
     line = f"ulimit -f 1; exec {sys.executable} -m arc_suite {command}"
     with (folder / "output.txt").open("w") as output:
-        environ = {**os.environ, "PYTHONUNBUFFERED": ""}
+        environ = {
+            **os.environ,
+            "PYTHONUNBUFFERED": "",
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }  # bytecode would be cut off, too
         return subprocess.run(["bash", "-c", line], cwd=folder, env=environ, stdout=output, stderr=-1, text=True)
 
 
