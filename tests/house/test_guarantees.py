@@ -36,9 +36,9 @@ TESTS = {
     "Without OpenGL, `arc_suite.simulation.opengl.RenderingUnavailable` states reason and remedy; all else works.": [
         f"{OPENGL}::test_egl_where_no_display_answers_and_what_is_missing"
     ],
-    "Objects made before a fork raise `arc_suite.simulation.forks.ForkError` in the child.": [
-        f"{FORKS}::test_what_was_made_before_a_fork"
-    ],
+    "Environments made before a fork raise `arc_suite.simulation.forks.ForkError` in the child, whatever is called "
+    "but `close`.": [f"{FORKS}::test_what_was_made_before_a_fork"],
+    "Copies and pickles that the child makes of them work there.": [f"{FORKS}::test_a_copy_made_in_the_child_works"],
     "Make environments in the child, as Gymnasium's `AsyncVectorEnv` does; fork, spawn and forkserver all work.": [
         f"{FORKS}::test_async_vector_environments_work"
     ],
