@@ -136,7 +136,8 @@ def _parse(data: bytes) -> ElementTree.Element:
     if sources.ENTITY.search(text):
         raise SpecError("expected XML without a document type and entities")
     # Some exporters write an empty line before the declaration, which XML forbids.
-    with parsers.guard("expected XML", raises=SpecError):
+    cure = "; a body in JSON needs no import: every program takes it as --spec" if text.lstrip()[:1] == "{" else ""
+    with parsers.guard("expected XML", cure, raises=SpecError):
         return ElementTree.fromstring(_XML_DECLARATION.sub("", text))
 
 
