@@ -194,10 +194,10 @@ def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):
     assert os.listdir(tmp_path) == []
 
 
-def test_without_opengl_it_says_what_to_install_and_leaves_the_old_file(tmp_path, monkeypatch):
+def test_without_opengl_it_says_what_to_do_and_leaves_the_old_file(tmp_path, monkeypatch):
     (tmp_path / "queen.png").write_text("old")
     monkeypatch.setenv("MUJOCO_GL", "vulkan")
     done = render(tmp_path, "--output=queen.png")
     programs.refused(done, "arc-suite render: cannot render with MUJOCO_GL=vulkan: ")
-    assert "apt-get install libegl1 libgl1 libgl1-mesa-dri" in done.stderr
+    assert done.stderr.endswith("; unset it, or set MUJOCO_GL=egl\n")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
