@@ -9,6 +9,13 @@ As a dm_env and as a Gymnasium environment::
     env = gymnasium.make("arc_suite/queen-walk-v0")
 """
 
+import sys
+
+if sys.orig_argv[1:3] == ["-m", "arc_suite"]:  # a program, from whose first import on Ctrl-C is one line
+    from arc_suite.cli import interrupts
+
+    interrupts.exit_at_once()
+
 from arc_suite import moved, versions
 from arc_suite.simulation import opengl
 

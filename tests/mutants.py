@@ -99,7 +99,7 @@ MUTANTS = {
     "the same noise in every step": "key« ^ (step * _GOLDEN)→»",
     "positions held without damping": "(«self.damping→0.0» * state.speeds)",
     "the reward sees what weak motors give": "self.task.before(memory.task, «→0.5 * »action)",
-    "a changed model stays so": "«self._write_fields(self._unchanged)→pass»\n        super().reset(keyframe_id)",
+    "a changed model stays so": "«self._restore_compiled_fields()→pass»\n        super().reset(keyframe_id)",
     "the last substep of batches on the compiled model": "set_models(«self._models→None»)\n"
     "            simulations.step(mask)",
     # Environments.

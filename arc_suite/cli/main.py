@@ -5,7 +5,7 @@ import sys
 from types import ModuleType
 
 from arc_suite import checks, registry, versions
-from arc_suite.cli import program
+from arc_suite.cli import interrupts, program
 from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, docstring_of, installed_programs, usage
 
 
@@ -15,6 +15,7 @@ def main(*arguments: str) -> None:
     Args:
         *arguments: before those of the command line.
     """
+    interrupts.exit_at_once()
     # Modules that flags name may lie in the current folder. It comes last: no file there hides an installed module.
     sys.path.append("")
     program_name, *program_arguments = [*arguments, *sys.argv[1:]] or ["--help"]

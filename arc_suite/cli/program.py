@@ -20,26 +20,21 @@ from tqdm import tqdm
 
 import arc_suite
 from arc_suite import checks, files, policies, registry
+from arc_suite.cli import interrupts
 from arc_suite.cli.help_text import help_text
 from arc_suite.cli.programs import docstring_of
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
 
-INTERRUPTED = 130  # exit status of a program that Ctrl-C has ended, as shells count it
-TERMINATED = 143  # exit status of a program that SIGTERM has ended, as shells count it
-
 VERSION = f"arc_suite {arc_suite.__version__}"
 
 _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
+_EXPECTED_ERRORS = (flags.Error, ValueError, OSError, RenderingUnavailable, PhysicsError)
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
 _VERSION = flags.DEFINE_bool("version", False, "Print the version of the package and exit.")
-
-
-class Terminated(KeyboardInterrupt):
-    """SIGTERM has come, which clusters send before they take a machine away."""
 
 
 def progress(*args, **kwargs) -> tqdm:
@@ -66,17 +61,10 @@ def say(line: str) -> None:
 @contextlib.contextmanager
 def resumable(folder: str | os.PathLike) -> Iterator[None]:
     """Run work in a folder; when Ctrl-C or SIGTERM interrupts it, say that the same command resumes it."""
-
-    def terminate(*_):
-        raise Terminated
-
-    previous_handler = signal.signal(signal.SIGTERM, terminate)
     try:
         yield
     except KeyboardInterrupt as interrupt:
         raise type(interrupt)(f"interrupted; the same command resumes {folder}") from None
-    finally:
-        signal.signal(signal.SIGTERM, previous_handler)
 
 
 @contextlib.contextmanager
@@ -128,8 +116,8 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     """Call `work` and exit the process with the status that it returns.
 
     - A wrong flag, a ValueError, an OSError, a RenderingUnavailable and a PhysicsError, of a body that cannot be
-      simulated, become one line on standard error and exit status 1. Ctrl-C becomes one line and exit status 130;
-      SIGTERM in `resumable` work becomes one line and 143.
+      simulated, become one line on standard error and exit status 1. Ctrl-C becomes one line and exit status 130,
+      SIGTERM one line and 143.
     - Any other exception is a mistake of the suite, and keeps its traceback.
     - A warning becomes one line on standard error.
     - Where nobody reads the output any more, as in `program | head`, the work goes on without it, so that its files are
@@ -146,19 +134,28 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     # A stream that was closed before the start is None.
     output = _Output(sys.stdout or io.StringIO())
     errors = _Output(sys.stderr or io.StringIO())
+    statuses: list[int] = []  # of signals
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors), warnings.catch_warnings():
         warnings.showwarning = print_reason
         try:
-            status = work()
-            output.flush()  # in which a full disk may raise
-        except (flags.Error, ValueError, OSError, RenderingUnavailable, PhysicsError) as error:
-            print_reason(error)
-            status = 1
-        except KeyboardInterrupt as interrupt:
-            print_reason(str(interrupt) or "interrupted")
-            status = TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED
+            with interrupts.interruptible(name, statuses):
+                status = work()
+                output.flush()  # in which a full disk may raise
+        except BaseException as error:
+            is_interrupt = isinstance(error, KeyboardInterrupt)
+            if statuses or is_interrupt:
+                message = str(error) if is_interrupt else ""
+                print_reason(message or "interrupted")
+                status = statuses[-1] if statuses else interrupts.INTERRUPTED
+            elif isinstance(error, _EXPECTED_ERRORS):
+                print_reason(error)
+                status = 1
+            else:
+                raise
         finally:
             output.flush()
+    if status in (interrupts.INTERRUPTED, interrupts.TERMINATED):
+        interrupts.leave(status)
     sys.exit(status)
 
 

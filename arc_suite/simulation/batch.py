@@ -9,7 +9,7 @@ import mujoco.batch
 import numpy as np
 
 from arc_suite.simulation import forks, timers
-from arc_suite.simulation.model import ReadOnly, change_fields, field
+from arc_suite.simulation.model import ReadOnly, change_fields, field, merge_lasting
 from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, check_snapshot, model_fields
 
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -184,12 +184,15 @@ class Batch:
 
     def _change_for_episode(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
         """Set models of some simulations to the compiled ones with fields of one episode, and with lasting changes."""
-        self._changed_fields |= dict.fromkeys(name for fields in models for name in fields)
+        self._changed_fields |= dict.fromkeys(name for fields in (*models, self._lasting) for name in fields)
         compiled = self._compiled or [self._simulations.model] * len(mask)
         changes = []
         for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
             compiled_fields = {name: field(compiled[index], name) for name in self._changed_fields}
-            changes.append({**compiled_fields, **fields, **self.lasting(index)})
+            lasting = self._lasting_of(index)
+            episode_fields = {**compiled_fields, **fields}
+            merged_fields = {name: merge_lasting(episode_fields[name], lasting.get(name)) for name in episode_fields}
+            changes.append(merged_fields)
         self._write(mask, changes)
 
     def _write(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
@@ -205,9 +208,13 @@ class Batch:
             change_fields(self._silent[index], fields, scratch)
 
     def lasting(self, index: int) -> dict[str, np.ndarray]:
-        """Return fields of a simulation's model that stay over resets, by name."""
+        """Return fields of a simulation's model of which rows stay over resets, by name."""
+        return {name: field(self._models[index], name) for name in self._lasting_of(index)}
+
+    def _lasting_of(self, index: int) -> dict[str, np.ndarray]:
+        """Return the lasting values of a simulation's model, by name; NaN where values do not last."""
         fields = {name: values[index] for name, values in self._lasting.items()}
-        return {name: values for name, values in fields.items() if not np.isnan(values).any()}
+        return {name: values for name, values in fields.items() if not np.isnan(values).all()}
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""
@@ -231,7 +238,7 @@ class Batch:
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue bit-identically from the arrays of `snapshot`."""
         fields, self._lasting = model_fields(arrays)
-        if fields or self._models is not self._compiled:
+        if fields or self._lasting or self._models is not self._compiled:
             count = self._simulations.nsim
             changes = [{name: values[index] for name, values in fields.items()} for index in range(count)]
             self._change_for_episode(np.ones(count, bool), changes)

@@ -1,13 +1,15 @@
 """Episodes in pictures: single views, one gait cycle at a glance, films."""
 
+import contextlib
 import errno
+import fractions
 import itertools
 import math
+import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
-import imageio.v2 as imageio
 import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -18,6 +20,7 @@ from arc_suite.simulation.episode_loop import play_episode
 
 _TOLERANCE = 1e-6  # control steps, of times
 _MIN_FRAME_SECONDS = 0.02  # players change the pace of a GIF with shorter frames
+_MP4_CRF = 10  # constant rate factor of the encoder, 0 to 51; the lower, the better
 _WEBP_METHOD = 4  # of the encoder, 0 to 6
 _BOX_HEADER = 16  # bytes at the beginning of a box of MP4: size, kind, and the size once more where it is long
 _MIN_BOX = 8  # bytes
@@ -216,21 +219,28 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
 
     Raises:
         ValueError: imageio-ffmpeg is not installed.
+        OSError: ffmpeg cannot write the file.
     """
     with versions.require_extra("MP4 needs imageio-ffmpeg", "video"):
-        import imageio_ffmpeg  # noqa: F401
-    with imageio.get_writer(
-        path,
-        format="FFMPEG",
-        fps=1.0 / seconds,
-        codec="libx264",
-        pixelformat="yuv420p",
-        quality=8,
-        macro_block_size=2,
-        output_params=["-movflags", "+faststart"],
-    ) as writer:
-        for frame in frames:
-            writer.append_data(frame)  # type: ignore[attr-defined]  # imageio names the base of writers and readers
+        import imageio_ffmpeg
+    frames = iter(frames)
+    first_frame = next(frames)
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), *_encoder_arguments(first_frame.shape, seconds), str(path)]
+    # In a session of its own, Ctrl-C in the terminal does not reach ffmpeg, which would write half a film.
+    encoder = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        with contextlib.suppress(BrokenPipeError):  # ffmpeg has ended early
+            for frame in itertools.chain([first_frame], frames):
+                encoder.stdin.write(frame.tobytes())
+            encoder.stdin.close()
+        encoder.wait()
+    finally:
+        encoder.kill()  # where an exception has left it running
+        encoder.wait()
+        with contextlib.suppress(BrokenPipeError):
+            encoder.stdin.close()
+    if encoder.returncode:
+        raise OSError(errno.EIO, "ffmpeg has not written all of it")
     _check_mp4(path)
 
 
@@ -255,6 +265,18 @@ def _check_mp4(path: Path) -> None:
             place += size
     if place != file_size or not {b"moov", b"mdat"} <= set(kinds):
         raise OSError(errno.EIO, "ffmpeg has not written all of it")
+
+
+def _encoder_arguments(shape: Sequence[int], seconds: float) -> list[str]:
+    """Return the arguments with which ffmpeg reads raw frames (height, width, 3) and encodes them."""
+    height, width, _ = shape
+    fps = fractions.Fraction(1.0 / seconds).limit_denominator()
+    even_size = f"scale={width + width % 2}:{height + height % 2}"
+    arguments = f"""
+        -y -v error -f rawvideo -vcodec rawvideo -s {width}x{height} -pix_fmt rgb24 -r {fps} -i - -an
+        -vcodec libx264 -pix_fmt yuv420p -crf {_MP4_CRF} -vf {even_size} -movflags +faststart
+        """
+    return arguments.split()
 
 
 def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:

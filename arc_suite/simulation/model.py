@@ -82,11 +82,12 @@ def compile_model(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
     Returns:
         A new model, to which the caller may write.
     """
-    return copy.copy(_cached_model(body, arena))
+    return copy.copy(shared_model(body, arena))
 
 
 @functools.lru_cache(maxsize=32)
-def _cached_model(body: Body, arena: Arena) -> mujoco.MjModel:
+def shared_model(body: Body, arena: Arena) -> mujoco.MjModel:
+    """Return the model of `compile_model`, to which nobody may write."""
     has_fast_path = arena == FLAT and not body.source
     spec = direct.on_flat_ground(size_body(body)) if has_fast_path else models.model_spec(body, arena)
     model = spec.compile()
@@ -108,6 +109,13 @@ def change_fields(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scrat
     for name, values in fields.items():
         field(model, name)[:] = values
     mujoco.mj_setConst(model, scratch)
+
+
+def merge_lasting(values: np.ndarray, lasting: np.ndarray | None) -> np.ndarray:
+    """Return values of a field, with its lasting values, where these are not NaN, in their place."""
+    if lasting is None:
+        return values
+    return np.where(np.isnan(lasting), values, lasting)
 
 
 def field(model: mujoco.MjModel, name: str) -> np.ndarray:

@@ -15,7 +15,7 @@ from arc_suite.arenas import FLAT, Arena
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
-from arc_suite.simulation.model import change_fields, compile_model, field
+from arc_suite.simulation.model import change_fields, compile_model, field, merge_lasting, shared_model
 from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, check_snapshot, model_fields
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -61,8 +61,8 @@ class Physics(dm_mujoco.Physics):
     def _reload_from_data(self, data):
         super()._reload_from_data(data)
         self._decorated = None
-        self._unchanged = {}  # compiled values of changed fields of the model
-        self._lasting = {}  # fields of the model that stay over resets
+        self._written = {}  # values of fields of the model, as they were written last
+        self._lasting = {}  # fields of the model that stay over resets; NaN where they do not
         self._scratch = None
         self.shown_reward = None
         self.marker = None
@@ -73,12 +73,11 @@ class Physics(dm_mujoco.Physics):
     def reset(self, keyframe_id=None) -> None:
         """Restart from the default pose, as in dm_control, with the compiled model and its lasting changes."""
         self.check_process()
-        if self._unchanged:
-            self._write_fields(self._unchanged)
+        self._keep_edits(self._written)
+        self._restore_compiled_fields()
         super().reset(keyframe_id)
         if self._lasting:
-            self._write_fields(self._lasting)
-        self._unchanged = {name: self._unchanged[name] for name in self._lasting}
+            self._write_fields({name: self.compiled_field(name) for name in self._lasting})
 
     def after_reset(self) -> None:
         """Compute derived quantities of the start; servos act, whereas dm_control disables motors."""
@@ -87,29 +86,65 @@ class Physics(dm_mujoco.Physics):
     def change_model(self, fields: Mapping[str, np.ndarray], lasting: bool = False) -> None:
         """Set fields of the model.
 
+        Rows of a field that a user has written into the model meanwhile, such as the mass of one body, count as
+        lasting ones.
+
         Args:
             fields: values by name, in the shapes of the model's fields.
             lasting: whether they stay over resets and prevail over later values; else they hold until the next reset.
         """
-        model = self.model.ptr
-        self._unchanged = {name: field(model, name).copy() for name in fields} | self._unchanged
+        self._keep_edits(fields)
         if lasting:
             self._lasting = {**self._lasting, **fields}
-        self._write_fields({name: self._lasting.get(name, values) for name, values in fields.items()})
+        self._write_fields(fields)
 
     def compiled_field(self, name: str) -> np.ndarray:
         """Return a field of the model as it was compiled."""
-        return self._unchanged[name] if name in self._unchanged else field(self.model.ptr, name)
+        return field(shared_model(self.body, self.arena), name)
 
     @property
     def lasting(self) -> Mapping[str, np.ndarray]:
-        """Fields of the model that stay over resets, by name."""
-        return self._lasting
+        """Fields of the model of which rows stay over resets, by name."""
+        self._keep_edits(self._written)
+        return {name: field(self.model.ptr, name) for name in self._lasting}
+
+    def _keep_edits(self, names: Iterable[str]) -> None:
+        """Make those rows of fields lasting that a user has written into the model."""
+        for name in names:
+            present_values = field(self.model.ptr, name)
+            known_values = self._written.get(name)
+            if known_values is None:
+                known_values = self.compiled_field(name)
+            differs = present_values != known_values
+            if differs.any():
+                is_edited = differs.reshape(len(differs), -1).any(axis=1)
+                values = self._lasting.get(name, np.full_like(present_values, np.nan)).copy()
+                values[is_edited] = present_values[is_edited]
+                self._lasting = {**self._lasting, name: values}
+                self._written[name] = present_values.copy()
+
+    def _restore_compiled_fields(self) -> None:
+        """Write the compiled values of all fields that were written, and forget that they were."""
+        if self._written:
+            compiled_fields = {name: self.compiled_field(name) for name in self._written}
+            change_fields(self.model.ptr, compiled_fields, self._get_scratch())
+            self._written = {}
 
     def _write_fields(self, fields: Mapping[str, np.ndarray]) -> None:
+        """Write fields of the model, with lasting values in place of others."""
+        merged_fields = {name: merge_lasting(values, self._lasting.get(name)) for name, values in fields.items()}
+        change_fields(self.model.ptr, merged_fields, self._get_scratch())
+        self._remember_values(merged_fields)
+
+    def _remember_values(self, names: Iterable[str]) -> None:
+        """Remember the present values of fields, with which later ones are compared."""
+        self._written |= {name: field(self.model.ptr, name).copy() for name in names}
+
+    def _get_scratch(self) -> mujoco.MjData:
+        """Return data that `change_fields` overwrites."""
         if self._scratch is None:
             self._scratch = mujoco.MjData(self.model.ptr)
-        change_fields(self.model.ptr, fields, self._scratch)
+        return self._scratch
 
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps.
@@ -209,18 +244,20 @@ class Physics(dm_mujoco.Physics):
             self._shared = True
             physics._shared = True
         else:
-            physics._unchanged = self._unchanged
+            self._keep_edits(self._written)
+            physics._written = dict(self._written)
             physics._lasting = self._lasting
         return physics
 
     def snapshot(self, fields: Iterable[str]) -> dict[str, np.ndarray]:
         """Return the simulation's state and derived fields of `MjData` as a snapshot of a `Batch` of one."""
+        self._keep_edits(self._written)
         model = self.model.ptr
         data = self.data.ptr
         state = np.empty((1, mujoco.mj_stateSize(model, _STATE)))
         mujoco.mj_getState(model, data, state[0], _STATE)
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
-        models = {f"{OF_MODEL}{name}": field(model, name)[None].copy() for name in self._unchanged}
+        models = {f"{OF_MODEL}{name}": field(model, name)[None].copy() for name in self._written}
         lasting = {f"{LASTING}{name}": np.array(values)[None] for name, values in self._lasting.items()}
         return {"state": state, **{name: getattr(data, name)[None].copy() for name in fields}, **models, **lasting}
 
@@ -235,13 +272,10 @@ class Physics(dm_mujoco.Physics):
         self.check_process()
         fields_of_batch, lasting_of_batch = model_fields(arrays)
         fields = {name: values[0] for name, values in fields_of_batch.items()}
-        lasting = {name: values[0] for name, values in lasting_of_batch.items()}
-        if self._unchanged:
-            self._write_fields(self._unchanged)
-        self._unchanged = {}
-        self._lasting = {name: values for name, values in lasting.items() if not np.isnan(values).any()}
+        self._restore_compiled_fields()
+        self._lasting = {name: values[0] for name, values in lasting_of_batch.items() if not np.isnan(values).all()}
         if fields:
-            self.change_model(fields)
+            self._write_fields(fields)
         model = self.model.ptr
         data = self.data.ptr
         mujoco.mj_setState(model, data, arrays["state"][0], _STATE)
@@ -253,13 +287,14 @@ class Physics(dm_mujoco.Physics):
         self.divergence = None
 
     def __getstate__(self):
-        return super().__getstate__(), self.body, self.arena, self._unchanged, self._lasting
+        self._keep_edits(self._written)
+        return super().__getstate__(), self.body, self.arena, list(self._written), self._lasting
 
     def __setstate__(self, state):
-        data, self.body, self.arena, unchanged, lasting = state
+        data, self.body, self.arena, written_names, lasting = state
         # dm_control recomputes the derived quantities; here they are one substep behind the state.
         saved_data = copy.copy(data.ptr)
         super().__setstate__(data)
         mujoco.mj_copyData(data.ptr, data.model.ptr, saved_data)
-        self._unchanged = unchanged
         self._lasting = lasting
+        self._remember_values(written_names)

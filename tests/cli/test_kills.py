@@ -16,7 +16,7 @@ from arc_suite.learning.studies import csv_files, results
 
 FIXTURES = pathlib.Path(__file__).parents[1] / "fixtures"
 
-# By program: the flags, and the least number of changes of files.
+# By program, or algorithm of `train`: the flags, and the least number of changes of files.
 COMMANDS = {
     "train": (
         (
@@ -33,8 +33,38 @@ COMMANDS = {
         ("--around=tick", "--goal=speed", "--bodies=40", "--steps=10", "--nopages", "--processes=1", "--output=a"),
         10,
     ),
+    "finetune": (
+        (
+            "--robot=leaper",
+            "--algorithm=finetune",
+            "--set=time_limit=0.5",
+            "--steps=64",
+            "--evaluate_every=32",
+            *("--hp=start=../start", "--hp=num_envs=4", "--hp=horizon=8", "--hp=minibatch=16", "--hp=value_warm_up=8"),
+            "--output=run",
+        ),
+        20,
+    ),
     "study": (("tiny_studies:PAIR", "--jobs=2"), 10),
     "benchmark": (("samples", "--algorithm=tiny_studies:climb", "--places=tick-walk", "--seeds=1"), 10),
+}
+
+# The run from which `finetune` starts.
+IMITATION = (
+    *("--robot=leaper", "--algorithm=dagger", "--set=time_limit=0.5", "--steps=80", "--evaluate_every=80"),
+    *("--hp=num_envs=4", "--hp=round=10", "--hp=left_out=0", "--hp=hidden=16", "--hp=batch=64", "--output=run"),
+)
+
+# Flags of programs that write one file, by the file.
+FILES = {
+    "a.json": ("import", str(FIXTURES / "robots" / "go2_like.xml")),
+    "body.json": ("evaluate", "--robot=tick", "--episodes=1", "--set=time_limit=0.5"),
+    "a.csv": ("transfer", "--families=robots", "--set=time_limit=0.5"),
+    "a.glb": ("animate", "--robot=tick", "--clips=walk"),
+    "a.webp": ("animate", "--robot=tick", "--clips=walk", "--size=32", "--fps=4"),
+    "a.mp4": ("render", "--robot=tick", "--policy=zero", "--steps=3", "--width=64", "--height=48"),
+    "a.gif": ("render", "--robot=tick", "--policy=zero", "--steps=3", "--width=64", "--height=48"),
+    "a.xml": ("build_model", "--robot=tick"),
 }
 
 
@@ -60,7 +90,13 @@ def contents(folder):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_killed_at_any_change_of_files_the_same_command_completes_it(command, tmp_path):
     flags, least = COMMANDS[command]
-    kills.whole((command, *flags), tmp_path / "whole")
+    program = command
+    if command == "finetune":
+        program = "train"
+        pytest.importorskip("jax")
+        kills.whole(("train", *IMITATION), tmp_path / "before")
+        (tmp_path / "before" / "run").rename(tmp_path / "start")
+    kills.whole((program, *flags), tmp_path / "whole")
     expected = contents(tmp_path / "whole")
 
     def check():
@@ -74,21 +110,27 @@ def test_killed_at_any_change_of_files_the_same_command_completes_it(command, tm
         for path in (begun / "studies").rglob("*"):
             if path.is_file() and path.name != results.DEMONSTRATORS:
                 path.unlink()
-    assert kills.resumed((command, *flags), tmp_path / "killed", check, begun) >= least
+    assert kills.resumed((program, *flags), tmp_path / "killed", check, begun) >= least
 
 
-def test_sigterm_is_one_line_and_143(capsys):
-    before = signal.getsignal(signal.SIGTERM)
+@pytest.mark.release
+@pytest.mark.parametrize("name", FILES)
+def test_killed_at_any_change_of_files_a_file_is_whole_or_absent(name, tmp_path):
+    """The same command writes it, and deletes what the kill has left beside it."""
+    flag = "json" if FILES[name][0] == "evaluate" else "output"
+    command = (*FILES[name], f"--{flag}={name}")
+    kills.whole(command, tmp_path / "whole")
+    expected = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir()}
 
-    def work():
-        with program.resumable("runs/here"):
-            os.kill(os.getpid(), signal.SIGTERM)
+    def check_killed():
+        for other in expected:  # clips have a table beside them
+            path = tmp_path / "killed" / other
+            assert not path.exists() or path.read_bytes() == expected[other]
 
-    with pytest.raises(SystemExit) as ended:
-        program.guard(work, "arc-suite study")
-    assert ended.value.code == 143
-    assert capsys.readouterr().err == "arc-suite study: interrupted; the same command resumes runs/here\n"
-    assert signal.getsignal(signal.SIGTERM) == before
+    def check():
+        assert {path.name: path.read_bytes() for path in (tmp_path / "killed").iterdir()} == expected
+
+    assert kills.resumed(command, tmp_path / "killed", check, check_killed=check_killed) >= 2
 
 
 def test_sigterm_can_be_asked_for():

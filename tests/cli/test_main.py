@@ -106,7 +106,7 @@ def test_only_the_program_that_runs_is_imported():
         "try: main.main()\n"
         "finally: print(sorted(name for name in sys.modules if name.startswith('arc_suite.cli.')))"
     )
-    names = [f"arc_suite.cli.{name}" for name in ("doctor", "help_text", "main", "program", "programs")]
+    names = [f"arc_suite.cli.{name}" for name in ("doctor", "help_text", "interrupts", "main", "program", "programs")]
     assert interpreters.printed(code) == [VERSION.strip(), f"{names}"]
 
 

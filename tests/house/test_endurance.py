@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -9,6 +10,7 @@ import determinism
 import gymnasium
 import numpy as np
 import pytest
+import soak
 from dm_control.rl.control import PhysicsError
 
 import arc_suite
@@ -41,7 +43,7 @@ def test_soak_in_short():
     command = [sys.executable, FOLDER / "soak.py", "--steps=8000", "--block=2000", "--lives=4", "--slope=1000"]
     done = subprocess.run(command, env=ENVIRON, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.startswith("8000 steps, ")
+    assert re.findall(r"^(\w+): 8000 steps, ", done.stdout, re.MULTILINE) == list(soak.STEPS)
 
 
 ACCIDENTS = (("qpos", np.nan), ("qpos", np.inf), ("qvel", np.nan), ("qvel", -np.inf), ("qvel", 1e12))

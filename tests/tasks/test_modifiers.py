@@ -42,6 +42,7 @@ from arc_suite.tasks.modifiers import (
     motors,
     pushes,
 )
+from arc_suite.tasks.scene import CHANGEABLE
 
 SPIDER = load_body("spider")
 BODIES = {**ROBOTS, "spider": SPIDER}
@@ -667,3 +668,48 @@ def test_a_default_leaves_the_first_episode_of_a_seed_as_it_is(name):
     starts = [environment.reset().observation["posture"] for environment in (plain, modified, stronger)]
     assert not np.array_equal(starts[0], starts[1])
     np.testing.assert_array_equal(starts[1], starts[2])
+
+
+def edit_torso(model, torso):
+    """Write into one row of each field that modifiers may write, as users do; return the rows by name."""
+    rows = {}
+    for name in CHANGEABLE:
+        values, row = getattr(model, name), torso if name.startswith("body_") else 0
+        if len(values):
+            values[row] = (0.6, 0.0, 0.0, 0.8) if name == "body_iquat" else 1.5 * values[row] + 0.01
+            rows[name] = (row, values[row].copy())
+    return rows
+
+
+@pytest.mark.parametrize("setting", [*EACH, "all"])
+def test_own_edits_of_the_model_stay_in_their_rows_whatever_modifiers_write(setting):
+    """Edits before the first episode, and those within one; in pickles, copies and snapshots, too."""
+    body, settings = imports.quadruped(), CASES[setting] | {"random": 3}
+    edited, twin = (arc_suite.load(body, "walk", settings) for _ in range(2))
+    torso = twin.task.definition.scene.layout.torso
+    rows = edit_torso(edited.physics.model, torso)
+    written = {}
+    for episode in range(3):
+        again, restored = pickle.loads(pickle.dumps(edited)), arc_suite.load(body, "walk", settings)
+        if episode:
+            restored.restore(edited.snapshot())
+        for environment in (edited, twin, again, restored):
+            environment.reset()
+        drawn = twin.task.definition.start(np.random.RandomState(0), twin.task.definition.first()).model
+        for environment in (edited, again, restored) if episode else (edited, again):
+            for name, (row, values) in rows.items():
+                found = getattr(environment.physics.model, name)
+                if environment is not restored or name in drawn:  # a snapshot holds the fields that are written
+                    assert_array_equal(found[row], values, name)
+                others = np.arange(len(found)) != row
+                assert_array_equal(found[others], getattr(twin.physics.model, name)[others], name)
+        written = {name: drawn[name] for name in drawn}
+        if episode == 1:
+            edited.physics.model.body_mass[torso] = 0.5
+            rows["body_mass"] = (torso, np.float64(0.5))
+    if setting == "all":
+        assert set(written) == set(CHANGEABLE) - {"actuator_gear"}
+    vector = VectorEnv(body, "walk", 1, task_kwargs=settings | {"random": 3})
+    vector.reset(seed=3)
+    with pytest.raises(ValueError, match="read-only"):
+        vector.batch.models[0].body_mass[torso] = 0.5

@@ -38,7 +38,8 @@ from arc_suite.cli.flags import (
     refuse_flags,
     task_from_flags,
 )
-from arc_suite.cli.program import TERMINATED, progress, resumable, say, watch_for_termination
+from arc_suite.cli.interrupts import TERMINATED
+from arc_suite.cli.program import progress, resumable, say, watch_for_termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning import onnx_file, outcomes, processes

@@ -1,6 +1,7 @@
 """`arc-suite render` writes pictures and films that other programs can read, or one line and nothing."""
 
 import os
+import pathlib
 import re
 
 import imageio.v2 as imageio
@@ -201,3 +202,21 @@ def test_without_opengl_it_says_what_to_do_and_leaves_the_old_file(tmp_path, mon
     programs.refused(done, "arc-suite render: cannot render with MUJOCO_GL=vulkan: ")
     assert done.stderr.endswith("; unset it, or set MUJOCO_GL=egl\n")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
+
+
+def test_an_error_of_ffmpeg_is_one_line(tmp_path):
+    picture = np.zeros((64, 64, 3), np.uint8)
+    with pytest.raises(OSError, match="ffmpeg has not written all of it"):
+        films.write_mp4(tmp_path / "missing" / "a.mp4", [picture] * 3, 0.02)
+
+
+def test_a_film_that_is_interrupted_ends_ffmpeg(tmp_path, capfd):
+    def frames():
+        yield np.zeros((64, 64, 3), np.uint8)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        films.write_mp4(tmp_path / "a.mp4", frames(), 0.02)
+    assert capfd.readouterr().err == ""
+    commands = [path.read_bytes() for path in pathlib.Path("/proc").glob("[0-9]*/cmdline") if path.exists()]
+    assert not [command for command in commands if os.fsencode(tmp_path) in command]
