@@ -21,15 +21,17 @@ from arc_suite.tasks.contract import Task
 class Demonstrator:
     """A policy that walks by a preset, fitted to a task, in one environment or in a batch.
 
-    Gait, units of the command, control step and body are those of the task. The presets slow, medium, fast, tuned and
-    refined walk straight ahead by their own clock. They read the angles and velocities of joints and the torso's
-    orientation alone. All others follow the observed command of a task, by the clock of its gait; planned computes
-    its command itself. In a batch a demonstrator acts by `reset` and `act`, as every policy does. In one environment
-    it is a function of a `TimeStep` with named blocks; the first `TimeStep` of an episode restarts it.
+    Gait, control step, body and velocity units are those of the task. The presets `slow`, `medium`, `fast`, `tuned`
+    and `refined` walk straight ahead by their own clock. They read the angles and velocities of joints and the torso's
+    orientation alone. The other presets follow the velocity command that a task shows them, by the clock of its gait;
+    `planned` computes the command itself.
+
+    In a batch a demonstrator acts by `reset` and `act`, as every policy does. In one environment it is a function of a
+    `TimeStep` with named blocks; the first `TimeStep` of an episode restarts it.
 
     An observation does not name its robot. An observation with another number of joints or rigid bodies is an error.
-    A start below half or above twice the standing height is a warning, since a task may start so. Another robot with
-    the same numbers of parts and about the same height is not recognized, and walks badly.
+    A start below half or above twice the standing height is only a warning, since some tasks start so. Another robot
+    with the same numbers of parts and about the same height is not recognized, and walks badly.
 
     Attributes:
         law: law of the preset, fitted to the task; see `cpg.law`.
@@ -43,11 +45,12 @@ class Demonstrator:
                 `gymnasium.make` or `make_vec`. A body, see `registry.body_of`, stands for the task walk with default
                 settings.
             preset: name of a preset, or parameters of a law: a `Preset`, `SteeringParameters`, ... A number is a
-                target speed as a share of sqrt(g h), h being the standing height, negative for backwards. Names:
-                slow, medium and fast, which every body has; tuned and refined of the four robots: tuned has the
-                highest return of the paper's law in walk, refined the highest of all; steered and surefooted, which
-                follow a command; sighted and leaping, which need a height scan; balanced of leaper; planned for the
-                task navigate; `module:name` of a law of another package.
+                target speed as a share of sqrt(g h), h being the standing height, negative for backwards. None is
+                the body's default preset. Every body has the names `slow`, `medium` and `fast`. Queen, Bastion, Tick
+                and Leaper have `tuned`, with the highest return of the paper's law in walk, and `refined`, with the
+                highest return of all laws. `steered` and `surefooted` follow a command. `sighted` and `leaping` need
+                a height scan. Leaper has `balanced`. `planned` is for the task navigate. `module:name` is a law of
+                another package.
 
         Raises:
             ValueError: an unknown name, a value out of range, a preset that does not fit, or a body that
@@ -56,7 +59,7 @@ class Demonstrator:
         body, body_task = _body_and_task(task)
         if isinstance(preset, str) or preset is None:
             preset = preset_of(body, preset)
-        # A preset of the published law was searched for its body, flaws or not.
+        # Parameters of the paper's law, a `Preset`, come from a search on the body, which walks in spite of flaws.
         if not isinstance(preset, Preset):
             flaws = hopeless_flaws(body)
             if flaws:
@@ -67,7 +70,7 @@ class Demonstrator:
         self._body = body
         self._starts_lying = body_task.lies
         self._state: Any = None  # of the law; None before the first action
-        self._reset_indices: list[int] = []  # environments that have been reset since the last action
+        self._reset_indices: list[int] = []  # environments of the latest reset, until the next action
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start episodes in some environments, given by their indices; seeds have no effect."""
@@ -99,7 +102,8 @@ class Demonstrator:
             self._state = self.law.initial(count)
         self._state, actions = self.law(self._state, blocks)
         if self._reset_indices and not self._starts_lying:
-            self._check_heights(blocks["posture"][self._reset_indices, 0])
+            torso_heights = blocks["posture"][:, 0]
+            self._check_heights(torso_heights[self._reset_indices])
         return actions[0] if is_one_environment else actions
 
     def snapshot(self) -> dict[str, np.ndarray]:
@@ -142,9 +146,11 @@ def _body_and_task(source: Any) -> tuple[Body, Task | None]:
         return source, None
     if isinstance(source, Task):
         return source.scene.body, source
+    # A wrapper of Gymnasium holds an environment, which holds a view of its task, which holds the task. `source` may be
+    # any of these.
     environment = getattr(source, "unwrapped", source)
-    environment_task = getattr(environment, "task", environment)
-    definition = getattr(environment_task, "definition", environment_task)
+    task_view = getattr(environment, "task", environment)
+    definition = getattr(task_view, "definition", task_view)
     if isinstance(definition, Task):
         return definition.scene.body, definition
     return registry.body_of(source), None

@@ -2,8 +2,9 @@
 
 Finished episodes go to part files in a hidden folder next to the dataset, `.<name>.parts`, which holds the
 dataset's metadata, too. In the end they are merged with the dataset's earlier episodes into one
-`main_data.hdf5`, which Minari opens. Every file is written under a temporary name and then moved: until
-the merged file takes its place, the dataset stays as it was, and the next collection continues from the parts.
+`main_data.hdf5`, which Minari opens. Every file is written under a temporary name and then moved. If a kill comes
+before the merged file is moved, the next collection continues from the parts. The dataset then is as it was before, or
+without metadata where it was to be overwritten.
 """
 
 import contextlib
@@ -36,8 +37,9 @@ class Storage:
     """The files of one dataset; `open` makes one.
 
     Attributes:
-        id: Minari's.
-        metadata: Minari's without the counts; None in a new dataset until the caller sets it.
+        id: Minari's id of the dataset.
+        metadata: Minari's metadata without the counts of episodes and steps; None in a new dataset until the caller
+            sets it.
     """
 
     def __init__(self, dataset_id: str, overwrite: bool):
@@ -52,7 +54,7 @@ class Storage:
         if self._data.is_symlink():  # nothing outside the dataset's folder is written
             raise ValueError(f"dataset {dataset_id!r} is damaged: expected a folder, and {self._data} is a link")
         if self._data.exists():
-            files.folder(self._data)
+            files.folder(self._data)  # raises an error if it is a file
         try:
             self._read()
         except ValueError:
@@ -66,13 +68,15 @@ class Storage:
             metadata_of_parts = read_metadata(self.id, self._parts)
         else:  # parts whose deletion was interrupted
             shutil.rmtree(self._parts, ignore_errors=True)
-        # A kill while the merged file takes its place leaves no metadata in the dataset: the parts hold all of it.
+        # With parts, the dataset counts only if it has metadata: a kill in the middle of an overwriting merge leaves it
+        # without, and the parts hold all episodes. Without parts, any file is of the dataset, and damage is an error.
         pattern = "*" if metadata_of_parts is None else METADATA
         if not self._overwrite and any(self._data.glob(pattern)):
             self.metadata = read_metadata(self.id, self._data)
             self._scan(self._data / MAIN)
         if metadata_of_parts is None:
             return
+        # Parts with other settings than the dataset's are left alone; the first new episodes replace them.
         if self.metadata is None or self.metadata["arc_suite"] == metadata_of_parts["arc_suite"]:
             self.metadata = metadata_of_parts
             self._continues = True
@@ -106,7 +110,7 @@ class Storage:
         return frozenset(self._stored)
 
     def clear(self) -> None:
-        """Forget all episodes; the first episodes that are added then replace the parts."""
+        """Forget all episodes; `add` then deletes their parts before it writes new ones."""
         self._stored = {}
         self.metadata = None
         self._continues = False
@@ -133,13 +137,13 @@ class Storage:
         self._stored |= {index: StoredEpisode(path, episode.length) for index, episode in finished.items()}
 
     def finish(self, progress: Callable) -> None:
-        """Merge the episodes before the first missing one into the dataset, and delete the parts if these are all.
+        """Merge the episodes before the first missing one into the dataset. If none is missing, delete the parts.
 
         Args:
             progress: wraps an iterable of the episodes' indices, such as `tqdm`.
 
         Raises:
-            OSError: the disk has no space for two copies of the dataset; the parts stay.
+            OSError: the disk has no space for the merged file in addition to the parts, which stay.
         """
         count = 0  # of episodes before the first missing one
         while count in self._stored:
@@ -158,7 +162,9 @@ class Storage:
                     with h5py.File(part, "r") as source:
                         for index in indices:
                             source.copy(episodes.name(index), merged)
-            if self._overwrite:  # earlier metadata describe other episodes
+            # The merged file takes its place at the end of this block. Metadata of the replaced episodes must not stand
+            # next to it, not even after a kill.
+            if self._overwrite:
                 (self._data / METADATA).unlink(missing_ok=True)
         counts = {
             "total_episodes": count,
@@ -170,7 +176,7 @@ class Storage:
             shutil.rmtree(self._parts)
 
     def _scan(self, path: Path) -> None:
-        """Find the episodes of a file, read them and compare their digests."""
+        """Find the episodes of a file, and read them: `episodes.read` compares their digests."""
         with damages(self.id, path), h5py.File(files.plain(path), "r") as file:
             for index in map(episodes.index, file):
                 self._stored[index] = StoredEpisode(path, episodes.read(file, index).length)

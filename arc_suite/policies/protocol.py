@@ -52,7 +52,8 @@ class Script:
             joints: number of joints of an action.
         """
         self._script = script
-        self._scripts: list[Iterator] = [iter(())] * num_envs
+        no_actions: Iterator = iter(())  # before the first episode
+        self._scripts = [no_actions] * num_envs
         self._zero = np.zeros(joints)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
@@ -96,7 +97,7 @@ class Positioned:
         self._task = task
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
-        """Start the episodes of seeds in some environments."""
+        """Start the episodes of seeds in some environments; demonstrators need no seeds."""
         self._policy.reset(indices, seeds)
 
     def act(self, observation, rewards=None) -> np.ndarray:
@@ -106,11 +107,14 @@ class Positioned:
             ValueError: an observation without the blocks of joint angles and velocities.
         """
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
-        _, angles, speeds = proprioception(read_blocks(observation, Clocked.reads, torques.shape[-1]))
-        return self._task.modifier(Control).positions(torques, angles, speeds)
+        joints = torques.shape[-1]
+        blocks = read_blocks(observation, Clocked.reads, joints)  # checked posture and velocities
+        _, angles, speeds = proprioception(blocks)  # the first is the torso's orientation
+        position_control = self._task.modifier(Control)  # the task's modifier of this class
+        return position_control.positions(torques, angles, speeds)
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return the memory of a demonstrator; see `Demonstrator.snapshot`."""
+        """Return the memory of the policy as arrays by name, if it has this method, as demonstrators do."""
         return self._policy.snapshot()
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -135,13 +139,14 @@ class Mixture:
     def act(self, observation, rewards) -> np.ndarray:
         """Return the actions (num_envs, joints)."""
         actions = np.stack([policy.act(observation, rewards) for policy in self._policies])
-        return actions[self._policy_indices, np.arange(len(self._policy_indices))]
+        environments = np.arange(len(self._policy_indices))
+        return actions[self._policy_indices, environments]  # of (policies, num_envs, joints)
 
 
 class Individuals:
-    """A policy of functions of a dm_env `TimeStep`: every episode has a new function.
+    """A policy that acts by plain functions from a dm_env `TimeStep` to an action, a new one in every episode.
 
-    A function gets the observations of an environment of `arc_suite.load`: named blocks.
+    A function gets the observations that an environment of `arc_suite.load` has: blocks by name.
     """
 
     def __init__(self, make: Callable[[], Callable], num_envs: int, joints: int, name: str = "policy"):
@@ -201,7 +206,7 @@ def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarr
         seed: seed of all its episodes.
 
     Raises:
-        ValueError: `seed` is no seed.
+        ValueError: `seed` is no integer that `checks.seed` accepts.
     """
     seed = checks.seed(seed)
 

@@ -47,7 +47,7 @@ class WalkMemory(NamedTuple):
         distance: (...) along world x since the start, m.
         all_schedule_errors: (...) sum of `schedule_errors` over the steps.
         healthy: (...) whether the torso is in its healthy range of heights.
-        energy: energy of the motors.
+        energy: the motors' work by weight, m, from which the cost of transport follows.
     """
 
     tick: int | np.ndarray
@@ -66,8 +66,9 @@ class Walk(Task):
     """Walking forward at the target speed in the prescribed gait."""
 
     name = "walk"
-    from_body = ("clock", "clearances", "_torques")
-    weights: ClassVar[Mapping[str, float]] = {  # Section 4; robots have a "control" of their own
+    from_body = ("clock", "clearances", "_torques")  # attributes that follow from the body; see `Task.from_body`
+    # Section 4 of the paper. Each robot replaces "control" by a weight of its own.
+    weights: ClassVar[Mapping[str, float]] = {
         "forward": 1.5,
         "healthy": 1.0,
         "gait_bonus": 1.5,
@@ -88,13 +89,14 @@ class Walk(Task):
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> WalkSettings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
+        # `arena` is a setting of every task, which is read elsewhere; an error may propose it.
         values = parameters.values(body, overrides, cls.name, cls.names(), names_of_others=("arena",))
         return WalkSettings(
-            parameters.parameters(body, values),
-            parameters.positive("velocity_band", values["velocity_band"]),
-            _healthy_range(values["healthy_range"]),
-            parameters.weights(cls.weights, values["weights"], overrides.get("weights")),
-            parameters.noise(values),
+            parameters=parameters.parameters(body, values),
+            velocity_band=parameters.positive("velocity_band", values["velocity_band"]),
+            healthy_range=_healthy_range(values["healthy_range"]),
+            weights=parameters.weights(cls.weights, values["weights"], overrides.get("weights")),
+            noise=parameters.noise(values),
         )
 
     @functools.cached_property
@@ -126,10 +128,10 @@ class Walk(Task):
 
     def phase(self, memory: WalkMemory):
         """Return the phase (...) of the gait, rad."""
-        return self.clock.at(self.clock.phases, memory.tick)
+        return self.clock.at(self.clock.phases, memory.tick)  # the clock has a table with a row for each tick
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
-        """Draw the state: the standing pose with noise. The clock starts at 0."""
+        """Draw the state: the standing pose with noise. The clock starts at tick 0, which is phase 0."""
         qpos, qvel = self.settings.noise.draw(self.scene.standing, random)
         joints = len(self.scene.body.joint_names)
         no_action = np.zeros(joints)
@@ -166,6 +168,7 @@ class Walk(Task):
         displacement = x - memory.x
         low, high = self.settings.healthy_range
         height = readings.torso_height
+        efforts = readings.effort(memory.action)  # (..., joints) torques as shares of the largest
         return memory._replace(
             tick=tick,
             x=x,
@@ -174,12 +177,13 @@ class Walk(Task):
             distance=memory.distance + displacement,
             all_schedule_errors=memory.all_schedule_errors + schedule_errors,
             healthy=(low <= height) & (height <= high),
-            energy=energy.after(memory.energy, self._torques, readings.effort(memory.action), readings.joint_angles),
+            energy=energy.after(memory.energy, self._torques, efforts, readings.joint_angles),
         )
 
     def terms(self, memory: WalkMemory, readings: Readings) -> dict:
         """Return the paper's ten terms."""
         gait = self.parameters
+        # The seven terms with a negative weight.
         costs = terms.costs(
             readings, memory.action, memory.previous_action, memory.schedule_errors, gait.default_angles
         )
@@ -208,11 +212,11 @@ class Walk(Task):
         """Return the mean `speed`, m/s, `gait_compliance`, the share of feet as prescribed, and `cost_of_transport`."""
         steps = memory.tick + (memory.tick == 0)  # at least 1
         time = steps * self.scene.control_timestep
-        path = abs(self.target_velocity) * time
+        target_path = abs(self.target_velocity) * time  # m, that the body would have gone at the target velocity
         return {
             "speed": memory.distance / time,
             "gait_compliance": clock.compliance(memory.all_schedule_errors, steps, self.parameters.feet),
-            "cost_of_transport": energy.cost_of_transport(memory.energy, abs(memory.distance), path),
+            "cost_of_transport": energy.cost_of_transport(memory.energy, abs(memory.distance), target_path),
         }
 
 

@@ -42,10 +42,11 @@ def rise(body: Body, rest: Pose) -> Motion:
     sinking = _ease_in(sink_steps)
     depth_shares = np.concatenate([sinking, np.ones(hold_steps), sinking[::-1], np.zeros(hold_steps)])
     joints = gestures.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
-    recording = _simulate(body, rest, joints + _loaded_targets(body, rest) - rest.joints)
+    recording = _simulate(body, rest, _bear_weight(body, rest, joints))
     first = sizing.simulation(body).substeps * (sink_steps + hold_steps)
     _check_lies(body, rest, recording.poses[first])
-    return stay_at_start(recording, first, samples=len(recording.poses) - 1 - first)
+    last = len(recording.poses) - 1
+    return stay_at_start(recording, first, samples=last - first)
 
 
 def jump(body: Body, rest: Pose) -> Motion:
@@ -54,7 +55,7 @@ def jump(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: its feet do not leave the ground, or it does not land on them.
     """
-    recording = _simulate_leap(body, rest, leaps.JUMPS, "clearance")
+    recording = _simulate_leap(body, rest, leaps.JUMPS, "clearance")  # the largest height of the lowest foot
     return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
 
 
@@ -64,7 +65,7 @@ def leap(body: Body, rest: Pose) -> Motion:
     Raises:
         ValueError: its feet do not leave the ground, or it does not land on them.
     """
-    candidates = presets_of(body)["leaping"].choice
+    candidates = presets_of(body)["leaping"].choice  # leaps, of which bodies take the one that suits them
     return advance_straight(_simulate_leap(body, rest, candidates, "distance"))
 
 
@@ -91,7 +92,7 @@ def _simulate_leap(body: Body, rest: Pose, candidates: tuple[leaps.Leap, ...], m
     leap_joints = leaps.leap_targets(body, legs, legs.by_leg(rest.joints), best_leap)
     rest_joints = np.tile(rest.joints, (_to_steps(body, _HOLD_DURATION), 1))
     joints = np.concatenate([leap_joints, rest_joints])
-    return _simulate(body, rest, joints + _loaded_targets(body, rest) - rest.joints)
+    return _simulate(body, rest, _bear_weight(body, rest, joints))
 
 
 def _belly_height(body: Body, rest: Pose) -> float:
@@ -101,7 +102,7 @@ def _belly_height(body: Body, rest: Pose) -> float:
 
 
 def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
-    """Raise a ValueError if a torso in a pose (7 + joints,) stands still."""
+    """Raise a ValueError unless the torso lies on the ground in a pose (7 + joints,)."""
     rest_height = rest.position[2]
     height = pose[2]
     is_high = height > _LYING_HEIGHT * rest_height
@@ -117,8 +118,13 @@ def _to_steps(body: Body, duration: float) -> int:
 
 
 def _ease_in(steps: int) -> np.ndarray:
-    """Return shares (steps,) that rise smoothly from 0, and would be 1 after the last."""
+    """Return shares (steps,) that rise smoothly from 0; a further step would reach 1."""
     return 0.5 - 0.5 * np.cos(np.pi * np.arange(steps) / steps)
+
+
+def _bear_weight(body: Body, rest: Pose, joints: np.ndarray) -> np.ndarray:
+    """Return targets (steps, joints), rad, for angles (steps, joints), so that control bears the weight at rest."""
+    return joints + _loaded_targets(body, rest) - rest.joints
 
 
 def _loaded_targets(body: Body, rest: Pose) -> np.ndarray:
@@ -127,7 +133,7 @@ def _loaded_targets(body: Body, rest: Pose) -> np.ndarray:
     standing_pose = pose_mechanics(sized_body, rest.joints)
     torque_limits = np.array([joint.torque for joint in sized_body.joints])  # N m
     stiffness = drive(sized_body, standing_pose.inertias).stiffness  # shares of the torque limits per rad
-    return rest.joints + standing_pose.loads / (torque_limits * stiffness)
+    return rest.joints + standing_pose.loads / (torque_limits * stiffness)  # loads: N m that hold the pose
 
 
 def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float = 1.0) -> Recording:
@@ -136,7 +142,8 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     Args:
         body: the spec.
         rest: first pose.
-        targets: (steps + 1, joints) targets of position control, rad; NaN for no torque.
+        targets: (steps + 1, joints) targets of position control at the start and after each step, rad. A step that
+            begins or ends with NaN has no torque.
         damping_share: damping of the joints, as a share of their own.
 
     Returns:
@@ -152,7 +159,8 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     model.dof_damping[6:] *= damping_share  # the first six are the torso's
     layout = readings.layout(model, body)
     data = mujoco.MjData(model)
-    data.qpos[:] = readings.positions(np.concatenate(rest), layout, standing_qpos(model))
+    rest_pose = np.concatenate(rest)  # position, quaternion and joint angles
+    data.qpos[:] = readings.positions(rest_pose, layout, standing_qpos(model))
     positions = [data.qpos.copy()]
     for target, next_target in zip(targets[:-1], targets[1:], strict=True):
         angles = readings.pose(data.qpos, layout)[7:]
@@ -160,7 +168,7 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
         target_speeds = (next_target - target) / control_timestep
         actions = joint_drive.actions(target, target_speeds, angles, speeds)
         data.ctrl[:joint_count] = np.nan_to_num(actions)
-        if is_imported:  # the other controls release servos
+        if is_imported:  # its joints have servos, and a second control for each, which releases the servo
             data.ctrl[joint_count : 2 * joint_count] = np.isnan(actions)
         for _ in range(substeps):
             mujoco.mj_step(model, data)

@@ -129,6 +129,7 @@ class ProcessEvaluator:
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,
                     encoding="utf-8",
+                    start_new_session=True,  # a Ctrl-C in the terminal is for this process alone, which ends them
                 )
 
 
