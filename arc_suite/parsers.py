@@ -1,8 +1,7 @@
 """One guard for parsers of files that others may have written: whatever a parser raises becomes one line.
 
-Parsers of other packages raise errors of many classes for damaged files, and their releases add more. A guard around
-a parser catches all of them. The caller
-checks bounds on the work before the parser starts.
+Parsers of other packages raise errors of many classes for damaged files, and their releases add more. A guard around a
+parser catches all of them. The caller checks bounds on the work before the parser starts.
 """
 
 import contextlib
