@@ -110,11 +110,7 @@ def main() -> None:
         refuse_flags(_COLLECTION_FLAGS, "expected none with --verify, as the dataset holds what it was collected by")
     setups = setups_from_flags()
     if FLAGS.verify is not None:
-        any_setup = next(iter(setups.values()))
-        body = any_setup.body if FLAGS["robot"].present or custom_body() else None
-        task = any_setup.task if FLAGS["task"].present else None
-        count = data.verify(FLAGS.verify, body, FLAGS.num_envs, FLAGS.threads, progress, task)
-        print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")
+        _verify(next(iter(setups.values())))
         return
     if FLAGS.id is not None and len(setups) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(setups)}")
@@ -142,6 +138,16 @@ def main() -> None:
             print(f"{dataset_id}: {describe_dataset(dataset)}")
         else:
             print(f"{dataset_id}: has its {len(dataset)} episodes already")
+
+
+def _verify(setup: Setup) -> None:
+    """Replay the dataset of `--verify`, with the body and task of a setup where flags name them."""
+    from arc_suite import data
+
+    body = setup.body if FLAGS["robot"].present or custom_body() else None
+    task = setup.task if FLAGS["task"].present else None
+    count = data.verify(FLAGS.verify, body, FLAGS.num_envs, FLAGS.threads, progress, task)
+    print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")
 
 
 def describe_dataset(dataset) -> str:

@@ -45,19 +45,18 @@ class Demonstrator:
                 `gymnasium.make` or `make_vec`. A body, see `registry.body_of`, stands for the task walk with default
                 settings.
             preset: name of a preset, or parameters of a law: a `Preset`, `SteeringParameters`, ... A number is a
-                target speed as a share of sqrt(g h), h being the standing height, negative for backwards. None is
-                the body's default preset. Every body has the names `slow`, `medium` and `fast`. Queen, Bastion, Tick
-                and Leaper have `tuned`, with the highest return of the paper's law in walk, and `refined`, with the
-                highest return of all laws. `steered` and `surefooted` follow a command. `sighted` and `leaping` need
-                a height scan. Leaper has `balanced`. `planned` is for the task navigate. `module:name` is a law of
-                another package.
+                target speed as a share of sqrt(g h), h being the standing height, negative for backwards. Every body
+                has the names `slow`, `medium` and `fast`. Queen, Bastion, Tick and Leaper have `tuned`, with the
+                highest return of the paper's law in walk, and `refined`, with the highest return of all laws.
+                `steered`, `surefooted` and `reactive` follow a command. `sighted` and `leaping` need a height scan.
+                Leaper has `balanced`. `planned` is for the task navigate. `module:name` is a law of another package.
 
         Raises:
             ValueError: an unknown name, a value out of range, a preset that does not fit, or a body that
                 cannot walk by any preset, as its feet hang far above the floor.
         """
         body, body_task = _body_and_task(task)
-        if isinstance(preset, str) or preset is None:
+        if isinstance(preset, str) or preset is None:  # None raises an error that lists the names
             preset = preset_of(body, preset)
         # Parameters of the paper's law, a `Preset`, come from a search on the body, which walks in spite of flaws.
         if not isinstance(preset, Preset):

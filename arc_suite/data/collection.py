@@ -5,6 +5,7 @@ import functools
 import math
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from minari import __version__ as minari_version
@@ -64,11 +65,7 @@ def collect(
     _check(settings, episodes)
     checks.boolean("overwrite", overwrite)
     checks.boolean("wait", wait)
-    further_metadata = {}
-    if author is not None:
-        further_metadata["author"] = [author]  # Minari makes a set of it
-    if code_permalink is not None:
-        further_metadata["code_permalink"] = code_permalink
+    further_metadata = _further_metadata(author, code_permalink)
     provenance = settings.provenance()
     with Storage.open(dataset_id, overwrite, wait) as storage:
         _check_same_dataset(storage, dataset_id, provenance, overwrite)
@@ -91,6 +88,16 @@ def collect(
             error_type = ValueError if isinstance(error, ValueError) else OSError
             raise error_type(f"{error}; {note}") from None
         return len(missing)
+
+
+def _further_metadata(author: str | None, code_permalink: str | None) -> dict[str, Any]:
+    """Return the part of Minari's metadata that the caller names."""
+    metadata: dict[str, Any] = {}
+    if author is not None:
+        metadata["author"] = [author]  # Minari makes a set of it
+    if code_permalink is not None:
+        metadata["code_permalink"] = code_permalink
+    return metadata
 
 
 def _check(settings: DatasetSettings, episodes: int) -> None:

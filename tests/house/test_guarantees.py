@@ -76,9 +76,14 @@ TESTS = {
         "envs/test_gym.py::test_copies_carry_on_bit_for_bit",
         "envs/test_vector.py::test_copies_carry_on_bit_for_bit",
     ],
-    "An [error](contributing.md#errors) is one line on standard error and exit status 1; Ctrl-C is one line and 130.": [
-        "cli/test_program.py::test_expected_errors_are_one_line",
-        "cli/test_program.py::test_an_interrupt_is_one_line_and_exit_status_130",
+    "An [error](contributing.md#errors) is one line on standard error and exit status 1.": [
+        "cli/test_program.py::test_expected_errors_are_one_line"
+    ],
+    "Ctrl-C is one line and 130, SIGTERM one line and 143, from a program's first import on; its child processes end, "
+    "too.": [
+        "cli/test_interrupts.py::test_an_interrupt_is_one_line_and_leaves_nothing_half_done",
+        "cli/test_interrupts.py::test_imports_can_be_interrupted",
+        "cli/test_interrupts.py::test_interrupts_are_not_lost",
     ],
     "A file is complete or absent.": [
         "cli/test_kills.py::test_killed_at_any_change_of_files_the_same_command_completes_it",

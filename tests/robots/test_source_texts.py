@@ -39,7 +39,7 @@ REFUSED = {
     ('cone="elliptic"', 'cone="elliptic" iterations="1000000000"'): (
         "option '': iterations: expected an integer up to 10000, got '1000000000'"
     ),
-    ('impratio="100.0"', 'impratio="1e300"'): "option '': impratio: expected numbers, got '1e300'",
+    ('impratio="100.0"', 'impratio="1e300"'): "option '': impratio: expected numbers from -1e+15 to 1e+15, got '1e300'",
     ('name="home" qpos="0.0', 'name="home" qpos="0.0 0.0'): "expected a keyframe 'home' of 19 numbers",
     ('key name="home"', 'key name="other"'): "key 'other': name: expected one of home, got 'other'",
     ("<mujoco>", '<!DOCTYPE a [<!ENTITY b "c">]><mujoco>'): "expected XML without a document type and entities",

@@ -7,7 +7,7 @@ The text of an iteration is that of `on_policy`.
 
 import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -83,11 +83,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             iterations = int(saved["iterations"])
             worlds = rollouts.restore(saved)
     trainer_state = _copy(TrainerState(worlds, learner_state))  # donated arrays must not be those of others
-    run_chunk = jax.jit(
-        functools.partial(run_iterations, hp, rollouts, symmetry, jax.random.key(context.seed)),
-        static_argnums=3,
-        donate_argnums=0,
-    )
+    run_chunk = _compile_chunks(hp, rollouts, symmetry, context.seed)
 
     def start_chunk(trainer_state):
         columns, learns_policy = _schedule_columns(hp, context, chunk)
@@ -110,6 +106,12 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             yield Slice(step, metrics, graph, {**checkpoint, "iterations": np.array(finished_chunk.end)})
             if step >= context.steps:
                 return
+
+
+def _compile_chunks(hp: ProximalPolicy, rollouts: WorldRollouts, symmetry: Symmetry | None, seed: int) -> Callable:
+    """Return `run_iterations` as a compiled function of the state, the first iteration, and what follows them."""
+    run_chunk = functools.partial(run_iterations, hp, rollouts, symmetry, jax.random.key(seed))
+    return jax.jit(run_chunk, static_argnums=3, donate_argnums=0)
 
 
 def next_chunk(hp: ProximalPolicy, context: RunContext, first: int) -> Chunk:

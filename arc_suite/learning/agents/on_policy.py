@@ -93,7 +93,6 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         Diverged: an action is not finite.
     """
     check(hp, context)
-    seed = context.seed
     collector = collecting.EnvironmentRollouts(hp, context)
     task = collector.task
     architecture = collector.architecture
@@ -119,7 +118,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
         # Learn from it, in epochs of minibatches.
         batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
-        orders = _draw_orders(hp, generator(seed, "orders", iterations), len(batch.returns))
+        orders = _draw_orders(hp, generator(context.seed, "orders", iterations), len(batch.returns))
         numbers = (np.float32(schedules.std), np.float32(schedules.desired_kl))
         state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, numbers, schedules.learns_policy)
         iterations += 1
