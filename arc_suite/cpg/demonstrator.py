@@ -58,7 +58,7 @@ class Demonstrator:
         body, body_task = _body_and_task(task)
         if isinstance(preset, str) or preset is None:  # None raises an error that lists the names
             preset = preset_of(body, preset)
-        # Parameters of the paper's law, a `Preset`, come from a search on the body, which walks in spite of flaws.
+        # Who gives a `Preset`, parameters of the paper's law, has seen the body walk by it, whatever its flaws.
         if not isinstance(preset, Preset):
             flaws = hopeless_flaws(body)
             if flaws:
@@ -74,7 +74,8 @@ class Demonstrator:
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start episodes in some environments, given by their indices; seeds have no effect."""
         if self._state is not None:
-            mask = np.zeros(len(self._state[0]), bool)
+            num_envs = len(self._state[0])  # arrays of a law's state have a row for each environment
+            mask = np.zeros(num_envs, bool)
             mask[indices] = True
             self._state = restart_where(self._state, self.law.initial(len(mask)), mask)
         self._reset_indices = list(indices)
@@ -116,7 +117,8 @@ class Demonstrator:
         Raises:
             KeyError: an array is missing.
         """
-        if not arrays:
+        if not arrays:  # of a time before the first action
+            self._state = None
             return
         initial = self.law.initial(len(arrays["0"]))
         numbers = itertools.count()  # of the leaves, in their order

@@ -148,7 +148,8 @@ class Storage:
         count = 0  # of episodes before the first missing one
         while count in self._stored:
             count += 1
-        if not self._continues or count == 0:
+        has_new_episodes = self._continues
+        if not has_new_episodes or count == 0:
             return
         path = files.folder(self._data) / MAIN
         paths = {episode.path for episode in self._stored.values()}
@@ -157,10 +158,12 @@ class Storage:
             raise OSError(f"cannot write {path}: no space left on device: {num_bytes} bytes are needed")
         with _writing(path) as temporary:
             with h5py.File(temporary, "w") as merged:
-                indices_by_path = itertools.groupby(progress(range(count)), key=lambda index: self._stored[index].path)
-                for part, indices in indices_by_path:
+                # Adjacent episodes of one file are copied together, so that it is opened once for them.
+                indices = progress(range(count))
+                indices_by_path = itertools.groupby(indices, key=lambda index: self._stored[index].path)
+                for part, indices_in_part in indices_by_path:
                     with h5py.File(part, "r") as source:
-                        for index in indices:
+                        for index in indices_in_part:
                             source.copy(episodes.name(index), merged)
             # The merged file takes its place at the end of this block. Metadata of the replaced episodes must not stand
             # next to it, not even after a kill.

@@ -34,6 +34,8 @@ def duty_factor(track: Track) -> np.ndarray:
 def phase_error(track: Track) -> np.ndarray:
     """Lateness of the middle of stance against the schedule, in cycles of the clock; (feet,) in -0.5 to 0.5.
 
+    It is positive where a foot stands later than in the schedule.
+
     The middle of stance is its circular mean over the clock (Fisher, "Statistical analysis of circular data", 1993).
     That of the schedule is computed from the same samples. NaN for a leg that never changes between stance and swing,
     or does so in another rhythm than the clock's.
@@ -42,6 +44,7 @@ def phase_error(track: Track) -> np.ndarray:
 
     def mean_vector(stance):
         """Return complex numbers (feet,): the angle is the middle of stance, the size its vector strength."""
+        # Without its mean, a foot that always stands has the vector 0.
         return ((stance - stance.mean(axis=0)) * phase_vectors).mean(axis=0)
 
     actual = mean_vector(track.stance)
@@ -159,9 +162,11 @@ def torso_pitch(track: Track) -> float:
 
 
 def torso_roll(track: Track) -> float:
-    """Root mean square of the torso's roll, its turn about its forward axis out of the horizontal, rad."""
-    axes = rotations.matrix(track.quaternions)
-    return _rms(np.arctan2(axes[:, 2, 1], axes[:, 2, 2]))
+    """Root mean square of the torso's roll, by which it is turned about its forward axis, rad."""
+    axes = rotations.matrix(track.quaternions)  # columns: forward, left and up in the world
+    left_z = axes[:, 2, 1]
+    up_z = axes[:, 2, 2]
+    return _rms(np.arctan2(left_z, up_z))
 
 
 def height_variation(track: Track) -> float:
@@ -209,7 +214,7 @@ def asymmetry(track: Track) -> np.ndarray:
 
 
 def cost_of_transport(track: Track) -> float:
-    """Positive work of the motors by weight and displacement, J/(N m).
+    """Positive work of the motors, divided by weight and displacement, J/(N m).
 
     See Collins et al., "Efficient bipedal robots based on passive-dynamic walkers", 2005. Negative work does not count,
     as motors do not recover it. Torque is constant in a control step: its work is torque times the change of the angle.

@@ -1,10 +1,12 @@
 """Tasks in which a body follows a command of velocities, on some ground, in the prescribed gait.
 
-A task is composed of frozen values: a command, a ground, a health, and in some tasks a gait and a pose by
-command. This module defines the order in which they draw, remember, observe and are rewarded. Nothing in it has a
-scale: lengths are in standing heights h, speeds in the target velocity or sqrt(g h), rates in sqrt(g / h),
-contact forces in the body's weight. Directions are relative to the heading of the torso, so that an episode may
-start with any heading. Bonuses that standing still would have are multiplied by the tracking of the command.
+A task is composed of frozen values: a command, a ground, a `Health` that says when a body has fallen, and in some tasks
+a gait and a pose by command. This module defines the order in which they draw, remember, observe and are rewarded.
+
+Observations and rewards do not depend on a body's size: lengths are in standing heights h, speeds in the target
+velocity or sqrt(g h), rates in sqrt(g / h), contact forces in the body's weight. Directions are relative to the heading
+of the torso, so that an episode may start with any heading. Bonuses that standing still would have are multiplied by
+the tracking of the command.
 """
 
 import functools
@@ -76,6 +78,7 @@ class CommandTaskSettings(NamedTuple):
     gait_and_pose: GaitAndPose | None = None
 
 
+# A NamedTuple cannot extend another one, so the fields of `Readings` are repeated, and two of its methods.
 class Sensed(
     NamedTuple("Sensed", [(field, np.ndarray) for field in (*Readings._fields, "heading", "touches", "feet")])
 ):
@@ -101,7 +104,7 @@ class Core(NamedTuple):
         previous_action: (..., joints) action of the step before; 0 before the first.
         schedule_errors: (...) number of contact schedule errors in the latest step.
         all_schedule_errors: (...) sum of `schedule_errors` over the steps.
-        energy: energy of the motors.
+        energy: the motors' work by weight, m, from which the cost of transport follows.
         path: (...) length of the path since the start, from `motion`, m.
         place: (..., 3) place of the torso's frame at the latest reading: x and y, m, and yaw, rad.
         motion: (..., 3) velocity of the torso, a leaky mean over a cycle of the gait.
@@ -173,19 +176,20 @@ class CommandTask(Task):
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> CommandTaskSettings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
+        # `arena` is a setting of tasks without an arena of their own, which is read elsewhere; an error may propose it.
         names_of_others = () if cls.own_arena else ("arena",)
         values = parameters.values(body, overrides, cls.name, cls.names(), names_of_others)
         gait_and_pose = None
         if cls.gait_and_pose is not None:
             gait_and_pose = cls.gait_and_pose.with_settings(body, overrides)
         return CommandTaskSettings(
-            parameters.parameters(body, values, backward=False),
-            parameters.weights(cls.weights, values["weights"], overrides.get("weights")),
-            parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
-            parameters.noise(values),
-            cls.ground.with_settings(overrides),
-            cls.command.with_settings(body, overrides),
-            gait_and_pose,
+            parameters=parameters.parameters(body, values, backward=False),
+            weights=parameters.weights(cls.weights, values["weights"], overrides.get("weights")),
+            cost_limit=parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
+            noise=parameters.noise(values),
+            ground=cls.ground.with_settings(overrides),
+            command=cls.command.with_settings(body, overrides),
+            gait_and_pose=gait_and_pose,
         )
 
     @classmethod
@@ -270,13 +274,13 @@ class CommandTask(Task):
         return self.settings.gait_and_pose.phase(memory.gait_and_pose)
 
     def leg_phases(self, memory: CommandTaskMemory) -> tuple[Any, Any]:
-        """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds."""
+        """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the present gait."""
         if self.settings.gait_and_pose is None:
             return super().leg_phases(memory)
         return self.settings.gait_and_pose.leg_phases(memory.gait_and_pose)
 
     def first(self) -> Any:
-        """Return the ground's stream state."""
+        """Return the stream state with which a new stream of episodes begins; the ground alone has one."""
         return self.settings.ground.first()
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
@@ -293,7 +297,8 @@ class CommandTask(Task):
         qpos, qvel = self.settings.noise.draw(ground.pose(self.scene), random)
         qpos[:2] += displacement
         qpos[3:7] = rotations.turn_about_z(qpos[3:7], random.uniform(-self.yaw, self.yaw))
-        schedule = self.settings.command.schedule(random, ground.share(ground_memory))
+        widening = ground.share(ground_memory)  # share, from 0 to 1, by which a curriculum has widened the commands
+        schedule = self.settings.command.schedule(random, widening)
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
         command_memory = self._start_command(random, schedule)
         gait_and_pose = self.settings.gait_and_pose
@@ -347,11 +352,14 @@ class CommandTask(Task):
         return Sensed(*readings, heading, touches, rotations.to_heading_frame(feet_from_torso, heading_of_parts))
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
-        """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
+        """Return the qpos (..., nq) that brings every foot clear of the ground.
+
+        Other than in `Task`, level ground is no exception.
+        """
         return self.raise_off_ground(readings)
 
     def begin(self, memory: CommandTaskMemory, readings: Sensed) -> CommandTaskMemory:
-        """Return the memory with the place of the torso, and the velocity that the command asks for there."""
+        """Return the memory with the torso's place after the reset, and the velocity that is desired there."""
         place = _read_place(readings)
         command = self.settings.command.begin(self.context, memory.command, place)
         desired = self.settings.command.desired(self.context, command, memory.core.steps, place)
@@ -377,8 +385,9 @@ class CommandTask(Task):
         gait_memory = memory.gait_and_pose
         if gait_and_pose is None:
             stance = self.clock.at(self.clock.stance, tick)
-            crouch = 1.0
+            crouch = 1.0  # share of the standing height that the command asks for
         else:
+            # The gait by command goes on before feet are judged by it.
             gait_memory = gait_and_pose.before_feet(context, gait_memory, steps, is_going)
             stance = gait_and_pose.stance(gait_memory)
             crouch = gait_and_pose.crouch(gait_memory)
@@ -434,7 +443,7 @@ class CommandTask(Task):
         return memory._replace(core=memory.core._replace(desired=desired), command=command)
 
     def terms(self, memory: CommandTaskMemory, readings: Sensed) -> dict:
-        """Return the paper's costs without scale, and bonuses for following the command.
+        """Return the paper's costs, made independent of the body's size, and bonuses for following the command.
 
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
         """
@@ -503,6 +512,7 @@ class CommandTask(Task):
         gait_and_pose = self.settings.gait_and_pose
         judged_steps = self.judged_steps(memory)
         steps = core.steps + (core.steps == 0)  # at least 1
+        target_path = self.context.pace * steps  # m, that the body would have gone at the target velocity
         metrics_of_command = self.settings.command.progress(self.context, memory.command, judged_steps)
         if gait_and_pose is not None:
             metrics_of_command |= gait_and_pose.progress(memory.gait_and_pose, judged_steps)
@@ -511,7 +521,7 @@ class CommandTask(Task):
             "tracking": core.all_tracking / steps,
             **self.health.progress(memory.health),
             "gait_compliance": clock.compliance(core.all_schedule_errors, steps, self.parameters.feet),
-            "cost_of_transport": energy.cost_of_transport(core.energy, core.path, self.context.pace * steps),
+            "cost_of_transport": energy.cost_of_transport(core.energy, core.path, target_path),
             **self.settings.ground.progress(memory.ground),
         }
 
@@ -527,9 +537,10 @@ class CommandTask(Task):
     def judged_steps(self, memory: CommandTaskMemory):
         """Return the steps (...) over which an episode is judged: those so far, or of a full one once it ended."""
         steps = memory.core.steps
-        terminated, truncated = self.ended(memory, None)
+        terminated, truncated = self.ended(memory, None)  # the memory decides, readings are not used
         xp = memory.core.place.__array_namespace__()
-        return xp.where(terminated | truncated, self.context.steps, steps + (steps == 0))
+        steps_so_far = steps + (steps == 0)  # at least 1
+        return xp.where(terminated | truncated, self.context.steps, steps_so_far)
 
     def stream_state(self, memory: CommandTaskMemory) -> Any:
         """Return the stream state of the ground, by the outcome of the episode.
@@ -538,7 +549,7 @@ class CommandTask(Task):
         """
         steps = memory.core.steps
         terminated, truncated = self.ended(memory, None)
-        has_ended = terminated or truncated or steps >= self.step_limit
+        has_ended = terminated or truncated or steps >= self.step_limit  # drivers, not `ended`, apply the limit
         has_full_cycle = steps * self.context.leak >= 1.0  # the leak is the share of a cycle in a step
         if not has_ended and not has_full_cycle:
             return self.settings.ground.stream_state(memory.ground, outcome=np.nan, fell=False)
@@ -586,7 +597,7 @@ class CommandTask(Task):
 def _velocity(name: str) -> tuple[Part, ...]:
     """Return the parts of a velocity (3,) in units of the command."""
     planar = Planar(unit="v*", axes=(f"{name} forward", f"{name} left"))
-    turning = Scalar(f"{name} turning", "v* / R", sign=-1)
+    turning = Scalar(f"{name} turning", "v* / R", sign=-1)  # a mirror image turns to the other side
     return planar, turning
 
 

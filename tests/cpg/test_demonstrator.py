@@ -323,3 +323,13 @@ def test_nobody_is_warned_of_the_robot_itself(robot):
         low = environment.reset().observation
         low["posture"][0] *= 0.3  # it may fall once it walks
         demonstrator.act({name: block[None] for name, block in low.items()})
+
+
+def test_a_snapshot_from_before_the_first_action_goes_back_to_it():
+    environment, demonstrator = arc_suite.load("tick", "walk", {"random": 0}), Demonstrator("tick", "tuned")
+    timestep = environment.reset()
+    arrays = demonstrator.snapshot()
+    first_action = demonstrator.act(timestep.observation)
+    demonstrator.act(timestep.observation)
+    demonstrator.restore(arrays)
+    np.testing.assert_array_equal(demonstrator.act(timestep.observation), first_action)

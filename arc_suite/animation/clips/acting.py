@@ -77,7 +77,7 @@ def death(body: Body, rest: Pose) -> Motion:
     """
     collapse_steps = _to_steps(body, _COLLAPSE_DURATION)
     limp_steps = _to_steps(body, _LIMP_DURATION)
-    depth_shares = np.append(_ease_in(collapse_steps), 1.0)
+    depth_shares = np.append(_ease_in(collapse_steps), 1.0)  # 1 is reached after the last step
     joints = gestures.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
     no_torque = np.full((limp_steps, len(rest.joints)), np.nan)
     recording = _simulate(body, rest, np.concatenate([joints, no_torque]), damping_share=_LIMP_DAMPING_SHARE)
@@ -106,7 +106,8 @@ def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
     rest_height = rest.position[2]
     height = pose[2]
     is_high = height > _LYING_HEIGHT * rest_height
-    is_clear = height - rest_height + _belly_height(body, rest) > _LYING_CLEARANCE * rest_height
+    lowest_height = _belly_height(body, rest) + (height - rest_height)  # of the torso's lowest point, if it is level
+    is_clear = lowest_height > _LYING_CLEARANCE * rest_height
     if is_high and is_clear:
         raise ValueError("the legs do not fold far enough to lie down")
 

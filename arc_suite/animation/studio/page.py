@@ -35,7 +35,7 @@ from arc_suite.robots.spec_files import MAX_IMPORTED
 _REFRESH_INTERVAL = 0.25  # s, between two updates of the status and the charts
 _PANEL_WIDTH = 330  # pixels of the panel with the charts
 _MIN_WIDTH_FOR_CHARTS = 1000  # pixels of a window, in which charts leave room for the picture
-_KEY_CHANGE = 0.25  # of the body's own speed, by which a key changes the command
+_KEY_CHANGE = 0.25  # share of the body's target speed, by which a key changes the command
 
 
 class _Key(NamedTuple):
@@ -141,6 +141,7 @@ class Page:
             self._shown_companion = companion_creature
             self._view.show(walker.creature, companion_creature)
             self._fit(walker.creature)
+        # `share`: of the present control step that has passed; poses between two steps are interpolated.
         qpos = walker.episodes.qpos(walker.share)
         markers = walker.episodes.markers(walker.share)
         companion_qpos = None if companion is None else companion.episodes.qpos(companion.share)
@@ -227,7 +228,7 @@ class Page:
         self._downloads.show_lines(sketch)
 
     def _fit_pose(self, creature: Creature) -> None:
-        """Offer the poses and gaits of a body, if they are by command in its task."""
+        """Offer the poses and gaits of a body, if its task takes commands for them."""
         task = creature.environment.task.definition
         self._fixed_pose_fields = frozenset()
         if not player_controls.is_directed(task):
@@ -271,6 +272,7 @@ class Page:
             for field, widget in self._widgets.items():
                 layout.set_value(widget, state.value(field))
                 layout.set_visible(widget, field not in idle)
+            # `tempo` has an effect where poses and gaits have, and `lengths` where a body has links to drag.
             layout.set_visible(self._pose_folder, "tempo" not in idle)
             self._links.show(state.sketch, creature, visible="lengths" not in idle)
 
