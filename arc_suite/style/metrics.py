@@ -200,16 +200,18 @@ def asymmetry(track: Track) -> np.ndarray:
     horses", 1965): left and right feet move alike, half a cycle apart. NaN for a leg that has no counterpart.
     """
     offsets = track.foot_positions - track.positions[:, None]  # from the torso, in the world
-    positions = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), offsets)  # in the torso's frame
+    # The transposed matrices of rotation lead from the world into the torso's frame.
+    positions = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), offsets)
     cycle_shares = track.leg_phases / TWO_PI % 1.0
     bins = (cycle_shares * _BINS).astype(int) % _BINS  # a share may be rounded to 1, which is the first bin again
     mean_paths = np.full((len(track.legs), _BINS, 3), np.nan)  # NaN for bins without a step, which do not count
     for leg in range(len(track.legs)):
         for occupied_bin in np.unique(bins[:, leg]):
             mean_paths[leg, occupied_bin] = positions[bins[:, leg] == occupied_bin, leg].mean(axis=0)
+    # Legs without a counterpart, whose mirror is -1, get the last leg's path here, and NaN below.
     reflected_paths = mean_paths[track.mirrors] * (1.0, -1.0, 1.0)
     squared_distances = ((mean_paths - reflected_paths) ** 2).sum(axis=-1)  # (feet, bins)
-    has_counterpart = (track.mirrors >= 0)[:, None]  # `mirrors` has -1 for a leg without one
+    has_counterpart = (track.mirrors >= 0)[:, None]
     return np.sqrt(_mean_where(squared_distances, ~np.isnan(squared_distances) & has_counterpart))
 
 
@@ -255,7 +257,8 @@ def _rms_by_leg(track, values) -> np.ndarray:
     """Return the root mean square over time and over the joints of each leg: (steps, joints) to (feet,)."""
     squares = (values**2).mean(axis=0)
     counts = np.bincount(track.joint_legs, minlength=len(track.legs))
-    return np.sqrt(np.bincount(track.joint_legs, squares, len(track.legs)) / counts)
+    sums = np.bincount(track.joint_legs, weights=squares, minlength=len(track.legs))
+    return np.sqrt(sums / counts)
 
 
 def _mean_where(values, mask) -> np.ndarray:

@@ -37,7 +37,7 @@ from arc_suite.tasks.readings import Readings, component
 
 COST_LIMIT = 0.6  # standing costs a third of it, uniform random torques twice as much
 
-# Weights of the costs: those of walk. Rates are in units of the body, and weigh for Queen as much as in walk.
+# Weights of the costs. They are those of walk, converted to units of the body's size with the robot Queen.
 COSTS = {
     "gait_cost": -0.1,
     "control": -0.05,
@@ -49,6 +49,7 @@ COSTS = {
     "transport": 0.0,
 }
 
+# R is the mean distance of the feet from their center.
 _ARROW_DISTANCE = 0.8  # of the start of the command's arrows from the torso, R
 _ARROW_RADIUS = 0.06  # R
 _ARROW_SAMPLES = np.linspace(0.0, 1.0, 9)  # points of an arrow that must lie over the ground
@@ -183,7 +184,7 @@ class CommandTask(Task):
         if cls.gait_and_pose is not None:
             gait_and_pose = cls.gait_and_pose.with_settings(body, overrides)
         return CommandTaskSettings(
-            parameters=parameters.parameters(body, values, backward=False),
+            parameters=parameters.parameters(body, values, backward=False),  # a target velocity above 0 alone
             weights=parameters.weights(cls.weights, values["weights"], overrides.get("weights")),
             cost_limit=parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
             noise=parameters.noise(values),

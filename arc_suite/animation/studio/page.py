@@ -191,6 +191,7 @@ class Page:
             self._view,
             self._editor,
             show_state=self._show_state,
+            # In the thread of the simulation, between two of its steps.
             switch_dragging=lambda: self._session.do(self._switch_dragging),
         )
 
@@ -218,6 +219,7 @@ class Page:
         sketch = creature.sketch
         gait_names = (DEFAULT_CHOICE, *gaits.fitting_gaits(body))
         presets = (DEFAULT_CHOICE, *presets_of(body))
+        # A present choice that is not among the names is listed, too.
         self._widgets["gait"].options = layout.list_with(sketch.gait, gait_names)
         self._widgets["preset"].options = layout.list_with(sketch.preset, presets)
         self._links.fit(creature)
@@ -324,7 +326,8 @@ class Page:
 
     def _open_upload(self, event: viser.GuiEvent) -> None:
         """Open the spec of a body, or a state of the page, that a visitor uploads."""
-        text = event.target.value.content[: MAX_IMPORTED + 1].decode("utf-8", "replace")
+        first_bytes = event.target.value.content[: MAX_IMPORTED + 1]  # one more than allowed, so that it is refused
+        text = first_bytes.decode("utf-8", "replace")
         if is_state(text):
             try:
                 state = self._read_state(text)
@@ -337,7 +340,7 @@ class Page:
         self._show_state()
 
     def _read_state(self, text: str) -> PageState:
-        """Return the state of a file, if the widgets offer its values; nothing is imported for it.
+        """Return the state of a file, if the widgets offer its values. No module that it names is imported.
 
         Raises:
             ValueError: a name or a number that the widgets do not offer.

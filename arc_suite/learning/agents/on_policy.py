@@ -3,9 +3,9 @@
 With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`),
 unless the network treats left and right alike.
 
-A time limit bootstraps: the episode is worth the value of its last observation. Environments start at different
-ages, so their time limits fall on different steps. A step that begins another command bootstraps from the observation
-before it (`VectorEnv.resampled`).
+At a time limit, the value of the last observation stands for the rewards that would have followed. Environments start
+at different ages, so their time limits fall on different steps. Where a step begins another command, the value of the
+observation before it stands for what follows (`VectorEnv.resampled`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -52,7 +52,7 @@ class Schedules(NamedTuple):
 
         Args:
             hp: hyperparameters.
-            steps: environment steps of the run.
+            steps: environment steps of the whole run.
             iterations: number of iterations before it.
         """
         progress = min(iterations * hp.num_envs * hp.horizon / steps, 1.0)
@@ -119,8 +119,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         # Learn from it, in epochs of minibatches.
         batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
         orders = _draw_orders(hp, generator(context.seed, "orders", iterations), len(batch.returns))
-        numbers = (np.float32(schedules.std), np.float32(schedules.desired_kl))
-        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, numbers, schedules.learns_policy)
+        std_and_kl = (np.float32(schedules.std), np.float32(schedules.desired_kl))
+        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, std_and_kl, schedules.learns_policy)
         iterations += 1
 
         if schedules.updates_normalizer:
@@ -249,7 +249,8 @@ def _read_start(hp: ProximalPolicy, context: RunContext, task, architecture: Arc
         start_policy = policies.policy(Path(hp.start), context.setup.body, task=task)
     if not isinstance(start_policy, Network):
         raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
-    for name in {**start_policy.blocks, **task.sizes}:
+    all_names = {**start_policy.blocks, **task.sizes}  # a dictionary, for the order of its keys
+    for name in all_names:
         policy_size = start_policy.blocks.get(name, 0)
         task_size = task.sizes.get(name, 0)
         if policy_size != task_size:
@@ -268,7 +269,7 @@ def _read_start(hp: ProximalPolicy, context: RunContext, task, architecture: Arc
     if len(shapes) != len(expected_shapes):
         raise ValueError(f"{hp.start}: expected the {len(expected_shapes)} arrays of a {hp.network}, got {len(shapes)}")
     if shapes != expected_shapes:
-        first_bias_shape = shapes[0]
+        first_bias_shape = shapes[0]  # leaves of a layer are ordered by name: bias, then weight
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {first_bias_shape[0]}")
     return normalize, policy
 

@@ -32,8 +32,8 @@ except ImportError as error:
 
 IMPLEMENTATIONS = ("jax", "warp")
 
-# Limits of the solver under `jax`, whose loops run until the slowest world is ready. Lower limits cost return, higher
-# ones only time. See docs/gpu.md.
+# Limits of the solver under `jax`, whose loops run until the slowest world is ready. With lower limits policies have
+# lower returns, higher ones only take time. See docs/gpu.md.
 SOLVER_ITERATIONS = 20
 LINE_SEARCH_ITERATIONS = 8
 
@@ -110,13 +110,14 @@ def _move_margins_into_geoms(model: mujoco.MjModel) -> None:
         growing_sizes = _GROWING_SIZES[int(model.geom_type[geom])]
         model.geom_size[geom, :growing_sizes] += margin
         model.geom_aabb[geom, 3:] += margin  # half-extents of the bounding box
-        model.geom_rbound[geom] += math.sqrt(3.0) * margin
+        model.geom_rbound[geom] += math.sqrt(3.0) * margin  # a corner of the bounding box moves so far
     model.pair_margin[is_pair_with_field] = 0.0
 
 
 def _limit_cell_depth(model: mujoco.MjModel) -> None:
     """Make cells of height fields at most as deep as wide: in deeper ones Warp finds wrong contacts now and then."""
-    cell_widths = 2.0 * model.hfield_size[:, 0] / np.maximum(model.hfield_ncol - 1, 1)
+    half_lengths = model.hfield_size[:, 0]  # along x; cells of the suite are square
+    cell_widths = 2.0 * half_lengths / np.maximum(model.hfield_ncol - 1, 1)
     depths = model.hfield_size[:, 3]  # of the base below the lowest point
     model.hfield_size[:, 3] = np.minimum(depths, cell_widths)
 
@@ -167,7 +168,7 @@ def table_sizes(model: mujoco.MjModel) -> tuple[int, int]:
     """
     geom_types = np.stack([model.geom_type[model.pair_geom1], model.geom_type[model.pair_geom2]])  # (2, pairs)
     has_plane = (geom_types == mujoco.mjtGeom.mjGEOM_PLANE).any(axis=0)
-    points = []  # of each pair, that can touch a plane or a height field
+    points = []  # for each pair, how many points of its geoms can touch a plane or a height field
     for first_type, second_type in geom_types.T.tolist():
         points.append(max(_PLANE_CONTACTS.get(first_type, 1), _PLANE_CONTACTS.get(second_type, 1)))
     contacts = max(_MIN_CONTACTS, int(np.dot(points, np.where(has_plane, 0.5, 1.0))))
@@ -182,7 +183,8 @@ def advance(model: mjx.Model, data: mjx.Data, substeps: int) -> mjx.Data:
         data = data.tree_replace({"_impl.overflow": jnp.zeros_like(data._impl.overflow)})
     data = jax.lax.fori_loop(0, substeps, lambda _, substep_data: mjx.step(model, substep_data), data)
     if data.impl == mjx.Impl.JAX:
-        # The contact forces of the last substep, which sensors compute in Warp. Kinematics must not be computed before.
+        # The contact forces of the last substep, which sensors compute in Warp. They belong to its kinematics, which
+        # nothing may have replaced by those of the new state.
         data = mjx.rne_postconstraint(model, data)
     return data
 
