@@ -83,16 +83,16 @@ def test_presets_of_a_dataset_import_nothing(kept, module):
 
 @pytest.mark.long
 def test_what_the_caller_names_is_imported(module):
-    def run(*arguments):
-        return collected(f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments)
+    def verify(*arguments):
+        return collected(f"--verify={ID}", *arguments)
 
-    named, verify = ("--task=strolling:stroll", "--set=arena=strolling:lawn"), f"--verify={ID}"
-    programs.passed(run(*named))
+    named = ("--task=strolling:stroll", "--set=arena=strolling:lawn")
+    programs.passed(collected(f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *named))
     line = "task 'strolling:stroll': files import nothing; import 'strolling' first"
-    programs.refused(run(verify), f"arc-suite collect: dataset {ID!r}: metadata.json: {line}\n")
-    assert programs.passed(run(verify, *named)) == f"{ID}: 1 episodes replayed, all bit-equal\n"
+    programs.refused(verify(), f"arc-suite collect: dataset {ID!r}: metadata.json: {line}\n")
+    assert programs.passed(verify(*named)) == f"{ID}: 1 episodes replayed, all bit-equal\n"
     line = "holds episodes of the task strolling:stroll, and not of walk"
-    done = run(verify, "--set=arena=strolling:lawn", "--task=walk")
+    done = verify("--set=arena=strolling:lawn", "--task=walk")
     programs.refused(done, f"arc-suite collect: dataset {ID!r} {line}\n")
 
 
