@@ -19,12 +19,14 @@ import signal
 import sys
 import tempfile
 import traceback
+import warnings
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from absl import logging
 from dm_control.rl.control import PhysicsError
 from tqdm import tqdm
 
@@ -396,6 +398,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kind", choices=list(KINDS), help="of files; all by default")
     arguments = parser.parse_args()
+    logging.set_verbosity(logging.ERROR)  # MuJoCo's warnings about odd models
+    warnings.simplefilter("error", RuntimeWarning)  # users would see it next to the line
     print(f"{'file':<24}" + "".join(f"{name:>11}" for name in OUTCOMES))
     failed = False
     with tempfile.TemporaryDirectory() as folder:

@@ -209,9 +209,11 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     """
     scores_by_learner: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
-        division, learner, robot, task, seed, *numbers, notes = row.values()
+        division, learner, robot, task, seed, *cells, notes = row.values()
         checks.name(division, DIVISIONS, "division")
-        score = RunScore(robot, task, int(seed), *map(float, numbers), notes)
+        score = RunScore(robot, task, int(seed), *map(float, cells), notes)
+        if np.isinf((score.result, score.score)).any():
+            raise ValueError(f"{studies / SCORES}: expected finite returns and scores, got {', '.join(cells)[:100]}")
         scores_by_learner.setdefault((division, learner), []).append(score)
     return scores_by_learner
 
