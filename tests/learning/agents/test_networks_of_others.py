@@ -45,7 +45,8 @@ def test_guide(tmp_path):
     start = ("--algorithm=finetune", "--hp=start=runs/deep", "--hp=value_warm_up=0", "--set=time_limit=1")
     done = run(TRAIN.replace("runs/deep", "runs/tuned"), *SHORT, *start)
     assert done.returncode == 0 and "runs/tuned: finished, return " in done.stdout, done.stderr
-    done = run(TRAIN.replace("runs/deep", "runs/other"), *SHORT, *start, "--hp=network=perceptron")
+    to_perceptron = TRAIN.replace("runs/deep", "runs/other").replace("network=deepening:deep", "network=perceptron")
+    done = run(to_perceptron, *SHORT, *start)
     assert done.stderr == "arc-suite train: runs/deep: expected the 6 arrays of a perceptron, got 10\n"
     (tmp_path / "deepening.py").unlink()
     assert "\ntick " in programs.passed(run(EVALUATE, "--episodes=1"))

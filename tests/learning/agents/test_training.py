@@ -168,7 +168,7 @@ def test_a_run_with_a_schedule_is_not_extended(tmp_path):
         if steps == 20:
             assert train(run, tmp_path / "run", progress=silent)
         else:
-            with pytest.raises(ValueError, match=r"of another run, with steps 20, not 40;"):
+            with pytest.raises(ValueError, match=r"run: of a run of 20 steps, which cannot be extended; to train"):
                 train(run, tmp_path / "run", progress=silent)
 
 
