@@ -14,6 +14,7 @@ import itertools
 import json
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import sys
@@ -22,7 +23,7 @@ import traceback
 import warnings
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -345,13 +346,25 @@ def outcome(*uses: Callable[[], object], limit: float = LIMIT) -> str:
             signal.signal(kind, signal.SIG_DFL)  # ends the process wherever it is, in a library too
         signal.setitimer(signal.ITIMER_PROF, limit)
         signal.setitimer(signal.ITIMER_REAL, WAIT * limit)
-        os._exit(max(OUTCOMES.index(_tried(use)) for use in uses))
-    _, wait_status, usage = os.wait4(child, 0)
+        os._exit(OUTCOMES.index(_worst_of(uses)))
+    _, wait_status = os.waitpid(child, 0)
     status = os.waitstatus_to_exitcode(wait_status)
     if status < 0:
         return TOO_LONG if status in (-signal.SIGPROF, -signal.SIGALRM) else CRASHED
-    unit = 1 if sys.platform == "darwin" else 1024  # bytes, of the largest memory
-    return TOO_LARGE if usage.ru_maxrss * unit > MAX_MEMORY else OUTCOMES[status]
+    return OUTCOMES[status]
+
+
+def _worst_of(uses: Sequence[Callable[[], object]]) -> str:
+    """Return the worst that came of using a file in this process, which started with the memory of its parent."""
+    memory_before = _peak_memory()
+    worst = max((_tried(use) for use in uses), key=OUTCOMES.index)
+    return TOO_LARGE if _peak_memory() - memory_before > MAX_MEMORY else worst
+
+
+def _peak_memory() -> int:
+    """Return the largest memory of this process until now, bytes."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
 def _tried(use: Callable[[], object]) -> str:
