@@ -88,10 +88,11 @@ def _read_generations(path: Path, text: bytes, header: bytes, generation: Callab
     """
     advice = "delete it or write to another folder"
     with parsers.guard(f"{path}: no journal of a search", cure=f"; {advice}"):
-        stored_settings, *lines = map(json.loads, text.splitlines())
+        first_line, *lines = text.splitlines()
+        stored_settings = json.loads(first_line)
         settings = json.loads(header)
         different_names = [name for name in settings if stored_settings[name] != settings[name]]
-        generations = [generation(**fields) for fields in lines]
+        generations = [generation(**json.loads(line)) for line in lines]
     if different_names:
         name = different_names[0]
         stored_value = checks.quote(stored_settings[name])

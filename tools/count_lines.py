@@ -9,6 +9,7 @@ Examples:
 """
 
 import ast
+import functools
 import io
 import tokenize
 from collections.abc import Iterator
@@ -28,7 +29,8 @@ _FUNCTIONS = flags.DEFINE_bool(
 )
 
 
-def code_lines(text: str) -> set[int]:
+@functools.cache
+def code_lines(text: str) -> frozenset[int]:
     """Return the numbers of the lines of a source that hold code."""
     lines = set()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
@@ -39,7 +41,7 @@ def code_lines(text: str) -> set[int]:
             lines.difference_update(range(node.body[0].lineno, node.body[0].end_lineno + 1))
     # A text in several lines may have empty ones.
     blank = {number for number, line in enumerate(text.splitlines(), 1) if not line.strip()}
-    return lines - blank
+    return frozenset(lines - blank)
 
 
 def functions(text: str) -> Iterator[tuple[str, int]]:

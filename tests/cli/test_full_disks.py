@@ -21,7 +21,7 @@ COMMANDS = {
 PICTURES = {
     "a.png": "render --robot tick --steps 0 --output a.png",
     "a.gif": "render --robot tick --steps 2 --output a.gif",
-    "a.mp4": "render --robot tick --steps 20 --output a.mp4",
+    "a.mp4": "render --robot tick --steps 6 --output a.mp4",
 }
 
 

@@ -8,8 +8,8 @@ from programs import arc_suite as run
 
 from arc_suite.policies import network
 
-SETTINGS = {"friction": [0.5, 1.2], "observation_noise": 0.5}
-FLAGS = ["--robot=tick", "--task=rough", "--set=friction=[0.5,1.2]", "--set=observation_noise=0.5"]
+SETTINGS = {"friction": [0.5, 1.2], "observation_noise": 0.5, "time_limit": 2.0}
+FLAGS = ["--robot=tick", "--task=rough", *(f"--set={name}={value}" for name, value in SETTINGS.items())]
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def test_a_run_is_evaluated_by_its_folder_alone(folder, tmp_path):
 
 def test_settings_change_those_of_the_run_and_a_task_replaces_them(folder):
     done = run("render", f"--policy={folder}", "--set=friction=1.0", "--output=/nonexistent/tick.png")
-    kept = {"friction": 1.0, "observation_noise": 0.5}
+    kept = SETTINGS | {"friction": 1.0}
     assert done.stdout.splitlines()[0].endswith(f"; plays in tick, rough, {json.dumps(kept)}")
     done = run("render", f"--policy={folder}", "--task=rough", "--output=/nonexistent/tick.png")
     assert done.stdout.splitlines()[0].endswith("; plays in tick, rough")

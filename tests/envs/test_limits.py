@@ -41,7 +41,7 @@ def play(environment, steps, before_last=lambda environment: None):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", ["walk", "steer"])
+@pytest.mark.parametrize("task", ["walk", pytest.param("steer", marks=pytest.mark.release)])
 def test_a_longer_time_limit_holds_on_every_face(task):
     settings = {"healthy_range": (0.0, 1.0)} if task == "walk" else {}
     for name, environment in faces(task, 1010, **settings).items():

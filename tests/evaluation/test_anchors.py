@@ -51,9 +51,8 @@ def _same_as_fresh(robot, task):
         assert fresh == pytest.approx(returns[0], rel=0.01), (robot, task, name)
 
 
-@pytest.mark.parametrize(("robot", "task"), [("tick", "walk"), ("queen", "steer")])
-def test_a_fresh_episode_earns_what_the_table_says(robot, task):
-    _same_as_fresh(robot, task)
+def test_a_fresh_episode_earns_what_the_table_says():
+    _same_as_fresh("tick", "walk")
 
 
 @pytest.mark.release

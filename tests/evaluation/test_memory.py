@@ -19,7 +19,7 @@ from arc_suite.learning.agents import priors
 from arc_suite.learning.agents.learner import MAX_RUN_SEED
 from arc_suite.policies import network
 
-STEPS, RECORDED, PLAYED = 150, 30, 60
+STEPS, RECORDED, PLAYED = 100, 15, 30
 
 
 class Replay:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import itertools
 
 import gymnasium
 import numpy as np
@@ -12,7 +13,7 @@ from crossings import walked
 from episodes import opened
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
-from tiers import never, tiers
+from tiers import never, tiers, turns
 
 import arc_suite
 from arc_suite.arenas import ARENAS, Arena, terrain
@@ -29,6 +30,7 @@ from arc_suite.tasks.ground import LEVELS, Lanes, Stream, next_level
 from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
 
 KINDS = ("rough", "slopes", "stairs", "gaps")
+GROUNDS = [name for name in ARENAS if name != "flat"]
 every_kind = pytest.mark.parametrize("kind", tiers(KINDS, lambda kind: kind == "gaps"))
 
 
@@ -270,8 +272,7 @@ def test_no_command_leads_over_the_edge_of_the_ground_of_roam(robot, settings):
             assert not task.scene.arena.has_left(*(places + start).T).any()
 
 
-@pytest.mark.parametrize("arena", [name for name in ARENAS if name != "flat"])
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(("robot", "arena"), tiers(itertools.product(ROBOTS, GROUNDS), turns(ROBOTS, GROUNDS)))
 def test_no_command_leads_over_the_edge_of_an_arena(robot, arena):
     task, _ = prepare_task(robot, "steer", {"arena": arena})
     assert not task.scene.arena.has_left(*obedient_places(task, 500).T).any()
