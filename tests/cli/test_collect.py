@@ -74,7 +74,7 @@ def test_an_unknown_dataset_is_one_line_with_the_folder(root):
     programs.refused(run("--verify=arc_suite/queen/cpg-v0"), line)
 
 
-@pytest.mark.parametrize(("limit", "steps"), [(50.5, 1010), (0.25, 5)])
+@pytest.mark.parametrize(("limit", "steps"), [pytest.param(50.5, 1010, marks=pytest.mark.release), (0.25, 5)])
 def test_episodes_last_as_long_as_those_of_the_task(root, limit, steps):
     own = ("--robot=tick", "--policy=zero", "--episodes=1", f"--set=time_limit={limit}", "--id=arc_suite/limit-v0")
     done = programs.passed(run(*own, "--set=healthy_range=[0, 1]"))

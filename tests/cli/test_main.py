@@ -72,7 +72,7 @@ main.main("--help")
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_help_needs_no_docstrings():
     programs_that_import = [name for name in main.PROGRAMS if name not in ("studio", "view")]
     code = _HELP_WITHOUT_DOCSTRINGS.replace("sys.argv[1:]", repr(programs_that_import))

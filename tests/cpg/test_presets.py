@@ -16,8 +16,8 @@ from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("robot", tiers(RETURNS, never, lambda robot: robot == "tick"))
+@pytest.mark.release
+@pytest.mark.parametrize("robot", RETURNS)
 def test_medium_earns_the_published_return(robot):
     environment = arc_suite.load(robot, "walk")
     results = evaluation.episodes(environment, Demonstrator(robot))

@@ -114,17 +114,20 @@ def test_robots_are_registered_names_and_inline_bodies_alone(kept, robot):
     assert_refused(data.open, "metadata.json: ")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value"),
-    [
-        *(("seed", value) for value in ("5", 5.0, None, [5], -1, 2**40, True)),
-        *(("steps", value) for value in ("20", 0, 1e3, {})),
-        *(("noise", value) for value in ("0", -1.0, float("nan"), [])),
-        *(("presets", value) for value in ("medium", [1], None)),
-        *(("task_kwargs", value) for value in ("walk", [], None, 3)),
-        ("policy", 7),
-    ],
+    tiers(
+        [
+            *(("seed", value) for value in ("5", 5.0, None, [5], -1, 2**40, True)),
+            *(("steps", value) for value in ("20", 0, 1e3, {})),
+            *(("noise", value) for value in ("0", -1.0, float("nan"), [])),
+            *(("presets", value) for value in ("medium", [1], None)),
+            *(("task_kwargs", value) for value in ("walk", [], None, 3)),
+            ("policy", 7),
+        ],
+        never,
+        lambda name, value: isinstance(value, str | int),
+    ),
 )
 def test_settings_of_another_type_are_named(kept, name, value):
     about(kept, **{name: value})

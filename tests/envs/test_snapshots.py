@@ -48,7 +48,7 @@ def assert_equal_steps(one, other, actions):
     ),
 )
 def test_another_environment_goes_on_to_the_bit(task, mode):
-    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (100, NUM_ENVS, 18))
+    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (64, NUM_ENVS, 18))
     one, other = envs(task, mode, random=5), envs(task, mode)
     one.reset()
     for action in actions[:40]:  # so that levels and models of environments are no longer those of the start

@@ -62,11 +62,17 @@ def test_files_are_damaged_again_in_the_same_way():
     assert 50 < sum(isinstance(parsed(text), dict) for text in texts) < 150
 
 
-@pytest.mark.long
-def test_a_few_damaged_files_of_each_kind():
-    command = [sys.executable, ROOT / "tests" / "fuzz.py", "--cases=5", "--seed=1"]
+@pytest.mark.parametrize(
+    ("flags", "kinds"),
+    [
+        pytest.param(["--kind=spec"], ["spec"], marks=pytest.mark.slow),
+        pytest.param([], list(fuzz.KINDS), marks=pytest.mark.release),
+    ],
+)
+def test_a_few_damaged_files_of_each_kind(flags, kinds):
+    command = [sys.executable, ROOT / "tests" / "fuzz.py", "--cases=5", "--seed=1", *flags]
     done = subprocess.run(command, capture_output=True, text=True)
     rows = [line.rsplit(maxsplit=6) for line in programs.passed(done).splitlines()[1:]]
-    assert [name.strip() for name, *_ in rows] == list(fuzz.KINDS)
+    assert [name.strip() for name, *_ in rows] == kinds
     for name, read, refused, *_ in rows:
         assert int(read) + int(refused) == 5 + len(fuzz.KINDS[name.strip()].table), name

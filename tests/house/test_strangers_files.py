@@ -6,8 +6,14 @@ import damages
 import fuzz
 import pytest
 
-# Tables of damage that take no time, by kind of file; those of runs and datasets are `long`.
+# Tables of damage that take no time, by kind of file, and one of each further table and reader; `make check-release`
+# has the others of runs and studies.
 QUICK = ("robot in MJCF", "robot in URDF", "mesh in STL", "imported body", "policy", "tracks", "journal of a search")
+LONG = (
+    *("mesh in OBJ", "header of a policy", "zip of another library", "snapshot", "journal of a design"),
+    *("config.json of a run", "checkpoint.npz of a run", "evaluations.csv of a run", "scores of a benchmark"),
+    *("runs.csv of a study", "metadata of a dataset", "episodes of a dataset"),
+)
 
 
 @pytest.fixture
@@ -17,7 +23,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("label", QUICK)
+@pytest.mark.parametrize("label", [*QUICK, *(pytest.param(label, marks=pytest.mark.long) for label in LONG)])
 def test_every_kind_of_damage_is_read_or_one_line(label, folder, capfd):
     kind = fuzz.KINDS[label]
     outcomes = fuzz.fuzz(kind, cases=3, seed=5, label=label)

@@ -36,8 +36,8 @@ def test_they_earn_what_is_listed(name):
     assert np.mean(returns) == pytest.approx(INDEX[name]["return"], rel=0.01)  # which is of a hundred episodes
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("task", ["walk", pytest.param("steer", marks=pytest.mark.release)])
+@pytest.mark.release
+@pytest.mark.parametrize("task", ["walk", "steer"])
 def test_those_of_any_body_earn_what_is_listed(task):
     packaged = universal.load("universal", Setup.of("queen", task).definition)
     count = evaluation.EPISODES  # as many bodies; fewer are others

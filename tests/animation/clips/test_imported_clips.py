@@ -7,6 +7,7 @@ import imports
 import numpy as np
 import pytest
 from poses import placed
+from tiers import never, tiers
 
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import acting, gestures
@@ -15,6 +16,7 @@ from arc_suite.envs.setup import Setup
 
 BODIES = {"four legs": imports.quadruped, "six legs": imports.hexapod}
 NAMES = ("walk", "idle", "hit_front", "rise", "death")
+EACH = tiers(BODIES, never, lambda name: name == "four legs")
 
 
 @functools.cache
@@ -22,8 +24,7 @@ def made(name):
     return {clip.name: clip for clip in export.clips(Setup.of(BODIES[name](), "steer"), NAMES, fps=30)}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["four legs", "six legs"])
+@pytest.mark.parametrize("name", EACH)
 def test_clips_are_in_the_bytes_as_the_simulation_moves(name):
     body, clips = BODIES[name](), made(name)
     assert set(clips) == set(NAMES)
@@ -35,8 +36,7 @@ def test_clips_are_in_the_bytes_as_the_simulation_moves(name):
             assert abs(places - feet[:, leg][:, [1, 2, 0]]).max() < 1e-5
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["four legs", "six legs"])
+@pytest.mark.parametrize("name", EACH)
 def test_servos_walk_hold_and_let_go(name):
     body, clips = BODIES[name](), made(name)
     height, rest = body.torso.standing_height, clips["idle"].motion.pose(0)

@@ -1,5 +1,6 @@
 """MAP-Elites fills its cells with better and better bodies, and depends on nothing but its seed."""
 
+import functools
 import json
 
 from arc_suite.animation.design.axes import Map
@@ -26,6 +27,12 @@ def evaluated(jobs):
     return found
 
 
+@functools.cache
+def finished_search(**arguments):
+    """A search that no test goes on with."""
+    return search(**arguments)
+
+
 def search(seed=3, goes=10, random=RANDOM_BODIES):
     course = Search(ProportionGenes(), Map.of(["legs", "links"]), TRIAL, seed, "body", random)
     return course, [course.evaluate_batch(evaluated) for _ in range(goes)]
@@ -36,14 +43,14 @@ def costs(course):
 
 
 def test_a_search_is_a_function_of_its_seed():
-    (first, _), (second, _), (other, _) = search(), search(), search(4)
+    (first, _), (second, _), (other, _) = finished_search(), search(), search(4)
     assert first.candidates == second.candidates and first.elites == second.elites
     assert first.candidates != other.candidates
     assert len(first.candidates) == 10 * BATCH_SIZE
 
 
 def test_a_search_restored_from_json_goes_on_as_if_nothing_had_happened():
-    straight, batches = search()
+    straight, batches = finished_search()
     again = Search(ProportionGenes(), Map.of(["legs", "links"]), TRIAL, 3, "body")
     for batch in batches[:6]:
         again.add(Candidates.from_json(**json.loads(json.dumps(batch._asdict()))))
@@ -53,7 +60,7 @@ def test_a_search_restored_from_json_goes_on_as_if_nothing_had_happened():
 
 
 def test_elites_are_the_best_of_their_cells():
-    course, _ = search()
+    course, _ = finished_search()
     for cell, index in course.elites.items():
         inside = [one for one in course.candidates if one.cell == cell]
         best = min(one.outcome.first.cost_of_transport for one in inside)

@@ -16,6 +16,7 @@ from arc_suite.learning.agents.replay import Transitions
 
 NAMES = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.hyperparameters, SoftActorCritic)]
 STEPS = 3
+update = jax.jit(sac.update, static_argnums=0)
 
 
 def by_hand(layers, heads=1):
@@ -35,12 +36,12 @@ def of_policy(policy):
 @pytest.fixture
 def recorded(monkeypatch):
     """The inputs of the learner's updates: the state, and the arrays of batch and noise."""
-    calls, update = [], off_policy.update
+    calls, learn = [], off_policy.update
 
     def recording(hp, state, sums, batch, noise, next_actions):
         copies = [None if part is None else np.array(part) for part in (*batch, *noise)]
         calls.append((jax.tree.map(np.array, state), copies))
-        return update(hp, state, sums, batch, noise, next_actions)
+        return learn(hp, state, sums, batch, noise, next_actions)
 
     monkeypatch.setattr(off_policy, "update", recording)
     return calls
@@ -101,7 +102,7 @@ def test_first_three_updates(name, learner, recorded):
             is_last_of_step = (index + 1) % max(1, hp.utd_ratio) == 0
             assert (noise is None) == (index >= updates or not is_last_of_step)
             assert (kept is None) == (hp.dropout == 0.0)
-            state, ours = sac.update(hp, state, Transitions(*batch), sac.Noise(next_noise, noise, kept))
+            state, ours = update(hp, state, Transitions(*batch), sac.Noise(next_noise, noise, kept))
             reference.update(*batch, next_noise, noise, kept)
             assert float(ours["critic_loss"]) == pytest.approx(reference.critic_loss, rel=1e-9)
             if noise is not None:
@@ -138,10 +139,10 @@ def test_what_an_update_leaves_out_shows(learner, recorded):
         batch, noise = Transitions(*batch), sac.Noise(next_noise, noise, kept)
 
         def after(batch=batch, noise=noise, state=state, hp=hp):
-            flat = jax.tree.leaves(sac.update(hp, state, batch, noise)[0][:4])
+            flat = jax.tree.leaves(update(hp, state, batch, noise)[0][:4])
             return np.concatenate([np.ravel(leaf) for leaf in flat])
 
-        moved_critics = sac.update(hp, state, batch, noise._replace(action=None))[0].critics
+        moved_critics = update(hp, state, batch, noise._replace(action=None))[0].critics
         usual = after()
         for other in (
             after(batch=batch._replace(goes_on=0.0 * batch.goes_on)),

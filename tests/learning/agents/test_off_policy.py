@@ -108,21 +108,21 @@ def test_phases_follow_the_update_of_their_step(name, learner, batches):
 @pytest.mark.parametrize("name", tiers(["sope_eo", "sope"], lambda name: name == "sope"))
 def test_validation_set(name, learner, batches):
     """A tenth of the online transitions, and as many of the prior ones; updates of the phase never see them."""
-    agent = learner(name, small(name, phase_every=200, batch=16), evaluate_every=200)
+    agent = learner(name, small(name), evaluate_every=100)
     agent.advance()
     held_out = agent.phase.held_out
-    assert held_out == 20
+    assert held_out == 10
     parts = [
         source.transitions_at(order[:held_out]) for source, order in zip(agent.sources, agent.phase.orders, strict=True)
     ]
     assert len(parts) == (2 if name == "sope" else 1)
     unseen = set_of(np.concatenate([part.observations for part in parts]))
     assert len(unseen) >= 0.9 * held_out * len(parts)  # a start may occur twice
-    agent.until(200)
+    agent.until(100)
     seen = set_of(np.concatenate([batch for batch, with_policy in batches if not with_policy]))
     assert not seen & unseen
     batches.clear()
-    agent.until(399)
+    agent.until(199)
     assert set_of(np.concatenate([batch for batch, _ in batches])) & unseen, "they are sampled again afterwards"
 
 

@@ -1,8 +1,11 @@
 """SAC in parallel environments: what an update sees, and how learning begins."""
 
+import itertools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tiers import tiers
 
 jax = pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
@@ -77,8 +80,13 @@ def test_what_an_update_sees(learner, drawn, n_step, discounts):
     assert agent.inputs.moments.count == 2 * 200
 
 
-@pytest.mark.parametrize("network", ["perceptron", "legs"])
-@pytest.mark.parametrize("name", [NAME, "xqc"])
+@pytest.mark.parametrize(
+    ("name", "network"),
+    tiers(
+        itertools.product((NAME, "xqc"), ("perceptron", "legs")),
+        lambda name, network: (name == "xqc") == (network == "legs"),
+    ),
+)
 def test_its_policy_takes_whole_observations(learner, name, network):
     agent = learner(name, small(name, network=network))
     found = agent.until(50)

@@ -248,7 +248,7 @@ def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypa
     assert found[:3] == ("tick", "walk", 2) and found.score == pytest.approx(0.0, abs=0.05)
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_policies_of_others_are_scored(tmp_path):
     """Those of the package stand for them; what is no policy of a place is left out."""
     (tmp_path / "theirs").mkdir()
