@@ -48,8 +48,8 @@ def test_what_comes_of_reading_is_told(read, expected):
 
 
 def test_large_memory_is_told(monkeypatch):
-    monkeypatch.setattr(fuzz, "MAX_MEMORY", 1 << 20)
-    assert fuzz.outcome(lambda: np.ones(1 << 20)) == fuzz.TOO_LARGE
+    monkeypatch.setattr(fuzz, "MAX_MEMORY", 1 << 26)
+    assert fuzz.outcome(lambda: np.ones(1 << 24)) == fuzz.TOO_LARGE
     assert fuzz.outcome(lambda: None) == fuzz.READ
 
 
