@@ -35,7 +35,7 @@ def compiled(model) -> dict[str, np.ndarray]:
 def walked(robot: str, steps: int = STEPS) -> dict[str, np.ndarray]:
     """Observations, rewards and terms of a short walk, partly by rote, partly at random."""
     environment = arc_suite.load(robot, "walk", {"random": 7})
-    demonstrator, noise = Demonstrator(robot), np.random.RandomState(8)
+    demonstrator, noise = Demonstrator(robot, "medium"), np.random.RandomState(8)
     timestep = environment.reset()
     observations, rewards, terms = [], [], []
     for _ in range(steps):

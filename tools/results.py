@@ -33,13 +33,13 @@ LANES = ("rough", "slopes", "stairs", "gaps", "course")
 
 # Task -> presets to compare; zero stands still.
 PRESETS = {
-    "steer": ("zero", "tuned", "steered", "surefooted", "reactive"),
-    "directed": ("zero", "steered", "surefooted", "reactive", "balanced"),
-    "shoved": ("zero", "tuned", "steered", "surefooted", "reactive"),
-    "limp": ("zero", "tuned", "steered", "surefooted", "reactive"),
-    "roam": ("zero", "steered", "surefooted", "balanced"),
+    "steer": ("zero", "tuned", "steered", "reactive"),
+    "directed": ("zero", "steered", "reactive"),
+    "shoved": ("zero", "tuned", "steered", "reactive"),
+    "limp": ("zero", "tuned", "steered", "reactive"),
+    "roam": ("zero", "steered", "surefooted"),
     "navigate": ("zero", "steered", "planned"),
-    **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "balanced", "sighted")),
+    **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "sighted")),
     "leap": ("zero", "sighted", "leaping"),
 }
 # Presets that straight walks are compared with, for anchors alone: docs/results.md has them by `arc-suite evaluate`.

@@ -1,5 +1,5 @@
-// The law `Directed`, as arc_suite.cpg.stepping defines it, with constants that Python computed.
-import { clamp, moved, reached, tilt, weighing } from "./legs.js";
+// The law `Stepping`, as arc_suite.cpg.stepping defines it, with constants that Python computed.
+import { clamp, moved, reached, tilt, vertical, verticalAbout, weighing } from "./legs.js";
 
 const share = (value) => value - Math.floor(value); // of a cycle
 
@@ -45,27 +45,34 @@ export class Law {
   }
 
   // Targets of the law in this control step and in the next.
-  walked({ posture, command, gait_clock: clock, pose, gait }) {
+  walked({ posture, velocities, command, gait_clock: clock, pose, gait }) {
     const c = this.constants, state = this.state;
     const going = clock[0] !== 0 || clock[1] !== 0;
     const asked = command.slice(0, 3), motion = command.slice(3);
     const smooth = state.command.map((value, i) => value + c.smoothing * (asked[i] - value));
-    const integral = state.integral.map((value, i) =>
-      going ? clamp(value + c.integral * (asked[i] - motion[i]), -1, 1) : 0,
-    );
+    const errors = smooth.map((value, i) => value - motion[i]), gained = state.size >= 1 ? c.integral : 0;
+    const integral = state.integral.map((value, i) => (going ? clamp(value + gained * errors[i], -1, 1) : 0));
     const size = clamp(state.size + (going ? c.onset : -c.onset), 0, 1);
     const requested = going
-      ? smooth.map((value, i) => value + integral[i] + c.gain[i] * (value - motion[i]))
+      ? smooth.map((value, i) => value + integral[i] + c.gain[i] * errors[i])
       : state.motion;
-    const { off, posed } = this.corrected(pose, posture);
-    const angles = this.planned(requested, size, going, gait, posed);
+    const up = vertical(posture.slice(1, 5)), { off, posed } = this.corrected(pose, posture[0], up);
+    const balance = this.balanced(verticalAbout(up, pose.slice(3)), asked, velocities);
+    const angles = this.planned(requested, size, going, gait, posed, balance);
     this.state = { command: smooth, integral, motion: requested, size, angles, off };
     return [this.byJoint(state.angles), this.byJoint(angles)];
   }
 
+  // The share of the request at which a torso that tilts walks on, and the shift of footholds, m.
+  balanced(up, asked, velocities) {
+    const c = this.constants, slowed = clamp(2 - Math.hypot(up[0], up[1]) / c.slowing_tilt, 0, 1);
+    const shift = [0, 1].map((i) => c.capture * (velocities[i] - asked[i] * c.units[i]) - c.lean * up[i]);
+    return { slowed, shift };
+  }
+
   // The integral of the error of height, roll and pitch, and the pose that makes up for it.
-  corrected(pose, posture) {
-    const c = this.constants, shown = [posture[0] / c.height - c.ride, ...tilt(posture.slice(1, 5))];
+  corrected(pose, height, up) {
+    const c = this.constants, shown = [height / c.height - c.ride, ...tilt(up)];
     const errors = [0, 3, 4].map((number, i) => clamp(pose[number] - shown[i], -c.largest, c.largest));
     const off = errors.map((error, i) => clamp(this.state.off[i] + c.integral * error, -c.most_off, c.most_off));
     const [rise, roll, pitch] = off.map((value, i) => value + c.proportional * errors[i]);
@@ -73,9 +80,9 @@ export class Law {
   }
 
   // Angles of the links of each leg, rad, that bring the soles where they are to be in the next control step.
-  planned(requested, size, going, gait, posed) {
+  planned(requested, size, going, gait, posed, { slowed, shift }) {
     const c = this.constants, count = c.legs.length;
-    const [forward, left, turn] = requested.map((value, i) => clamp(value, -c.most, c.most) * c.units[i]);
+    const [forward, left, turn] = requested.map((value, i) => slowed * clamp(value, -c.most, c.most) * c.units[i]);
     const [duty, rate] = gait.slice(2 * count), frequency = rate * c.rate, half = (0.5 * duty) / frequency;
     return c.legs.map((leg, index) => {
       const [x, y, z] = leg.place, flow = [forward - turn * y, left + turn * x];
@@ -83,8 +90,10 @@ export class Law {
       const cycle = share(phase + c.lead + (going ? frequency * c.step : 0));
       const stands = cycle < duty, swung = stands ? 0 : (cycle - duty) / (1 - duty);
       const along = stands ? 1 - (2 * cycle) / duty : 2 * swung - 1;
-      const reach = size * along * half, lift = size * c.lift * Math.sin(Math.PI * swung);
-      const goal = moved([x + reach * flow[0], y + reach * flow[1], z + lift], posed, c.height);
+      const shifted = c.take_off_share + (1 - c.take_off_share) * 0.5 * (1 + along);
+      const ground = [0, 1].map((i) => leg.place[i] + size * (along * half * flow[i] + shifted * shift[i]));
+      const lift = size * c.lift * Math.sin(Math.PI * swung);
+      const goal = moved([...ground, z + lift], posed, c.height);
       return reached(leg, this.state.angles[index], goal, weighing(flow, c.across), c.damping_of_feet, c.steps);
     });
   }

@@ -76,6 +76,9 @@ export function moved(place, [rise, forward, left, ...angles], height) {
   return times(columnsOf(attitude(angles)), shifted);
 }
 
+// The vertical in the frame of a torso, as a torso has it that is turned back by roll, pitch and yaw, rad.
+export const verticalAbout = (up, angles) => times(attitude(angles), up);
+
 // The rotation of a torso by roll, pitch and yaw, rad, in this order, about fixed axes.
 function attitude(angles) {
   const [[roll, down], [pitch, dip], [yaw, aside]] = angles.map((angle) => [Math.cos(angle), Math.sin(angle)]);
@@ -86,8 +89,8 @@ function attitude(angles) {
   ];
 }
 
-// Roll and pitch, rad, of a torso with an orientation.
-export function tilt([w, x, y, z]) {
-  const up = [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]; // the vertical, in its frame
-  return [Math.atan2(up[1], up[2]), -Math.asin(clamp(up[0], -1, 1))];
-}
+// The vertical in the frame of a torso with an orientation.
+export const vertical = ([w, x, y, z]) => [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)];
+
+// Roll and pitch, rad, of a torso in whose frame the vertical is given.
+export const tilt = (up) => [Math.atan2(up[1], up[2]), -Math.asin(clamp(up[0], -1, 1))];

@@ -1,7 +1,7 @@
 """Pages to play in: MuJoCo steps a body in the browser, and a policy follows keys, sticks and touch.
 
 A page is one HTML file with nothing to fetch. `make web` builds its scripts, with three.js and MuJoCo's own
-WebAssembly; the law `Directed` is a port to JavaScript of what Python computes, with its constants, and trained
+WebAssembly; the law `Stepping` is a port to JavaScript of what Python computes, with its constants, and trained
 policies are graphs, which the page runs as they are.
 """
 
@@ -18,10 +18,10 @@ from arc_suite import models, policies
 from arc_suite.animation import pages, player_controls
 from arc_suite.bodies import universal
 from arc_suite.bodies.universal import Universal
-from arc_suite.cpg import Demonstrator, leaps
+from arc_suite.cpg import leaps
 from arc_suite.cpg.presets import DEFAULTS
-from arc_suite.cpg.selection import presets_of
-from arc_suite.cpg.stepping import Directed
+from arc_suite.cpg.selection import law, preset_of, presets_of
+from arc_suite.cpg.stepping import Stepping
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
@@ -71,7 +71,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         body: any.
         policy: cpg, for a demonstrator that follows the command; or the name of a trained policy, as for
             `policies.policy`.
-        preset: preset of the demonstrator: steered, which None stands for, surefooted or reactive.
+        preset: preset of the demonstrator: steered, which None stands for, surefooted, reactive or balanced.
 
     Raises:
         ValueError: a policy or preset that a page cannot run, or that does not fit the body.
@@ -177,22 +177,22 @@ def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
 
 def _describe_law(task: Task, preset: str) -> dict[str, Any]:
     """Return the constants of a demonstrator's law; a ValueError if a page cannot run it."""
-    law = Demonstrator(task, preset).law
-    if not isinstance(law, Directed):
+    stepping = law(task, preset_of(task.scene.body, preset))
+    if not isinstance(stepping, Stepping):
         raise ValueError(
-            f"preset {preset!r}: a page runs steered, surefooted or reactive, which follow a command by joint angles"
+            f"preset {preset!r}: a page runs steered, surefooted, reactive or balanced, which follow a command by steps"
         )
-    return {"kind": "law", "constants": law.constants() | {"leaps": _describe_leaps(law)}}
+    return {"kind": "law", "constants": stepping.constants() | {"leaps": _describe_leaps(stepping)}}
 
 
-def _describe_leaps(law: Directed) -> dict[str, Any]:
+def _describe_leaps(stepping: Stepping) -> dict[str, Any]:
     """Return the leaps that a body can, by name.
 
     Each has the targets of joints (steps, joints), rad, and the step at which the crouch ends.
     """
-    body = law.body
+    body = stepping.body
     legs = Legs.of(body)  # whose joints use all of their ranges in a leap
-    rest_joints = tuple(legs.by_joint(law.rest_angles).tolist())
+    rest_joints = tuple(legs.by_joint(stepping.rest_angles).tolist())
     forward_leaps = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
     leap_of_name = {}
     for name, candidates, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", forward_leaps, "distance")):
@@ -201,8 +201,8 @@ def _describe_leaps(law: Directed) -> dict[str, Any]:
         except ValueError:
             continue  # and the page has no key for it
         leap_of_name[name] = {
-            "crouched": leaps.lay_out_movement(body, legs, law.rest_angles, leap).crouch_end,
-            "targets": leaps.leap_targets(body, legs, law.rest_angles, leap),
+            "crouched": leaps.lay_out_movement(body, legs, stepping.rest_angles, leap).crouch_end,
+            "targets": leaps.leap_targets(body, legs, stepping.rest_angles, leap),
         }
     return leap_of_name
 

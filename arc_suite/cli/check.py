@@ -2,12 +2,14 @@
 
   arc-suite check spider
   arc-suite check --walk spider
+  arc-suite check --tasks spider
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
 nothing up, none that can step. With --walk the demonstrator walks it for 100 control steps. Where it falls,
 drags its torso, or stays below 0.7 of the target speed, the line names the fields to leave out, which are
-then sized to suit the body.
+then sized to suit the body. With --tasks the demonstrator of each task walks it, too, in four episodes of 200
+control steps; a line for each task names the preset, its metric and how many episodes ended upright.
 
 A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
 the line names the terms, metrics and blocks that differ.
@@ -18,17 +20,22 @@ Exit status 1 if there is any flaw, fall, slow walk or difference.
 from absl import flags
 
 from arc_suite import registry
+from arc_suite.cli import program
 from arc_suite.cli.flags import ROBOT_HELP, define_task, refuse_flags, task_from_flags
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import conformance, cures
+from arc_suite.evaluation import conformance, cures, suitability
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body
+from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_bool("walk", False, "Let the demonstrator walk a body, whatever its flaws are, if any walk is possible.")
+flags.DEFINE_bool("tasks", False, "Let the demonstrator of each task walk a body, if any walk is possible.")
 flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}.")
 
+_SEEDS = suitability.SEEDS[:4]  # of the episodes of each task
+_STEPS = 200  # control steps of each of them
 _GOOD_QUALITY = 2  # of a walk that counts as walking; see `cures.FirstWalk`
 _FAILURE_TEXTS = {"touch": "drags its torso", "slow": "is slow"}  # by the failures of a walk, except falls
 
@@ -37,8 +44,9 @@ def main(spec: str | None = None) -> int:
     """Print the flaws of the body in a spec file, or how a task differs, and return the exit status."""
     if (spec is None) != FLAGS["task"].present:
         raise ValueError("expected a spec file or --task; see --help")
-    if FLAGS.walk and spec is None:
-        raise ValueError("--walk: expected a spec file, got --task")
+    for name in ("walk", "tasks"):
+        if FLAGS[name].value and spec is None:
+            raise ValueError(f"--{name}: expected a spec file, got --task")
     if spec is not None:
         refuse_flags(("set", "robot"), "goes with --task, not with a spec file")
     is_sound = _check_task() if spec is None else _check_body(spec)
@@ -57,6 +65,8 @@ def _check_body(spec: str) -> bool:
     can_walk = not any(flaw.hopeless for flaw in body_flaws)
     if FLAGS.walk and can_walk:
         walks_well = _check_walk(spec, body)
+    if FLAGS.tasks and can_walk:
+        _try_tasks(spec, body)
     return walks_well and not body_flaws
 
 
@@ -73,6 +83,14 @@ def _check_walk(spec: str, body: Body) -> bool:
         problem = f"{failures}: {_describe_walk(walk)}"
     print(f"{spec}: {body.name} {problem}{_advice(body, walk)}")
     return False
+
+
+def _try_tasks(spec: str, body: Body) -> None:
+    """Print how the demonstrator of each task walks a body in it."""
+    trials = suitability.try_defaults(body, _SEEDS, _STEPS)
+    for trial in program.progress(trials, total=len(TASKS), desc="walk", unit="task", leave=False):
+        upright = f"{trial.upright} of {trial.episodes} upright"
+        print(f"{spec}: {trial.task} by {trial.preset}: {trial.metric} {trial.value:.2f}, {upright}", flush=True)
 
 
 def _advice(body: Body, walk: cures.FirstWalk) -> str:

@@ -138,9 +138,12 @@ class CommandLaw(ABC):
         is_walking = clock.any(axis=-1, keepdims=True)  # (environments, 1)
 
         smooth = state.command + self.smoothing * (desired - state.command)
-        integral = state.integral + self.parameters.integral * self.cycles_per_step * (desired - measured)
+        error = smooth - measured
+        # While the gait grows the body cannot follow yet, and the integral would make it run later.
+        is_grown = state.size >= 1.0
+        integral = state.integral + self.parameters.integral * self.cycles_per_step * error * is_grown
         integral = integral.clip(-1.0, 1.0) * is_walking
-        feedback = np.array(self.parameters.gain) * (smooth - measured)
+        feedback = np.array(self.parameters.gain) * error
         motion = xp.where(is_walking, smooth + integral + feedback, state.motion)
 
         size_change = xp.where(is_walking, 1.0, -1.0) * self.onset

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import registry
+from arc_suite import checks, registry
 from arc_suite.cpg.law import read_blocks, restart_where
 from arc_suite.cpg.prescribed import Preset
-from arc_suite.cpg.selection import law, preset_of
+from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.soundness import hopeless_flaws
@@ -37,35 +37,41 @@ class Demonstrator:
         law: law of the preset, fitted to the task; see `cpg.law`.
     """
 
-    def __init__(self, task, preset="medium"):
+    def __init__(self, task, preset=None):
         """Fit a demonstrator.
 
         Args:
             task: a task of the contract, or an environment with one as its `task`: of `arc_suite.load`,
                 `gymnasium.make` or `make_vec`. A body, see `registry.body_of`, stands for the task walk with default
                 settings.
-            preset: name of a preset, or parameters of a law: a `Preset`, `SteeringParameters`, ... A number is a
-                target speed as a share of sqrt(g h), h being the standing height, negative for backwards. Every body
-                has the names `slow`, `medium` and `fast`. Queen, Bastion, Tick and Leaper have `tuned`, with the
-                highest return of the paper's law in walk, and `refined`, with the highest return of all laws.
-                `steered`, `surefooted` and `reactive` follow a command. `sighted` and `leaping` need a height scan.
-                Leaper has `balanced`. `planned` is for the task navigate. `module:name` is a law of another package.
+            preset: None for the one that suits the task and its body best; see `suited_preset`. Otherwise the name of
+                a preset, or parameters of a law: a `Preset`, `SteppingParameters`, ... A number is a target speed as a
+                share of sqrt(g h), h being the standing height, negative for backwards. Every body has the names
+                `slow`, `medium` and `fast`. Queen, Bastion, Tick and Leaper have `tuned`, with the highest return of
+                the paper's law in walk, and `refined`, with the highest return of all laws. `steered`, `surefooted`
+                and `reactive` follow a command. `sighted` and `leaping` need a height scan. Leaper has `balanced`.
+                `planned` is for the task navigate. `module:name` is a law of another package.
+
+        Warns:
+            UserWarning: the task gives commands that the law of the preset does not read.
 
         Raises:
-            ValueError: an unknown name, a value out of range, a preset that does not fit, or a body that
-                cannot walk by any preset, as its feet hang far above the floor.
+            ValueError: no preset suits the task, an unknown name, a value out of range, a preset that does not fit, or
+                a body that cannot walk by any preset, as its feet hang far above the floor.
         """
         body, body_task = _body_and_task(task)
-        if isinstance(preset, str) or preset is None:  # None raises an error that lists the names
-            preset = preset_of(body, preset)
+        if body_task is None:
+            body_task, _ = prepare_task(body, "walk")
+        name = suited_preset(body_task) if preset is None else preset
+        parameters = preset_of(body, name) if isinstance(name, str) else name
         # Who gives a `Preset`, parameters of the paper's law, has seen the body walk by it, whatever its flaws.
-        if not isinstance(preset, Preset):
+        if not isinstance(parameters, Preset):
             flaws = hopeless_flaws(body)
             if flaws:
                 raise ValueError(f"{body.name} cannot walk: {flaws[0].text}")
-        if body_task is None:
-            body_task, _ = prepare_task(body, "walk")
-        self.law = law(body_task, preset)
+        self.law = law(body_task, parameters)
+        if preset is not None:
+            _warn_of_ignored_commands(body_task, name, ignored_commands(body_task, self.law))
         self._body = body
         self._starts_lying = body_task.lies
         self._state: Any = None  # of the law; None before the first action
@@ -139,6 +145,13 @@ class Demonstrator:
             start = "the torso starts below half or above twice that"
             text = f"{self._body.name} stands {standing_height:g} m high, and {start}"
             warnings.warn(f"{text}: is this the demonstrator of another robot?", stacklevel=3)
+
+
+def _warn_of_ignored_commands(task: Task, preset: Any, ignored: Sequence[str]) -> None:
+    """Warn if a preset, by name or by its parameters, ignores blocks that show what a task commands."""
+    if ignored:
+        text = f"preset {checks.preview(preset)}: ignores what the task {task.name} commands: {', '.join(ignored)}"
+        warnings.warn(f"{text}; {suited_preset(task)} suits it", stacklevel=3)
 
 
 def _body_and_task(source: Any) -> tuple[Body, Task | None]:

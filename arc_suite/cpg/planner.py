@@ -1,7 +1,7 @@
 """The demonstrator `planned`: it finds its way among pillars by what it sees, and steers along the plan.
 
 Pillars are circles of known radius. They are fitted to the ranges that the torso measures. A* finds a
-shortest path around them, over points about them. The law of `steering` follows the command that leads
+shortest path around them, over points about them. The law of `stepping` follows the command that leads
 along the beginning of this path. The path is searched anew in every step. Lengths are in R, the mean
 distance of the feet from their center. The search runs under NumPy alone, and not under `jax.jit`.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from arc_suite.arenas.pillars import RADIUS
 from arc_suite.cpg.command_law import CommandLawState
-from arc_suite.cpg.steering import Steered, SteeringParameters
+from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.sensors import FAR, RAYS, SIGHT
@@ -46,7 +46,7 @@ class PlanningParameters(NamedTuple):
         aside: largest command sideways.
     """
 
-    steering: SteeringParameters
+    steering: SteppingParameters
     room: float = 0.3
     least: float = 0.8
     nearness: float = 6.0
@@ -59,13 +59,15 @@ class PlanningParameters(NamedTuple):
 class Planned:
     """Goes to the goal of the block `goal`, around the pillars in the block `ranges`."""
 
-    reads = (*Steered.reads, "goal", "ranges")
+    reads = (*Stepping.reads, "goal", "ranges")
 
     def __init__(self, task: Task, parameters: PlanningParameters):
         """Fit the law that steers to a task; see `CommandLaw`."""
         self._parameters = parameters
-        self._steering_law = Steered(task, parameters.steering)
-        self._extent = self._steering_law.extent / reach(self._steering_law.body)  # of the feet, R
+        self._steering_law = Stepping(task, parameters.steering)
+        foot_radii = [leg.foot.radius for leg in self._steering_law.body.legs]
+        distances = np.hypot(*self._steering_law.rest_soles[:, :2].T)  # of the feet from the torso, m
+        self._extent = max(distances + foot_radii) / reach(self._steering_law.body)  # of the feet, R
 
     def initial(self, count: int) -> CommandLawState:
         """Return the state of the law that steers."""

@@ -3,18 +3,21 @@
 import json
 from pathlib import Path
 
-from arc_suite.cpg.balancing import BalancingParameters
 from arc_suite.cpg.leaping import LeapingParameters
 from arc_suite.cpg.leaps import Leap
 from arc_suite.cpg.planner import PlanningParameters
 from arc_suite.cpg.prescribed import Bend, Preset
 from arc_suite.cpg.sighted import SightedParameters
-from arc_suite.cpg.steering import SteeringParameters
+from arc_suite.cpg.stepping import SteppingParameters
 from arc_suite.robots.gaits import TRIPOD, TROT
 
 # Leaps that a generated body chooses from. Its feet stand wide, so that it steps over trenches of the standing height.
 _LEAPS = (Leap(drive=1.5), Leap(), Leap(drive=4.0), Leap(back=0.3, forward=0.7, drive=4.0))
 _LEAPING = LeapingParameters(choice=_LEAPS, widest=1.0)
+
+
+# A kick of sqrt(g h) moves the point over which the torso would come to rest by h: nearer soles cannot hold it.
+_WIDE = {"wider": 0.2, "lower": 0.15}
 
 
 def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _LEAPING, **steering) -> dict:
@@ -23,16 +26,18 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
     Args:
         sighted: parameters of the preset `sighted`.
         leaping: parameters of the preset `leaping`.
-        **steering: fields of `SteeringParameters` that depend on the build of the body.
+        **steering: fields of `SteppingParameters` that depend on the build of the body.
     """
-    steered = SteeringParameters(**steering)
-    surefooted = steered._replace(lift=0.45, gain=(2.0, 2.0, 1.0), integral=0.6, attitude=0.3)
+    steered = SteppingParameters(**{"most": 1.2, "lean": 0.5, "capture": 0.3} | steering)
+    braced = steered._replace(**_WIDE)
+    surefooted = braced._replace(lift=0.4, most=2.0)
     # Without an integral, actions are a function of the observation: networks without memory can learn them.
-    reactive = steered._replace(gain=(3.0, 3.0, 1.5), integral=0.0)
+    reactive = steered._replace(integral=0.0)
     planned = PlanningParameters(steered)
     return {
         "steered": steered,
         "surefooted": surefooted,
+        "braced": braced,
         "reactive": reactive,
         "sighted": sighted,
         "leaping": leaping._replace(walk=sighted),
@@ -44,27 +49,23 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
 # of sqrt(g h). These bodies keep near their standing pose, for which their motors are sized. Their gait is quick, and
 # feet follow late.
 _SIGHTED = SightedParameters(lead=0.24, longer=0.12, trust=0.5)
-DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_command_presets(_SIGHTED, share=0.05, level=1.0)}
+DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_command_presets(_SIGHTED)}
 
 # Presets of imported bodies. Their servos need little feedback on the motion: it comes late, and tips them.
-_STEERED = SteeringParameters(lift=0.12, gain=(0.3, 0.3, 0.3), integral=0.3, share=0.05, level=1.0)
-_BALANCED = BalancingParameters()
+_STEERED = SteppingParameters(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.1, most=1.4, capture=0.2)
+_SUREFOOTED = _STEERED._replace(wider=0.35, lower=0.15)
 DEFAULTS_OF_SERVOS = {
     "slow": 0.18,
     "medium": 0.24,
     "fast": 0.3,
     "steered": _STEERED,
-    "surefooted": _STEERED._replace(lift=0.3),
+    "surefooted": _SUREFOOTED,
+    "braced": _STEERED._replace(wider=0.5, lower=0.25),
+    "balanced": _SUREFOOTED,  # its former name
     "reactive": _STEERED._replace(integral=0.0),
     "sighted": _SIGHTED,
     "leaping": _LEAPING._replace(walk=_SIGHTED),
     "planned": PlanningParameters(_STEERED),
-}
-# Presets of imported bodies that step for their balance; with six legs such steps tip them.
-BALANCING = {
-    "surefooted": _BALANCED,
-    "balanced": _BALANCED,
-    "reactive": _BALANCED._replace(integral=0.0),
 }
 
 
@@ -140,16 +141,8 @@ PRESETS["bastion"] |= _command_presets(
     lead=0.08,
 )
 PRESETS["tick"] |= _command_presets(SightedParameters(trust=0.5), lead=0.1)
-PRESETS["leaper"] |= _command_presets(SightedParameters(), share=0.03, level=1.0, sweep=0.8, unload=0.0, lead=0.04)
-PRESETS["leaper"]["balanced"] = BalancingParameters(
-    feet=((0.59, 0.9, -0.62), (-0.55, 0.64, -0.64)),
-    lift=0.32,
-    gain=(0.5, 0.3, 0.5),
-    integral=0.5,
-    most=1.2,
-    shorter=0.06,
-    lead=0.06,
-    attitude=0.3,
-    lean=0.5,
-    capture=0.45,
+PRESETS["leaper"] |= _command_presets(
+    SightedParameters(), gain=(1.0, 1.0, 0.5), integral=0.45, most=1.05, lead=0.04, lean=0.0
 )
+PRESETS["leaper"]["surefooted"] = PRESETS["leaper"]["steered"]._replace(integral=0.2, lean=0.4)
+PRESETS["leaper"]["balanced"] = PRESETS["leaper"]["surefooted"]  # its former name

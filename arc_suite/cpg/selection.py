@@ -5,14 +5,12 @@ from numbers import Real
 from typing import Any
 
 from arc_suite import checks, registry, robots
-from arc_suite.cpg.balancing import Balanced, BalancingParameters
 from arc_suite.cpg.leaping import Leaping, LeapingParameters
 from arc_suite.cpg.planner import Planned, PlanningParameters
 from arc_suite.cpg.prescribed import PrescribedLaw, Preset
-from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
+from arc_suite.cpg.presets import DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
-from arc_suite.cpg.steering import Steered, SteeringParameters
-from arc_suite.cpg.stepping import Directed, observes_gait_and_pose
+from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.cpg.stride_law import StrideLaw
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -21,18 +19,15 @@ from arc_suite.tasks.contract import Task
 LAWS: dict[type, Any] = {
     Preset: PrescribedLaw,
     float: StrideLaw,
-    SteeringParameters: Steered,
+    SteppingParameters: Stepping,
     SightedParameters: Sighted,
     LeapingParameters: Leaping,
-    BalancingParameters: Balanced,
     PlanningParameters: Planned,
 }
 
-# Laws that replace others in a task whose commands include gait and pose.
-_GAIT_AND_POSE_LAWS = {Steered: Directed}
-
-_MAX_BALANCING_LEGS = 5  # bodies with servos and more legs need no steps for their balance
 _STRAIGHT_PRESETS = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
+_MEMORYLESS = {"steered": "reactive", "braced": "reactive"}  # presets without an integral, in place of others
+_COMMAND_BLOCKS = ("command", "pose", "gait", "goal")  # blocks of the observation that show what a task commands
 
 
 def law(task: Task, preset: Any, laws: Mapping[type, Any] = LAWS):
@@ -47,8 +42,6 @@ def law(task: Task, preset: Any, laws: Mapping[type, Any] = LAWS):
         ValueError: the preset is of no class that has a law, or does not fit.
     """
     kind = law_class(preset, laws)
-    if observes_gait_and_pose(task):
-        kind = _GAIT_AND_POSE_LAWS.get(kind, kind)
     return kind(task, preset)
 
 
@@ -104,6 +97,16 @@ def presets_of(body: Body) -> Mapping[str, Any]:
     return body_presets | {name: preset for name, preset in defaults.items() if name not in body_presets}
 
 
+def memoryless_preset(task: Task) -> str:
+    """Return the preset that suits a task and its body, with an integral left out: networks without memory learn it.
+
+    Raises:
+        ValueError: as `suited_preset`.
+    """
+    name = suited_preset(task)
+    return _MEMORYLESS.get(name, name)
+
+
 def _registered_presets() -> dict[str, Any]:
     """Return the presets of laws of other packages by name."""
     return {name: law.preset for name, law in registry.ADDITIONS["law"].items()}
@@ -111,11 +114,7 @@ def _registered_presets() -> dict[str, Any]:
 
 def _default_presets(body: Body) -> Mapping[str, Any]:
     """Return the presets that suit any body of its kind by name."""
-    if not body.source:
-        return DEFAULTS
-    if len(body.legs) > _MAX_BALANCING_LEGS:
-        return DEFAULTS_OF_SERVOS
-    return DEFAULTS_OF_SERVOS | BALANCING
+    return DEFAULTS_OF_SERVOS if body.source else DEFAULTS
 
 
 def preset_names() -> tuple[str, ...]:
@@ -145,6 +144,11 @@ def suited_presets(task: Task) -> tuple[str, ...]:
         if name in presets and set(law_class(presets[name]).reads) <= task.blocks.keys():
             suited_names.append(name)
     return tuple(suited_names)
+
+
+def ignored_commands(task: Task, law) -> tuple[str, ...]:
+    """Return the names of the blocks that show what a task commands and that a law, fitted to it, does not read."""
+    return tuple(name for name in _COMMAND_BLOCKS if name in task.blocks and name not in law.reads)
 
 
 def suited_preset(task: Task) -> str:

@@ -1,12 +1,19 @@
-"""Laws that plan paths of feet in space, and follow them by inverse kinematics.
+"""The demonstrators that step: one law for any body that follows a command of velocities, without sight.
 
-In stance a foot moves against the requested velocity, in swing it returns and is lifted. Where a task
-observes a pose and a gait by command, feet step in that gait under a torso in that pose: both are read
-anew in every step, so that they may change at any time. Feedback on height, roll and pitch makes up for
-what joints give way.
+Feet follow paths in space. In stance a foot moves against the requested velocity, in swing it returns and is lifted.
+Joint angles follow by inverse kinematics, which folds legs that stand near the bounds of their joints.
+
+Where a task observes a pose and a gait by command, feet step in that gait under a torso in that pose: both are read
+anew in every step, so that they may change at any time. Feedback on height, roll and pitch makes up for what joints
+give way.
+
+A body of few legs that is thrown lands its feet aside of the footholds of the command: by the distance that its weight
+falls aside of its feet, and by the distance that an unwanted velocity carries it, as in the capture point of a linear
+inverted pendulum (Pratt et al., "Capture point: a step toward humanoid push recovery", 2006) or Raibert's foothold
+("Legged robots that balance", 1986).
 """
 
-from abc import abstractmethod
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -15,14 +22,55 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.models import posture
-from arc_suite.models.kinematics import Legs, path_weights, point_velocities, tilt_heights
+from arc_suite.models.kinematics import path_weights, point_velocities
 from arc_suite.models.standing import GRAVITY
 from arc_suite.tasks.contract import Task
 
 _IK_ITERATIONS = 3  # of inverse kinematics in a control step
+_STANCE_ITERATIONS = 50  # of inverse kinematics, for the stance
+_STANCE_SHARES = (1.0, 0.75, 0.5, 0.25)  # of the parameters' stance, which are tried
+_STANCE_ROOM = 0.2  # standing heights, about a sole at rest, that a leg of a wider stance must reach
+_MAX_STANCE_MISS = 0.02  # standing heights, between a sole at rest and its goal
+_MAX_ROOM_MISS = 0.05  # standing heights, between a sole and a goal at the edge of its room
+_AHEAD = np.array((1.0, 0.0, 0.0))
+_UP = np.array((0.0, 0.0, 1.0))
+# Standing heights. With less of it, legs that are stretched out jump, neighbors of many legs press against each other,
+# and feet push against uneven ground in place of yielding.
+_IK_DAMPING = 0.5
+_SLIP_WEIGHT = 0.3  # of a foot's slip across its path against its motion along it
 _MAX_POSE_INTEGRAL = 0.2  # standing heights or rad
 _MAX_POSE_ERROR = 0.05  # standing heights or rad; larger errors count as this one
 _MEASURED_NUMBERS = np.array((0, 3, 4))  # indices of height, roll and pitch among the six numbers of a pose
+_SLOWING_TILT = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops
+_TAKE_OFF_SHARE = 0.6  # share of the shift for balance that is left when a foot takes off
+
+
+class SteppingParameters(NamedTuple):
+    """How a demonstrator that steps walks.
+
+    Attributes:
+        wider: how much further out feet stand than in the body's pose at rest, see `posture.find_rest_pose`, in
+            standing heights.
+        lower: how much lower the torso is than in that pose, in standing heights. Of both numbers a body takes the
+            share that its legs reach. Where a task commands the pose, they have no effect.
+        lift: height of a foot in mid-swing, in standing heights.
+        gain: gain of the feedback on the motion's error: forward, left and turning.
+        integral: gain of the same error, added up over a cycle of the gait.
+        most: largest request, in units of the command; feedback on a body that cannot go on would throw it.
+        lead: lead of all legs over the gait's clock, cycles.
+        lean: shift of footholds, as a share of the distance by which the torso's weight falls aside of the feet.
+        capture: shift of footholds, as a share of the distance that an unwanted velocity carries an inverted pendulum.
+    """
+
+    wider: float = 0.0
+    lower: float = 0.0
+    lift: float = 0.3
+    gain: tuple[float, float, float] = (3.0, 3.0, 1.5)
+    integral: float = 0.3
+    most: float = 2.0
+    lead: float = 0.0
+    lean: float = 0.0
+    capture: float = 0.0
 
 
 def observes_gait_and_pose(task: Task) -> bool:
@@ -43,7 +91,7 @@ class SteppingState(NamedTuple):
 
 
 class Stepping(CommandLaw):
-    """Plans paths of feet.
+    """Steps along paths of feet.
 
     Attributes:
         directed: whether pose and gait are by command.
@@ -52,25 +100,14 @@ class Stepping(CommandLaw):
         rest_soles: (legs, 3) positions of the soles at rest, in the torso's frame, m.
         rest_angles: (legs, links) angles of the joints at rest, rad.
         foot_lift: height of a foot in mid-swing, m.
-        slip_weight: weight of a foot's slip across its path against its motion along it.
-        stance_reduction: time by which the stance is shorter than in the commanded gait, cycles.
-        tilt_share: how far a foot is pushed down, as a share of how far the torso's tilt lowers the foot's rest.
-        relative_ik_damping: damping of inverse kinematics, standing heights.
-        max_request: the largest request, in units of the command.
     """
 
-    slip_weight = 1.0
-    stance_reduction = 0.0
-    tilt_share = 0.0
-    relative_ik_damping = posture.IK_DAMPING
-    max_request = np.inf
-
-    def __init__(self, task: Task, parameters):
+    def __init__(self, task: Task, parameters: SteppingParameters):
         """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
         standing_height = self.mechanics.height
         self._rate_unit = (GRAVITY / standing_height) ** 0.5  # Hz, in which commands give the gait's frequency
-        self._ik_damping = self.relative_ik_damping * standing_height  # m
+        self._ik_damping = _IK_DAMPING * standing_height  # m
         self.foot_lift = parameters.lift * standing_height
         # Proportional feedback replaces an integral: with both, gaits are disturbed.
         if parameters.integral:
@@ -80,12 +117,43 @@ class Stepping(CommandLaw):
         self.directed = observes_gait_and_pose(task)
         if self.directed:
             self.reads = (*self.reads, *task.gait_and_pose.observed)
-            self._rest_pose = posture.find_rest_pose(task.scene.body)
-        self.legs, self.rest_soles, self.rest_angles = self._find_rest(task)
+        self._rest_pose = posture.find_rest_pose(task.scene.body)
+        self.legs = self._rest_pose.legs
+        self.rest_soles = self._rest_pose.sole_positions
+        self.rest_angles = self._rest_pose.joint_angles
+        if not self.directed and (parameters.wider or parameters.lower):
+            self._widen_stance()
+        self._ride_height = -self.rest_soles[:, 2].mean()  # m
+        self._pendulum_time = math.sqrt(self._ride_height / GRAVITY)  # s, of an inverted pendulum of this height
 
-    @abstractmethod
-    def _find_rest(self, task: Task) -> tuple[Legs, np.ndarray, np.ndarray]:
-        """Return the legs, positions (legs, 3) of their soles at rest, m, and angles (legs, links) at rest, rad."""
+    def _widen_stance(self) -> None:
+        """Move the soles at rest out and up, by the largest share at which all legs reach the ground about them."""
+        outward = np.sign(self.rest_soles[:, 1:2]) * (0.0, 1.0, 0.0)
+        shift = self.parameters.wider * outward + self.parameters.lower * _UP  # (legs, 3) standing heights
+        for share in _STANCE_SHARES:
+            goals = self.rest_soles + share * shift * self.mechanics.height
+            soles, angles = self._reach_goals(self.rest_angles, goals)
+            misses = [self._largest_distance(soles, goals) - _MAX_STANCE_MISS]
+            for direction in (_AHEAD, -_AHEAD, outward, -outward):
+                nearby_goals = soles + _STANCE_ROOM * direction * self.mechanics.height
+                nearby_soles, _ = self._reach_goals(angles, nearby_goals)
+                misses.append(self._largest_distance(nearby_soles, nearby_goals) - _MAX_ROOM_MISS)
+            if max(misses) <= 0.0:
+                self.rest_soles = soles
+                self.rest_angles = angles
+                return
+
+    def _reach_goals(self, angles: np.ndarray, goals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the nearest positions (legs, 3) of the soles to their goals, m, and the angles (legs, links), rad."""
+        weights = np.tile(np.eye(3), (len(goals), 1, 1))
+        damping = posture.IK_DAMPING * self.mechanics.height
+        angles = self.legs.solve_joint_angles(angles, goals, weights, damping, _STANCE_ITERATIONS)
+        soles, _ = self.legs.soles(angles)
+        return soles, angles
+
+    def _largest_distance(self, soles: np.ndarray, goals: np.ndarray) -> float:
+        """Return the largest distance of a sole from its goal, in standing heights."""
+        return float(np.linalg.norm(soles - goals, axis=-1).max() / self.mechanics.height)
 
     def initial_paths(self, count: int) -> SteppingState:
         """Return the angles at rest and an integral of 0, for a number of environments."""
@@ -103,16 +171,14 @@ class Stepping(CommandLaw):
             balance_vertical = (posture.rotation_of(pose[:, 3:]) @ vertical[..., None])[..., 0]
 
         leg_phases, duty_factor, stance_duration = self._gait_timing(request, observation)
-        velocity, foothold_shift = self.balance(request.motion, balance_vertical, observation)
-        soles = self.next_feet(
-            leg_phases, velocity, foothold_shift, request.size, balance_vertical, duty_factor, stance_duration
-        )
+        velocity, foothold_shift = self._balance(request.motion, balance_vertical, observation)
+        soles = self._next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
         pose_integral = state.pose_integral
         if self.directed:
             pose_integral, corrected_pose = self._correct_pose(pose_integral, pose, torso_height, vertical)
             soles = posture.move_ground_points(soles, corrected_pose, self.mechanics.height)
 
-        weights = path_weights(point_velocities(velocity, self.rest_soles), self.slip_weight)
+        weights = path_weights(point_velocities(velocity, self.rest_soles), _SLIP_WEIGHT)
         joint_angles = self.legs.solve_joint_angles(
             state.joint_angles, soles, weights, self._ik_damping, _IK_ITERATIONS
         )
@@ -136,14 +202,14 @@ class Stepping(CommandLaw):
         sines = gait[:, :leg_count]
         cosines = gait[:, leg_count : 2 * leg_count]
         commanded_phases = xp.arctan2(sines, cosines) / (2.0 * np.pi)
-        duty_factor = gait[:, -2:-1] - self.stance_reduction
+        duty_factor = gait[:, -2:-1]
         frequency = gait[:, -1:] * self._rate_unit  # Hz
         is_walking = request.advance[:, None] > 0.0
         advance = frequency * self.control_timestep * is_walking
         leg_phases = (commanded_phases + self.parameters.lead + advance) % 1.0
         return leg_phases, duty_factor, (duty_factor / frequency)[..., None]
 
-    def balance(self, motion, vertical, observation: Mapping) -> tuple:
+    def _balance(self, motion, vertical, observation: Mapping) -> tuple:
         """Return the velocity (environments, 3) that feet give the torso, m/s and rad/s, and shifts of footholds.
 
         Args:
@@ -154,9 +220,16 @@ class Stepping(CommandLaw):
         Returns:
             The velocity, and shifts (environments, 2) of all footholds, forward and left, m.
         """
-        velocity = motion.clip(-self.max_request, self.max_request) * self.units
-        no_shift = motion[:, :2] * 0.0
-        return velocity, no_shift
+        xp = motion.__array_namespace__()
+        parameters = self.parameters
+        full_velocity = motion.clip(-parameters.most, parameters.most) * self.units
+        tilt = xp.hypot(vertical[:, :1], vertical[:, 1:2])  # sine of its angle
+        velocity = full_velocity * (2.0 - tilt / _SLOWING_TILT).clip(0.0, 1.0)
+        commanded_velocity = observation["command"][:, :2] * self.units[:2]  # m/s
+        unwanted_velocity = observation["velocities"][:, :2] - commanded_velocity
+        capture_shift = parameters.capture * self._pendulum_time * unwanted_velocity
+        lean_shift = parameters.lean * self._ride_height * vertical[:, :2]
+        return velocity, capture_shift - lean_shift
 
     def _correct_pose(self, pose_integral, pose, torso_height, vertical) -> tuple:
         """Return the next integral of the error of a pose, and a pose (environments, 6) that makes up for the error.
@@ -179,7 +252,7 @@ class Stepping(CommandLaw):
         zero = xp.zeros_like(height)  # of the numbers without feedback: forward, left and yaw
         return pose_integral, pose + xp.concatenate([height, zero, zero, roll_and_pitch, zero], axis=-1)
 
-    def next_feet(self, leg_phases, velocity, foothold_shift, gait_size, vertical, duty_factor, stance_duration):
+    def _next_feet(self, leg_phases, velocity, foothold_shift, gait_size, duty_factor, stance_duration):
         """Return positions (environments, legs, 3) of the soles in the next control step, m, under a level torso.
 
         Args:
@@ -187,7 +260,6 @@ class Stepping(CommandLaw):
             velocity: (environments, 3) requested of the torso, m/s and rad/s.
             foothold_shift: (environments, 2) shift of all footholds for balance, m.
             gait_size: (environments, 1) from 0 to 1.
-            vertical: (environments, 3) the world's, in the torso's frame.
             duty_factor: a number or (environments, 1).
             stance_duration: s, a number or (environments, 1, 1).
         """
@@ -199,27 +271,12 @@ class Stepping(CommandLaw):
         # Along the path of a foot, from 1 in front to -1 at its end.
         path_position = xp.where(is_stance, stance_position, swing_position)[..., None]
         half_path = 0.5 * stance_duration * point_velocities(velocity, self.rest_soles)
-        shift = self._shift_share(path_position) * foothold_shift[:, None]
+        shift_share = _TAKE_OFF_SHARE + (1.0 - _TAKE_OFF_SHARE) * 0.5 * (1.0 + path_position)
+        shift = shift_share * foothold_shift[:, None]
         ground = self.rest_soles[:, :2] + gait_size[..., None] * (path_position * half_path + shift)
         lift = self.foot_lift * xp.sin(np.pi * swing_progress)
-        tilt_push = self.tilt_share * tilt_heights(vertical, self.rest_soles)
-        heights = self.rest_soles[:, 2] + gait_size * (lift + tilt_push)
+        heights = self.rest_soles[:, 2] + gait_size * lift
         return xp.concatenate([ground, heights[..., None]], axis=-1)
-
-    def _shift_share(self, path_position):
-        """Return the share of the shift for balance that applies at a position along a foot's path, from 1 to -1."""
-        return 1.0
-
-
-class Directed(Stepping):
-    """Follows a velocity in a pose and a gait by command, on level ground, without sight."""
-
-    slip_weight = 0.3
-    relative_ik_damping = 0.1  # standing heights; with less of it, legs that are stretched out jump
-    max_request = 2.0  # units of the command; feedback on a body that cannot go on would throw it
-
-    def _find_rest(self, task: Task) -> tuple[Legs, np.ndarray, np.ndarray]:
-        return self._rest_pose.legs, self._rest_pose.sole_positions, self._rest_pose.joint_angles
 
     def constants(self) -> dict:
         """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
@@ -243,7 +300,7 @@ class Directed(Stepping):
             "damping": self.drive.damping,
             "reach": self.drive.reach,
             "units": self.units,
-            "most": self.max_request,
+            "most": self.parameters.most,
             "gain": self.parameters.gain,
             "smoothing": self.smoothing,
             "integral": self.parameters.integral * self.cycles_per_step,
@@ -253,11 +310,15 @@ class Directed(Stepping):
             "height": self.mechanics.height,
             "ride": self._rest_pose.ride_height,
             "lift": self.foot_lift,
-            "across": self.slip_weight,
+            "across": _SLIP_WEIGHT,
             "damping_of_feet": self._ik_damping,
             "steps": _IK_ITERATIONS,
             "largest": _MAX_POSE_ERROR,
             "most_off": _MAX_POSE_INTEGRAL,
             "rate": self._rate_unit,
             "step": self.control_timestep,
+            "lean": self.parameters.lean * self._ride_height,
+            "capture": self.parameters.capture * self._pendulum_time,
+            "slowing_tilt": _SLOWING_TILT,
+            "take_off_share": _TAKE_OFF_SHARE,
         }

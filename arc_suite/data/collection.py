@@ -108,7 +108,7 @@ def _check(settings: DatasetSettings, episodes: int) -> None:
 
 
 def _policy(settings: DatasetSettings, num_envs: int, task: Task | None = None) -> policies.Policy:
-    return policies.policy(settings.policy, settings.setup.body, settings.presets, num_envs, settings.noise, task)
+    return policies.policy(settings.policy, settings.setup.body, settings.preset_names, num_envs, settings.noise, task)
 
 
 def _check_same_dataset(storage: Storage, dataset_id: str, provenance: dict, overwrite: bool) -> None:
@@ -193,7 +193,8 @@ def _play(
 
 def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, threads) -> dict:
     """Return Minari's metadata without the counts."""
-    presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
+    preset_names = settings.preset_names
+    presets = f" {' and '.join(preset_names)}" if preset_names else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
     environment = settings.environment(evaluation.CURVE_EPISODES, threads)
     with contextlib.closing(environment):
@@ -205,7 +206,7 @@ def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, thre
             "observation_space": serialize_space(environment.single_observation_space),
             "action_space": serialize_space(environment.single_action_space),
             "env_spec": settings.setup.spec(settings.steps).to_json(),
-            "algorithm_name": "-".join([settings.policy, *settings.presets]),
+            "algorithm_name": "-".join([settings.policy, *preset_names]),
             "description": f"{settings.setup} by policy {settings.policy}"
             f"{presets}{noise}; episode k has seed {settings.seed} + k.",
             "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],

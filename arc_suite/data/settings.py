@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from arc_suite import policies, registry, seed_ranges
-from arc_suite.cpg.selection import presets_of
+from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints
@@ -20,7 +20,7 @@ class DatasetSettings(NamedTuple):
         setup: body, task and settings of the task.
         policy: a name, or `module:attribute`; see `policies.policy`.
         presets: presets of the demonstrator, names or `module:name`; the episode with seed s has number s modulo their
-            count. Empty for other policies.
+            count. Empty for the one that suits the task and the body, and for other policies.
         noise: standard deviation of the normal noise on actions, which are clipped after it.
         seed: seed of the first episode, of `seed_ranges.COLLECTING`.
         steps: control steps after which an episode is truncated, unless the task's limit is shorter.
@@ -28,14 +28,22 @@ class DatasetSettings(NamedTuple):
 
     setup: Setup
     policy: str = "cpg"
-    presets: tuple[str, ...] = ("medium",)
+    presets: tuple[str, ...] = ()
     noise: float = 0.0
     seed: int = seed_ranges.COLLECTING.start
     steps: int = STEPS
 
     def preset(self, seed: int) -> str | None:
         """Return the preset of the episode with this seed."""
-        return self.presets[seed % len(self.presets)] if self.presets else None
+        names = self.preset_names
+        return names[seed % len(names)] if names else None
+
+    @property
+    def preset_names(self) -> tuple[str, ...]:
+        """The presets of the demonstrator, also where none is named; empty for other policies."""
+        if self.presets or self.policy != "cpg":
+            return self.presets
+        return (suited_preset(self.setup.definition),)
 
     def dataset_id(self, label: str = "") -> str:
         """Return the default id of such a dataset.
@@ -43,7 +51,7 @@ class DatasetSettings(NamedTuple):
         Args:
             label: in place of the policy's name.
         """
-        parts = [label or self.policy, *self.presets]
+        parts = [label or self.policy, *self.preset_names]
         if self.noise:
             parts.append(f"noise{self.noise:g}")
         if self.steps != STEPS:
@@ -65,10 +73,11 @@ class DatasetSettings(NamedTuple):
         Raises:
             ValueError: a setting of the task that does not fit.
         """
-        presets = presets_of(self.setup.body) if self.presets else {}
-        record = self.setup.provenance() | self._asdict() | {"presets": list(self.presets)}
+        names = self.preset_names
+        presets = presets_of(self.setup.body) if names else {}
+        record = self.setup.provenance() | self._asdict() | {"presets": list(names)}
         del record["setup"]
-        record["presets_sha256"] = [_sha256(repr(presets.get(registry.bare_name(preset)))) for preset in self.presets]
+        record["presets_sha256"] = [_sha256(repr(presets.get(registry.bare_name(preset)))) for preset in names]
         if policies.is_file(self.policy):
             record["policy_sha256"] = policies.digest(self.policy)
             record["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]

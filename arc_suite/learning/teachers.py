@@ -6,7 +6,8 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from arc_suite.bodies import BodiesEnv
-from arc_suite.cpg import Demonstrator, suited_preset
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.selection import memoryless_preset
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.named import policy
 from arc_suite.policies.protocol import Positioned
@@ -41,7 +42,8 @@ class Teacher:
 
         Args:
             environment: environments of one body or of several.
-            preset: preset of the demonstrators; "" for the one that suits each body and the task.
+            preset: preset of the demonstrators; "" for the one that suits each body and the task, without an
+                integral, see `memoryless_preset`.
 
         Raises:
             ValueError: a body has no such preset.
@@ -61,7 +63,7 @@ class Teacher:
         self._groups = []
         for indices in indices_by_task.values():
             task = tasks[indices[0]]
-            name = preset or suited_preset(task)
+            name = preset or memoryless_preset(task)
             demonstrator = policy("cpg", task.scene.body, name, len(indices), task=task)
             # One preset gives one demonstrator, which has snapshots.
             group = _Group(task, np.array(indices), cast(Demonstrator | Positioned, demonstrator))

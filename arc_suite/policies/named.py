@@ -96,7 +96,7 @@ PRESET_HELP = (
 def policy(
     name: str,
     robot: str | Body,
-    presets: str | Sequence[str] | None = "medium",
+    presets: str | Sequence[str] | None = None,
     num_envs: int = 1,
     noise: float = 0.0,
     task: Task | None = None,
@@ -124,10 +124,10 @@ def policy(
         OSError: a file that cannot be read.
     """
     body = registry.body_of(robot)
+    if presets is None and name == "cpg":
+        presets = suited_preset(prepare_task(body, "walk")[0] if task is None else task)
     if presets is None:
         presets = ()
-        if name == "cpg":
-            presets = suited_preset(prepare_task(body, "walk")[0] if task is None else task)
     preset_list = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in preset_list:
         check_preset_name(preset)

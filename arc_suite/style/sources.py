@@ -33,7 +33,7 @@ class Source(NamedTuple):
     recorders: Callable[[Setup, Sequence[int]], list[Callable[[], Track]]]
 
 
-def source(name: str, preset: str | None = "medium") -> Source:
+def source(name: str, preset: str | None = None) -> Source:
     """Open a source, of a kind that follows from its name.
 
     Args:

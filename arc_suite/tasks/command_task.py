@@ -162,7 +162,7 @@ class CommandTask(Task):
         **COSTS,
     }
     yaw: ClassVar[float] = math.pi
-    demonstrators: ClassVar[tuple[str, ...]] = ("reactive",)
+    demonstrators: ClassVar[tuple[str, ...]] = ("steered",)
 
     def __init_subclass__(cls, **kwargs):
         super().__init_subclass__(**kwargs)

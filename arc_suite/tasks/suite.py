@@ -27,6 +27,7 @@ class Shoved(CommandTask):
     command = Schedule()
     modifiers = {"kicks": 1.5}
     from_body = _FROM_BODY
+    demonstrators = ("braced",)
 
 
 class Limp(CommandTask):
@@ -36,6 +37,7 @@ class Limp(CommandTask):
     command = Schedule()
     modifiers = {"actuator_failure": True}
     from_body = _FROM_BODY
+    demonstrators = ("braced",)
 
 
 class Directed(CommandTask):
@@ -45,7 +47,7 @@ class Directed(CommandTask):
     command = Schedule()
     gait_and_pose = GaitAndPose()
     from_body = _FROM_BODY
-    demonstrators = ("balanced", "steered")
+    demonstrators = ("steered",)
     weights: ClassVar[Mapping[str, float]] = {
         "progress": 0.25,
         "tracking": 0.25,
@@ -63,7 +65,7 @@ class Rough(CommandTask):
     command = AlongLane()
     ground = Lanes(("rough",))
     from_body = _FROM_BODY
-    demonstrators = ("balanced", "surefooted")
+    demonstrators = ("surefooted",)
 
 
 class Slopes(CommandTask):
@@ -74,7 +76,7 @@ class Slopes(CommandTask):
     command = AlongLane()
     ground = Lanes(("slopes",))
     from_body = _FROM_BODY
-    demonstrators = ("balanced", "surefooted")
+    demonstrators = ("surefooted",)
 
 
 class Stairs(CommandTask):
@@ -85,7 +87,7 @@ class Stairs(CommandTask):
     command = AlongLane()
     ground = Lanes(("stairs",), copies=(4, 1))
     from_body = _FROM_BODY
-    demonstrators = ("balanced", "surefooted")
+    demonstrators = ("surefooted",)
 
 
 class Gaps(CommandTask):
@@ -107,7 +109,7 @@ class Course(CommandTask):
     command = AlongLane()
     ground = Lanes(("rough", "slopes", "stairs", "gaps"), copies=(2, 1))
     from_body = _FROM_BODY
-    demonstrators = ("balanced", "surefooted")
+    demonstrators = ("surefooted",)
 
 
 class Leap(CommandTask):
@@ -129,7 +131,7 @@ class Roam(CommandTask):
     command = Schedule()
     ground = Lanes(("rough",), middle=0.5, thresholds=(0.25, 0.5), roams=True)
     from_body = _FROM_BODY
-    demonstrators = ("balanced", "surefooted")
+    demonstrators = ("braced",)
 
 
 class Navigate(CommandTask):

@@ -66,7 +66,9 @@ def test_environments_and_policies_of_every_kind(bundle):
     dm = arc_suite.load("tick", "walk", SETTINGS)
     one = gymnasium.make("arc_suite/tick-walk-v0", **settings)
     many = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2, **settings)
-    shown = [walk_of(animation.show(environment, Demonstrator("tick"), steps=4)) for environment in (dm, one, many)]
+    shown = [
+        walk_of(animation.show(environment, Demonstrator("tick", "medium"), steps=4)) for environment in (dm, one, many)
+    ]
     assert shown[0] == shown[1] == shown[2] and len(shown[0]["positions"]) == 4
     still = walk_of(animation.show(dm, "zero", steps=4))
     assert still | {"label": "tick, policy"} == walk_of(animation.show(dm, lambda timestep: np.zeros(18), steps=4))

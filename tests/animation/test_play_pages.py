@@ -297,7 +297,7 @@ def test_the_program_writes_a_page(tmp_path):
         (("-o", "a.html", "--policy=zero"), "policy zero: a page runs cpg, ppo, universal, or one trained network"),
         (
             ("-o", "a.html", "--preset=sighted"),
-            "preset 'sighted': a page runs steered, surefooted or reactive, which follow a command by joint angles",
+            "preset 'sighted': a page runs steered, surefooted, reactive or balanced, which follow a command by steps",
         ),
         (("-o", "a.html", "--policy=none/there.npz"), "cannot read none/there.npz: no such file"),
     ],

@@ -66,7 +66,7 @@ def test_a_picture_of_rewards_names_its_tracks():
 
 @pytest.mark.slow
 def test_pictures_of_a_track_of_one_step():
-    track = record(arc_suite.load("tick", "walk"), Demonstrator("tick"), seed=0, max_steps=1)
+    track = record(arc_suite.load("tick", "walk"), Demonstrator("tick", "medium"), seed=0, max_steps=1)
     for draw in PICTURES.values():
         draw({"a": track})
 

@@ -50,6 +50,7 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
         ((), "expected a spec file or --task; see --help"),
         (("--task=wlak",), "unknown task 'wlak'; did you mean 'walk'? (there are: " + ", ".join(TASKS) + ")"),
         (("--task=walk", "--walk"), "--walk: expected a spec file, got --task"),
+        (("--task=walk", "--tasks"), "--tasks: expected a spec file, got --task"),
         (("missing.json",), "cannot read missing.json: no such file or directory"),
     ],
 )
@@ -181,3 +182,12 @@ def test_imported_robots_walk_for_20_seconds_and_get_no_advice(path):
     assert re.search(
         rf"{path}: quadruped_15_kg (falls after \d+ control steps|is slow: walks .*\))$", done.stdout.strip()
     )
+
+
+@pytest.mark.long
+def test_every_task_is_walked_by_the_preset_that_suits_it():
+    lines = programs.passed(check("--tasks", "spider")).splitlines()
+    assert lines[0] == "spider: spider stands and can take steps"
+    for line, task in zip(lines[1:], TASKS, strict=True):
+        assert re.fullmatch(rf"spider: {task} by \w+: (speed|tracking|goals) \d\.\d\d, [0-4] of 4 upright", line), line
+    assert "spider: shoved by braced: tracking" in lines[10]

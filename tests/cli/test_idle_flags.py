@@ -19,7 +19,7 @@ COMMON = f"{BODY} {SET} policy vecnormalize preset"
 ALWAYS = {
     "build_model": "robot spec legs links length output summary render scale seed",
     "import": "output home",
-    "check": "task walk",
+    "check": "task tasks walk",
     "render": f"{COMMON} seed steps output".replace(" preset", ""),
     "animate": f"{COMMON} clips fps straight plant output".replace(" preset", ""),
     "play": f"{BODY} policy vecnormalize output",

@@ -53,12 +53,12 @@ LEFT = ("l1", "l2", "l3", "fl", "rl")
     ("body", "task", "settings", "preset"),
     [
         (ROBOTS["queen"], "walk", {}, "refined"),
-        (ROBOTS["queen"], "shoved", {}, "reactive"),
-        (ROBOTS["queen"], "roam", {}, "surefooted"),
-        (generator.generate(4, 2), "steer", {}, "reactive"),
+        (ROBOTS["queen"], "shoved", {}, "braced"),
+        (ROBOTS["queen"], "roam", {}, "braced"),
+        (generator.generate(4, 2), "steer", {}, "steered"),
         (ROBOTS["tick"], "rough", {}, "surefooted"),
         (ROBOTS["tick"], "rough", {"exclude_blocks": "command"}, "refined"),
-        (ROBOTS["leaper"], "rough", {}, "balanced"),
+        (ROBOTS["leaper"], "rough", {}, "surefooted"),
         (ROBOTS["tick"], "gaps", {}, "sighted"),
         (ROBOTS["tick"], "navigate", {}, "planned"),
         (generator.generate(4, 2), "walk", {}, "medium"),
@@ -92,7 +92,7 @@ def test_action_is_the_published_law(robot):
     joints = ROBOTS[robot].joint_names
     n = len(joints)
     task = arc_suite.load(robot, "walk").task.definition
-    demonstrator = Demonstrator(robot)
+    demonstrator = Demonstrator(robot, "medium")
     rng = np.random.default_rng(1)
     ramp, start = (15, 0.2) if robot == "leaper" else (20, 0.3)
     for step in range(200):
@@ -111,7 +111,7 @@ def test_action_is_the_published_law(robot):
 @pytest.mark.filterwarnings("ignore:.*another robot")  # what is felt here is drawn at random
 def test_batches_are_single_demonstrators_and_restart_alone():
     rng = np.random.default_rng(0)
-    batch, singles = Demonstrator("tick"), [Demonstrator("tick") for _ in range(3)]
+    batch, singles = Demonstrator("tick", "medium"), [Demonstrator("tick", "medium") for _ in range(3)]
     split = arc_suite.load("tick", "walk").task.definition.split
     for step in range(60):
         observations = rng.normal(0, 0.3, (3, 199))
@@ -126,7 +126,7 @@ def test_batches_are_single_demonstrators_and_restart_alone():
 
 def test_first_timestep_restarts_the_clock():
     environment = arc_suite.load("leaper", "walk", {"random": 0})
-    demonstrator = Demonstrator("leaper")
+    demonstrator = Demonstrator("leaper", "medium")
     first = environment.reset()
     before = demonstrator(first)
     for _ in range(7):
@@ -135,7 +135,7 @@ def test_first_timestep_restarts_the_clock():
 
 
 def test_presets_of_other_bodies_are_one_line_errors():
-    with pytest.raises(ValueError, match=r"^presets: expected a body named 'queen' to have the 18 joints of queen, g"):
+    with pytest.raises(ValueError, match=r"^walk: expected a body named 'queen' to have the 18 joints of queen, g"):
         Demonstrator(ROBOTS["bastion"].replace(name="queen"))
     with pytest.raises(ValueError, match=r"^preset: queen has 6 legs, and phase_offsets is for 4$"):
         Demonstrator("queen", PRESETS["leaper"]["medium"])
@@ -301,7 +301,7 @@ def test_another_robot_of_as_many_joints_is_told_by_its_parts(robot, other, pres
 
 @pytest.mark.parametrize(("robot", "other", "stands"), [("queen", "tick", "0.75"), ("tick", "queen", "0.18")])
 def test_another_robot_of_as_many_parts_is_warned_of_by_its_height(robot, other, stands):
-    environment, demonstrator = arc_suite.load(other, "walk", {"random": 0}), Demonstrator(robot)
+    environment, demonstrator = arc_suite.load(other, "walk", {"random": 0}), Demonstrator(robot, "medium")
     with pytest.warns(UserWarning) as caught:
         timestep = environment.step(demonstrator(environment.reset()))
         demonstrator(timestep)
@@ -314,7 +314,7 @@ def test_another_robot_of_as_many_parts_is_warned_of_by_its_height(robot, other,
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_nobody_is_warned_of_the_robot_itself(robot):
-    demonstrator = Demonstrator(robot)
+    demonstrator = Demonstrator(robot, "medium")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         environment = arc_suite.load(robot, "walk", {"random": 0})

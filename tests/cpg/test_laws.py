@@ -55,10 +55,10 @@ def test_feet_do_not_jump_at_a_stop(robot, preset):
             walking = max(walking, changes[~resting].max(initial=0.0))
             assert (changes <= 1.1 * walking).all(), step
             if preset == "steered":  # balanced shifts its feet to catch the torso
-                assert (changes[np.arange(count) < step - 41] <= 0.3 * walking).all(), step
+                assert (changes[np.arange(count) < step - 41] <= 0.4 * walking).all(), step
         assert_array_equal(state.phase[resting], held[resting])
         before = targets
-    assert resting.all() and changes[:15].max() < 1e-9 < walking
+    assert resting.all() and changes[:15].max() < 1e-5 < walking
 
 
 @pytest.mark.parametrize(("robot", "task", "preset"), PRESETS)
@@ -117,7 +117,7 @@ def test_who_cannot_be_fitted_is_told_in_one_line():
     for preset in ("steered", "medium"):
         with refused(message):
             Demonstrator(still, preset)
-    with pytest.raises(ValueError, match="^preset: expected one of Preset, float, SteeringParameters, .*, got dict$"):
+    with pytest.raises(ValueError, match="^preset: expected one of Preset, float, SteppingParameters, .*, got dict$"):
         Demonstrator("tick", {})
 
 

@@ -20,7 +20,7 @@ from arc_suite.robots import ROBOTS
 @pytest.mark.parametrize("robot", RETURNS)
 def test_medium_earns_the_published_return(robot):
     environment = arc_suite.load(robot, "walk")
-    results = evaluation.episodes(environment, Demonstrator(robot))
+    results = evaluation.episodes(environment, Demonstrator(robot, "medium"))
     returns = RETURNS[robot]
     assert_allclose(np.mean([episode.total for episode in results]), returns.medium, rtol=returns.within)
     assert {episode.length for episode in results} == {1000}

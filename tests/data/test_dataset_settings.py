@@ -11,7 +11,9 @@ from arc_suite.envs.setup import Setup
 
 def test_ids_by_default_are_minaris():
     named = {
-        "arc_suite/queen/walk/cpg-medium-v0": data.DatasetSettings(QUEEN),
+        "arc_suite/queen/walk/cpg-refined-v0": data.DatasetSettings(QUEEN),
+        "arc_suite/spider/walk/cpg-medium-v0": data.DatasetSettings(SPIDER),
+        "arc_suite/tick/steer/cpg-steered-v0": data.DatasetSettings(Setup.of("tick", "steer")),
         "arc_suite/tick/steer/random-v0": data.DatasetSettings(Setup.of("tick", "steer"), "random", ()),
         "arc_suite/queen/walk/cpg-medium-fast-noise0_1-v0": data.DatasetSettings(
             QUEEN, presets=("medium", "fast"), noise=0.1
@@ -19,7 +21,7 @@ def test_ids_by_default_are_minaris():
         "arc_suite/spider/walk/my_package_policies_make-50steps-v0": data.DatasetSettings(
             SPIDER, "my_package.policies:make", (), steps=50
         ),
-        "arc_suite/queen/walk/cpg-medium-set59ccfc0d-v0": data.DatasetSettings(
+        "arc_suite/queen/walk/cpg-refined-set59ccfc0d-v0": data.DatasetSettings(
             Setup.of("queen", "walk", {"arena": "bumps"})
         ),
     }

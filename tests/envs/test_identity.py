@@ -25,7 +25,7 @@ def test_names_of_the_suite_are_those_of_its_bodies(name):
     setup = Setup.of(WORDS[name])
     assert (setup.name, str(setup), setup.env_id) == (name, f"{name}, walk", f"arc_suite/{name}-walk-v0")
     assert Setup.of(setup.body) == setup
-    assert DatasetSettings(setup).dataset_id() == f"arc_suite/{name}/walk/cpg-medium-v0"
+    assert DatasetSettings(setup, presets=("medium",)).dataset_id() == f"arc_suite/{name}/walk/cpg-medium-v0"
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -34,7 +34,7 @@ def test_other_bodies_of_these_names_are_told_apart(name):
     own = setup.name
     assert own.startswith(f"{name}_") and len(own) == len(name) + 7
     assert (str(setup), setup.env_id) == (f"{own}, walk", f"arc_suite/{own}-walk-v0")
-    assert DatasetSettings(setup).dataset_id() == f"arc_suite/{own}/walk/cpg-medium-v0"
+    assert DatasetSettings(setup, presets=("medium",)).dataset_id() == f"arc_suite/{own}/walk/cpg-medium-v0"
     heavier = Setup.of(impostor(name).replace(density=9.0))
     assert heavier.name not in (own, name)
     assert Setup.from_dict(setup.to_dict()) == setup

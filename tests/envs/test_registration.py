@@ -188,8 +188,8 @@ for program, *arguments in (
     assert lines == [
         *(f"{program} 0" for program in ("evaluate", "style", "style", "collect", "collect", "render")),
         "evaluate 1 arc-suite evaluate: unknown preset 'prwl'; did you mean 'prowl'? "
-        "(there are: slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, leaping, planned, "
-        "balanced, prowl)",
+        "(there are: slow, medium, fast, tuned, refined, steered, surefooted, braced, reactive, sighted, leaping, "
+        "planned, balanced, prowl)",
     ]
 
 
@@ -197,7 +197,6 @@ TICK = ROBOTS["tick"]
 OTHER = TICK.replace(name="other")
 ROW = PARAMETERS["walk"]["tick"]
 WITHOUT_BANDS = {name: value for name, value in ROW.items() if name not in ("velocity_band", "healthy_range")}
-BALANCED = PRESETS["leaper"]["balanced"]
 
 
 def walk(row):
@@ -271,8 +270,7 @@ class Misnamed(Walk):
         ({"body": OTHER, "parameters": {"wlak": ROW}}, "unknown task of parameters 'wlak'; did you mean 'walk'?"),
         (presets(**PRESETS["leaper"]), "preset 'slow': preset: other has 6 legs, and phase_offsets is for 4"),
         (presets(**PRESETS["bastion"]), "preset 'slow': preset: does not fit other: KeyError: 'knee'"),
-        (presets(balanced=BALANCED), "preset 'balanced': preset: other has 3 ranks of legs, and feet is for 2"),
-        (presets(trot={"lead": 0.1}), "preset 'trot': preset: expected one of Preset, float, SteeringParameters"),
+        (presets(trot={"lead": 0.1}), "preset 'trot': preset: expected one of Preset, float, SteppingParameters"),
         ({"tasks": (Other,)}, "task 'walk' is already registered"),
         ({"tasks": (Misnamed,)}, "task 'walk-slowly': expected a name of letters, digits and underscores"),
         ({"tasks": (len,)}, "tasks: expected classes by the contract of arc_suite.tasks.Task, got <built-in"),
@@ -287,7 +285,7 @@ class Misnamed(Walk):
         ),
         ({"laws": {"mine": 3}}, "law 'mine': has no preset and no reads and no initial and no __call__, which "),
         ({"laws": {"mine": Blind}}, "law 'mine': reads: expected posture, velocities and others, got ('goal',)"),
-        ({"laws": {"mine": Stolen}}, "law 'mine': presets of SteeringParameters are those of Steered"),
+        ({"laws": {"mine": Stolen}}, "law 'mine': presets of SteppingParameters are those of Stepping"),
         ({"laws": {"mine": Numbered}}, "law 'mine': presets of float are those of StrideLaw"),
         ({"laws": {"mine": Law}} | walk(WITHOUT_BANDS), "parameters of walk: other has no healthy_range and no veloc"),
         ({"laws": {"mine": Law}} | presets(mine=3.0), "preset 'mine': froude: expected a number from -1 to 1, got 3.0"),

@@ -15,9 +15,9 @@ from arc_suite.envs.setup import Setup
 
 def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
     environment = arc_suite.load("leaper", "walk", {"time_limit": 2.0})
-    first, second, third = evaluation.episodes(environment, Demonstrator("leaper"), range(4, 7))
-    assert evaluation.run(environment, Demonstrator("leaper"), 5) == second != first
-    timestep, total, compliance, policy = environment.reset(6), 0.0, 0.0, Demonstrator("leaper")
+    first, second, third = evaluation.episodes(environment, Demonstrator("leaper", "medium"), range(4, 7))
+    assert evaluation.run(environment, Demonstrator("leaper", "medium"), 5) == second != first
+    timestep, total, compliance, policy = environment.reset(6), 0.0, 0.0, Demonstrator("leaper", "medium")
     start = environment.physics.data.xpos[1, 0]  # of the torso's frame, as in the reward
     while not timestep.last():
         timestep = environment.step(policy(timestep))
@@ -61,8 +61,8 @@ def test_watchers_see_every_step_in_the_environment():
     def watch(timestep):
         seen.append((timestep.reward, environment.physics.data.time))
 
-    plain = evaluation.run(environment, Demonstrator("tick"), seed=4)
-    episode = evaluation.run(environment, Demonstrator("tick"), seed=4, watchers=[watch, watch])
+    plain = evaluation.run(environment, Demonstrator("tick", "medium"), seed=4)
+    episode = evaluation.run(environment, Demonstrator("tick", "medium"), seed=4, watchers=[watch, watch])
     assert episode == plain
     assert len(seen) == 2 * (1 + episode.length) and seen[0::2] == seen[1::2]
     assert seen[0][0] is None and sum(reward for reward, _ in seen[2::2]) == episode.total
@@ -79,7 +79,7 @@ def test_returns_of_the_papers_demonstrators():
 
 def test_a_final_policy_is_judged_on_100_episodes():
     environment = arc_suite.load("tick", "walk", {"time_limit": 0.1})
-    assert len(evaluation.episodes(environment, Demonstrator("tick"))) == 100
+    assert len(evaluation.episodes(environment, Demonstrator("tick", "medium"))) == 100
 
 
 def test_episodes_that_need_not_end_are_one_line():
@@ -89,8 +89,8 @@ def test_episodes_that_need_not_end_are_one_line():
     )
     environment = setup.load()
     with pytest.raises(ValueError, match=line):
-        evaluation.episodes(environment, Demonstrator("tick"))
-    assert len(list(evaluation.rollout(environment, Demonstrator("tick"), seed=0, max_steps=3))) == 4
+        evaluation.episodes(environment, Demonstrator("tick", "medium"))
+    assert len(list(evaluation.rollout(environment, Demonstrator("tick", "medium"), seed=0, max_steps=3))) == 4
     zero = policies.policy("zero", "tick", num_envs=2)
     with contextlib.closing(setup.make_vec(2)) as endless, pytest.raises(ValueError, match=line):
         evaluation.episodes_in_batch(endless, zero, range(2))

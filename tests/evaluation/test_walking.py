@@ -70,7 +70,7 @@ def test_a_tilted_or_terminated_body_has_fallen():
 def test_a_demonstrator_is_seen_to_walk():
     environment = arc_suite.load("tick", "walk", {"time_limit": 6.0})
     watcher = walking.WalkWatcher(environment)
-    episode = evaluation.run(environment, Demonstrator(environment), 0, watchers=[watcher])
+    episode = evaluation.run(environment, Demonstrator(environment, "medium"), 0, watchers=[watcher])
     verdict = watcher.verdict(episode.length)
     assert verdict.walks and not verdict.fell and verdict.touching == 0.0
     assert (watcher.ending, watcher.length) == (walking.TIME, 120)
@@ -87,7 +87,7 @@ def test_steps_after_a_fall_do_not_count():
         if watcher.length == 20:
             data.qpos[2:7] = (0.5 * data.qpos[2], 0.0, 1.0, 0.0, 0.0)  # onto its back
 
-    steps = evaluation.run(environment, Demonstrator(environment), 0, watchers=[watcher, capsize]).length
+    steps = evaluation.run(environment, Demonstrator(environment, "medium"), 0, watchers=[watcher, capsize]).length
     verdict = watcher.verdict(steps)
     assert (watcher.ending, watcher.length, steps) == (walking.FALL, 21, 80)
     assert verdict.fell and verdict.failures == ("fall", "slow")
@@ -96,7 +96,7 @@ def test_steps_after_a_fall_do_not_count():
 def test_a_divergence_ends_a_walk():
     environment = arc_suite.load("tick", "walk")
     watcher = walking.WalkWatcher(environment)
-    for timestep in evaluation.rollout(environment, Demonstrator(environment), 0, max_steps=8):
+    for timestep in evaluation.rollout(environment, Demonstrator(environment, "medium"), 0, max_steps=8):
         watcher(timestep)
     watcher.note_divergence()
     assert watcher.length == 9 and watcher.verdict(100).failures == ("divergence", "slow")

@@ -33,7 +33,7 @@ import sys
 import arc_suite
 from arc_suite.cpg import Demonstrator
 environment = arc_suite.load("queen", "walk")
-demonstrator = Demonstrator(environment)
+demonstrator = Demonstrator(environment, "medium")
 environment.step(demonstrator(environment.reset()))
 rooms = ("importing", "bodies", "learning", "animation")
 print(sorted(name for name in sys.modules if name.startswith(tuple(f"arc_suite.{room}" for room in rooms))))

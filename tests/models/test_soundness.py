@@ -178,7 +178,7 @@ def test_a_demonstrator_refuses_a_body_that_cannot_walk(body, text):
 
 @pytest.mark.parametrize("body", [case[0] for case in DOUBTFUL])
 def test_a_demonstrator_tries_a_body_that_may_walk(body):
-    environment, policy = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body)
+    environment, policy = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body, "medium")
     environment.step(policy(environment.reset()))
 
 

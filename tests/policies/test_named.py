@@ -14,8 +14,8 @@ from arc_suite.evaluation import provenance
 from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 
-ALL = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, leaping, planned, balanced"
-GENERAL = "slow, medium, fast, steered, surefooted, reactive, sighted, leaping, planned"
+ALL = "slow, medium, fast, tuned, refined, steered, surefooted, braced, reactive, sighted, leaping, planned, balanced"
+GENERAL = "slow, medium, fast, steered, surefooted, braced, reactive, sighted, leaping, planned"
 
 JOINTS = "expected a body named 'queen' to have the 18 joints of queen"
 
@@ -79,7 +79,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cpg", generate(4, 2), "tuned"), f"unknown preset 'tuned' (there are: {GENERAL})"),
         (("cpg", "queen", ()), f"preset: expected one or more of {ALL}, got none"),
         (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number of at least 0, got -0.1"),
-        (("cpg", ROBOTS["bastion"].replace(name="queen")), f"presets: {JOINTS}, got 12; give it another name"),
+        (("cpg", ROBOTS["bastion"].replace(name="queen")), f"walk: {JOINTS}, got 12; give it another name"),
     ],
 )
 def test_unknown_names_are_named(arguments, message):
@@ -91,7 +91,7 @@ OWN = """
 import numpy as np
 import arc_suite.cpg
 number = 3
-def walk(robot): return arc_suite.cpg.Demonstrator(robot)
+def walk(robot): return arc_suite.cpg.Demonstrator(robot, "medium")
 def forgets(robot): return None
 robots = []
 def told(robot):
@@ -111,8 +111,10 @@ def test_policies_from_pythons_path_and_from_files_of_any_name(own, tmp_path):
     """The file is told where it lies, so that it finds its weights."""
     (tmp_path / "own-policies-0.py").write_text(f"{OWN}\nassert __file__ == {str(tmp_path / 'own-policies-0.py')!r}")
     time_step = arc_suite.load("tick", "walk", {"random": 0}).reset()
-    expected = alone(policy("cpg", "tick"))(time_step)
+    own_policy = alone(policy("cpg", "tick", "medium"))(time_step)
+    default = alone(policy("cpg", "tick", "refined"))(time_step)
     for path in ("own_policies:walk", "arc_suite.cpg:Demonstrator", f"{tmp_path}/own-policies-0.py:walk"):
+        expected = default if path == "arc_suite.cpg:Demonstrator" else own_policy
         np.testing.assert_array_equal(alone(policy(path, "tick"))(time_step), expected)
 
 

@@ -101,7 +101,7 @@ def test_task_and_demonstrator_take_a_gait():
 def test_a_body_walks_in_the_gait_that_is_asked_for():
     def compliance(walked):
         environment = arc_suite.load(HEXAPOD, "walk", {"random": 0, "gait": "ripple"})
-        policy = Demonstrator(arc_suite.load(HEXAPOD, "walk", {"gait": walked}))
+        policy = Demonstrator(arc_suite.load(HEXAPOD, "walk", {"gait": walked}), "medium")
         step, share = environment.reset(), 0.0
         for _ in range(200):
             step = environment.step(policy(step))

@@ -4,11 +4,13 @@ python tests/robots_of_others/check.py FOLDER [NAME ...]
 python tests/robots_of_others/check.py FOLDER --page studies/robots_of_others.md
 
 Prints a table and writes it to FOLDER/robots.csv. Of each file: whether it comes in, in how many of 200 states the
-accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. Fails where
+accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. Of each task:
+the preset that suits it, its metric, and how many of eight episodes end upright. Fails where
   - a file that should come in does not, or one that should not does;
   - accelerations differ;
   - a robot of MUST_WALK does not walk, or is at its torque limits in 3 % of the samples;
-  - fewer than seven tenths of the NEW robots walk.
+  - fewer than seven tenths of the NEW robots walk;
+  - the preset that suits a task gains .05 less than another that obeys the same commands.
 """
 
 import csv
@@ -28,16 +30,18 @@ from studies.pages import table_writer  # noqa: E402
 
 from arc_suite.cpg import Demonstrator  # noqa: E402
 from arc_suite.envs.setup import Setup  # noqa: E402
-from arc_suite.evaluation import protocol, walking  # noqa: E402
+from arc_suite.evaluation import protocol, suitability, walking  # noqa: E402
 from arc_suite.importing import import_robot  # noqa: E402
 from arc_suite.models.soundness import flaws  # noqa: E402
 from arc_suite.robots.spec import Body  # noqa: E402
+from arc_suite.tasks import TASKS  # noqa: E402
 
 WALKS = {"medium": "walk", "steered": "steer"}  # task of each preset
 SEEDS, SECONDS = 3, 20.0
 LEAST, MOST, MOST_LIMITED = 0.8, 1.25, 0.03
 MUST_WALK = ("go2_like", "a1_like", "hexapod", "go2", "aliengo", "anymal_b", "a1")
 SHARE = 0.7  # of the NEW robots
+STEPS = 300  # control steps of an episode of each task
 
 
 class Walk(NamedTuple):
@@ -59,6 +63,17 @@ class Walk(NamedTuple):
         return self.slowest >= LEAST and self.fastest <= MOST and not self.falls
 
 
+class TaskTrials(NamedTuple):
+    """Of the presets that suit a task and obey its commands, the default first."""
+
+    presets: tuple[suitability.Trial, ...]
+    shortfall: float
+
+    def __str__(self) -> str:
+        default = self.presets[0]
+        return f"{default.preset}, {default.value:.2f}, {default.upright}/{default.episodes}"
+
+
 class Row(NamedTuple):
     """Of one file; see the table."""
 
@@ -67,6 +82,7 @@ class Row(NamedTuple):
     legs: int = 0
     same: int | None = None
     walks: dict[str, Walk | None] = {}
+    tasks: tuple["TaskTrials", ...] = ()
 
     @property
     def came(self) -> bool:
@@ -90,6 +106,10 @@ class Row(NamedTuple):
             found.append(f"same bits in {self.same} of {reference.STATES} states")
         if self.robot.name in MUST_WALK and (not self.walked or self.strained):
             found.append("does not walk within the limits of its motors")
+        for trials in self.tasks:
+            if trials.shortfall > suitability.MAX_SHORTFALL:
+                default, best = trials.presets[0], max(trials.presets, key=lambda trial: trial.mean_return)
+                found.append(f"{default.task}: {default.preset} gains {trials.shortfall:.0%} less than {best.preset}")
         return [f"{self.robot.name}: {fault}" for fault in found]
 
 
@@ -106,9 +126,23 @@ def row(robot: zoo.Robot, folder: pathlib.Path) -> Row:
         for preset, task in WALKS.items():
             walks[preset], line = attempt(walk, body, task, preset)
             lines.append(line)
+    tasks = ()
+    if robot.group != zoo.ODD:
+        tasks, line = attempt(try_tasks, body)
+        lines.append(line)
     flawed, line = attempt(flaws, body)
     lines += [line, *(flaw.text for flaw in flawed or ())]
-    return Row(robot, next(filter(None, lines), ""), len(body.legs), same, walks)
+    return Row(robot, next(filter(None, lines), ""), len(body.legs), same, walks, tasks or ())
+
+
+def try_tasks(body: Body) -> tuple[TaskTrials, ...]:
+    """Try the presets of a body in each task."""
+    trials_of_tasks = []
+    for task in TASKS:
+        trials = suitability.try_presets(body, task, suitability.SEEDS, STEPS)
+        standing = suitability.stand_still(body, task, suitability.SEEDS, STEPS)
+        trials_of_tasks.append(TaskTrials(tuple(trials), suitability.shortfall(trials, standing)))
+    return tuple(trials_of_tasks)
 
 
 def attempt(function, *arguments, **keywords):
@@ -150,7 +184,7 @@ def _tried(body: Body, task: str, preset: str, seed: int) -> tuple[float, bool, 
 
 HEADER = ["robot", "group", "legs", "same bits"]
 HEADER += [f"{preset} {figure}" for preset in WALKS for figure in ("slowest", "fastest", "falls", "at limit")]
-HEADER += ["walks", "line"]
+HEADER += [*TASKS, "walks", "line"]
 
 
 def cells(row: Row) -> list[str]:
@@ -160,7 +194,8 @@ def cells(row: Row) -> list[str]:
         one = row.walks.get(preset)
         figures += ["", "", "", ""] if one is None else [f"{value:.3g}" for value in one]
     came = ["" if not row.came else str(row.legs), "" if row.same is None else str(row.same)]
-    return [row.robot.name, row.robot.group, *came, *figures, "yes" if row.walked else "no", row.line]
+    tasks = [str(trials) for trials in row.tasks] or [""] * len(TASKS)
+    return [row.robot.name, row.robot.group, *came, *figures, *tasks, "yes" if row.walked else "no", row.line]
 
 
 def page(rows: list[Row]) -> str:
@@ -169,7 +204,18 @@ def page(rows: list[Row]) -> str:
     for one in (one for one in rows if one.walks):
         medium, steered = ("did not run" if each is None else _said(each) for each in one.walks.values())
         found.append(f"| {one.robot.name} | {one.robot.group} | {one.legs} | {medium} | {steered} |")
-    return "\n".join(["| robot | | legs | `medium` | `steered` |", "|---|---|---|---|---|", *found])
+    speeds = ["| robot | | legs | `medium` | `steered` |", "|---|---|---|---|---|", *found]
+    tasks = [task for task in TASKS if task != "walk"]
+    trials = [f"| | {' | '.join(tasks)} |", "|---" * (1 + len(tasks)) + "|"]
+    for one in rows:
+        if one.tasks:
+            texts = {each.presets[0].task: _tried_text(each.presets[0]) for each in one.tasks}
+            trials.append(f"| {one.robot.name} | {' | '.join(texts[task] for task in tasks)} |")
+    return "\n".join([*speeds, "", *trials])
+
+
+def _tried_text(trial: suitability.Trial) -> str:
+    return f"{trial.value:.2f}, {trial.upright}/{trial.episodes}"
 
 
 def _said(each: Walk) -> str:

@@ -65,7 +65,7 @@ def test_the_ground_of_an_arena_compiles_where_the_heap_cannot_grow():
 
 def walk(body):
     """Start and actions of a demonstrator's walk."""
-    environment, demonstrator = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body)
+    environment, demonstrator = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body, "medium")
     timestep, start, actions = environment.reset(), environment.physics.get_state(), []
     for _ in range(40):
         actions.append(demonstrator(timestep))

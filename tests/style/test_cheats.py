@@ -47,7 +47,7 @@ ONE = pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "que
 
 @functools.cache
 def measured(robot, cheat=None):
-    policy = Scripted(robot, cheat) if cheat else Demonstrator(robot)
+    policy = Scripted(robot, cheat) if cheat else Demonstrator(robot, "medium")
     return measure(record(arc_suite.load(robot, "walk"), policy, seed=0, max_steps=400))
 
 

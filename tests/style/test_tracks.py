@@ -26,8 +26,8 @@ from arc_suite.tasks.clock import TWO_PI, desired_contacts
 @pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "bastion"))
 def test_tracks_agree_with_the_reward(robot):
     environment = arc_suite.load(robot, "walk", {"time_limit": 5.0})
-    track = record(environment, Demonstrator(robot), seed=3)
-    episode = evaluation.run(environment, Demonstrator(robot), seed=3)
+    track = record(environment, Demonstrator(robot, "medium"), seed=3)
+    episode = evaluation.run(environment, Demonstrator(robot, "medium"), seed=3)
     assert len(track.times) == episode.length == 100
     assert track.times[-1] == pytest.approx(5.0)
     assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
@@ -57,9 +57,9 @@ def test_tracks_of_any_task_and_ground(task, arena, monkeypatch):
     with gaitless.registered():
         setup = Setup.of("queen", task, settings)
         environment = setup.load()
-        track = record(environment, Demonstrator("queen"), seed=3)
+        track = record(environment, Demonstrator("queen", "medium"), seed=3)
     definition = environment.task.definition
-    episode = evaluation.run(environment, Demonstrator("queen"), seed=3)
+    episode = evaluation.run(environment, Demonstrator("queen", "medium"), seed=3)
     assert (track.setup, track.weights) == (setup, definition.settings.weights)
     assert len(track.times) == episode.length == 40
     assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
@@ -103,7 +103,7 @@ def test_the_gait_of_a_track_is_the_one_that_holds():
 
 def test_recording_is_seeded():
     environment = arc_suite.load("leaper", "walk", {"time_limit": 1.0})
-    first, second, other = (record(environment, Demonstrator("leaper"), seed) for seed in (1, 1, 2))
+    first, second, other = (record(environment, Demonstrator("leaper", "medium"), seed) for seed in (1, 1, 2))
     assert_array_equal(first.foot_velocities, second.foot_velocities)
     assert (first.positions != other.positions).all()
 

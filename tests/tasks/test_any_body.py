@@ -31,7 +31,7 @@ def track(body, seconds, demonstrator=None, **kwargs):
     """Positions (n, 2) of the torso from control step to control step; the body must not fall."""
     kwargs = {"time_limit": seconds, "random": 0, "joint_noise": 0.0, "base_noise": 0.0} | kwargs
     environment = arc_suite.load(body, "walk", kwargs)
-    demonstrator = demonstrator or Demonstrator(body)
+    demonstrator = demonstrator or Demonstrator(body, "medium")
     step, positions = environment.reset(), [environment.physics.position()[:2].copy()]
     while not step.last():
         step = environment.step(demonstrator(step))
@@ -64,7 +64,7 @@ def test_random_bodies_walk(seed):
 
 
 def test_the_gait_makes_the_walk():
-    in_phase = Demonstrator(arc_suite.load(BODY, "walk", {"duty_factor": 0.6, "phase_offsets": 0.0}))
+    in_phase = Demonstrator(arc_suite.load(BODY, "walk", {"duty_factor": 0.6, "phase_offsets": 0.0}), "medium")
     assert speed(BODY, demonstrator=in_phase) < 0.1
     assert speed(BODY) > 0.17
 
@@ -84,7 +84,7 @@ def test_mirrored_bodies_walk_mirrored_tracks():
     gait = arc_suite.load(body, "walk").task.settings.parameters
     gait = {"duty_factor": gait.duty_factor, "phase_offsets": gait.phase_offsets}
     positions = track(body, 6.0)
-    mirrored = track(body.mirrored(), 6.0, Demonstrator(arc_suite.load(body.mirrored(), "walk", gait)))
+    mirrored = track(body.mirrored(), 6.0, Demonstrator(arc_suite.load(body.mirrored(), "walk", gait), "medium"))
     assert np.ptp(positions[:, 1]) > 1e-3 * body.torso.standing_height
     np.testing.assert_allclose(mirrored * (1.0, -1.0), positions, atol=1e-6)
 
@@ -110,7 +110,7 @@ def test_bodies_of_one_shape_start_and_walk_alike_with_the_noise_of_the_task(sca
 def measures_of(body):
     """Episodes of 160 control steps of a body in the task as it is: starts and walks, in units without dimension."""
     found = {name: [] for name in ("tilts", "clearances", "shares", "falls")}
-    environment, policy = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body)
+    environment, policy = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body, "medium")
     height, feet = body.torso.standing_height, list(body.foot_names)
     for _ in range(4):
         step, steps = environment.reset(), 0
@@ -214,7 +214,7 @@ def test_64_legs_load():
     legs = [left.replace(name=f"l{i}", mount=(3.0 - 0.19 * i, 0.1, 0.0)) for i in range(32)]
     body = BODY.replace(name="centipede", legs=(*legs, *(leg.mirrored(f"r{leg.name[1:]}") for leg in legs)))
     environment = arc_suite.load(body, "walk")
-    Demonstrator(body)
+    Demonstrator(body, "medium")
     assert environment.task.definition.size == 13 + 2 * 256 + 6 * 321
     assert body.ranks == (*range(32), *range(32))
 

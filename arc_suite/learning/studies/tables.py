@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from arc_suite import checks
-from arc_suite.cpg.selection import suited_preset
+from arc_suite.cpg.selection import memoryless_preset
 from arc_suite.data import DatasetSettings
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
@@ -135,8 +135,8 @@ def benchmark(division: str, algorithm: str) -> Study:
 
 
 def _collecting_preset(robot: str, task: str) -> str:
-    """Return the preset that collects prior data: that of the paper on `walk`, elsewhere the one that suits."""
-    return "medium" if task == "walk" else suited_preset(Setup.of(robot, task).definition)
+    """Return the preset that collects prior data: on `walk` that of the paper, elsewhere see `memoryless_preset`."""
+    return "medium" if task == "walk" else memoryless_preset(Setup.of(robot, task).definition)
 
 
 def folder_name(name: str) -> str:

@@ -1,0 +1,126 @@
+"""How well the presets that suit a task walk a body in it."""
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from arc_suite.cpg.selection import ignored_commands, law, law_class, presets_of, suited_preset, suited_presets
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import protocol
+from arc_suite.policies import Policy, policy
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import TASKS
+
+SEEDS = range(500, 508)  # no demonstrator was tuned on these episodes
+METRICS = ("goals", "tracking", "speed")  # names of metrics, of which a task shows the first that it has
+MAX_SHORTFALL = 0.05  # of a default preset, as a share of what the best preset gains over standing still
+
+
+class Trial(NamedTuple):
+    """Episodes of a policy in a task.
+
+    Attributes:
+        task: name of the task.
+        preset: name of the demonstrator's preset.
+        mean_return: over the episodes.
+        metric: name of the metric.
+        value: mean of the metric at the end of the episodes.
+        upright: number of episodes without a fall.
+        episodes: number of episodes.
+    """
+
+    task: str
+    preset: str
+    mean_return: float
+    metric: str
+    value: float
+    upright: int
+    episodes: int
+
+
+def try_defaults(body: Body, seeds: Sequence[int], steps: int) -> Iterator[Trial]:
+    """Yield a trial of each task of the suite by the preset that suits it best; tasks without one are left out.
+
+    Args:
+        body: any body.
+        seeds: seeds of the episodes.
+        steps: control steps of an episode, at most.
+
+    Raises:
+        ValueError: a body that no demonstrator can walk.
+    """
+    for task in TASKS:
+        setup = Setup.of(body, task)
+        names = suited_presets(setup.definition)
+        if names:
+            yield try_preset(setup, names[0], seeds, steps)
+
+
+def try_presets(body: Body, task: str, seeds: Sequence[int], steps: int) -> list[Trial]:
+    """Return trials of all presets of a body that obey the commands of a task, the default first.
+
+    Args:
+        body: any body.
+        task: name of a task.
+        seeds: seeds of the episodes.
+        steps: control steps of an episode, at most.
+
+    Raises:
+        ValueError: a task that no preset suits, or a body that no demonstrator can walk.
+    """
+    setup = Setup.of(body, task)
+    presets = presets_of(body)
+    default = suited_preset(setup.definition)
+    names = {repr(presets[default]): default}  # by parameters: some presets have several names
+    for name, preset in presets.items():
+        law_reads = law_class(preset).reads
+        is_able = set(law_reads) <= setup.definition.blocks.keys()
+        if is_able and not ignored_commands(setup.definition, law(setup.definition, preset)):
+            names.setdefault(repr(preset), name)
+    return [try_preset(setup, name, seeds, steps) for name in names.values()]
+
+
+def try_preset(setup: Setup, preset: str, seeds: Sequence[int], steps: int) -> Trial:
+    """Return a trial of a preset; see `try_presets`."""
+    return _play(setup, preset, policy("cpg", setup.body, preset, len(seeds), task=setup.definition), seeds, steps)
+
+
+def shortfall(trials: Sequence[Trial], standing: Trial) -> float:
+    """Return how much less the first of several trials gains than the best, as a share of what the best gains.
+
+    Args:
+        trials: trials of presets, the default first.
+        standing: trial of standing still; gains are those over its return.
+    """
+    gains = [trial.mean_return - standing.mean_return for trial in trials]
+    best = max(gains)
+    return (best - gains[0]) / best if best > 0.0 else 0.0
+
+
+def stand_still(body: Body, task: str, seeds: Sequence[int], steps: int) -> Trial:
+    """Return a trial of standing still."""
+    setup = Setup.of(body, task)
+    return _play(setup, "zero", policy("zero", body, num_envs=len(seeds), task=setup.definition), seeds, steps)
+
+
+def _play(setup: Setup, preset: str, acting: Policy, seeds: Sequence[int], steps: int) -> Trial:
+    environment = setup.make_vec(
+        len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED, max_episode_steps=steps
+    )
+    with contextlib.closing(environment):
+        results = protocol.episodes_in_batch(environment, acting, seeds)
+    metrics = results[0].progress
+    metric = next(name for name in METRICS if name in metrics)
+    longest = max(result.length for result in results)
+    return Trial(
+        task=setup.kind.name,
+        preset=preset,
+        mean_return=float(np.mean([result.total for result in results])),
+        metric=metric,
+        value=float(np.mean([result.progress[metric] for result in results])),
+        upright=sum(result.length == longest for result in results),
+        episodes=len(results),
+    )
