@@ -214,7 +214,7 @@ def test_a_policy_of_any_body_is_that_of_python(script, tmp_path, task):
     assert_networks_agree(script, setup, policy(name, body, task=setup.definition), name)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @nodes.needs_node
 def test_heights_on_bumps_are_those_of_python(script):
     """Contacts with height fields differ between versions of MuJoCo; heights over them do not."""

@@ -40,7 +40,7 @@ class Replay:
         return next(self.actions).astype(float)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("robot", "task", "preset"),
     [("queen", "walk", "medium"), pytest.param("tick", "steer", "reactive", marks=pytest.mark.release)],

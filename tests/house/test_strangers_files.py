@@ -8,8 +8,9 @@ import pytest
 
 # Tables of damage that take no time, by kind of file, and one of each further table and reader; `make check-release`
 # has the others of runs and studies.
-QUICK = ("robot in MJCF", "robot in URDF", "mesh in STL", "imported body", "policy", "tracks", "journal of a search")
+QUICK = ("robot in MJCF", "robot in URDF", "mesh in STL", "journal of a search")
 LONG = (
+    *("imported body", "policy", "tracks"),
     *("mesh in OBJ", "header of a policy", "zip of another library", "snapshot", "journal of a design"),
     *("config.json of a run", "checkpoint.npz of a run", "evaluations.csv of a run", "scores of a benchmark"),
     *("runs.csv of a study", "metadata of a dataset", "episodes of a dataset"),

@@ -66,7 +66,10 @@ DISOBEDIENT = {
 }
 
 
-@pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "tick"))
+@pytest.mark.parametrize(
+    "robot",
+    [pytest.param(robot, marks=pytest.mark.long if robot == "tick" else pytest.mark.release) for robot in ROBOTS],
+)
 def test_disobedience_earns_less_than_half(robot):
     environment = opened(robot, "directed", 2 * len(SEEDS))
     task, seeds = environment.task.definition, range(2 * len(SEEDS))

@@ -314,7 +314,7 @@ def test_the_sidecar_has_blend_spaces_and_tells_missing_steps(robot):
     assert export.sidecar(body, [lame])["clips"]["walk_loop"]["missing_steps"] == {body.foot_names[1]: 1}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_played_from_rest_begins_or_ends_with_idle():
     clips = made("tick", "walk", "idle", "hit_front", "limp", "rise", "jump", "death", "turn_180", "attack")
     rest, body = clips["idle"].motion.pose(0), ROBOTS["tick"]

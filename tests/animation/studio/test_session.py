@@ -53,7 +53,7 @@ def running(sketch=Sketch(legs=6, links=2)):  # noqa: B008
         thread.join()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_walks_as_the_command_says():
     with running() as (session, shown):
         shown.steps(60)
