@@ -35,9 +35,9 @@ LANES = ("rough", "slopes", "stairs", "gaps", "course")
 PRESETS = {
     "steer": ("zero", "tuned", "steered", "reactive"),
     "directed": ("zero", "steered", "reactive"),
-    "shoved": ("zero", "tuned", "steered", "reactive"),
-    "limp": ("zero", "tuned", "steered", "reactive"),
-    "roam": ("zero", "steered", "surefooted"),
+    "shoved": ("zero", "tuned", "steered", "reactive", "braced"),
+    "limp": ("zero", "tuned", "steered", "reactive", "braced"),
+    "roam": ("zero", "steered", "surefooted", "braced"),
     "navigate": ("zero", "steered", "planned"),
     **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "sighted")),
     "leap": ("zero", "sighted", "leaping"),

@@ -17,7 +17,7 @@ _LEAPING = LeapingParameters(choice=_LEAPS, widest=1.0)
 
 
 # A kick of sqrt(g h) moves the point over which the torso would come to rest by h: nearer soles cannot hold it.
-_WIDE = {"wider": 0.2, "lower": 0.15}
+_WIDE = {"wider": 0.2, "lower": 0.15, "integral": 0.3}
 
 
 def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _LEAPING, **steering) -> dict:
@@ -28,9 +28,9 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
         leaping: parameters of the preset `leaping`.
         **steering: fields of `SteppingParameters` that depend on the build of the body.
     """
-    steered = SteppingParameters(**{"most": 1.2, "lean": 0.5, "capture": 0.3} | steering)
-    braced = steered._replace(**_WIDE)
-    surefooted = braced._replace(lift=0.4, most=2.0)
+    steered = SteppingParameters(**steering)
+    braced = steered._replace(**_WIDE, most=1.2)
+    surefooted = steered._replace(**_WIDE, lift=0.4)
     # Without an integral, actions are a function of the observation: networks without memory can learn them.
     reactive = steered._replace(integral=0.0)
     planned = PlanningParameters(steered)
@@ -52,7 +52,7 @@ _SIGHTED = SightedParameters(lead=0.24, longer=0.12, trust=0.5)
 DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_command_presets(_SIGHTED)}
 
 # Presets of imported bodies. Their servos need little feedback on the motion: it comes late, and tips them.
-_STEERED = SteppingParameters(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.1, most=1.4, capture=0.2)
+_STEERED = SteppingParameters(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.1, most=1.4, lean=0.0, capture=0.2)
 _SUREFOOTED = _STEERED._replace(wider=0.35, lower=0.15)
 DEFAULTS_OF_SERVOS = {
     "slow": 0.18,
@@ -144,5 +144,6 @@ PRESETS["tick"] |= _command_presets(SightedParameters(trust=0.5), lead=0.1)
 PRESETS["leaper"] |= _command_presets(
     SightedParameters(), gain=(1.0, 1.0, 0.5), integral=0.45, most=1.05, lead=0.04, lean=0.0
 )
+PRESETS["leaper"]["braced"] = PRESETS["leaper"]["steered"]
 PRESETS["leaper"]["surefooted"] = PRESETS["leaper"]["steered"]._replace(integral=0.2, lean=0.4)
 PRESETS["leaper"]["balanced"] = PRESETS["leaper"]["surefooted"]  # its former name

@@ -66,11 +66,11 @@ class SteppingParameters(NamedTuple):
     lower: float = 0.0
     lift: float = 0.3
     gain: tuple[float, float, float] = (3.0, 3.0, 1.5)
-    integral: float = 0.3
+    integral: float = 0.6
     most: float = 2.0
     lead: float = 0.0
-    lean: float = 0.0
-    capture: float = 0.0
+    lean: float = 0.5
+    capture: float = 0.3
 
 
 def observes_gait_and_pose(task: Task) -> bool:

@@ -95,18 +95,18 @@ def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("task", ["steer", "staying:stay"])
-def test_other_tasks(tmp_path, task):
+@pytest.mark.parametrize(("task", "preset"), [("steer", "steered"), ("staying:stay", "medium")])
+def test_other_tasks(tmp_path, task, preset):
     fixtures = (ROOT / "tests" / "fixtures" / "gaitless.py").read_text()
     registering = "import arc_suite\narc_suite.register(module=__name__, tasks=(Stay,))\n"
     (tmp_path / "staying.py").write_text(fixtures + registering)
     saved, figures, folder = tmp_path / "tick.npz", tmp_path / "style.json", tmp_path / "pictures"
     asked = (f"--task={task}", "--set=time_limit=2", "--set=arena=bumps", "--episodes=1")
     files = (f"--save={saved}", f"--json={figures}", f"--output={folder}")
-    lines = told("--robot=tick", "--preset=medium", *asked, *files, cwd=tmp_path)
+    lines = told("--robot=tick", f"--preset={preset}", *asked, *files, cwd=tmp_path)
     report = json.loads(figures.read_text(), parse_constant=pytest.fail)
     assert (report["task"], report["task_kwargs"]) == (task, {"time_limit": 2, "arena": "bumps"})
-    recorded = report["robots"]["tick"]["cpg medium"]
+    recorded = report["robots"]["tick"][f"cpg {preset}"]
     measured = recorded["metrics"].keys()
     assert recorded["length"]["mean"] == 40
     names, rows = ["path.png", "reward.png", "speed.png"], {line[:18].strip() for line in lines}
@@ -119,7 +119,7 @@ def test_other_tasks(tmp_path, task):
     assert sorted(path.name for path in folder.iterdir()) == names
 
     # What was saved tells its task and settings; the same episode again gives the same figures.
-    compare = (f"--policy={saved}", "--compare=cpg", "--compare_preset=medium", f"--json={figures}")
+    compare = (f"--policy={saved}", "--compare=cpg", f"--compare_preset={preset}", f"--json={figures}")
     again = run(*compare, "--episodes=1", cwd=tmp_path)
     if task == "steer":
         programs.passed(again)
