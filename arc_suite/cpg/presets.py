@@ -53,15 +53,14 @@ DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_command_presets(_SIGH
 
 # Presets of imported bodies. Their servos need little feedback on the motion: it comes late, and tips them.
 _STEERED = SteppingParameters(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.1, most=1.4, lean=0.0, capture=0.2)
-_SUREFOOTED = _STEERED._replace(wider=0.35, lower=0.15)
 DEFAULTS_OF_SERVOS = {
     "slow": 0.18,
     "medium": 0.24,
     "fast": 0.3,
     "steered": _STEERED,
-    "surefooted": _SUREFOOTED,
+    "surefooted": _STEERED,  # a wide stance costs some of the way over uneven ground
     "braced": _STEERED._replace(wider=0.5, lower=0.25),
-    "balanced": _SUREFOOTED,  # its former name
+    "balanced": _STEERED,  # the former name of surefooted
     "reactive": _STEERED._replace(integral=0.0),
     "sighted": _SIGHTED,
     "leaping": _LEAPING._replace(walk=_SIGHTED),
