@@ -16,10 +16,6 @@ _LEAPS = (Leap(drive=1.5), Leap(), Leap(drive=4.0), Leap(back=0.3, forward=0.7, 
 _LEAPING = LeapingParameters(choice=_LEAPS, widest=1.0)
 
 
-# A kick of sqrt(g h) moves the point over which the torso would come to rest by h: nearer soles cannot hold it.
-_WIDE = {"wider": 0.2, "lower": 0.15, "integral": 0.3}
-
-
 def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _LEAPING, **steering) -> dict:
     """Return the presets of a body that follow a command.
 
@@ -29,8 +25,10 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
         **steering: fields of `SteppingParameters` that depend on the build of the body.
     """
     steered = SteppingParameters(**steering)
-    braced = steered._replace(**_WIDE, most=1.2)
-    surefooted = steered._replace(**_WIDE, lift=0.4)
+    # A kick of sqrt(g h) moves the point over which the torso would come to rest by h: nearer soles cannot hold it.
+    wide = steered._replace(wider=0.2, lower=0.15, integral=0.3)
+    braced = wide._replace(most=1.2)
+    surefooted = wide._replace(lift=0.4)
     # Without an integral, actions are a function of the observation: networks without memory can learn them.
     reactive = steered._replace(integral=0.0)
     planned = PlanningParameters(steered)

@@ -27,13 +27,6 @@ from arc_suite.models.standing import GRAVITY
 from arc_suite.tasks.contract import Task
 
 _IK_ITERATIONS = 3  # of inverse kinematics in a control step
-_STANCE_ITERATIONS = 50  # of inverse kinematics, for the stance
-_STANCE_SHARES = (1.0, 0.75, 0.5, 0.25)  # of the parameters' stance, which are tried
-_STANCE_ROOM = 0.2  # standing heights, about a sole at rest, that a leg of a wider stance must reach
-_MAX_STANCE_MISS = 0.02  # standing heights, between a sole at rest and its goal
-_MAX_ROOM_MISS = 0.05  # standing heights, between a sole and a goal at the edge of its room
-_AHEAD = np.array((1.0, 0.0, 0.0))
-_UP = np.array((0.0, 0.0, 1.0))
 # Standing heights. With less of it, legs that are stretched out jump, neighbors of many legs press against each other,
 # and feet push against uneven ground in place of yielding.
 _IK_DAMPING = 0.5
@@ -49,7 +42,7 @@ class SteppingParameters(NamedTuple):
     """How a demonstrator that steps walks.
 
     Attributes:
-        wider: how much further out feet stand than in the body's pose at rest, see `posture.find_rest_pose`, in
+        wider: how much further out feet stand than in the body's pose at rest, see `posture.find_wide_pose`, in
             standing heights.
         lower: how much lower the torso is than in that pose, in standing heights. Of both numbers a body takes the
             share that its legs reach. Where a task commands the pose, they have no effect.
@@ -117,43 +110,14 @@ class Stepping(CommandLaw):
         self.directed = observes_gait_and_pose(task)
         if self.directed:
             self.reads = (*self.reads, *task.gait_and_pose.observed)
-        self._rest_pose = posture.find_rest_pose(task.scene.body)
+            self._rest_pose = posture.find_rest_pose(task.scene.body)
+        else:
+            self._rest_pose = posture.find_wide_pose(task.scene.body, parameters.wider, parameters.lower)
         self.legs = self._rest_pose.legs
         self.rest_soles = self._rest_pose.sole_positions
         self.rest_angles = self._rest_pose.joint_angles
-        if not self.directed and (parameters.wider or parameters.lower):
-            self._widen_stance()
         self._ride_height = -self.rest_soles[:, 2].mean()  # m
         self._pendulum_time = math.sqrt(self._ride_height / GRAVITY)  # s, of an inverted pendulum of this height
-
-    def _widen_stance(self) -> None:
-        """Move the soles at rest out and up, by the largest share at which all legs reach the ground about them."""
-        outward = np.sign(self.rest_soles[:, 1:2]) * (0.0, 1.0, 0.0)
-        shift = self.parameters.wider * outward + self.parameters.lower * _UP  # (legs, 3) standing heights
-        for share in _STANCE_SHARES:
-            goals = self.rest_soles + share * shift * self.mechanics.height
-            soles, angles = self._reach_goals(self.rest_angles, goals)
-            misses = [self._largest_distance(soles, goals) - _MAX_STANCE_MISS]
-            for direction in (_AHEAD, -_AHEAD, outward, -outward):
-                nearby_goals = soles + _STANCE_ROOM * direction * self.mechanics.height
-                nearby_soles, _ = self._reach_goals(angles, nearby_goals)
-                misses.append(self._largest_distance(nearby_soles, nearby_goals) - _MAX_ROOM_MISS)
-            if max(misses) <= 0.0:
-                self.rest_soles = soles
-                self.rest_angles = angles
-                return
-
-    def _reach_goals(self, angles: np.ndarray, goals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest positions (legs, 3) of the soles to their goals, m, and the angles (legs, links), rad."""
-        weights = np.tile(np.eye(3), (len(goals), 1, 1))
-        damping = posture.IK_DAMPING * self.mechanics.height
-        angles = self.legs.solve_joint_angles(angles, goals, weights, damping, _STANCE_ITERATIONS)
-        soles, _ = self.legs.soles(angles)
-        return soles, angles
-
-    def _largest_distance(self, soles: np.ndarray, goals: np.ndarray) -> float:
-        """Return the largest distance of a sole from its goal, in standing heights."""
-        return float(np.linalg.norm(soles - goals, axis=-1).max() / self.mechanics.height)
 
     def initial_paths(self, count: int) -> SteppingState:
         """Return the angles at rest and an integral of 0, for a number of environments."""

@@ -1,0 +1,19 @@
+"""Poses of the torso over its feet."""
+
+import numpy as np
+import pytest
+
+from arc_suite.models import posture
+from arc_suite.robots import ROBOTS
+
+
+def test_a_pose_is_as_wide_as_legs_reach_with_room_about_their_feet():
+    tick = posture.find_wide_pose(ROBOTS["tick"], 0.2, 0.15)
+    rest = posture.find_rest_pose(ROBOTS["tick"])
+    height = ROBOTS["tick"].torso.standing_height
+    moved = abs(tick.sole_positions) - abs(rest.sole_positions)
+    np.testing.assert_allclose(moved[:, 1:], np.tile((0.2 * height, -0.15 * height), (6, 1)), atol=0.02 * height)
+    assert tick.ride_height == pytest.approx(rest.ride_height - 0.15)
+    # The rear hips of Leaper are at their limit: it keeps its pose, as does a body whose pose is not to change.
+    for name, numbers in (("leaper", (0.2, 0.15)), ("tick", (0.0, 0.0))):
+        assert posture.find_wide_pose(ROBOTS[name], *numbers) is posture.find_rest_pose(ROBOTS[name])
