@@ -18,9 +18,9 @@ from arc_suite import models, policies
 from arc_suite.animation import pages, player_controls
 from arc_suite.bodies import universal
 from arc_suite.bodies.universal import Universal
-from arc_suite.cpg import leaps
+from arc_suite.cpg import Demonstrator, leaps
 from arc_suite.cpg.presets import DEFAULTS
-from arc_suite.cpg.selection import law, preset_of, presets_of
+from arc_suite.cpg.selection import law_class, preset_of, presets_of
 from arc_suite.cpg.stepping import Stepping
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
@@ -177,11 +177,11 @@ def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
 
 def _describe_law(task: Task, preset: str) -> dict[str, Any]:
     """Return the constants of a demonstrator's law; a ValueError if a page cannot run it."""
-    stepping = law(task, preset_of(task.scene.body, preset))
-    if not isinstance(stepping, Stepping):
+    if law_class(preset_of(task.scene.body, preset)) is not Stepping:
         raise ValueError(
             f"preset {preset!r}: a page runs steered, surefooted, reactive or balanced, which follow a command by steps"
         )
+    stepping = Demonstrator(task, preset).law
     return {"kind": "law", "constants": stepping.constants() | {"leaps": _describe_leaps(stepping)}}
 
 

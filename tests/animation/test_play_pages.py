@@ -289,6 +289,13 @@ def test_the_program_writes_a_page(tmp_path):
     assert "Permission is hereby granted, free of charge" in head  # three.js's
 
 
+def test_a_body_that_cannot_walk_has_no_page():
+    queen = ROBOTS["queen"]
+    high = queen.replace(name="high", torso=queen.torso.replace(standing_height=9.0))
+    with pytest.raises(ValueError, match=r"^high cannot walk: "):
+        play_pages.creature(high)
+
+
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
