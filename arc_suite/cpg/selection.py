@@ -141,9 +141,31 @@ def suited_presets(task: Task) -> tuple[str, ...]:
         candidates += _STRAIGHT_PRESETS
     suited_names = []
     for name in dict.fromkeys(candidates):
-        if name in presets and set(law_class(presets[name]).reads) <= task.blocks.keys():
+        if name in presets and _is_able(task, presets[name]):
             suited_names.append(name)
     return tuple(suited_names)
+
+
+def obedient_presets(task: Task) -> tuple[str, ...]:
+    """Return the presets of a task's body that obey all that the task commands, the one that suits it best first.
+
+    Presets with the same parameters are one.
+
+    Raises:
+        ValueError: as `suited_preset`.
+    """
+    presets = presets_of(task.scene.body)
+    default = suited_preset(task)
+    name_of_parameters = {repr(presets[default]): default}
+    for name, preset in presets.items():
+        if _is_able(task, preset) and not ignored_commands(task, law(task, preset)):
+            name_of_parameters.setdefault(repr(preset), name)
+    return tuple(name_of_parameters.values())
+
+
+def _is_able(task: Task, preset: Any) -> bool:
+    """Return whether a task observes the blocks of a preset's law."""
+    return set(law_class(preset).reads) <= task.blocks.keys()
 
 
 def ignored_commands(task: Task, law) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ over ten episodes, Leaper's `medium` has a return of 2619.8 here and of 2610.4 t
 import contextlib
 import csv
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -126,13 +126,32 @@ def play_returns(setup: Setup, name: str, seeds: range) -> np.ndarray:
     Raises:
         ValueError: as `policies.policy`.
     """
-    environment = setup.make_vec(len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
+    return np.array([episode.total for episode in play_episodes(setup, name, seeds)])
+
+
+def play_episodes(
+    setup: Setup, name: str, seeds: Sequence[int], max_steps: int | None = None, watch: Callable | None = None
+) -> list[protocol.EpisodeResult]:
+    """Play episodes of standing still, `zero`, or of a preset of the demonstrator, all at once.
+
+    Args:
+        setup: setup of the episodes.
+        name: `zero`, or the preset.
+        seeds: seeds of the episodes.
+        max_steps: control steps of an episode, at most; None for the limit of the task.
+        watch: as of `protocol.episodes_in_batch`.
+
+    Raises:
+        ValueError: as `policies.policy`.
+    """
+    environment = setup.make_vec(
+        len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED, max_episode_steps=max_steps
+    )
     policy_name = ZERO if name == ZERO else "cpg"
     presets = () if name == ZERO else name
     with contextlib.closing(environment):
         policy = policies.policy(policy_name, setup.body, presets, len(seeds), task=environment.task.definition)
-        episodes = protocol.episodes_in_batch(environment, policy, seeds)
-    return np.array([episode.total for episode in episodes])
+        return protocol.episodes_in_batch(environment, policy, seeds, watch)
 
 
 def read(path: Path) -> dict[str, dict[str, np.ndarray]]:

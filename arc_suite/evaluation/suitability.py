@@ -1,16 +1,13 @@
 """How well the presets that suit a task walk a body in it."""
 
-import contextlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 
-from arc_suite.cpg.selection import ignored_commands, law, law_class, presets_of, suited_preset, suited_presets
+from arc_suite.cpg.selection import obedient_presets, suited_presets
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import protocol
-from arc_suite.policies import Policy, policy
+from arc_suite.evaluation import anchors
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
 
@@ -24,7 +21,7 @@ class Trial(NamedTuple):
 
     Attributes:
         task: name of the task.
-        preset: name of the demonstrator's preset.
+        preset: name of the demonstrator's preset; `zero` for standing still.
         mean_return: over the episodes.
         metric: name of the metric.
         value: mean of the metric at the end of the episodes.
@@ -72,20 +69,28 @@ def try_presets(body: Body, task: str, seeds: Sequence[int], steps: int) -> list
         ValueError: a task that no preset suits, or a body that no demonstrator can walk.
     """
     setup = Setup.of(body, task)
-    presets = presets_of(body)
-    default = suited_preset(setup.definition)
-    names = {repr(presets[default]): default}  # by parameters: some presets have several names
-    for name, preset in presets.items():
-        law_reads = law_class(preset).reads
-        is_able = set(law_reads) <= setup.definition.blocks.keys()
-        if is_able and not ignored_commands(setup.definition, law(setup.definition, preset)):
-            names.setdefault(repr(preset), name)
-    return [try_preset(setup, name, seeds, steps) for name in names.values()]
+    return [try_preset(setup, name, seeds, steps) for name in obedient_presets(setup.definition)]
 
 
 def try_preset(setup: Setup, preset: str, seeds: Sequence[int], steps: int) -> Trial:
-    """Return a trial of a preset; see `try_presets`."""
-    return _play(setup, preset, policy("cpg", setup.body, preset, len(seeds), task=setup.definition), seeds, steps)
+    """Return a trial of a preset, or of standing still, `zero`; see `try_presets`."""
+    has_fallen = np.zeros(len(seeds), bool)
+
+    def note_falls(is_playing, is_falling):
+        has_fallen[is_falling] = True
+
+    results = anchors.play_episodes(setup, preset, seeds, steps, note_falls)
+    metrics = results[0].progress
+    metric = next(name for name in METRICS if name in metrics)
+    return Trial(
+        task=setup.kind.name,
+        preset=preset,
+        mean_return=float(np.mean([result.total for result in results])),
+        metric=metric,
+        value=float(np.mean([result.progress[metric] for result in results])),
+        upright=int((~has_fallen).sum()),
+        episodes=len(results),
+    )
 
 
 def shortfall(trials: Sequence[Trial], standing: Trial) -> float:
@@ -102,25 +107,4 @@ def shortfall(trials: Sequence[Trial], standing: Trial) -> float:
 
 def stand_still(body: Body, task: str, seeds: Sequence[int], steps: int) -> Trial:
     """Return a trial of standing still."""
-    setup = Setup.of(body, task)
-    return _play(setup, "zero", policy("zero", body, num_envs=len(seeds), task=setup.definition), seeds, steps)
-
-
-def _play(setup: Setup, preset: str, acting: Policy, seeds: Sequence[int], steps: int) -> Trial:
-    environment = setup.make_vec(
-        len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED, max_episode_steps=steps
-    )
-    with contextlib.closing(environment):
-        results = protocol.episodes_in_batch(environment, acting, seeds)
-    metrics = results[0].progress
-    metric = next(name for name in METRICS if name in metrics)
-    longest = max(result.length for result in results)
-    return Trial(
-        task=setup.kind.name,
-        preset=preset,
-        mean_return=float(np.mean([result.total for result in results])),
-        metric=metric,
-        value=float(np.mean([result.progress[metric] for result in results])),
-        upright=sum(result.length == longest for result in results),
-        episodes=len(results),
-    )
+    return try_preset(Setup.of(body, task), anchors.ZERO, seeds, steps)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import suitability
 from arc_suite.evaluation.suitability import Trial
 from arc_suite.robots import ROBOTS
@@ -20,6 +21,12 @@ def test_a_trial_has_return_metric_and_falls():
     standing = suitability.stand_still(ROBOTS["tick"], "navigate", SEEDS, 20)
     assert trial[:2] == ("navigate", "planned") and (trial.metric, trial.upright, trial.episodes) == ("goals", 2, 2)
     assert trial.mean_return > standing.mean_return
+
+
+def test_episodes_that_fall_in_the_same_step_are_not_upright():
+    too_high = Setup.of("tick", "walk", {"healthy_range": (0.9, 1.0)})  # the torso stands lower
+    trial = suitability.try_preset(too_high, "medium", SEEDS, 20)
+    assert (trial.upright, trial.episodes) == (0, 2)
 
 
 @pytest.mark.parametrize(("returns", "shortfall"), [((3.0, 2.0), 0.0), ((2.0, 3.0), 0.5), ((0.5, 0.0), 0.0)])

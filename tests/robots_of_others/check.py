@@ -71,7 +71,7 @@ class TaskTrials(NamedTuple):
 
     def __str__(self) -> str:
         default = self.presets[0]
-        return f"{default.preset}, {default.value:.2f}, {default.upright}/{default.episodes}"
+        return f"{default.preset}, {_tried_text(default)}"
 
 
 class Row(NamedTuple):
