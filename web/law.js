@@ -83,9 +83,13 @@ export class Law {
   planned(requested, size, going, gait, posed, { slowed, shift }) {
     const c = this.constants, count = c.legs.length;
     const [forward, left, turn] = requested.map((value, i) => slowed * clamp(value, -c.most, c.most) * c.units[i]);
-    const [duty, rate] = gait.slice(2 * count), frequency = rate * c.rate, half = (0.5 * duty) / frequency;
+    const [duty, rate] = gait.slice(2 * count), frequency = rate * c.rate, time = (0.5 * duty) / frequency;
+    const flows = c.legs.map(({ place: [x, y] }) => [forward - turn * y, left + turn * x]);
+    // No foot steps so far that legs would pass through each other.
+    const longest = Math.max(1e-9, ...flows.map((flow) => time * Math.hypot(...flow)));
+    const half = time * Math.min(1, c.longest / longest);
     return c.legs.map((leg, index) => {
-      const [x, y, z] = leg.place, flow = [forward - turn * y, left + turn * x];
+      const z = leg.place[2], flow = flows[index];
       const phase = Math.atan2(gait[index], gait[count + index]) / (2 * Math.PI);
       const cycle = share(phase + c.lead + (going ? frequency * c.step : 0));
       const stands = cycle < duty, swung = stands ? 0 : (cycle - duty) / (1 - duty);

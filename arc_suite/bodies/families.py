@@ -1,13 +1,13 @@
 """Families of bodies: a body for every seed. `registry.FAMILIES` names them."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 
 from arc_suite import checks
 from arc_suite.bodies import generator, varied
 from arc_suite.models.overlap import overlaps
-from arc_suite.models.soundness import flaws
+from arc_suite.models.soundness import has_flaws
 from arc_suite.robots.spec import Body, SpecError
 
 MAX_DRAWS = 100  # for one seed
@@ -38,7 +38,7 @@ def sound_body(seed: int, legs: int | None = None, links: int | None = None, lay
         return generator.draw_body(random, leg_count, link_count, layout)
 
     # The first draw is `first_body` again: NumPy's generator of (seed, 0) is that of the seed.
-    return sound(draw, "random", seed, overlaps)
+    return sound(draw, "random", seed, lambda body: any(overlaps(body)))
 
 
 def varied_body(seed: int) -> Body:
@@ -63,7 +63,7 @@ def sound(
     draw: Callable[[np.random.Generator], Body],
     family: str,
     seed: int,
-    faults: Callable[[Body], Iterable] = flaws,
+    is_unsound: Callable[[Body], bool] = has_flaws,
 ) -> Body:
     """Return the first sound body that is drawn for a seed, `<family>_<seed>`; see `varied_body`.
 
@@ -71,7 +71,7 @@ def sound(
         draw: returns a body, or raises a SpecError.
         family: its name.
         seed: 0 or more.
-        faults: returns what is wrong with a body; a sound one has none.
+        is_unsound: returns whether a body must be drawn again.
 
     Raises:
         ValueError: not a seed, or a family without sound bodies.
@@ -83,7 +83,7 @@ def sound(
             body = draw(random).replace(name=f"{family}_{seed}")
         except SpecError:  # a length is out of range
             continue
-        if not any(faults(body)):
+        if not is_unsound(body):
             return body
     raise ValueError(f"{family}:{seed}: none of {MAX_DRAWS} draws stands and can take steps; see arc-suite check")
 

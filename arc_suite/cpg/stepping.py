@@ -21,20 +21,17 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
-from arc_suite.models import posture
+from arc_suite.models import foot_paths, overlap, posture
 from arc_suite.models.kinematics import path_weights, point_velocities
 from arc_suite.models.standing import GRAVITY
 from arc_suite.tasks.contract import Task
 
-_IK_ITERATIONS = 3  # of inverse kinematics in a control step
-# Standing heights. With less of it, legs that are stretched out jump, neighbors of many legs press against each other,
-# and feet push against uneven ground in place of yielding.
-_IK_DAMPING = 0.5
-_SLIP_WEIGHT = 0.3  # of a foot's slip across its path against its motion along it
 _MAX_POSE_INTEGRAL = 0.2  # standing heights or rad
 _MAX_POSE_ERROR = 0.05  # standing heights or rad; larger errors count as this one
 _MEASURED_NUMBERS = np.array((0, 3, 4))  # indices of height, roll and pitch among the six numbers of a pose
 _SLOWING_TILT = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops
+_MIN_PATH_LENGTH = 1e-9  # m, of a foot that moves
+_NO_BOUND = 1e9  # m, in place of infinity, which JSON does not have
 _TAKE_OFF_SHARE = 0.6  # share of the shift for balance that is left when a foot takes off
 
 
@@ -57,7 +54,7 @@ class SteppingParameters(NamedTuple):
 
     wider: float = 0.0
     lower: float = 0.0
-    lift: float = 0.3
+    lift: float = foot_paths.FOOT_CLEARANCE
     gain: tuple[float, float, float] = (3.0, 3.0, 1.5)
     integral: float = 0.6
     most: float = 2.0
@@ -100,7 +97,7 @@ class Stepping(CommandLaw):
         super().__init__(task, parameters)
         standing_height = self.mechanics.height
         self._rate_unit = (GRAVITY / standing_height) ** 0.5  # Hz, in which commands give the gait's frequency
-        self._ik_damping = _IK_DAMPING * standing_height  # m
+        self._ik_damping = foot_paths.IK_DAMPING * standing_height  # m
         self.foot_lift = parameters.lift * standing_height
         # Proportional feedback replaces an integral: with both, gaits are disturbed.
         if parameters.integral:
@@ -118,6 +115,23 @@ class Stepping(CommandLaw):
         self.rest_angles = self._rest_pose.joint_angles
         self._ride_height = -self.rest_soles[:, 2].mean()  # m
         self._pendulum_time = math.sqrt(self._ride_height / GRAVITY)  # s, of an inverted pendulum of this height
+        self._longest_half_path = self._find_longest_half_path(task)
+
+    def _find_longest_half_path(self, task: Task) -> float:
+        """Return how far from their positions at rest feet may step, m: further, legs would pass through each other."""
+        half_path = 0.5 * self.stance_duration * self.units[0]  # at the target velocity
+
+        def stretch_steps(stretch: float) -> np.ndarray:
+            return foot_paths.cycle_angles(
+                self._rest_pose,
+                self.phase_offsets,
+                self.duty_factor,
+                stretch * half_path,
+                self.foot_lift,
+                self._ik_damping,
+            )
+
+        return half_path * overlap.find_largest_stretch(task.scene.body, stretch_steps, self.parameters.most)
 
     def initial_paths(self, count: int) -> SteppingState:
         """Return the angles at rest and an integral of 0, for a number of environments."""
@@ -142,9 +156,9 @@ class Stepping(CommandLaw):
             pose_integral, corrected_pose = self._correct_pose(pose_integral, pose, torso_height, vertical)
             soles = posture.move_ground_points(soles, corrected_pose, self.mechanics.height)
 
-        weights = path_weights(point_velocities(velocity, self.rest_soles), _SLIP_WEIGHT)
+        weights = path_weights(point_velocities(velocity, self.rest_soles), foot_paths.SLIP_WEIGHT)
         joint_angles = self.legs.solve_joint_angles(
-            state.joint_angles, soles, weights, self._ik_damping, _IK_ITERATIONS
+            state.joint_angles, soles, weights, self._ik_damping, foot_paths.IK_ITERATIONS
         )
         target_angles = self.legs.by_joint(state.joint_angles)
         angle_changes = self.legs.by_joint(joint_angles) - target_angles
@@ -228,13 +242,11 @@ class Stepping(CommandLaw):
             stance_duration: s, a number or (environments, 1, 1).
         """
         xp = leg_phases.__array_namespace__()
-        is_stance = leg_phases < duty_factor
-        swing_progress = ((leg_phases - duty_factor) / (1.0 - duty_factor)).clip(0.0)
-        stance_position = 1.0 - 2.0 * leg_phases / duty_factor
-        swing_position = 2.0 * swing_progress - 1.0
-        # Along the path of a foot, from 1 in front to -1 at its end.
-        path_position = xp.where(is_stance, stance_position, swing_position)[..., None]
+        path_position, swing_progress = foot_paths.find_path_position(leg_phases, duty_factor)
+        path_position = path_position[..., None]
         half_path = 0.5 * stance_duration * point_velocities(velocity, self.rest_soles)
+        longest_half_path = xp.hypot(half_path[..., 0], half_path[..., 1]).max(axis=-1)[:, None, None]  # of any foot
+        half_path = half_path * (self._longest_half_path / longest_half_path.clip(_MIN_PATH_LENGTH)).clip(max=1.0)
         shift_share = _TAKE_OFF_SHARE + (1.0 - _TAKE_OFF_SHARE) * 0.5 * (1.0 + path_position)
         shift = shift_share * foothold_shift[:, None]
         ground = self.rest_soles[:, :2] + gait_size[..., None] * (path_position * half_path + shift)
@@ -265,6 +277,7 @@ class Stepping(CommandLaw):
             "reach": self.drive.reach,
             "units": self.units,
             "most": self.parameters.most,
+            "longest": min(self._longest_half_path, _NO_BOUND),
             "gain": self.parameters.gain,
             "smoothing": self.smoothing,
             "integral": self.parameters.integral * self.cycles_per_step,
@@ -274,9 +287,9 @@ class Stepping(CommandLaw):
             "height": self.mechanics.height,
             "ride": self._rest_pose.ride_height,
             "lift": self.foot_lift,
-            "across": _SLIP_WEIGHT,
+            "across": foot_paths.SLIP_WEIGHT,
             "damping_of_feet": self._ik_damping,
-            "steps": _IK_ITERATIONS,
+            "steps": foot_paths.IK_ITERATIONS,
             "largest": _MAX_POSE_ERROR,
             "most_off": _MAX_POSE_INTEGRAL,
             "rate": self._rate_unit,

@@ -15,9 +15,10 @@ from arc_suite import checks, rotations
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import Drive, Pattern, joint_targets, proprioception
+from arc_suite.models.overlap import find_largest_stretch
 from arc_suite.models.sizing import size_body
 from arc_suite.models.standing import GRAVITY, measure_standing
-from arc_suite.models.stride import FOOT_LIFT, strokes
+from arc_suite.models.stride import FOOT_LIFT, cycle_angles, strokes
 from arc_suite.tasks.contract import Task
 
 _MIN_FROUDE = 1e-3
@@ -25,6 +26,8 @@ _MIN_FROUDE = 1e-3
 # A leg that cannot sweep, such as a radial one in front, would brake. It stays this share of the standing height off
 # the ground in stance too, and carries weight only when other legs sink or the body tilts.
 UNLOADED_HEIGHT = 0.1
+
+_SAMPLES = np.arange(24) / 24  # of a cycle, at which legs must pass each other
 
 ONSET_CYCLES = 1.0  # over which the gait grows to its full size
 STEERING = 1.5  # share of the sweep per rad of yaw, for the outermost feet
@@ -46,6 +49,7 @@ class Stride(NamedTuple):
         drive: actuators of the joints.
         held: (joints,) action of a standing leg that carries its share of the weight.
         steering: (joints,) share by which the sweep of the joint's leg grows for a yaw of 1 rad.
+        longest: largest factor of sweeps; further, legs would pass through each other.
     """
 
     pattern: Pattern
@@ -54,6 +58,7 @@ class Stride(NamedTuple):
     drive: Drive
     held: np.ndarray
     steering: np.ndarray
+    longest: float
 
     @classmethod
     def fit(cls, task: Task, froude: float) -> Self:
@@ -86,14 +91,23 @@ class Stride(NamedTuple):
         for jacobian, (sweep, lift) in zip(pose.jacobians, leg_strokes, strict=True):
             sweep_share = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)  # of the reach that the leg can sweep
             centers.append((1.0 - sweep_share) * UNLOADED_HEIGHT / FOOT_LIFT * lift)
+        sweep = np.concatenate([sweep for sweep, _ in leg_strokes])
+        lift = np.concatenate([lift for _, lift in leg_strokes])
+        center = np.concatenate(centers)
+        offset = np.repeat(gait.offsets, joint_counts)
+
+        def stretch_strides(stretch: float) -> np.ndarray:
+            cycles = (_SAMPLES[:, None] + offset) % 1.0
+            return center + cycle_angles(cycles, gait.duty_factor, stretch * sweep, lift)
+
         pattern = Pattern(
             frequency=gait.frequency,
             duty_factor=gait.duty_factor,
-            offset=np.repeat(gait.offsets, joint_counts),
-            sweep=np.concatenate([sweep for sweep, _ in leg_strokes]),
-            center=np.concatenate(centers),
+            offset=offset,
+            sweep=sweep,
+            center=center,
             stance=np.zeros(len(body.joints)),
-            swing=np.concatenate([lift for _, lift in leg_strokes]),
+            swing=lift,
         )
         largest_torques = np.array([joint.torque for joint in body.joints])
         # Positions of feet to the left of the torso, from -1 to 1.
@@ -105,6 +119,7 @@ class Stride(NamedTuple):
             drive=drive(body, pose.inertias),
             held=pose.loads / (gait.duty_factor * largest_torques),
             steering=math.copysign(STEERING, speed) * np.repeat(lateral_positions, joint_counts),
+            longest=find_largest_stretch(task.scene.body, stretch_strides, STRETCH_BOUNDS[1]),
         )
 
     def __call__(self, clock, speed, quaternion, angles, velocities):
@@ -116,7 +131,7 @@ class Stride(NamedTuple):
         if has_motors:
             shortest, longest = STRETCH_BOUNDS
             stretch = (2.0 - speed / self.speed).clip(shortest, longest)[..., None] * stretch
-        pattern = self.pattern._replace(sweep=self.pattern.sweep * stretch)
+        pattern = self.pattern._replace(sweep=self.pattern.sweep * stretch.clip(max=self.longest))
         time = self.control_timestep * clock
         onset = (pattern.frequency * time[..., None] / ONSET_CYCLES).clip(max=1.0)
         targets = onset * joint_targets(pattern, time)

@@ -1,12 +1,16 @@
 """Overlaps of a body's parts, which no contact keeps apart, standing and in the strides of its gait."""
 
 import copy
-from collections.abc import Iterator
+import functools
+import math
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from arc_suite.models import foot_paths
+from arc_suite.models.posture import find_rest_pose
 from arc_suite.models.standing import compile_body
 from arc_suite.models.stride import fitted_gait, half_stroke, strokes
 from arc_suite.robots import ROBOTS
@@ -14,9 +18,11 @@ from arc_suite.robots.spec import Body
 
 _MAX_DEPTH = 0.01  # standing heights, of an overlap that does not count
 
-# Demonstrators lengthen strides to keep their course. Of 49 random bodies that overlapped as they walked, 47 are found
-# with this factor and 41 without, and none that did not.
-_STRIDE_FACTOR = 1.25
+# Demonstrators lengthen strides to keep their course, and as they start. They stretch strides by this factor at least,
+# and further where legs have room; see `find_largest_stretch`.
+_MIN_STRETCH = 1.25
+# To spare, and between stretches that are tried: legs come late, and balance shifts their feet.
+_STRETCH_STEP = 0.125
 
 # Owners of geoms that are no legs.
 _TORSO = -1
@@ -48,6 +54,38 @@ def overlaps(body: Body, spread: float = 1.0) -> Iterator[Overlap]:
     """
     if body.source:  # the legs of an imported body are only a sketch of its colliders
         return
+    yield from overlaps_in_poses(body, _poses(body), spread)
+
+
+def find_largest_stretch(body: Body, stretch_steps: Callable[[float], np.ndarray], largest: float) -> float:
+    """Return the largest factor of the length of strides at which legs pass each other and the torso.
+
+    Args:
+        body: any body.
+        stretch_steps: returns joint angles (n, joints) in a cycle of strides that are longer by a factor, rad.
+        largest: largest factor that matters.
+
+    Returns:
+        The factor, 1.25 or more, as legs of sound bodies pass each other at 1.25; infinity if legs have room at the
+        largest one. Robots of the suite and imported bodies have infinity, as `overlaps` finds none in their strides.
+    """
+    if body.source or body.name in ROBOTS:
+        return math.inf
+
+    def passes(stretch: float) -> bool:
+        poses = (("a stride", angles) for angles in stretch_steps(stretch))
+        return not any(overlaps_in_poses(body, poses))
+
+    if passes(largest + _STRETCH_STEP):
+        return math.inf
+    stretch = _MIN_STRETCH
+    while stretch < largest and passes(stretch + _STRETCH_STEP):
+        stretch += _STRETCH_STEP
+    return stretch
+
+
+def overlaps_in_poses(body: Body, poses: Iterable[tuple[str, np.ndarray]], spread: float = 1.0) -> Iterator[Overlap]:
+    """Yield the overlaps of a body in poses by name, (joints,) rad; see `overlaps`."""
     names = _geom_names(body)
     pairs = _separate_pairs(body)
     model = copy.copy(compile_body(body))
@@ -55,7 +93,7 @@ def overlaps(body: Body, spread: float = 1.0) -> Iterator[Overlap]:
     model.body_pos[first_links, :2] *= spread
     data = mujoco.MjData(model)
     max_distances = model.geom_rbound[pairs].sum(axis=1)  # between centers of geoms that can overlap, m
-    for pose, angles in _poses(body):
+    for pose, angles in poses:
         data.qpos[7:] = angles
         mujoco.mj_kinematics(model, data)
         first_centers = data.geom_xpos[pairs[:, 0]]
@@ -73,7 +111,7 @@ def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
     if body.name in ROBOTS:  # has a gait of its own
         return
     gait = fitted_gait(body)
-    strokes_of_legs = strokes(body, _STRIDE_FACTOR * half_stroke(body, gait))
+    strokes_of_legs = strokes(body, _MIN_STRETCH * half_stroke(body, gait))
     offsets = np.array(gait.offsets)  # (legs,) cycles
     # Neighbors reach the ends of their strides at different times. All legs sweep at constant speed between the
     # moments at which one of them touches down or takes off, so that two are nearest at such a moment.
@@ -84,6 +122,24 @@ def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
         sweep_shares = np.interp(phases, (0.0, gait.duty_factor, 1.0), (1.0, -1.0, 1.0))
         angles = [share * sweep for share, (sweep, _) in zip(sweep_shares, strokes_of_legs, strict=True)]
         yield "a stride", np.concatenate(angles)
+    # Demonstrators that follow a command step along paths in space, where legs sweep otherwise.
+    for angles in _step_angles(body):
+        yield "a stride", angles
+
+
+@functools.lru_cache(maxsize=16)
+def _step_angles(body: Body) -> np.ndarray:
+    """Return the joint angles (n, joints), rad, of steps along paths in a cycle of the fitted gait."""
+    gait = fitted_gait(body)
+    standing_height = body.torso.standing_height
+    return foot_paths.cycle_angles(
+        find_rest_pose(body),
+        np.array(gait.offsets),
+        gait.duty_factor,
+        half_path=_MIN_STRETCH * half_stroke(body, gait),
+        foot_clearance=foot_paths.FOOT_CLEARANCE * standing_height,
+        damping=foot_paths.IK_DAMPING * standing_height,
+    )
 
 
 def _separate_pairs(body: Body) -> np.ndarray:

@@ -49,11 +49,12 @@ class Flaw(NamedTuple):
 
 def flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body, none for one that should walk."""
-    pose = measure_standing(body)
-    body_flaws = []
-    for check in (_check_height, _check_legs, _check_support, _check_motors, _check_joints, _check_parts):
-        body_flaws.extend(check(body, pose))
-    return body_flaws
+    return [*_check_all_but_parts(body), *_check_parts(body)]
+
+
+def has_flaws(body: Body) -> bool:
+    """Return whether a body has flaws; it is quicker than `flaws`, as it looks for no second one and for no cure."""
+    return any(_check_all_but_parts(body)) or any(overlaps(body))
 
 
 def hopeless_flaws(body: Body) -> list[Flaw]:
@@ -66,6 +67,12 @@ def hopeless_flaws(body: Body) -> list[Flaw]:
     for check in (_check_height, _check_support, _check_joints):
         body_flaws.extend(flaw for flaw in check(body, pose) if flaw.hopeless)
     return body_flaws
+
+
+def _check_all_but_parts(body: Body) -> Iterator[Flaw]:
+    pose = measure_standing(body)
+    for check in (_check_height, _check_legs, _check_support, _check_motors, _check_joints):
+        yield from check(body, pose)
 
 
 def _check_height(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
@@ -281,7 +288,7 @@ def _largest_strokes(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
     return sweeps.max(), lifts.max()
 
 
-def _check_parts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+def _check_parts(body: Body) -> Iterator[Flaw]:
     """Find legs that overlap, with each other or with the torso."""
     deepest = max(overlaps(body), key=lambda overlap: overlap.depth, default=None)
     if deepest is None:

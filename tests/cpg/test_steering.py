@@ -11,6 +11,7 @@ import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.models.overlap import overlaps_in_poses
 from arc_suite.robots import ROBOTS
 
 # In the body's own units.
@@ -51,6 +52,25 @@ def test_random_bodies_obey(seed):
     motion, fell = obeyed(generator.random_body(seed))
     assert not fell.any()
     assert abs(motion - COMMANDS).mean() <= 0.05
+
+
+@pytest.mark.parametrize(
+    ("body", "task"),
+    [("varied:9526", "steer"), ("random:9522", "steer"), ("random:9534", "steer"), ("random:9503", "walk")],
+)
+def test_legs_pass_each_other_as_they_walk(body, task):
+    """Feedback asks for the longest strides as a walk begins; there they passed through each other by .08 h."""
+    envs = VectorEnv(body, task, 1)
+    policy = Demonstrator(envs)
+    observations, _ = envs.reset(seed=0)
+    if task == "steer":
+        envs.command("command", np.array([[1.0, 0.0, 0.0]]))
+    poses = []
+    for _ in range(100):
+        observations, _, terminated, *_ = envs.step(policy.act(envs.task.split(observations)))
+        assert not terminated.any()
+        poses.append(("a step", envs.batch.data.qpos[0, 7:].copy()))
+    assert not any(overlaps_in_poses(envs.task.definition.scene.body, poses))
 
 
 @pytest.mark.slow
