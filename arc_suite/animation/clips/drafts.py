@@ -21,7 +21,14 @@ from arc_suite.animation.clips.catalog import (
     clip_of,
     recordings_for_clips,
 )
-from arc_suite.animation.clips.foot_contacts import MIN_RISE, TOUCH_DOWN, FootContact, find_foot_contacts, sole_heights
+from arc_suite.animation.clips.foot_contacts import (
+    MIN_RISE,
+    TOUCH_DOWN,
+    FootContact,
+    count_odd_feet,
+    find_foot_contacts,
+    sole_heights,
+)
 from arc_suite.animation.clips.loops import (
     GOOD_SEAM,
     MAX_SEAM,
@@ -29,9 +36,11 @@ from arc_suite.animation.clips.loops import (
     choose_start,
     cut_loop,
     find_closings,
+    find_starts,
     straighten_loop,
 )
 from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording, TurnRecording
+from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
@@ -219,13 +228,24 @@ def _cut_loops_in_step(
                 f"the pose does not return within {max_degrees:.0f} degrees: {degrees:.1f} after {cycles} cycles"
             )
             continue
-        first = choose_start(gait.recording, closing.samples)
+        starts = _keep_regular_starts(body, gait.recording, closing.samples, cycles)
+        first = choose_start(gait.recording, closing.samples, starts)
         motion = cut_loop(gait.recording, first, closing.samples)
         draft = Draft(motion, cycles, gait.cycle).put_on_ground(body)
         has_clock = gait.phase is not None
         begin = gait.samples_to_touchdown(first) if has_clock else _find_first_touchdown(body, draft)
         drafts[name] = draft._replace(motion=draft.motion.start_at(begin))
     return drafts
+
+
+def _keep_regular_starts(body: Body, recording: Recording, samples: int, cycles: int) -> np.ndarray:
+    """Return starts (n,) of loops that close, those in which the fewest feet step other than once a gait cycle."""
+    starts = find_starts(recording, samples)
+    heights = sole_heights(compile_model(body), body, recording.poses)
+    odd_feet = [
+        count_odd_feet(heights[start : start + samples], cycles, body.torso.standing_height) for start in starts
+    ]
+    return starts[odd_feet == np.min(odd_feet)]
 
 
 def _find_first_touchdown(body: Body, draft: Draft) -> int:

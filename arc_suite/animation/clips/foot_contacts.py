@@ -120,6 +120,23 @@ def find_touching(heights: np.ndarray, swings: np.ndarray, near: float, loops: b
     return np.roll(touches, begin)
 
 
+def count_odd_feet(heights: np.ndarray, cycles: int, standing_height: float) -> int:
+    """Return how many feet of a loop do not touch down once in each gait cycle.
+
+    Args:
+        heights: (samples, feet) heights of the soles, m, without the last sample, which is the first one.
+        cycles: gait cycles in the loop.
+        standing_height: m.
+    """
+    bounce = _BOUNCE * len(heights) / cycles  # samples
+    odd_feet = 0
+    for foot_heights in heights.T:
+        swings = find_swings(foot_heights, MIN_RISE * standing_height, bounce, loops=True)
+        touchdowns = ~swings & np.roll(swings, 1)
+        odd_feet += touchdowns.sum() != cycles
+    return odd_feet
+
+
 def find_foot_contacts(
     motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, min_rise: float = MIN_RISE
 ) -> tuple[list[FootContact], np.ndarray]:

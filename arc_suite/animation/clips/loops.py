@@ -116,33 +116,42 @@ def choose_cycles(closings: Mapping[str, Mapping[int, Closing]], good_seam: floa
     return min(common_cycles, key=count_bad_seams)
 
 
-def choose_start(recording: Recording, samples: int) -> int:
-    """Return the sample with which the most typical loop begins, among those that close, or nearly so if none does.
+def find_starts(recording: Recording, samples: int) -> np.ndarray:
+    """Return samples (n,) with which loops begin that close, or nearly so if none does; about 200 at most.
+
+    Args:
+        recording: recording to choose from.
+        samples: samples of the loop.
+    """
+    seams = _measure_seams(recording.poses[:-samples], recording.poses[samples:])
+    nearly_closed = min(_NEAREST_SEAMS * seams.min(), MAX_SEAM)
+    starts = np.flatnonzero(seams <= max(GOOD_SEAM, nearly_closed, seams.min()))
+    stride = -(-len(starts) // _MAX_CANDIDATES)  # rounded up
+    return starts[::stride]
+
+
+def choose_start(recording: Recording, samples: int, starts: np.ndarray) -> int:
+    """Return the sample with which the most typical loop begins.
 
     Loops are compared by the displacement of the root, as the torso's depends on where in its sway the loop begins.
 
     Args:
         recording: recording to choose from.
         samples: samples of the loop.
+        starts: (n,) samples to choose from.
     """
     torso = ground_poses(recording.poses)
     displacements = twist_to(relative_pose(torso[:-samples], torso[samples:]))
     mean_distance = np.hypot(displacements[:, 0], displacements[:, 1]).mean()
     _, mean_left, mean_turn = displacements.mean(axis=0)
 
-    seams = _measure_seams(recording.poses[:-samples], recording.poses[samples:])
-    nearly_closed = min(_NEAREST_SEAMS * seams.min(), MAX_SEAM)
-    candidates = np.flatnonzero(seams <= max(GOOD_SEAM, nearly_closed, seams.min()))
-    candidate_stride = -(-len(candidates) // _MAX_CANDIDATES)  # rounded up
-    candidates = candidates[::candidate_stride]
-
-    root_displacements = np.stack([_fit_root(torso[first : first + samples + 1])[0] for first in candidates])
+    root_displacements = np.stack([_fit_root(torso[first : first + samples + 1])[0] for first in starts])
     distances = np.hypot(root_displacements[:, 0], root_displacements[:, 1])
     distance_errors = abs(distances - mean_distance)
     mean_height = recording.poses[:, 2].mean()
     drifts = abs(root_displacements[:, 1] - mean_left) + mean_height * abs(root_displacements[:, 2] - mean_turn)
     best = (_SPEED_WEIGHT * distance_errors + drifts).argmin()
-    return int(candidates[best])
+    return int(starts[best])
 
 
 def cut_loop(recording: Recording, first: int, samples: int) -> Motion:

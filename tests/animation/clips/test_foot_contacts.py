@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from arc_suite.animation.clips.foot_contacts import find_swings, find_touching
+from arc_suite.animation.clips.foot_contacts import count_odd_feet, find_swings, find_touching
 
 PHASE = np.linspace(0.0, 3.0, 600, endpoint=False)  # cycles of 200 samples
 HEIGHTS = 0.1 * np.sin(2.0 * np.pi * PHASE).clip(0.0) + 0.003 * np.sin(40.0 * PHASE)
@@ -29,6 +29,14 @@ def test_a_bounce_belongs_to_its_swing():
     bouncing[60:65] = 0.0
     assert runs(find_swings(bouncing, 0.01, 20, True)) == 3
     assert runs(find_swings(bouncing, 0.01, 4, True)) == 4
+
+
+def test_feet_are_odd_that_step_twice_in_a_cycle_or_not_at_all():
+    twice = HEIGHTS + 0.09 * (np.arange(600) // 20 == 27)
+    still = 0.0 * HEIGHTS
+    heights = np.stack([HEIGHTS, np.roll(HEIGHTS, 90), twice, still], axis=-1)
+    assert count_odd_feet(heights, 3, 1.0) == 2
+    assert count_odd_feet(heights[:400], 2, 1.0) == 1  # before the second step
 
 
 def test_a_foot_that_stays_down():

@@ -91,13 +91,18 @@ def test_a_seam_is_spread():
     assert jumps[[0, -1]].max() < 1.2 * np.median(jumps) + 1e-3
 
 
+def choose_start(recording):
+    """The first sample of the loop of one cycle that is chosen of all that close."""
+    return loops.choose_start(recording, 275, loops.find_starts(recording, 275))
+
+
 @pytest.mark.parametrize("twist", TWISTS[:3])
 def test_of_the_loops_that_close_the_usual_one_is_taken(twist):
     """Of four cycles the last leads further: a loop of the first three goes as fast as the walk does on the mean."""
     recording = walk(twist, seconds=4 * CYCLE)
     poses = recording.poses.copy()
     poses[825:, :2] += np.outer(np.arange(276) / 275.0, 0.3 * (poses[-1, :2] - poses[825, :2]))
-    first = loops.choose_start(Recording(STEP, 25, poses), 275)
+    first = choose_start(Recording(STEP, 25, poses))
     assert first < 600
     speed = np.hypot(*loops.cut_loop(Recording(STEP, 25, poses), first, 275).twist[:2])
     mean = np.hypot(*twist[:2])
@@ -111,7 +116,7 @@ def test_a_loop_that_closes_goes_before_a_usual_one():
     poses[:275, 8] += 0.1 * (1.0 - np.arange(275) / 275.0)
     poses[275:, 0] += 0.05 * np.cos(2.5) * np.arange(276) / 275.0
     poses[275:, 1] += 0.05 * np.sin(2.5) * np.arange(276) / 275.0
-    first = loops.choose_start(Recording(STEP, 25, poses), 275)
+    first = choose_start(Recording(STEP, 25, poses))
     assert loops.cut_loop(Recording(STEP, 25, poses), first, 275).seam <= loops.GOOD_SEAM
 
 
@@ -121,7 +126,7 @@ def test_no_loop_is_taken_whose_seam_is_over_the_bound():
     poses = recording.poses[:-1].copy()
     poses[:275, 8] += np.radians(np.where(np.arange(275) < 11, 1.9, 2.2))
     poses[:11, :2] += 0.05  # a longer way than that of the others
-    first = loops.choose_start(Recording(STEP, 25, poses), 275)
+    first = choose_start(Recording(STEP, 25, poses))
     assert np.radians(1.8) < loops.cut_loop(Recording(STEP, 25, poses), first, 275).seam <= loops.MAX_SEAM
 
 
