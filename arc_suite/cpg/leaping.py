@@ -40,7 +40,7 @@ class LeapingParameters(NamedTuple):
 
 
 _MIN_LEAP = leaps.MIN_BY_MEASURE["distance"]  # standing heights; a body with a shorter leap gets a warning, and walks
-_GATHERING_CYCLES = 4  # cycles on the spot before it walks on; it may leap after each
+_GATHERING_CYCLES = 4  # cycles on the spot before it walks on; it may leap after each, and in the last one
 _SUPPORT_POINTS = 1.6 * footholds.SUPPORT_POINTS  # of a landing, standing heights along the path
 _PROBE_SPACING = 0.1  # standing heights between the points ahead of a foot that are looked at
 _MAX_FOOT_DROP = 0.15  # standing heights; a foot that is so far below the median foot does not stand
@@ -141,8 +141,11 @@ class Leaping(Sighted):
         ends = (step == self._last_step) | (step == last_after_leap)
         next_step = xp.where(ends, 0, step + 1)
         next_step = xp.where(step == -1, first_after_leap, next_step)
-        is_end_of_cycle = (step < 0) & (step % self._cycle_steps == self._cycle_steps - 1)
-        next_step = xp.where(is_end_of_cycle & may_leap, 1, next_step)
+        is_end_of_cycle = step % self._cycle_steps == self._cycle_steps - 1
+        # In the last cycle it leaps at any time: ends of cycles could all fall into swings, in which it may not leap.
+        is_last_cycle = step >= -self._cycle_steps
+        has_gathered = (step < 0) & (is_end_of_cycle | is_last_cycle)
+        next_step = xp.where(has_gathered & may_leap, 1, next_step)
         first_gathering = xp.where(may_leap, -_GATHERING_CYCLES * self._cycle_steps, 0)
         return xp.where(step == 0, first_gathering, next_step)
 

@@ -44,6 +44,40 @@ def test_queen_leaps_over_a_trench():
     assert environment.batch.data.qpos[0, 0] > 12.5 * ROBOTS["queen"].torso.standing_height
 
 
+def test_a_leap_carries_as_far_from_a_start_that_differs():
+    law = Demonstrator(VectorEnv("bastion", "leap", 1, 1), "leaping").law
+    rest = law._first_state.angles
+    targets = leaps.leap_targets(law.body, law.legs, rest, law.leap)[None]
+    crouch_end = law._movement.crouch_end
+    differences = 0.03 * np.random.default_rng(5).standard_normal((8, targets.shape[-1]))  # rad
+    starts = law.legs.by_joint(rest) + differences
+    flights = [leaps.simulate_flights(law.body, start, targets, [crouch_end])[0] for start in starts]
+    assert all(flight.landed for flight in flights)
+    np.testing.assert_allclose([flight.distance for flight in flights], law.flight.distance, atol=0.2)
+
+
+def test_a_leap_begins_when_feet_stand_though_they_swing_at_the_ends_of_cycles():
+    law = Demonstrator(VectorEnv("bastion", "leap", 1, 1), "leaping").law
+    step = law._next_step(np.array([0]), np.array([True]))
+    while step[0] < 0:
+        stands = step % law._cycle_steps < law._cycle_steps - 2
+        step = law._next_step(step, stands)
+    assert step[0] == 1
+
+
+@pytest.mark.long
+def test_bastion_leaps_over_trenches():
+    height = ROBOTS["bastion"].torso.standing_height
+    environment = VectorEnv("bastion", "leap", 40, 1, "Disabled", task_kwargs={"width": 0.8 * height})
+    observation, _ = environment.reset(seed=list(range(9000, 9040)))
+    policy = Demonstrator(environment, "leaping")
+    fell = np.zeros(40, bool)
+    for _ in range(330):
+        observation, _, ended, *_ = environment.step(policy.act(environment.task.split(observation)))
+        fell |= ended
+    assert fell.mean() <= 0.15
+
+
 def test_who_cannot_leap_is_told():
     with pytest.warns(
         UserWarning, match="^tick cannot leap: its feet get .* h ahead, and 0.8 h are needed; leaping walks"
