@@ -6,11 +6,12 @@ processor's, and runs of `arc-suite train` from their start: seconds, share of t
 
 Example:
   python tools/bench_gpu.py --document docs/gpu.md
-  python tools/bench_gpu.py --robots queen --worlds "" --episodes 0 --tasks walk,steer --seeds 0
-  python tools/bench_gpu.py --robots leaper --worlds 8 --impl jax --episodes 0 --learn ""
+  python tools/bench_gpu.py --robots queen --worlds 0 --episodes 0 --tasks walk,steer --seeds 0
+  python tools/bench_gpu.py --robots leaper --worlds 8 --impl jax --episodes 0 --learn none
 """
 
 import contextlib
+import itertools
 import os
 import pathlib
 import re
@@ -40,13 +41,13 @@ from arc_suite.simulation.cores import usable_cores
 
 FLAGS = flags.FLAGS
 flags.DEFINE_list("robots", list(ROBOTS), "Whose walks.")
-flags.DEFINE_list("worlds", ["4096", "16384", "65536"], "Numbers of worlds that step together.")
+flags.DEFINE_list("worlds", ["4096", "16384", "65536"], "Numbers of worlds that step together; 0 for none.")
 flags.DEFINE_list("impl", list(device.IMPLEMENTATIONS), "Implementations.")
 flags.DEFINE_integer("steps", 50, "Control steps of a measurement.", lower_bound=1)
 flags.DEFINE_integer("episodes", 256, "Episodes that are compared with a processor's; 0 for none.", lower_bound=0)
 flags.DEFINE_list("learn", ["warp"], "Simulations in which PPO learns: mjx, warp, or none.")
 flags.DEFINE_list("tasks", ["walk", "steer"], "Tasks that PPO learns.")
-flags.DEFINE_list("seeds", ["0", "1", "2"], "Seeds with which PPO learns.")
+flags.DEFINE_list("seeds", ["0", "1", "2"], "Seeds with which PPO learns, all in one process.")
 flags.DEFINE_multi_string("run_flag", [], "Further flag of arc-suite train for these runs.")
 flags.DEFINE_float("goal", 3700.0, "Return of an evaluation until which seconds are counted.")
 flags.DEFINE_string("runs", None, "Folder in which runs stay; by default they are deleted.")
@@ -155,48 +156,57 @@ def best_seconds(function, argument, repeats=3):
     return min(durations)
 
 
-def training_row(robot, task, simulation, seed, folder):
-    """Return a row of cells: `arc-suite train` with defaults, from the start of its process.
+def training_rows(robot, task, simulation, seeds, folder):
+    """Return a row of cells for each seed: `arc-suite train` with defaults, from the start of its process.
 
-    Seconds are those to the first line of training.csv, to an evaluation with the return of `--goal`, and to the end.
+    Several seeds are one process. Seconds are those to the first line of training.csv, to an evaluation with the return
+    of `--goal`, and to the end.
     """
-    flags_of_run = [f"--robot={robot}", f"--task={task}", f"--hp=simulation={simulation}", f"--seed={seed}"]
-    command = [sys.executable, "-m", "arc_suite", "train", *flags_of_run, *FLAGS.run_flag, f"--output={folder}"]
+    run_folders = [folder / f"{robot}-{task}-ppo-{seed}" for seed in seeds]
+    output = folder if len(seeds) > 1 else run_folders[0]
+    flags_of_run = [f"--robot={robot}", f"--task={task}", f"--hp=simulation={simulation}", f"--seed={','.join(seeds)}"]
+    command = [sys.executable, "-m", "arc_suite", "train", *flags_of_run, *FLAGS.run_flag, f"--output={output}"]
     start = time.perf_counter()
     seconds_to_first = None
-    seconds_to_goal = None
+    seconds_to_goal = {}
     with sample_gpu() as shares:
         process = subprocess.Popen(command)
         while process.poll() is None:
             time.sleep(_POLL_INTERVAL)
             seconds = time.perf_counter() - start
-            training_lines = run_folder.lines(folder, "training")
-            if training_lines and seconds_to_first is None:
+            if seconds_to_first is None and run_folder.lines(run_folders[0], "training"):
                 seconds_to_first = seconds
                 shares.clear()
-            if seconds_to_goal is None and best_return(folder) >= FLAGS.goal:
-                seconds_to_goal = seconds
+            for run_path in run_folders:
+                if run_path not in seconds_to_goal and best_return(run_path) >= FLAGS.goal:
+                    seconds_to_goal[run_path] = seconds
     seconds = time.perf_counter() - start
     if process.returncode:
         raise ValueError(f"{' '.join(command)}: exit status {process.returncode}")
-    times = run_folder.table(folder, "times")
-    steps_per_second = (times["step"][-1] - times["step"][0]) / (times["wall_seconds"][-1] - times["wall_seconds"][0])
-    totals, falls = evaluate_run(folder, robot, task)
-    return [
-        robot,
-        task,
-        simulation,
-        f"{seed}",
-        f"{times['step'][-1] / 1e6:.1f} M",
-        f"{totals.mean():.0f}",
-        f"{totals.min():.0f}",
-        f"{falls}",
-        f"{seconds:.0f}",
-        _NOT_MEASURED if seconds_to_first is None else f"{seconds_to_first:.0f}",
-        "not reached" if seconds_to_goal is None else f"{seconds_to_goal:.0f}",
-        f"{steps_per_second:,.0f}",
-        f"{np.mean(shares):.1f} %" if shares else _NOT_MEASURED,
-    ]
+    rows = []
+    for seed, run_path in zip(seeds, run_folders, strict=True):
+        times = run_folder.table(run_path, "times")
+        learning_seconds = times["wall_seconds"][-1] - times["wall_seconds"][0]
+        steps_per_second = len(seeds) * (times["step"][-1] - times["step"][0]) / learning_seconds
+        totals, falls = evaluate_run(run_path, robot, task)
+        row = [
+            robot,
+            task,
+            simulation,
+            f"{seed}",
+            f"{times['step'][-1] / 1e6:.1f} M",
+            f"{totals.mean():.0f}",
+            f"{totals.min():.0f}",
+            f"{falls}",
+            f"{seconds:.0f}",
+            _NOT_MEASURED if seconds_to_first is None else f"{seconds_to_first:.0f}",
+            f"{seconds_to_goal[run_path]:.0f}" if run_path in seconds_to_goal else "not reached",
+            f"{steps_per_second:,.0f}",
+            f"{np.mean(shares):.1f} %" if shares else _NOT_MEASURED,
+        ]
+        print(" | ".join(row), flush=True)
+        rows.append(row)
+    return rows
 
 
 @contextlib.contextmanager
@@ -258,7 +268,7 @@ def main():
         raise ValueError(f"--document: JAX finds no GPU here, and tables of a {jax.default_backend()} are not written")
     packages = ("mujoco", "mujoco-mjx", "warp-lang", "jax")
     package_versions = ", ".join(f"{name} {versions.version_of(name)}" for name in packages)
-    worlds = [int(count) for count in FLAGS.worlds if count]
+    worlds = [int(count) for count in FLAGS.worlds if int(count)]
     parts = [f"{jax.devices()[0].device_kind}; {package_versions}.", "<!-- table -->"]
 
     def add_table(header, rows):
@@ -267,17 +277,12 @@ def main():
             print(parts[-1], flush=True)
 
     # Runs come first, since what others compile would make them faster.
-    simulations = [name for name in FLAGS.learn if name]
-    runs = [
-        (robot, task, simulation, seed)
-        for task in FLAGS.tasks
-        for robot in robots
-        for simulation in simulations
-        for seed in FLAGS.seeds
-    ]
+    simulations = [name for name in FLAGS.learn if name != "none"]
+    rows = []
     with contextlib.ExitStack() as stack:
         folder = pathlib.Path(FLAGS.runs or stack.enter_context(tempfile.TemporaryDirectory()))
-        rows = [training_row(*run, folder / "-".join(run)) for run in runs]
+        for case in itertools.product(robots, FLAGS.tasks, simulations):
+            rows += training_rows(*case, FLAGS.seeds, folder / case[-1])
     seconds = ["seconds", "to the first update", f"to {FLAGS.goal:g}"]
     add_table(
         [

@@ -46,6 +46,7 @@ _RANDOM_ARRAYS = {
 # Snapshots of earlier versions have neither.
 _SETUPS = "setup/facts"
 _SETUP_INDICES = "setup/indices"
+_STREAM_PREFIX = "stream/"  # then the index of the environment, and of the leaf
 _SETTINGS_ARRAYS = ("settings/present", "settings/next")  # snapshots have them only if a setting was changed
 
 
@@ -78,7 +79,7 @@ def to_arrays(state: State, opened_tasks: Sequence[Task]) -> dict[str, np.ndarra
     arrays |= state.environment_arrays
     for index, stream in enumerate(state.streams):
         for leaf_index, leaf in enumerate(trees.leaves(stream)):
-            arrays[f"stream/{index}/{leaf_index}"] = np.asarray(leaf)
+            arrays[_stream_name(index, leaf_index)] = np.asarray(leaf)
     for part_index, (name, random_array) in enumerate(_RANDOM_ARRAYS.items(), start=1):  # part 0 is a name
         values = [random_state[part_index] for random_state in state.randoms]
         arrays[name] = np.array(values, random_array.dtype)
@@ -121,12 +122,59 @@ def from_arrays(
         randoms = _read_randoms(arrays, len(like.streams))
         streams = []
         for index, opened_task in enumerate(opened_tasks):
-            streams.append(_read_stream(opened_task.first(), _with_prefix(f"stream/{index}/", arrays)))
+            streams.append(_read_stream(opened_task.first(), _with_prefix(f"{_STREAM_PREFIX}{index}/", arrays)))
         present_texts, next_texts = (_read_texts(arrays.get(name), len(opened_tasks)) for name in _SETTINGS_ARRAYS)
         present_tasks = _change_tasks(opened_tasks, settings, present_texts)
         next_tasks = _change_tasks(opened_tasks, settings, next_texts)
     state = State(simulations, memory, streams, randoms, environment_arrays, (present_texts, next_texts))
     return state, [present_tasks, next_tasks]
+
+
+def select_environments(arrays: Mapping[str, np.ndarray], environments: range) -> dict[str, np.ndarray]:
+    """Return the snapshot of some successive environments, from that of more environments of the same setup."""
+    rows = slice(environments.start, environments.stop)
+    selected_arrays = {}
+    for name, array in arrays.items():
+        if name.startswith(_STREAM_PREFIX):
+            index, leaf = _split_stream_name(name)
+            if index in environments:
+                selected_arrays[_stream_name(index - environments.start, leaf)] = array
+        else:
+            selected_arrays[name] = array if name == _SETUPS else array[rows]
+    return selected_arrays
+
+
+def join_environments(snapshots: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return the snapshot of the environments of all snapshots, which are of the same setup.
+
+    Raises:
+        KeyError, ValueError: a snapshot lacks an array, or has one of another shape.
+    """
+    joint_arrays = {}
+    for name, array in snapshots[0].items():
+        if name == _SETUPS:
+            joint_arrays[name] = array
+        elif not name.startswith(_STREAM_PREFIX):
+            joint_arrays[name] = np.concatenate([snapshot[name] for snapshot in snapshots])
+    first_index = 0
+    for snapshot in snapshots:
+        for name, array in snapshot.items():
+            if name.startswith(_STREAM_PREFIX):
+                index, leaf = _split_stream_name(name)
+                joint_arrays[_stream_name(first_index + index, leaf)] = array
+        first_index += len(snapshot["steps"])
+    return joint_arrays
+
+
+def _stream_name(index: int, leaf: int | str) -> str:
+    """Return the name of the array of a leaf of an environment's stream."""
+    return f"{_STREAM_PREFIX}{index}/{leaf}"
+
+
+def _split_stream_name(name: str) -> tuple[int, str]:
+    """Return the index of the environment, and the leaf, of the name of an array of a stream."""
+    index, leaf = name.removeprefix(_STREAM_PREFIX).split("/")
+    return int(index), leaf
 
 
 def number(value: np.ndarray, like) -> Any:

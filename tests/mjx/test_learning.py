@@ -1,7 +1,10 @@
 """PPO in worlds of MJX."""
 
 import contextlib
+import os
 import pathlib
+import subprocess
+import sys
 
 import jax
 import jax.numpy as jnp
@@ -9,13 +12,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from arc_suite import evaluation
+from arc_suite import evaluation, files
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import collecting, device_learner, learner, on_policy, run_folder, world_rollouts
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.normalizer import Moments
-from arc_suite.learning.agents.training import train
+from arc_suite.learning.agents.training import train, train_in_one_program
 from arc_suite.policies import policy
 from arc_suite.tasks import command
 
@@ -71,10 +74,11 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     changes = {"horizon": 12, "simulation": "mjx", "network": "perceptron"}
     run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | changes)
     hp, context = run.hyperparameters, run.context(pathlib.Path())
-    rollouts = world_rollouts.WorldRollouts(hp, context)
+    rollouts = world_rollouts.WorldRollouts(hp, [context])
     state = ppo.begin(hp, rollouts.architecture, np.random.default_rng(0))
     normalize = Moments.empty(rollouts.task.size).normalizer()
-    _, rollout = jax.jit(rollouts.roll_out)(rollouts.begin(), state.policy, normalize, 0.01, jax.random.key(0))
+    worlds = jax.tree.map(lambda array: array[0], rollouts.begin())
+    _, rollout = jax.jit(rollouts.roll_out)(worlds, state.policy, normalize, 0.01, jax.random.key(0))
     rollout = jax.tree.map(np.asarray, rollout)
     here, there = (
         rollouts.task.split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations")
@@ -145,6 +149,63 @@ def test_chunks_of_any_length_give_the_same_bits(tmp_path, monkeypatch):
     assert latest[0].step == 64
 
 
+@pytest.mark.long
+def test_seeds_in_one_program_are_those_alone(tmp_path):
+    """In their own folders, from which each goes on alone or with the others, to the same bits."""
+    setup = Setup.of("leaper", "walk", SHORT)
+    runs = [
+        Configuration.of(setup, "ppo", SMALL | {"simulation": "mjx"}, seed, steps=32, evaluate_every=16)
+        for seed in (0, 3)
+    ]
+    latest = []
+    for name, groups in {"alone": [[run] for run in runs], "mapped": [runs]}.items():
+        for group in groups:
+            assert train_in_one_program(group, [tmp_path / name / run.name for run in group])
+        latest.append([contents(tmp_path / name / run.name) for run in runs])
+    for (_, alone), (_, mapped) in zip(*latest, strict=True):
+        assert mapped.keys() == alone.keys()
+        for name, array in alone.items():
+            assert_allclose(mapped[name], array, rtol=1e-4, atol=1e-5, err_msg=name)
+    (_, first), (_, second) = latest[1]
+    assert any((first[name] != second[name]).any() for name in first if name.startswith("state/policy"))
+    (tmp_path / "parts").mkdir()
+    folders = [tmp_path / "parts" / run.name for run in runs]
+    assert not train_in_one_program(runs, folders, stop=lambda: True)
+    assert train_in_one_program(runs, folders)
+    for folder, (texts, arrays) in zip(folders, latest[1], strict=True):
+        assert contents(folder)[0] == texts
+        check_same(contents(folder)[1], arrays)
+
+
+@pytest.mark.long
+def test_two_devices_are_one(tmp_path):
+    """Each simulates half of the worlds; the other process finds two devices on this processor."""
+    run = Configuration.of(Setup.of("leaper", "walk", SHORT), "ppo", SMALL | {"simulation": "mjx"}, steps=32)
+    *_, latest = device_learner.learn(run.hyperparameters, run.context(tmp_path))
+    with files.writing_json(tmp_path / "config.json") as file:
+        file.update(run.to_dict())
+    flag = "--xla_force_host_platform_device_count=2"
+    surroundings = os.environ | {"XLA_FLAGS": f"{os.environ['XLA_FLAGS']} {flag}"}
+    subprocess.run([sys.executable, "-c", _LEARN, tmp_path], check=True, env=surroundings)
+    with np.load(tmp_path / "two.npz") as two:
+        assert int(two["devices"]) == 2
+        for name, array in latest.checkpoint.items():
+            assert_allclose(two[name], array, rtol=1e-4, atol=1e-5, err_msg=name)
+
+
+_LEARN = """
+import pathlib
+import sys
+import jax
+import numpy as np
+from arc_suite.learning.agents import configuration, device_learner
+folder = pathlib.Path(sys.argv[1])
+run = configuration.read(folder / "config.json")
+*_, latest = device_learner.learn(run.hyperparameters, run.context(folder))
+np.savez(folder / "two.npz", devices=len(jax.devices()), **latest.checkpoint)
+"""
+
+
 def test_a_policy_is_finetuned_once_values_have_learned(tmp_path, monkeypatch):
     """Its network stays as it is until then, as on the host, and its normalizer for ever."""
     setup = Setup.of("leaper", "walk", SHORT)
@@ -166,7 +227,7 @@ def test_a_policy_is_finetuned_once_values_have_learned(tmp_path, monkeypatch):
 
 
 def task_and_architecture(run):
-    rollouts = world_rollouts.WorldRollouts(run.hyperparameters, run.context(pathlib.Path()))
+    rollouts = world_rollouts.WorldRollouts(run.hyperparameters, [run.context(pathlib.Path())])
     return rollouts.task, rollouts.architecture
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from arc_suite.learning.agents import off_policy
 from arc_suite.learning.agents import soft_actor_critic as sac
 from arc_suite.learning.agents.algorithms import ALGORITHMS
-from arc_suite.learning.agents.learner import generator
 from arc_suite.learning.agents.replay import Transitions
 
 SIZE = 199  # numbers of Queen's observation
@@ -64,11 +63,11 @@ def rate(name: str, updates: int, with_policy: bool, in_phase: bool = False) -> 
     learner_state = sac.begin(hp, random, SIZE, JOINTS)
     sums = off_policy.zero_sums(metrics)
     next_actions = [np.zeros((BATCH, JOINTS), np.float32)] * 2 if in_phase else None
+    draw_noise = jax.jit(lambda index: sac.draw_noise(hp, jax.random.key(index), BATCH, (JOINTS,), with_policy))
 
     def update(index):
         nonlocal learner_state, sums
-        noise = sac.draw_noise(hp, generator(0, "update", index), BATCH, (JOINTS,), with_policy)
-        learner_state, sums = off_policy.update(hp, learner_state, sums, batch, noise, next_actions)
+        learner_state, sums = off_policy.update(hp, learner_state, sums, batch, draw_noise(index), next_actions)
         return sums
 
     return 1.0 / seconds(update, updates)

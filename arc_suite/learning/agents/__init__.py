@@ -14,4 +14,7 @@ from them bit-exactly.
 `training.train` does the rest: it evaluates, writes the folder of the run, and resumes. All random numbers come from
 generators seeded by the run's seed, a purpose and a count (`learner.generator`), so checkpoints need no random state.
 Environments resume from `VectorEnv.snapshot()`.
+
+Runs with equal `algorithms.program_of` can learn side by side on a GPU: `training.train_in_one_program`. Then learners
+yield the slices of all runs.
 """

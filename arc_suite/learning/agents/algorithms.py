@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from arc_suite import checks, registry, versions
@@ -149,12 +149,52 @@ def _learn(hp, context) -> Iterator[Any]:
     """
     with versions.require_extra("training needs JAX", "learn"):
         from arc_suite.learning.agents import bc, dagger, off_policy, on_policy
-    if getattr(hp, "simulation", "mujoco") != "mujoco":
+    if stays_on_device(hp):
         from arc_suite.learning.agents import device_learner  # needs the extra `gpu`
 
         return device_learner.learn(hp, context)
     learners = {SoftActorCritic: off_policy, ProximalPolicy: on_policy, DAgger: dagger, BehaviorCloning: bc}
     return learners[type(hp)].learn(hp, context)
+
+
+def program_of(hp, context) -> Hashable:
+    """Return a value that is equal for runs that `learn_in_one_program` takes together.
+
+    Raises:
+        ValueError: a run that learns alone, or JAX is not installed.
+    """
+    with versions.require_extra("training needs JAX", "learn"):
+        from arc_suite.learning.agents import mapped_updates
+    if isinstance(hp, SoftActorCritic):
+        return mapped_updates.program_of(hp, context)
+    if stays_on_device(hp):
+        from arc_suite.learning.agents import device_learner
+
+        return device_learner.program_of(hp, context)
+    raise ValueError(
+        f"expected soft actor-critic, or a simulation on a device, for runs in one program, got {type(hp).__name__}"
+    )
+
+
+def learn_in_one_program(all_hp: Sequence, contexts: Sequence) -> Iterator[list]:
+    """Learn in several runs with equal `program_of`; yield the slices of all runs, None for a run without one.
+
+    Args:
+        all_hp: hyperparameters of each run.
+        contexts: context of each run.
+    """
+    from arc_suite.learning.agents import mapped_updates, off_policy
+
+    if stays_on_device(all_hp[0]):
+        from arc_suite.learning.agents import device_learner
+
+        return device_learner.learn_in_step(all_hp[0], contexts)
+    return off_policy.learn_in_step(all_hp, contexts, mapped_updates.MappedUpdates)
+
+
+def stays_on_device(hp) -> bool:
+    """Return whether simulation and learning stay on JAX's device; see `device_learner`."""
+    return getattr(hp, "simulation", "mujoco") != "mujoco"
 
 
 # Kinds of algorithms; the further arguments of each are its hyperparameters and its summary.

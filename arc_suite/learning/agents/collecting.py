@@ -30,6 +30,7 @@ class EnvironmentRollouts:
         """Begin the first episodes."""
         self._hp = hp
         self._seed = context.seed
+        self._folder = context.folder
         self._has_privileged = bool(hp.critic_blocks)
         self.environment = context.environment(hp.num_envs, privileged=self._has_privileged)
         self.task = self.environment.task.definition
@@ -64,7 +65,7 @@ class EnvironmentRollouts:
         for _ in range(self._hp.horizon):
             means = np.asarray(ppo.predict_mean_actions(self.architecture, policy, normalize(self.observation)))
             if not np.isfinite(means).all():
-                raise Diverged("an action is not finite", step)
+                raise Diverged("an action is not finite", step, self._folder)
             actions = means + np.float32(std) * random.standard_normal(means.shape, np.float32)
             observation, rewards, terminated, truncated, info = self.environment.step(actions)
             view = self._view(observation, info)

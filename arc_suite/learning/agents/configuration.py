@@ -175,7 +175,7 @@ class Configuration:
     @property
     def learns_on_device(self) -> bool:
         """Whether simulation and learning stay on JAX's device; see `device_learner`."""
-        return getattr(self.hyperparameters, "simulation", "mujoco") != "mujoco"
+        return algorithms.stays_on_device(self.hyperparameters)
 
     def context(
         self, folder: str | os.PathLike, threads: int = 1, checkpoint: Mapping[str, np.ndarray] | None = None

@@ -1,7 +1,7 @@
 """Hyperparameters of the learners. Nothing here needs JAX."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from arc_suite import checks, registry
@@ -22,12 +22,14 @@ class DeviceDefaults(NamedTuple):
 
     Attributes:
         hyperparameters: hyperparameters by name.
+        num_envs_of_seeds: environments of each of several seeds in one program.
         steps: environment steps of a run.
         long_steps: environment steps of a run with commands, or in any arena except the flat one.
         evaluations: evaluations of a run.
     """
 
     hyperparameters: Mapping[str, int]
+    num_envs_of_seeds: int
     steps: int
     long_steps: int
     evaluations: int
@@ -35,7 +37,13 @@ class DeviceDefaults(NamedTuple):
 
 # By the hyperparameter `simulation`. Fewer worlds cost as much time, more ones learn less from a step: docs/gpu.md.
 DEVICE_DEFAULTS = {
-    "warp": DeviceDefaults({"num_envs": 4096, "horizon": 16, "minibatch": 4096}, 6_500_000, 18_000_000, evaluations=10)
+    "warp": DeviceDefaults(
+        {"num_envs": 4096, "horizon": 16, "minibatch": 4096},
+        num_envs_of_seeds=1024,
+        steps=6_500_000,
+        long_steps=18_000_000,
+        evaluations=10,
+    )
 }
 
 
@@ -153,6 +161,21 @@ class SoftActorCritic:
     def updates_of_a_step(self) -> int:
         """Number of updates after all environments have stepped once."""
         return round(self.num_envs * self.utd_ratio)
+
+    def update_groups(self) -> Iterator[tuple[int, bool]]:
+        """Yield the updates after all environments have stepped once: their number, and whether the policy learns."""
+        updates_of_policy = self.updates_of_a_step // self.policy_every
+        if self.policy_every == 1:
+            yield updates_of_policy, True
+            return
+        for _ in range(updates_of_policy):
+            yield self.policy_every - 1, False
+            yield 1, True
+
+    @property
+    def policy_every(self) -> int:
+        """Number of updates of which the last one moves the policy too."""
+        return max(1, round(self.utd_ratio))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -121,8 +121,8 @@ class NetworkInputs(NamedTuple):
         return observations if self.legs is None else self.legs.moment_vectors(self.legs.view(observations))
 
 
-def _mirror_every_other(mirror: Mirror, vectors: np.ndarray) -> np.ndarray:
-    """Return a copy of vectors (batch, ...), every other one mirrored."""
-    vectors = vectors.copy()
-    vectors[1::2] = mirror(vectors[1::2])
-    return vectors
+def _mirror_every_other(mirror: Mirror, vectors):
+    """Return vectors (batch, size) of NumPy or JAX, every other one mirrored."""
+    xp = vectors.__array_namespace__()
+    is_mirrored = np.arange(len(vectors))[:, None] % 2 == 1
+    return xp.where(is_mirrored, mirror(vectors), vectors)

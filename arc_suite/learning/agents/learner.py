@@ -23,11 +23,22 @@ UNLEARNED_PREFIXES = (ENVIRONMENT_PREFIX, teachers.PREFIX)
 
 
 class Diverged(ValueError):
-    """A value of the learner is not finite."""
+    """A value of the learner is not finite.
 
-    def __init__(self, what: str, step: int):
-        """Make the message from a value in words, such as "an action is not finite", and the environment step."""
+    Attributes:
+        folder: folder of the run.
+    """
+
+    def __init__(self, what: str, step: int, folder: Path):
+        """Make the message.
+
+        Args:
+            what: the value in words, such as "an action is not finite".
+            step: environment step.
+            folder: folder of the run.
+        """
         super().__init__(f"the learner diverged: {what} at step {step}; the checkpoint before stays")
+        self.folder = folder
 
 
 class Damaged(ValueError):
@@ -110,15 +121,25 @@ def generator(seed: int, purpose: str, count: int) -> np.random.Generator:
 
 def environment_arrays(environment: VectorEnv | BodiesEnv) -> dict[str, np.ndarray]:
     """Return the snapshot of an environment as part of a checkpoint."""
-    return {f"{ENVIRONMENT_PREFIX}{name}": array for name, array in environment.snapshot().items()}
+    return name_environment_arrays(environment.snapshot())
+
+
+def name_environment_arrays(snapshot: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the snapshot of an environment with the names that its arrays have in a checkpoint."""
+    return {f"{ENVIRONMENT_PREFIX}{name}": array for name, array in snapshot.items()}
 
 
 def restore_environment(environment: VectorEnv | BodiesEnv, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
     """Restore an environment from `environment_arrays`, and return its observations (num_envs, size)."""
-    snapshot = {
+    snapshot = environment_snapshot(arrays)
+    environment.restore(snapshot)
+    return snapshot["observation"]
+
+
+def environment_snapshot(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the snapshot of an environment that is part of a checkpoint."""
+    return {
         name.removeprefix(ENVIRONMENT_PREFIX): array
         for name, array in arrays.items()
         if name.startswith(ENVIRONMENT_PREFIX)
     }
-    environment.restore(snapshot)
-    return snapshot["observation"]

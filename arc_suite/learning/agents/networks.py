@@ -197,5 +197,16 @@ def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
     return jax.tree_util.tree_unflatten(structure, leaves)
 
 
+def stack_trees(trees: Sequence):
+    """Return a pytree whose arrays are those of several pytrees, with a leading axis, on the device."""
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
+
+
+@jax.jit
+def select_tree(tree, index):
+    """Return one of the pytrees of `stack_trees`."""
+    return jax.tree.map(lambda array: array[index], tree)
+
+
 def _path_text(path) -> str:
     return jax.tree_util.keystr(path, simple=True, separator="/")

@@ -10,6 +10,7 @@ Several environments take turns: with n of them, the transition after number k i
 
 import os
 import zlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -49,6 +50,10 @@ class Replay:
     overwritten, so a run can resume from a checkpoint that is up to `slack` transitions old.
 
     Attributes:
+        folder: folder of the files.
+        size: numbers of an observation.
+        joints: numbers of an action.
+        slots: number of the slots.
         total: transitions added since the start.
         ends: episodes that ended since the start.
         checksum: sum of the CRC-32 of the transitions that can be sampled, with their numbers since the start.
@@ -73,21 +78,22 @@ class Replay:
             Damaged: a file to resume from is missing, or one to read is missing or too short.
             OSError: the disk is full, or the like.
         """
-        self._folder = files.folder(folder)
+        self.folder = files.folder(folder)
         self._capacity = capacity
-        self._size = size
+        self.size = size
         self._mode = mode
         self._num_envs = num_envs
-        self._slots = capacity + slack + num_envs  # `num_envs` more for the next observations of the latest transitions
+        self.joints = joints
+        self.slots = capacity + slack + num_envs  # `num_envs` more for the next observations of the latest transitions
         make = mode == "w+"
-        self._observations = self._map_file("observations", np.float32, (self._slots, size), make)
-        self._actions = self._map_file("actions", np.float32, (self._slots, joints), make)
-        self._rewards = self._map_file("rewards", np.float32, (self._slots,), make)
-        self._goes_on = self._map_file("goes_on", np.float32, (self._slots,), make)
+        self._observations = self._map_file("observations", np.float32, (self.slots, size), make)
+        self._actions = self._map_file("actions", np.float32, (self.slots, joints), make)
+        self._rewards = self._map_file("rewards", np.float32, (self.slots,), make)
+        self._goes_on = self._map_file("goes_on", np.float32, (self.slots,), make)
         # Of each slot the index of its next observation among the final ones; `_NO_END` where the episode goes on.
-        self._end_indices = self._map_file("ends", np.int32, (self._slots,), make)
+        self._end_indices = self._map_file("ends", np.int32, (self.slots,), make)
         self._final_observations = self._map_file("final_observations", np.float32, (_ENDS, size), make)
-        self._checksums = np.zeros(self._slots, np.uint32)
+        self._checksums = np.zeros(self.slots, np.uint32)
         self.total = 0
         self.ends = 0
         self.checksum = 0
@@ -98,7 +104,7 @@ class Replay:
 
     def add(self, observation, action, reward: float, terminated: bool, next_observation, is_last: bool) -> None:
         """Add a transition; if it is not the last of its episode, the next one starts from its next observation."""
-        slot = self.total % self._slots
+        slot = self.total % self.slots
         self._observations[slot] = observation
         self._actions[slot] = action
         self._rewards[slot] = reward
@@ -112,7 +118,7 @@ class Replay:
             self._end_indices[slot] = _NO_END
             self._observations[self._next_slots(slot)] = next_observation
         if self.total >= self._capacity:
-            oldest_slot = (self.total - self._capacity) % self._slots
+            oldest_slot = (self.total - self._capacity) % self.slots
             self.checksum -= int(self._checksums[oldest_slot])
         self.total += 1
         latest = self.transitions_at(np.array([len(self) - 1]))
@@ -130,18 +136,17 @@ class Replay:
             Arrays (batch, ...).
         """
         numbers = self.total - len(self) + indices  # of transitions, since the start
-        first_slots = numbers % self._slots
-        rewards = self._rewards[first_slots]
-        discounts = np.ones(len(indices), np.float32)
-        has_next_step = np.ones(len(indices), bool)
-        for _ in range(n_step - 1):
-            episode_goes_on = self._end_indices[numbers % self._slots] < 0
-            is_next_stored = numbers + self._num_envs < self.total
-            has_next_step &= episode_goes_on & is_next_stored
-            numbers = np.where(has_next_step, numbers + self._num_envs, numbers)
-            discounts = np.where(has_next_step, discounts * np.float32(discount), discounts)
-            rewards += np.where(has_next_step, discounts * self._rewards[numbers % self._slots], np.float32(0.0))
-        last_slots = numbers % self._slots
+        first_slots = numbers % self.slots
+        last_numbers, rewards, discounts = follow_steps(
+            numbers,
+            self.total,
+            self._num_envs,
+            n_step,
+            discount,
+            reward_of=lambda numbers: self._rewards[numbers % self.slots],
+            is_last=lambda numbers: self._end_indices[numbers % self.slots] >= 0,
+        )
+        last_slots = last_numbers % self.slots
         next_observations = self._observations[self._next_slots(last_slots)]
         end_indices = self._end_indices[last_slots]
         is_end = end_indices >= 0
@@ -154,9 +159,20 @@ class Replay:
             next_observations=next_observations,
         )
 
+    def next_slots_to_add(self) -> np.ndarray:
+        """Return the slots (num_envs,) of the transitions that a step of all environments will add."""
+        return (self.total + np.arange(self._num_envs)) % self.slots
+
+    def parts(self) -> Iterator[tuple[np.ndarray, Transitions, np.ndarray]]:
+        """Yield all transitions in parts: slots, single steps, and whether they are the last of their episodes."""
+        for first in range(0, len(self), _TRANSITIONS_PER_READ):
+            indices = np.arange(first, min(first + _TRANSITIONS_PER_READ, len(self)))
+            slots = (self.total - len(self) + indices) % self.slots
+            yield slots, self.transitions_at(indices), self._end_indices[slots] >= 0
+
     def _next_slots(self, slots):
         """Return the slots of the next transitions of the same environments."""
-        return (slots + self._num_envs) % self._slots
+        return (slots + self._num_envs) % self.slots
 
     def restore(self, total: int, ends: int, checksum: int) -> None:
         """Resume with the counters of a checkpoint; at most `slack` later transitions may be on disk.
@@ -173,20 +189,20 @@ class Replay:
             indices = np.arange(first, min(first + _TRANSITIONS_PER_READ, len(self)))
             self._add_to_checksum(first_number + first, self.transitions_at(indices))
         if self.checksum != checksum:
-            raise Damaged(f"{self._folder} holds other transitions")
+            raise Damaged(f"{self.folder} holds other transitions")
 
     def _add_to_checksum(self, first_number: int, transitions: Transitions) -> None:
         """Add consecutive transitions to the checksum, of which the first has this number since the start."""
         columns = [array.reshape(len(array), -1) for array in transitions]
         for number, values in enumerate(np.concatenate(columns, axis=1), first_number):
             crc = zlib.crc32(values, number & 0xFFFFFFFF)
-            self._checksums[number % self._slots] = crc
+            self._checksums[number % self.slots] = crc
             self.checksum += crc
 
     def _grow_final_observations(self, ends: int) -> None:
         """Map the file of final observations again until it has room for this many."""
         while len(self._final_observations) < ends:
-            shape = (2 * len(self._final_observations), self._size)
+            shape = (2 * len(self._final_observations), self.size)
             make = self._mode != "r"
             self._final_observations = self._map_file("final_observations", np.float32, shape, make)
 
@@ -202,7 +218,7 @@ class Replay:
         Raises:
             Damaged: the file is missing or too short.
         """
-        path = self._folder / name
+        path = self.folder / name
         size = int(np.prod(shape)) * np.dtype(dtype).itemsize  # bytes
         is_resumed = self._mode == "r+" and path.is_file()
         if make or is_resumed:
@@ -211,6 +227,35 @@ class Replay:
             raise Damaged(f"{path} is missing or too short")
         mapped_array = np.memmap(path, dtype, "r" if self._mode == "r" else "r+", shape=shape)
         return np.asarray(mapped_array)  # indexing a plain array is faster
+
+
+def follow_steps(ordinals, total, num_envs: int, n_step: int, discount: float, reward_of: Callable, is_last: Callable):
+    """Follow transitions over several control steps, with arrays of NumPy or JAX.
+
+    Args:
+        ordinals: (batch,) numbers of the first transitions, since the start.
+        total: transitions added since the start.
+        num_envs: environments, whose transitions are added in turn.
+        n_step: control steps; fewer where an episode or the stored transitions end.
+        discount: discount of a control step.
+        reward_of: function of such numbers that returns the rewards of these transitions.
+        is_last: function of such numbers that returns whether these transitions are the last of their episodes.
+
+    Returns:
+        The numbers of the last transitions, the sums of the rewards, those after the first discounted, and the
+        discounts of the last; (batch,) each.
+    """
+    xp = ordinals.__array_namespace__()
+    rewards = reward_of(ordinals)
+    discounts = xp.ones(len(ordinals), xp.float32)
+    has_next_step = xp.ones(len(ordinals), bool)
+    for _ in range(n_step - 1):
+        is_next_stored = ordinals + num_envs < total
+        has_next_step = has_next_step & ~is_last(ordinals) & is_next_stored
+        ordinals = xp.where(has_next_step, ordinals + num_envs, ordinals)
+        discounts = xp.where(has_next_step, discounts * np.float32(discount), discounts)
+        rewards = rewards + xp.where(has_next_step, discounts * reward_of(ordinals), np.float32(0.0))
+    return ordinals, rewards, discounts
 
 
 def _allocate(path: Path, size: int) -> None:

@@ -157,6 +157,16 @@ def read_progress(path: str | os.PathLike) -> dict[str, Any]:
     return progress
 
 
+def read_arrays(path: str | os.PathLike) -> dict[str, np.ndarray] | None:
+    """Return the arrays of the latest checkpoint; None without a checkpoint.
+
+    Raises:
+        ValueError: the checkpoint is damaged.
+    """
+    arrays, _ = _read_checkpoint(Path(path) / CHECKPOINT)
+    return arrays
+
+
 def latest_returns(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the returns (episodes,) of the latest evaluation in a table of evaluations."""
     latest_step = evaluations["step"][-1]

@@ -10,7 +10,7 @@ An update computes in the order of the published code of the ARC-RL paper:
 The policy ascends the mean of the critics, not their minimum. Dropout comes before the layer norm. It also acts in the
 targets and in the policy's loss.
 
-Noise and dropout masks are inputs, so an update is a pure function.
+Noise and dropout masks are inputs of an update, and keys of JAX those of noise, so all are pure functions.
 """
 
 import math
@@ -31,6 +31,8 @@ HIDDEN_LAYERS = 2
 LOG_STD_RANGE = (-20.0, 2.0)  # of the logarithm of the policy's standard deviation
 
 _TINY_SLOPE = 1e-6  # added to the slope of tanh: keeps the logarithm of the density finite where tanh saturates
+_GAP_DEVIATIONS = 8  # standard deviations of the number of dropped units, up to which gaps are drawn
+_TINY_UNIFORM = 1e-37  # keeps the logarithm of a uniform number finite
 _LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
@@ -96,43 +98,40 @@ def update_hyperparameters(hp: SoftActorCritic) -> SoftActorCritic:
     return SoftActorCritic(**{name: getattr(hp, name) for name in names})
 
 
-def draw_noise(
-    hp: SoftActorCritic, random: np.random.Generator, batch: int, joints: tuple[int, ...], with_policy: bool
-) -> Noise:
+def draw_noise(hp: SoftActorCritic, key, batch: int, joints: tuple[int, ...], with_policy: bool) -> Noise:
     """Draw the random inputs of an update.
 
     Args:
         hp: hyperparameters.
-        random: generator to draw from.
+        key: key of JAX to draw from.
         batch: transitions of the update.
         joints: shape of an action.
         with_policy: whether the policy learns too; otherwise the critics alone.
     """
-    next_action = random.standard_normal((batch, *joints), np.float32)
-    action = random.standard_normal((batch, *joints), np.float32) if with_policy else None
+    next_action_key, action_key, mask_key = jax.random.split(key, 3)
+    next_action = jax.random.normal(next_action_key, (batch, *joints))
+    action = jax.random.normal(action_key, (batch, *joints)) if with_policy else None
     dropout_masks = None
     if hp.dropout:
         uses = 3 if with_policy else 2
         shape = (uses, CRITICS, HIDDEN_LAYERS, batch, hp.hidden)
-        dropout_masks = draw_dropout_masks(random, shape, hp.dropout)
+        dropout_masks = draw_dropout_masks(mask_key, shape, hp.dropout)
     return Noise(next_action, action, dropout_masks)
 
 
-def draw_dropout_masks(random: np.random.Generator, shape: tuple[int, ...], dropout: float) -> np.ndarray:
+def draw_dropout_masks(key, shape: tuple[int, ...], dropout: float):
     """Draw independent booleans of a shape, each False with the probability `dropout`.
 
     It draws the gaps between dropped units, which have a geometric distribution. For small `dropout` that takes a
     fraction of the time.
     """
-    mask = np.ones(math.prod(shape), bool)
-    expected_drops = mask.size * dropout
-    gaps_per_draw = int(expected_drops + 4.0 * math.sqrt(expected_drops)) + 8  # four standard deviations, and some
-    last_index = -1
-    while last_index < mask.size:
-        gaps = random.geometric(dropout, gaps_per_draw)
-        indices = last_index + np.cumsum(gaps)
-        mask[indices[indices < mask.size]] = False
-        last_index = indices[-1]
+    size = math.prod(shape)
+    expected_drops = size * dropout
+    draws = int(expected_drops + _GAP_DEVIATIONS * math.sqrt(expected_drops)) + _GAP_DEVIATIONS
+    uniform = jax.random.uniform(key, (draws,), minval=_TINY_UNIFORM)
+    gaps = jnp.ceil(jnp.log(uniform) / math.log1p(-dropout)).astype(jnp.int32)
+    indices = jnp.cumsum(jnp.maximum(gaps, 1)) - 1
+    mask = jnp.ones(size, bool).at[indices].set(False, mode="drop", indices_are_sorted=True, unique_indices=True)
     return mask.reshape(shape)
 
 

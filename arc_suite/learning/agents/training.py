@@ -1,9 +1,10 @@
 """Training: from a configuration to a folder with a policy, resumed bit-exactly after a kill at any moment."""
 
 import contextlib
+import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,15 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite import checks, evaluation, files, seed_ranges
-from arc_suite.learning.agents import priors, run_folder
+from arc_suite.learning.agents import algorithms, priors, run_folder
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
 from arc_suite.learning.agents.evaluating import Evaluator, Lines, ProcessEvaluator
-from arc_suite.learning.agents.learner import UNLEARNED_PREFIXES, Damaged, Diverged, Slice
+from arc_suite.learning.agents.learner import UNLEARNED_PREFIXES, Damaged, Diverged, RunContext, Slice
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
 from arc_suite.policies.network import Network
+from arc_suite.simulation.cores import usable_cores
 
 _SAVE_INTERVAL = 30.0  # s between two checkpoints of a learner that stays on a device
 
@@ -54,69 +56,251 @@ def train(
     """
     if minutes is not None:
         checks.number("minutes", minutes, 0.0)
-    folder = Path(folder)
     algorithm = configuration.definition
+    stays_on_device = configuration.learns_on_device
+    with (
+        _record(configuration, folder, threads, stays_on_device, 1, on_metrics) as recorder,
+        contextlib.closing(algorithm.learn(algorithm.hyperparameters, recorder.context)) as slices,
+        recorder.show_progress(progress),
+    ):
+        while not recorder.finished:
+            is_time_up = minutes is not None and recorder.cpu_seconds() > 60.0 * minutes
+            if (recorder.has_checkpoint and stop()) or is_time_up:
+                recorder.flush()
+                return False
+            with _naming_damage([recorder.folder]):
+                learned_slice = next(slices)
+            recorder.begin(learned_slice)
+            recorder.complete(learned_slice)
+    return True
+
+
+def train_in_one_program(
+    configurations: Sequence[Configuration],
+    folders: Sequence[Path],
+    progress: Callable = tqdm,
+    listeners: Sequence[Callable[[int, Mapping[str, float]], None]] = (),
+    stop: Callable[[], bool] = lambda: False,
+) -> bool:
+    """Train or resume several runs side by side, in one program of JAX's device; see `algorithms.program_of`.
+
+    Args:
+        configurations: configurations of the runs.
+        folders: folder of each run, which it has as if it were trained alone.
+        progress: makes a progress bar as `tqdm` does.
+        listeners: function of each run that is called as `on_metrics` of `train`; none for no calls.
+        stop: returns whether to stop; called after each slice.
+
+    Returns:
+        Whether all runs are finished.
+
+    Raises:
+        ValueError, Diverged, OSError: as `train`.
+    """
+    with contextlib.ExitStack() as stack:
+        recorders = []
+        listeners = listeners or [_ignore_metrics] * len(folders)
+        for configuration, folder, on_metrics in zip(configurations, folders, listeners, strict=True):
+            recording = _record(configuration, folder, usable_cores(), True, len(folders), on_metrics)
+            recorders.append(stack.enter_context(recording))
+        contexts = [recorder.context for recorder in recorders]
+        all_hyperparameters = [configuration.hyperparameters for configuration in configurations]
+        all_slices = stack.enter_context(
+            contextlib.closing(algorithms.learn_in_one_program(all_hyperparameters, contexts))
+        )
+        for recorder in recorders:
+            stack.enter_context(recorder.show_progress(progress))
+        while not all(recorder.finished for recorder in recorders):
+            with _naming_damage(folders):
+                slices = next(all_slices)
+            new_slices = [
+                (recorder, learned_slice)
+                for recorder, learned_slice in zip(recorders, slices, strict=True)
+                if learned_slice is not None and not recorder.finished
+            ]
+            for recorder, learned_slice in new_slices:
+                recorder.begin(learned_slice)
+            for recorder, learned_slice in new_slices:  # once the evaluations of all runs have begun
+                recorder.complete(learned_slice)
+            if stop():
+                for recorder in recorders:
+                    recorder.flush()
+                return all(recorder.finished for recorder in recorders)
+    return True
+
+
+def _ignore_metrics(step: int, metrics: Mapping[str, float]) -> None:
+    """Do nothing with metrics."""
+
+
+class _Recorder:
+    """Writes what a learner yields into the folder of its run: tables, policies and checkpoints.
+
+    Attributes:
+        folder: folder of the run.
+        context: what the learner takes.
+        has_checkpoint: whether the folder has a checkpoint, or will have one by `flush`.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        run_files: RunFolder,
+        context: RunContext,
+        evaluator: Evaluator | ProcessEvaluator,
+        training_seeds: seed_ranges.Ranges | None,
+        interval: float,
+        runs: int,
+        on_metrics: Callable[[int, Mapping[str, float]], None],
+    ):
+        """Begin where the folder's checkpoint stands.
+
+        Args:
+            configuration: configuration of the run.
+            run_files: the open folder.
+            context: what the learner takes.
+            evaluator: evaluates policies.
+            training_seeds: seeds of the episodes that policies learn from.
+            interval: seconds between two checkpoints; 0 to write each.
+            runs: runs that this process trains, which share its CPU time.
+            on_metrics: see `train`.
+        """
+        self.folder = run_files.path
+        self.context = context
+        self.has_checkpoint = run_files.arrays is not None
+        self._configuration = configuration
+        self._run_files = run_files
+        self._evaluator = evaluator
+        self._training_seeds = training_seeds
+        self._runs = runs
+        self._bar = None
+        self._on_metrics = on_metrics
+        self._writer = _CheckpointWriter(run_files, interval)
+        self._progress = {"evaluated": 0, "pending": [], "wall": 0.0, "cpu": 0.0} | run_files.progress
+        self._policy_step = self._progress["evaluated"]  # of the latest policy whose evaluation has begun
+        self._is_policy_new = False  # whether the latest slice has a policy to evaluate
+        # Where the clocks stood when the run began, if it had never stopped.
+        self._wall_start = time.monotonic() - self._progress["wall"]
+        self._cpu_start = _cpu_clock() - runs * self._progress["cpu"]
+        for step in self._progress["pending"]:
+            evaluator.begin(step, network.load(_checkpoint_folder(self.folder, step)))
+            self._policy_step = step
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last policy has been evaluated."""
+        return self._progress["evaluated"] >= self.context.steps
+
+    def show_progress(self, progress: Callable):
+        """Begin a progress bar, as `tqdm` does, and return it: a context."""
+        evaluated_step = self._progress["evaluated"]
+        options = {"total": self.context.steps, "initial": evaluated_step, "unit": "step", "unit_scale": True}
+        self._bar = progress(desc=self.folder.name, **options)
+        return self._bar
+
+    def cpu_seconds(self) -> float:
+        """Return the CPU time of the run so far, with that of evaluations that have ended."""
+        return (_cpu_clock() - self._cpu_start) / self._runs
+
+    def flush(self) -> None:
+        """Write the latest checkpoint if it has not been written."""
+        self._writer.flush()
+
+    def begin(self, learned_slice: Slice) -> None:
+        """Write the line of a slice, and begin the evaluation of its policy if it is due.
+
+        Raises:
+            Diverged: a metric or an array of it is not finite.
+        """
+        step = learned_slice.step
+        metrics = learned_slice.metrics
+        _check_finite(learned_slice, self.folder)
+        self._bar.update(step - self._bar.n)
+        if metrics is not None:
+            self._run_files.append("training", {"step": step, **metrics})
+            self._on_metrics(step, metrics)
+            self._bar.set_postfix_str(_postfix(metrics, self._progress), refresh=False)
+        self._is_policy_new = step >= self.context.next_evaluation(self._policy_step)
+        if self._is_policy_new:
+            self._policy_step = step
+            policy_setup = self._configuration.policy_setup
+            policy = Network(learned_slice.policy, policy_setup, self._evaluator.block_sizes, self._training_seeds)
+            network.save(files.folder(_checkpoint_folder(self.folder, step)) / network.FILE, policy)
+            self._evaluator.begin(step, policy)
+
+    def complete(self, learned_slice: Slice) -> None:
+        """Write the results of evaluations, times, and the checkpoint of a slice.
+
+        It waits for the evaluation of the last policy.
+        """
+        is_last = self._policy_step >= self.context.steps
+        for evaluated_step, lines in self._evaluator.pop_results(wait=is_last):
+            mean_return = _record_evaluation(self._configuration, self._run_files, evaluated_step, lines)
+            self._progress |= {"return": mean_return, "evaluated": evaluated_step}
+            self._on_metrics(evaluated_step, {"return": mean_return})
+        self._progress["pending"] = list(self._evaluator.pending)
+        self._progress["wall"] = time.monotonic() - self._wall_start  # s, of all processes of a run
+        self._progress["cpu"] = self.cpu_seconds()  # s, of all processes of a run
+        if learned_slice.metrics is not None or self._is_policy_new:
+            seconds = {f"{name}_seconds": round(self._progress[name], 3) for name in ("wall", "cpu")}
+            self._run_files.append("times", {"step": learned_slice.step, **seconds})
+        self._writer.write(learned_slice.checkpoint, self._progress, at_once=is_last)
+        self.has_checkpoint = True
+
+
+@contextlib.contextmanager
+def _record(
+    configuration: Configuration,
+    folder: Path,
+    threads: int,
+    stays_on_device: bool,
+    runs: int,
+    on_metrics: Callable[[int, Mapping[str, float]], None],
+) -> Iterator[_Recorder]:
+    """Open the folder of a run, and yield its recorder.
+
+    Args:
+        configuration, folder, threads, on_metrics: see `train`.
+        stays_on_device: whether the learner stays on a device: checkpoints are rarer, and other processes evaluate.
+        runs: runs that this process trains.
+    """
+    folder = Path(folder)
     record = configuration.record()
     if configuration.prior is not None:  # the data under an id may change
         record[PRIOR_SHA256] = priors.dataset_digest(configuration.prior)
     training_seeds = _training_seeds(configuration, folder)
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
     evaluation.check_ends(configuration.setup.definition.step_limit)
-    growing_fields = ("steps",) if algorithm.extends else ()
+    growing_fields = ("steps",) if configuration.definition.extends else ()
     with run_folder.open_run(folder, record, growing_fields) as run_files, contextlib.ExitStack() as stack:
-        progress_values = {"evaluated": 0, "pending": [], "wall": 0.0, "cpu": 0.0} | run_files.progress
-        run_folder.check_latest_evaluation(folder, progress_values["evaluated"])
+        evaluated_step = run_files.progress.get("evaluated", 0)
+        run_folder.check_latest_evaluation(folder, evaluated_step)
         context = configuration.context(folder, threads, run_files.arrays)
-        slices = stack.enter_context(contextlib.closing(algorithm.learn(algorithm.hyperparameters, context)))
-        evaluator = _make_evaluator(configuration, threads, folder)
+        if stays_on_device:
+            evaluator = ProcessEvaluator(configuration, folder, runs)
+        else:
+            evaluator = Evaluator(configuration, threads)
         stack.enter_context(contextlib.closing(evaluator))
-        policy_step = progress_values["evaluated"]  # of the latest policy whose evaluation has begun
-        for policy_step in progress_values["pending"]:
-            evaluator.begin(policy_step, network.load(_checkpoint_folder(folder, policy_step)))
-        writer = _CheckpointWriter(run_files, _SAVE_INTERVAL if configuration.learns_on_device else 0.0)
-        # Where the clocks stood when the run began, if it had never stopped.
-        wall_start = time.monotonic() - progress_values["wall"]
-        cpu_start = time.process_time() - progress_values["cpu"]
-        bar = progress(
-            total=context.steps, initial=progress_values["evaluated"], desc=folder.name, unit="step", unit_scale=True
-        )
-        stack.enter_context(bar)
-        has_checkpoint = run_files.arrays is not None
-        while progress_values["evaluated"] < context.steps:
-            is_time_up = minutes is not None and time.process_time() - cpu_start > 60.0 * minutes
-            if (has_checkpoint and stop()) or is_time_up:
-                writer.flush()
-                return False
-            learned_slice = _next_slice(slices, run_files)
-            step = learned_slice.step
-            metrics = learned_slice.metrics
-            _check_finite(learned_slice)
-            bar.update(step - bar.n)
-            if metrics is not None:
-                run_files.append("training", {"step": step, **metrics})
-                on_metrics(step, metrics)
-                bar.set_postfix_str(_postfix(metrics, progress_values), refresh=False)
-            is_evaluated = step >= context.next_evaluation(policy_step)
-            if is_evaluated:
-                policy_step = step
-                policy_setup = configuration.policy_setup
-                policy = Network(learned_slice.policy, policy_setup, evaluator.block_sizes, training_seeds)
-                network.save(files.folder(_checkpoint_folder(folder, step)) / network.FILE, policy)
-                evaluator.begin(step, policy)
-            is_last = policy_step >= context.steps
-            for evaluated_step, lines in evaluator.pop_results(wait=is_last):
-                progress_values["return"] = _record_evaluation(configuration, run_files, evaluated_step, lines)
-                progress_values["evaluated"] = evaluated_step
-                on_metrics(evaluated_step, {"return": progress_values["return"]})
-            progress_values["pending"] = list(evaluator.pending)
-            progress_values["wall"] = time.monotonic() - wall_start  # s, of all processes of a run
-            progress_values["cpu"] = time.process_time() - cpu_start  # s, of all processes of a run
-            if metrics is not None or is_evaluated:
-                seconds = {f"{name}_seconds": round(progress_values[name], 3) for name in ("wall", "cpu")}
-                run_files.append("times", {"step": step, **seconds})
-            writer.write(learned_slice.checkpoint, progress_values, at_once=is_last)
-            has_checkpoint = True
-    return True
+        # A buffer that overwrites transitions goes on from recent checkpoints alone.
+        overwrites = getattr(configuration.hyperparameters, "buffer_size", context.steps) < context.steps
+        interval = _SAVE_INTERVAL if stays_on_device and not overwrites else 0.0
+        yield _Recorder(configuration, run_files, context, evaluator, training_seeds, interval, runs, on_metrics)
+
+
+def _cpu_clock() -> float:
+    """Return the CPU time of this process and of its ended children, s."""
+    times = os.times()
+    return time.process_time() + times.children_user + times.children_system
+
+
+@contextlib.contextmanager
+def _naming_damage(folders: Sequence[Path]) -> Iterator[None]:
+    """Raise ValueError with the path of the checkpoint in place of `Damaged`."""
+    try:
+        yield
+    except Damaged as error:
+        paths = ", ".join(str(folder / run_folder.CHECKPOINT) for folder in folders)
+        raise ValueError(f"{paths} is damaged: {error}; delete it to start the run over") from None
 
 
 class _CheckpointWriter:
@@ -144,24 +328,15 @@ class _CheckpointWriter:
         self._next_time = time.monotonic() + self._interval
 
 
-def _next_slice(slices: Iterator[Slice], run_files: RunFolder) -> Slice:
-    """Return the next slice of a learner; raise ValueError with the path of a damaged checkpoint."""
-    try:
-        return next(slices)
-    except Damaged as error:
-        path = run_files.path / run_folder.CHECKPOINT
-        raise ValueError(f"{path} is damaged: {error}; delete it to start the run over") from None
-
-
-def _check_finite(learned_slice: Slice) -> None:
+def _check_finite(learned_slice: Slice, folder: Path) -> None:
     """Raise Diverged for a metric or an array of the learner that is not finite."""
     for name, metric in (learned_slice.metrics or {}).items():
         if not np.isfinite(metric):
-            raise Diverged(f"{name} is {metric}", learned_slice.step)
+            raise Diverged(f"{name} is {metric}", learned_slice.step, folder)
     for name, array in learned_slice.checkpoint.items():
         is_learned = array.dtype.kind == "f" and not name.startswith(UNLEARNED_PREFIXES)
         if is_learned and not np.isfinite(array).all():
-            raise Diverged(f"{name} is not finite", learned_slice.step)
+            raise Diverged(f"{name} is not finite", learned_slice.step, folder)
 
 
 def _postfix(metrics: Mapping[str, float], progress_values: Mapping[str, Any]) -> str:
@@ -194,13 +369,6 @@ def _training_seeds(configuration: Configuration, folder: Path) -> seed_ranges.R
     if start_ranges is None:
         return None
     return tuple(dict.fromkeys((*start_ranges, *ranges)))
-
-
-def _make_evaluator(configuration: Configuration, threads: int, folder: Path) -> Evaluator | ProcessEvaluator:
-    """Return what evaluates the policies of a run: in processes of its own for a learner that stays on a device."""
-    if configuration.learns_on_device:
-        return ProcessEvaluator(configuration, threads, folder)
-    return Evaluator(configuration, threads)
 
 
 def _record_evaluation(configuration: Configuration, run_files: RunFolder, step: int, lines: Lines) -> float:

@@ -1,7 +1,8 @@
 """Rollouts in the worlds of `learning.worlds.mjx`: simulation, policy and transitions stay on JAX's device."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Self
 
 import jax
 import jax.numpy as jnp
@@ -14,12 +15,13 @@ from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, RunContext
 from arc_suite.learning.agents.normalizer import Normalizer
 from arc_suite.learning.worlds import mjx
+from arc_suite.learning.worlds.starts import Starts
 
 _IMPLEMENTATIONS = {"mjx": "jax", "warp": "warp"}  # by the hyperparameter `simulation`
 
 
 class WorldsState(NamedTuple):
-    """The state of all worlds.
+    """The state of all worlds of a run, or with a leading axis of several runs.
 
     Attributes:
         state: state of the worlds, with a leading axis (num_envs,).
@@ -38,39 +40,49 @@ class WorldRollouts:
 
     Attributes:
         env: the task as functions of JAX.
+        starts: tables of starts of the runs, with a leading axis.
         task: the task.
         architecture: architecture of the networks.
     """
 
-    def __init__(self, hp: ProximalPolicy, context: RunContext):
-        """Load the task."""
+    def __init__(self, hp: ProximalPolicy, contexts: Sequence[RunContext]):
+        """Load the task of runs that differ in their seeds."""
         self._hp = hp
-        self._first_seed = context.first_seed
-        setup = context.training
+        setup = contexts[0].training
         self.env = mjx.load(
             setup.body,
             setup.task,
             setup.task_kwargs,
             impl=_IMPLEMENTATIONS[hp.simulation],
-            first_seed=context.first_seed,
-            num_envs=hp.num_envs,
+            first_seed=contexts[0].first_seed,
+            num_envs=hp.num_envs * len(contexts),
             privileged=bool(hp.critic_blocks),
         )
+        self.starts = networks.stack_trees([self.env.draw_starts(context.first_seed) for context in contexts])
         self.task = self.env.task
         self.architecture = architectures.of(self.task, hp.network, hp.critic_blocks, hp.symmetry_augmentation)
         self._columns = critic_blocks.privileged_columns(self.task, hp.critic_blocks)
 
+    def with_starts(self, starts: Starts) -> Self:
+        """Return the worlds of a run, whose episodes start from its table."""
+        rollouts = copy.copy(self)
+        rollouts.env = self.env.with_starts(starts)
+        return rollouts
+
     def begin(self) -> WorldsState:
-        """Return the worlds at the start of their first episodes."""
-        seeds = np.uint32(self._first_seed) + np.arange(self._hp.num_envs, dtype=np.uint32)
-        state = jax.jit(jax.vmap(self.env.start))(seeds)
-        ages = initial_ages(self._hp.num_envs, self.task.step_limit)
-        return WorldsState(state, jnp.asarray(ages, int))
+        """Return the worlds of all runs at the start of their first episodes."""
+        ages = jnp.asarray(initial_ages(self._hp.num_envs, self.task.step_limit), int)
+
+        def begin_run(starts):
+            state = jax.vmap(self.env.with_starts(starts).start_of)(jnp.arange(self._hp.num_envs))
+            return WorldsState(state, ages)
+
+        return jax.jit(jax.vmap(begin_run))(self.starts)
 
     def roll_out(
         self, worlds: WorldsState, policy, normalize: Normalizer, std, key
     ) -> tuple[WorldsState, dict[str, jax.Array]]:
-        """Act in all worlds for a horizon.
+        """Act in all worlds of a run for a horizon.
 
         Args:
             worlds: before the horizon.
@@ -123,11 +135,15 @@ class WorldRollouts:
         """Return the state of worlds as part of a checkpoint."""
         return networks.name_leaves({ENVIRONMENT_PREFIX.rstrip("/"): _saved_tree(worlds)})
 
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> WorldsState:
-        """Return the worlds whose state the arrays of a checkpoint hold."""
+    def restore(self, checkpoints: Sequence[Mapping[str, np.ndarray]]) -> WorldsState:
+        """Return the worlds of all runs whose states the arrays of checkpoints hold."""
         worlds = self.begin()
-        tree = networks.restore_tree(ENVIRONMENT_PREFIX.rstrip("/"), _saved_tree(worlds), arrays)
-        simulation, state_fields, steps = tree
+        saved_tree = _saved_tree(worlds)
+        trees = []
+        for index, arrays in enumerate(checkpoints):
+            template = networks.select_tree(saved_tree, index)
+            trees.append(networks.restore_tree(ENVIRONMENT_PREFIX.rstrip("/"), template, arrays))
+        simulation, state_fields, steps = networks.stack_trees(trees)
         data = worlds.state.data.replace(**simulation)
         return WorldsState(worlds.state.replace(data=data, **state_fields), steps)
 

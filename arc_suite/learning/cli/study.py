@@ -1,15 +1,17 @@
 """Make the runs of a study, or write its report.
 
-A study is a table of runs: robots, tasks, algorithms, seeds, steps. Each run is a process of one thread. Finished
-runs are skipped, and the others resume. Configurations, episodes, times and style of all runs become two tables, which
-are small enough to be committed, and the report is made from these tables alone. A name is module:attribute, a Study on
-Python's path or in the current folder, or <division>-<algorithm> of the benchmark.
+A study is a table of runs: robots, tasks, algorithms, seeds, steps. Each run is a process of one thread; with
+--device, runs of equal sizes are one program on a GPU. Finished runs are skipped, and the others resume.
+Configurations, episodes, times and style of all runs become two tables, which are small enough to be committed, and the
+report is made from these tables alone. A name is module:attribute, a Study on Python's path or in the current folder,
+or <division>-<algorithm> of the benchmark.
 
   arc-suite study my_studies:MINE
   arc-suite study my_studies:MINE --report
   arc-suite study my_studies:MINE --jobs 8 --shard 3/16
   arc-suite study my_studies:MINE --submit 16 --hours 24
   arc-suite study top-ppo
+  arc-suite study samples-sac --device --minutes 30
 """
 
 import sys
@@ -22,10 +24,12 @@ from arc_suite import checks, versions
 from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable
 from arc_suite.learning.studies import publication, report, runner, tables
-from arc_suite.simulation.cores import usable_cores
+from arc_suite.simulation.cores import prepare_jax, usable_cores
 
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
+flags.DEFINE_bool("device", False, "Learn on JAX's device, such as a GPU: runs of equal sizes in one program.")
+flags.DEFINE_float("minutes", None, "With --device: stop after so many minutes; the same command goes on.", 0.0)
 flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth from the ith on; i counts from 0.")
 flags.DEFINE_integer("submit", None, "Submit so many jobs to a SLURM cluster, each with a share of the runs.", 1)
 flags.DEFINE_float(
@@ -37,7 +41,15 @@ flags.DEFINE_string("runs", None, "Folder of the runs. [default: runs/NAME]")
 flags.DEFINE_string("results", None, "Folder of the tables and the report. [default: studies/NAME]")
 
 
-_FLAGS_OF_RUNS = ("jobs", "shard", "submit", "hours", "partition")  # flags without effect on a report
+_FLAGS_OF_RUNS = (
+    "jobs",
+    "device",
+    "minutes",
+    "shard",
+    "submit",
+    "hours",
+    "partition",
+)  # flags without effect on a report
 
 
 def main(name: str | None = None) -> int:
@@ -69,6 +81,10 @@ def make_or_report(
         refuse_flags(_FLAGS_OF_RUNS, "goes without --report, which makes no runs")
     if FLAGS.submit is None:
         refuse_flags(("hours", "partition"), "goes with --submit")
+    if FLAGS.device:
+        refuse_flags(("jobs", "submit"), "goes without --device, on which runs learn in this process")
+    else:
+        refuse_flags(["minutes"], "goes with --device")
     part, parts = shard(FLAGS.shard)
     runs = study.runs[part::parts]
     if not runs:
@@ -86,7 +102,11 @@ def make_or_report(
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
         return submit(command, min(FLAGS.submit, len(runs)), folder, results)
     with resumable(folder):
-        status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
+        if FLAGS.device:
+            prepare_jax()
+            status = runner.make_on_device(runs, folder, FLAGS.minutes, progress)
+        else:
+            status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
     publication.publish(study.runs, folder, results)
     return status
 

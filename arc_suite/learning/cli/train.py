@@ -7,6 +7,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --robot queen --task steer --algorithm dagger
   arc-suite train --robot tick --algorithm sac_parallel --minutes 5
   arc-suite train --robot tick --seed 0,1,2 --jobs 3 --until_score .9
+  arc-suite train --robot queen --seeds 0-15 --hp simulation=warp
   arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
   arc-suite train --robot tick --task steer --train_set kicks=1.5
@@ -45,7 +46,9 @@ from arc_suite.evaluation import anchors
 from arc_suite.learning import onnx_file, outcomes, processes
 from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.learning.agents.training import train
+from arc_suite.learning.agents.hyperparameters import DEVICE_DEFAULTS
+from arc_suite.learning.agents.learner import MAX_RUN_SEED
+from arc_suite.learning.agents.training import train, train_in_one_program
 from arc_suite.policies import network
 from arc_suite.simulation.cores import prepare_jax, usable_cores
 
@@ -85,7 +88,12 @@ flags.DEFINE_multi_string(
     "train_set", [], "Setting of the task in training alone, name=value, in place of that of --set."
 )
 flags.DEFINE_multi_string("hp", [], f"Hyperparameter, name=value, {describe_hyperparameters()}.")
-flags.DEFINE_list("seed", ["0"], "Seed of the run; several with commas are as many runs, each a process.")
+flags.DEFINE_list(
+    "seed",
+    ["0"],
+    "Seed of the run. Several, such as 0,1 or 0-15, are as many runs: each a process, or on a GPU all in one program.",
+)
+flags.DEFINE_alias("seeds", "seed")
 flags.DEFINE_integer(
     "steps",
     None,
@@ -156,7 +164,9 @@ def main() -> int:
         refuse_flags(["jobs"], "goes with several seeds, such as --seed=0,1,2")
     # Before the first step, as a score may be unreachable.
     threshold = None if FLAGS.until_score is None else outcomes.return_of_score(runs[0], FLAGS.until_score)
-    return train_seeds(runs) if len(runs) > 1 else train_run(runs[0], threshold)
+    if len(runs) == 1:
+        return train_run(runs[0], threshold)
+    return train_seeds_on_device(runs) if runs[0].learns_on_device else train_seeds(runs)
 
 
 def train_run(run: Configuration, threshold: float | None) -> int:
@@ -203,8 +213,7 @@ def train_run(run: Configuration, threshold: float | None) -> int:
             step = success_step()
             terminated = is_terminated()
     is_complete = finished or step is not None
-    if is_complete and importlib.util.find_spec("onnx") and not run.setup.several:
-        onnx_file.save(folder / "policy.onnx", network.load(folder))
+    save_onnx(run, folder, is_complete)
     print(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
     return TERMINATED if terminated and not is_complete else 0
 
@@ -247,6 +256,29 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
     return int(bool(failed_names))
 
 
+def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
+    """Train runs of several seeds in one program, print their results and their mean, and return the exit status."""
+    refuse_flags(("jobs", "minutes", "until_score", "tensorboard"), "goes without several seeds in one program")
+    folder = files.folder(FLAGS.output or "runs")
+    folders = [folder / run.name for run in runs]
+    listeners = [functools.partial(plot_returns, *pair) for pair in zip(runs, folders, strict=True)]
+    with resumable(folder), watch_for_termination() as is_terminated:
+        finished = train_in_one_program(runs, folders, progress, listeners, stop=is_terminated)
+        terminated = is_terminated()
+    for run, run_folder_path in zip(runs, folders, strict=True):
+        end = describe_end(run_folder_path, None, finished, terminated)
+        print(f"{run_folder_path}: {end}, {outcomes.latest_result(run, run_folder_path)}")
+        save_onnx(run, run_folder_path, finished)
+    print(f"{folder}: {outcomes.mean(runs, folder)}")
+    return TERMINATED if terminated and not finished else 0
+
+
+def save_onnx(run: Configuration, folder: Path, is_complete: bool) -> None:
+    """Write the policy of a complete run of one body in ONNX's format, if ONNX is installed."""
+    if is_complete and importlib.util.find_spec("onnx") and not run.setup.several:
+        onnx_file.save(folder / "policy.onnx", network.load(folder))
+
+
 def update_bars(folder: Path, bars: Mapping[str, Any]) -> None:
     """Update progress bars, by name of a run, from the folders of the runs."""
     for name, bar in bars.items():
@@ -280,6 +312,9 @@ def configurations_from_flags() -> list[Configuration]:
     training = named_values("train_set", FLAGS.train_set)
     several_bodies = registry.names_several_bodies(FLAGS.robot) and custom_body() is None
     setup = Setup.of(FLAGS.robot if several_bodies else only_body(), *task_from_flags())
+    seeds = parse_seeds(FLAGS.seed)
+    if len(seeds) > 1:
+        hyperparameters = with_worlds_of_seeds(hyperparameters)
     return [
         Configuration.of(
             setup,
@@ -291,19 +326,35 @@ def configurations_from_flags() -> list[Configuration]:
             prior=FLAGS.prior,
             training=training,
         )
-        for seed in parse_seeds(FLAGS.seed)
+        for seed in seeds
     ]
+
+
+def with_worlds_of_seeds(hyperparameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return hyperparameters with the worlds that each of several seeds has by default where a GPU simulates."""
+    simulation = hyperparameters.get("simulation")
+    if simulation not in DEVICE_DEFAULTS:
+        return dict(hyperparameters)
+    return {"num_envs": DEVICE_DEFAULTS[simulation].num_envs_of_seeds, **hyperparameters}
 
 
 def parse_seeds(texts: Sequence[str]) -> list[int]:
     """Return the seeds of --seed.
 
     Raises:
-        ValueError: a text that is no integer, or a seed twice.
+        ValueError: a text that is neither an integer nor a range of them, too many seeds, or a seed twice.
     """
-    seeds = [seed for text in texts if (seed := checks.digits(text)) is not None]
-    if not texts or len(set(seeds)) < len(texts):
-        raise ValueError(f"--seed={checks.quote(','.join(texts))}: expected different integers, such as 0,1,2")
+    refusal = ValueError(f"--seed={checks.quote(','.join(texts))}: expected different integers, such as 0,1,2 or 0-15")
+    seeds = []
+    for text in texts:
+        first_text, _, last_text = text.partition("-")
+        first = checks.digits(first_text)
+        last = checks.digits(last_text or first_text)
+        if first is None or last is None or not 0 <= last - first <= MAX_RUN_SEED:
+            raise refusal
+        seeds += range(first, last + 1)
+    if not seeds or len(set(seeds)) < len(seeds):
+        raise refusal
     return seeds
 
 

@@ -1,16 +1,22 @@
-"""Makes the runs of a study on this machine, a process for each."""
+"""Makes the runs of a study on this machine: a process for each, or many in one program of a device."""
 
 import functools
-from collections.abc import Callable, Sequence
+import math
+import sys
+import time
+from collections.abc import Callable, Hashable, Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
 from arc_suite import checks, data, files
 from arc_suite.learning import processes
-from arc_suite.learning.agents import run_folder
+from arc_suite.learning.agents import algorithms, run_folder, training
 from arc_suite.learning.agents.configuration import DATA_FIELDS
+from arc_suite.learning.agents.hyperparameters import SoftActorCritic
+from arc_suite.learning.agents.learner import Diverged
 from arc_suite.learning.studies.tables import Run
+from arc_suite.simulation.cores import usable_cores
 
 
 def make(runs: Sequence[Run], folder: Path, jobs: int, progress: Callable = tqdm) -> int:
@@ -31,6 +37,68 @@ def make(runs: Sequence[Run], folder: Path, jobs: int, progress: Callable = tqdm
     line = f"{len(runs) - failures} of {len(runs)} finished"
     print(f"{line}, {failures} failed" if failures else line)
     return int(failures > 0)
+
+
+def make_on_device(runs: Sequence[Run], folder: Path, minutes: float | None, progress: Callable = tqdm) -> int:
+    """Make the runs that are not finished in this process, and return the exit status: 1 if any failed.
+
+    Runs that can learn in one program of JAX's device do so together. The programs with the fewest updates come first.
+    A run that diverges leaves its program, which goes on from the checkpoints of the others.
+
+    Args:
+        runs: runs of the study.
+        folder: folder of the study, with a folder for each run.
+        minutes: time after which all stop; the same command goes on. None to make all runs.
+        progress: makes a progress bar as `tqdm` does.
+
+    Raises:
+        ValueError: a run that cannot learn on a device, or as `prepare`.
+        OSError: as `prepare`, or a file cannot be written.
+    """
+    end_time = math.inf if minutes is None else time.monotonic() + 60.0 * minutes
+    waiting = prepare(runs, folder, usable_cores(), progress)
+    failures = 0
+    while waiting and time.monotonic() < end_time:
+        program_runs = _group_by_program(waiting, folder)[0]
+        try:
+            training.train_in_one_program(
+                [run.configuration for run in program_runs],
+                [folder / run.name for run in program_runs],
+                progress,
+                stop=lambda: time.monotonic() >= end_time,
+            )
+        except Diverged as error:
+            tqdm.write(f"{error.folder}: {error}", file=sys.stderr)
+            program_runs = [run for run in program_runs if folder / run.name == error.folder]
+            failures += 1
+        waiting = [run for run in waiting if run not in program_runs]
+    finished = sum(is_finished(run, folder / run.name) for run in runs)
+    line = f"{finished} of {len(runs)} finished"
+    print(f"{line}, {failures} failed" if failures else line)
+    return int(failures > 0)
+
+
+def _group_by_program(runs: Sequence[Run], folder: Path) -> list[list[Run]]:
+    """Return runs in groups that can learn in one program, those with the fewest updates first."""
+    groups: dict[Hashable, list[Run]] = {}
+    for run in runs:
+        arrays = run_folder.read_arrays(folder / run.name)
+        context = run.configuration.context(folder / run.name, checkpoint=arrays)
+        try:
+            program = algorithms.program_of(run.configuration.hyperparameters, context)
+        except ValueError as error:
+            raise ValueError(f"{run.name}: {error}") from None
+        groups.setdefault(program, []).append(run)
+    return sorted(groups.values(), key=lambda group: _count_updates(group[0]))
+
+
+def _count_updates(run: Run) -> int:
+    """Return how many updates a run makes at most."""
+    hp = run.configuration.hyperparameters
+    steps = run.configuration.steps
+    if not isinstance(hp, SoftActorCritic):
+        return steps * hp.epochs // hp.minibatch
+    return steps // hp.num_envs * hp.updates_of_a_step + steps // hp.phase_every * hp.phase_updates
 
 
 def prepare(runs: Sequence[Run], folder: Path, threads: int, progress: Callable = tqdm) -> list[Run]:

@@ -8,11 +8,13 @@ Functions take one world and are pure. The wrappers and trainers of MuJoCo Playg
 They need the extra `gpu`; see docs/gpu.md.
 """
 
+import copy
 import dataclasses
+import functools
 import os
 import types
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import jax
 import jax.numpy as jnp
@@ -123,7 +125,10 @@ class Env:
         self.num_envs = checks.integer("num_envs", num_envs, 1, _MAX_ENVS)
         self.num_starts = num_starts
         self.first_seed = checks.seed(first_seed)
-        self._starts = starts.draw_starts(domain_name, task_name, task_kwargs, num_starts, first_seed, privileged)
+        self._draw = functools.partial(
+            starts.draw_starts, domain_name, task_name, task_kwargs, num_starts, privileged=privileged
+        )
+        self._starts = self._draw(first_seed)
         settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
         self.task, self.mj_model = prepare_task(domain_name, task_name, settings)
         if self.task.adapts:
@@ -153,8 +158,7 @@ class Env:
 
     def reset(self, rng) -> WorldState:
         """Return the start of an episode of the table, which a key of JAX draws."""
-        index = jax.random.randint(rng, (), 0, self.num_starts).astype("uint32")
-        return self.start(np.uint32(self.first_seed) + index)
+        return self.start_of(jax.random.randint(rng, (), 0, self.num_starts))
 
     def start(self, seed) -> WorldState:
         """Return the start of the episode that any environment of the suite has after `reset(seed=seed)`.
@@ -162,7 +166,21 @@ class Env:
         Args:
             seed: () an integer from `first_seed` on; episodes repeat after `num_starts`.
         """
-        index = (jnp.asarray(seed).astype("uint32") - np.uint32(self.first_seed)) % np.uint32(self.num_starts)
+        return self.start_of(jnp.asarray(seed).astype("uint32") - np.uint32(self.first_seed))
+
+    def draw_starts(self, first_seed: int) -> starts.Starts:
+        """Return a table of starts: as many as this environment has, whose first one has another seed."""
+        return self._starts if first_seed == self.first_seed else self._draw(first_seed)
+
+    def with_starts(self, table: starts.Starts) -> Self:
+        """Return this environment with another table of as many starts."""
+        environment = copy.copy(self)
+        environment._starts = table
+        return environment
+
+    def start_of(self, number) -> WorldState:
+        """Return the start of an episode of the table by its number, (); episodes repeat after `num_starts`."""
+        index = number.astype("uint32") % np.uint32(self.num_starts)
         start = jax.tree.map(lambda table: jnp.asarray(table)[index], self._starts)
         data = self._data.replace(qpos=start.qpos, qvel=start.qvel, mocap_pos=start.mocap_pos)
         zero = jnp.zeros(())

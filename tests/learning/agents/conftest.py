@@ -28,7 +28,10 @@ def small(name, **changes):
 
 
 class Learning:
-    """A learner's generator; the attributes are the local variables of `learn` after the latest slice."""
+    """A learner's generator; the attributes are the local variables of `learn` after the latest slice.
+
+    Those of soft actor-critic are in its run and in the updates of it.
+    """
 
     def __init__(self, slices):
         self.slices, self.latest = slices, None
@@ -45,7 +48,15 @@ class Learning:
         return self.latest
 
     def __getattr__(self, name):
-        return inspect.getgeneratorlocals(self.slices)[name]
+        variables = inspect.getgeneratorlocals(self.slices)
+        if "all_slices" not in variables:
+            return variables[name]
+        variables = inspect.getgeneratorlocals(variables["all_slices"])
+        if name in ("state", "sums", "update_hp"):
+            return getattr(variables["updates"], f"_{name}")
+        if name == "task":
+            return variables["environments"].tasks[0]
+        return getattr(variables["runs"][0], name)
 
 
 def learning(algorithm, hyperparameters, folder, setup, steps=10_000, evaluate_every=1, **context):

@@ -111,7 +111,7 @@ def test_first_three_updates(name, learner, recorded):
         assert float(state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-12)
     # More steps of Adam make of rounding what they like, and so do its first ones where a probability is near 0.
     if len(recorded) <= 2 * STEPS and hp.critics == "squared":
-        assert of_state(agent.state, reference).max() < 1e-5
+        assert of_state(agent.state, reference).max() < 3e-5
     assert float(agent.state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), rel=1e-6, abs=1e-6)
 
 

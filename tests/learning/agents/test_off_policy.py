@@ -185,7 +185,7 @@ def test_networks_begin_as_published():
 
 @pytest.mark.parametrize("dropout", [0.01, 0.3])
 def test_dropout_keeps_the_right_share_each_on_its_own(dropout):
-    kept = sac.draw_dropout_masks(np.random.default_rng(0), (3, 2, 2, 256, 256), dropout)
+    kept = np.asarray(sac.draw_dropout_masks(jax.random.key(0), (3, 2, 2, 256, 256), dropout))
     dropped = ~kept
     error = 5.0 * np.sqrt(dropout * (1.0 - dropout) / kept.size)
     assert dropped.mean() == pytest.approx(dropout, abs=error)

@@ -65,7 +65,9 @@ def test_what_an_update_sees(learner, drawn, n_step, discounts):
     agent.until(200)
     task, (batch, _) = agent.task, drawn[-1]
     assert batch.observations.shape == (64, task.size) and "contact_forces" not in task.sizes
-    places = off_policy.generator(0, "update", agent.updates - 1).integers(0, 200, size=64)
+    ranges = np.array([[0, 200]])
+    (places,), _ = off_policy.draw_update(agent.update_hp, 64, agent.inputs.joints, True, 0, agent.updates - 1, ranges)
+    places = np.asarray(places)
     raw = agent.buffer.transitions_at(places, n_step, 0.97)
     assert_array_equal(batch.rewards, np.float32(0.1) * raw.rewards)
     assert_array_equal(batch.goes_on, raw.goes_on)

@@ -1,7 +1,11 @@
 """Training: a tiny run of every algorithm, interrupted anywhere and resumed bit-exactly, and errors of one line."""
 
+import contextlib
 import functools
 import json
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -15,7 +19,7 @@ from conftest import SHORT, small
 import arc_suite
 from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import algorithms, configuration, off_policy, priors, run_folder
+from arc_suite.learning.agents import algorithms, configuration, evaluating, off_policy, priors, run_folder, training
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.learner import Diverged
@@ -111,6 +115,29 @@ def test_the_policy_of_a_run_earns_what_its_table_says(tiny, tmp_path):
     for index, episode in enumerate(evaluation.episodes(environment, policy, range(3))):
         row = len(table["step"]) - 10 + index
         assert (table["return"][row], table["length"][row]) == (episode.total, episode.length)
+
+
+def test_processes_share_the_episodes_of_the_last_policy(tiny, tmp_path, monkeypatch):
+    """They have the lines that one evaluation in this process has."""
+    run, folder = tiny("sac", steps=30), tmp_path / "run"
+    assert train(run, folder, progress=silent)
+    monkeypatch.setattr(evaluating, "usable_cores", lambda: 4)
+    evaluator = evaluating.ProcessEvaluator(run, folder)
+    with contextlib.closing(evaluator):
+        evaluator.begin(30, None)
+        assert len(evaluator._processes[30]) == 3 and evaluator.pending == [30]
+        ((step, lines),) = evaluator.pop_results(wait=True)
+    table = run_folder.table(folder, "evaluations")
+    assert step == 30 and evaluator.pending == []
+    for name in ("seed", "return", "length"):
+        assert [line[name] for line in lines] == table[name].tolist()
+
+
+def test_minutes_count_the_processes_of_evaluations():
+    before, here = training._cpu_clock(), time.process_time()
+    subprocess.run([sys.executable, "-c", "sum(range(10**7))"], check=True)
+    others = training._cpu_clock() - before - (time.process_time() - here)
+    assert others > 0.05
 
 
 def test_the_record_of_a_run(tiny, tmp_path):

@@ -254,6 +254,8 @@ def test_columns_stay_in_the_order_of_each_task():
         (["top-ppo", "--shard=0/2", "--submit=3"], "--shard=0/2: --submit makes shares of its own; leave one of "),
         (["top-ppo", "--jobs=2", "--submit=3"], "--jobs, --submit: this machine, or a cluster; give one of them"),
         (["top-ppo", "--shard=30/31"], "--shard=30/31: no run, as the study has 30"),
+        (["top-ppo", "--minutes=2"], "--minutes: goes with --device"),
+        (["top-ppo", "--device", "--jobs=2"], "--jobs: goes without --device, on which runs learn in this process"),
         (["arc_suite:load"], "study 'arc_suite:load': expected a Study, got function"),
         (
             ["tiny_studies:TWIC"],
