@@ -73,6 +73,7 @@ _DEMONSTRATED = (
     *(("walk", preset) for preset in ("slow", "medium", "fast", "tuned", "refined")),
     *(("steer", preset) for preset in ("steered", "surefooted")),
     ("rough", "surefooted"),
+    ("rough", "climbing"),
     ("gaps", "sighted"),
     ("navigate", "planned"),
 )

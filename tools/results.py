@@ -39,7 +39,7 @@ PRESETS = {
     "limp": ("zero", "tuned", "steered", "reactive", "braced"),
     "roam": ("zero", "steered", "surefooted", "braced"),
     "navigate": ("zero", "steered", "planned"),
-    **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "sighted")),
+    **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "climbing", "sighted")),
     "leap": ("zero", "sighted", "leaping"),
 }
 # Presets that straight walks are compared with, for anchors alone: docs/results.md has them by `arc-suite evaluate`.

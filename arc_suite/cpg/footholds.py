@@ -56,8 +56,8 @@ class View(NamedTuple):
             moved_forward = self.moved[:, scan, 0].reshape(-1, *extra_axes)
             moved_left = self.moved[:, scan, 1].reshape(-1, *extra_axes)
             # The points of a scan lie on a grid, in rows by FORWARD and columns by LEFT, as one list.
-            row = _grid_index((x + moved_forward) / self.reach, FORWARD)
-            column = xp.rint(_grid_index((y + moved_left) / self.reach, LEFT))
+            row = grid_index((x + moved_forward) / self.reach, FORWARD)
+            column = xp.rint(grid_index((y + moved_left) / self.reach, LEFT))
             point_before = (xp.floor(row) * len(LEFT) + column).astype(int)
             point_behind = (xp.ceil(row) * len(LEFT) + column).astype(int)
             bound = xp.minimum(heights[environments, point_before], heights[environments, point_behind])
@@ -106,6 +106,6 @@ def find_landings(view: View, landing, along, places, height: float, support_poi
     return shifts, has_ground
 
 
-def _grid_index(coordinate, grid):
+def grid_index(coordinate, grid):
     """Return where a coordinate lies among evenly spaced ones, as a number of steps from the first."""
     return ((coordinate - grid[0]) / (grid[1] - grid[0])).clip(0.0, len(grid) - 1)

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from arc_suite.cpg.climbing import ClimbingParameters
 from arc_suite.cpg.leaping import LeapingParameters
 from arc_suite.cpg.leaps import Leap
 from arc_suite.cpg.planner import PlanningParameters
@@ -29,12 +30,14 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
     wide = steered._replace(wider=0.2, lower=0.15, integral=0.3)
     braced = wide._replace(most=1.2)
     surefooted = wide._replace(lift=0.4)
+    climbing = ClimbingParameters(surefooted)
     # Without an integral, actions are a function of the observation: networks without memory can learn them.
     reactive = steered._replace(integral=0.0)
     planned = PlanningParameters(steered)
     return {
         "steered": steered,
         "surefooted": surefooted,
+        "climbing": climbing,
         "braced": braced,
         "reactive": reactive,
         "sighted": sighted,
@@ -48,6 +51,19 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
 # feet follow late.
 _SIGHTED = SightedParameters(lead=0.24, longer=0.12, trust=0.5)
 DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_command_presets(_SIGHTED)}
+# Of bodies with four legs or fewer, which tip between two feet. Others walk better without these corrections.
+DEFAULTS_OF_FOUR_LEGS = {
+    **DEFAULTS,
+    "climbing": ClimbingParameters(
+        DEFAULTS["surefooted"]._replace(lift=0.5, gain=(2.0, 2.0, 1.0), lean=0.2, capture=0.4),
+        reserve=1.5,
+        tilt_rate=0.4,
+        tilt_sum=0.45,
+        leveling=0.45,
+        slope=0.2,
+        preview=0.35,
+    ),
+}
 
 # Presets of imported bodies. Their servos need little feedback on the motion: it comes late, and tips them.
 _STEERED = SteppingParameters(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.1, most=1.4, lean=0.0, capture=0.2)
@@ -57,6 +73,7 @@ DEFAULTS_OF_SERVOS = {
     "fast": 0.3,
     "steered": _STEERED,
     "surefooted": _STEERED,  # a wide stance costs some of the way over uneven ground
+    "climbing": ClimbingParameters(_STEERED),
     "braced": _STEERED._replace(wider=0.5, lower=0.25),
     "balanced": _STEERED,  # the former name of surefooted
     "reactive": _STEERED._replace(integral=0.0),
@@ -144,4 +161,5 @@ PRESETS["leaper"] |= _command_presets(
 )
 PRESETS["leaper"]["braced"] = PRESETS["leaper"]["steered"]
 PRESETS["leaper"]["surefooted"] = PRESETS["leaper"]["steered"]._replace(integral=0.2, lean=0.4)
+PRESETS["leaper"]["climbing"] = ClimbingParameters(PRESETS["leaper"]["surefooted"], tilt_rate=0.2)
 PRESETS["leaper"]["balanced"] = PRESETS["leaper"]["surefooted"]  # its former name

@@ -5,10 +5,11 @@ from numbers import Real
 from typing import Any
 
 from arc_suite import checks, registry, robots
+from arc_suite.cpg.climbing import Climbing, ClimbingParameters
 from arc_suite.cpg.leaping import Leaping, LeapingParameters
 from arc_suite.cpg.planner import Planned, PlanningParameters
 from arc_suite.cpg.prescribed import PrescribedLaw, Preset
-from arc_suite.cpg.presets import DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
+from arc_suite.cpg.presets import DEFAULTS, DEFAULTS_OF_FOUR_LEGS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.cpg.stride_law import StrideLaw
@@ -20,13 +21,15 @@ LAWS: dict[type, Any] = {
     Preset: PrescribedLaw,
     float: StrideLaw,
     SteppingParameters: Stepping,
+    ClimbingParameters: Climbing,
     SightedParameters: Sighted,
     LeapingParameters: Leaping,
     PlanningParameters: Planned,
 }
 
 _STRAIGHT_PRESETS = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
-_MEMORYLESS = {"steered": "reactive", "braced": "reactive"}  # presets without an integral, in place of others
+# Presets in place of others whose state networks without memory cannot learn.
+_MEMORYLESS = {"steered": "reactive", "braced": "reactive", "climbing": "surefooted"}
 _COMMAND_BLOCKS = ("command", "pose", "gait", "goal")  # blocks of the observation that show what a task commands
 
 
@@ -114,7 +117,9 @@ def _registered_presets() -> dict[str, Any]:
 
 def _default_presets(body: Body) -> Mapping[str, Any]:
     """Return the presets that suit any body of its kind by name."""
-    return DEFAULTS_OF_SERVOS if body.source else DEFAULTS
+    if body.source:
+        return DEFAULTS_OF_SERVOS
+    return DEFAULTS_OF_FOUR_LEGS if len(body.legs) <= 4 else DEFAULTS
 
 
 def preset_names() -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.models import foot_paths, overlap, posture
 from arc_suite.models.kinematics import path_weights, point_velocities
 from arc_suite.models.standing import GRAVITY
+from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
 _MAX_POSE_INTEGRAL = 0.2  # standing heights or rad
@@ -89,6 +90,8 @@ class Stepping(CommandLaw):
         legs: their kinematics.
         rest_soles: (legs, 3) positions of the soles at rest, in the torso's frame, m.
         rest_angles: (legs, links) angles of the joints at rest, rad.
+        ride_height: height of the torso at rest, m.
+        pendulum_time: time constant of an inverted pendulum of this height, s.
         foot_lift: height of a foot in mid-swing, m.
     """
 
@@ -107,14 +110,12 @@ class Stepping(CommandLaw):
         self.directed = observes_gait_and_pose(task)
         if self.directed:
             self.reads = (*self.reads, *task.gait_and_pose.observed)
-            self._rest_pose = posture.find_rest_pose(task.scene.body)
-        else:
-            self._rest_pose = posture.find_wide_pose(task.scene.body, parameters.wider, parameters.lower)
+        self._rest_pose = self.choose_rest_pose(task.scene.body)
         self.legs = self._rest_pose.legs
         self.rest_soles = self._rest_pose.sole_positions
         self.rest_angles = self._rest_pose.joint_angles
-        self._ride_height = -self.rest_soles[:, 2].mean()  # m
-        self._pendulum_time = math.sqrt(self._ride_height / GRAVITY)  # s, of an inverted pendulum of this height
+        self.ride_height = -self.rest_soles[:, 2].mean()  # m
+        self.pendulum_time = math.sqrt(self.ride_height / GRAVITY)
         self._longest_half_path = self._find_longest_half_path(task)
 
     def _find_longest_half_path(self, task: Task) -> float:
@@ -133,6 +134,12 @@ class Stepping(CommandLaw):
 
         return half_path * overlap.find_largest_stretch(task.scene.body, stretch_steps, self.parameters.most)
 
+    def choose_rest_pose(self, body: Body) -> posture.RestPose:
+        """Return the pose over whose feet a body walks."""
+        if self.directed:
+            return posture.find_rest_pose(body)
+        return posture.find_wide_pose(body, self.parameters.wider, self.parameters.lower)
+
     def initial_paths(self, count: int) -> SteppingState:
         """Return the angles at rest and an integral of 0, for a number of environments."""
         return SteppingState(np.tile(self.rest_angles, (count, 1, 1)), np.zeros((count, 3)))
@@ -148,23 +155,33 @@ class Stepping(CommandLaw):
             pose = observation["pose"]
             balance_vertical = (posture.rotation_of(pose[:, 3:]) @ vertical[..., None])[..., 0]
 
-        leg_phases, duty_factor, stance_duration = self._gait_timing(request, observation)
-        velocity, foothold_shift = self._balance(request.motion, balance_vertical, observation)
-        soles = self._next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
+        leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
+        velocity, foothold_shift = self.balance(request.motion, balance_vertical, observation)
+        soles = self.next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
         pose_integral = state.pose_integral
         if self.directed:
             pose_integral, corrected_pose = self._correct_pose(pose_integral, pose, torso_height, vertical)
             soles = posture.move_ground_points(soles, corrected_pose, self.mechanics.height)
 
-        weights = path_weights(point_velocities(velocity, self.rest_soles), foot_paths.SLIP_WEIGHT)
-        joint_angles = self.legs.solve_joint_angles(
-            state.joint_angles, soles, weights, self._ik_damping, foot_paths.IK_ITERATIONS
-        )
-        target_angles = self.legs.by_joint(state.joint_angles)
-        angle_changes = self.legs.by_joint(joint_angles) - target_angles
+        joint_angles, target_angles, angle_changes = self.move_feet(state.joint_angles, soles, velocity)
         return SteppingState(joint_angles, pose_integral), target_angles, angle_changes
 
-    def _gait_timing(self, request: Request, observation: Mapping) -> tuple:
+    def move_feet(self, joint_angles, soles, velocity) -> tuple:
+        """Return the next planned joint angles, target angles (environments, joints), rad, and their change.
+
+        Args:
+            joint_angles: (environments, legs, links) planned in the latest control step, rad.
+            soles: (environments, legs, 3) goals of the soles, m.
+            velocity: (environments, 3) requested of the torso, m/s and rad/s.
+        """
+        weights = path_weights(point_velocities(velocity, self.rest_soles), foot_paths.SLIP_WEIGHT)
+        next_angles = self.legs.solve_joint_angles(
+            joint_angles, soles, weights, self._ik_damping, foot_paths.IK_ITERATIONS
+        )
+        target_angles = self.legs.by_joint(joint_angles)
+        return next_angles, target_angles, self.legs.by_joint(next_angles) - target_angles
+
+    def gait_timing(self, request: Request, observation: Mapping) -> tuple:
         """Return when feet stand, by the command where there is one, else by the task.
 
         Returns:
@@ -187,7 +204,7 @@ class Stepping(CommandLaw):
         leg_phases = (commanded_phases + self.parameters.lead + advance) % 1.0
         return leg_phases, duty_factor, (duty_factor / frequency)[..., None]
 
-    def _balance(self, motion, vertical, observation: Mapping) -> tuple:
+    def balance(self, motion, vertical, observation: Mapping) -> tuple:
         """Return the velocity (environments, 3) that feet give the torso, m/s and rad/s, and shifts of footholds.
 
         Args:
@@ -205,8 +222,8 @@ class Stepping(CommandLaw):
         velocity = full_velocity * (2.0 - tilt / _SLOWING_TILT).clip(0.0, 1.0)
         commanded_velocity = observation["command"][:, :2] * self.units[:2]  # m/s
         unwanted_velocity = observation["velocities"][:, :2] - commanded_velocity
-        capture_shift = parameters.capture * self._pendulum_time * unwanted_velocity
-        lean_shift = parameters.lean * self._ride_height * vertical[:, :2]
+        capture_shift = parameters.capture * self.pendulum_time * unwanted_velocity
+        lean_shift = parameters.lean * self.ride_height * vertical[:, :2]
         return velocity, capture_shift - lean_shift
 
     def _correct_pose(self, pose_integral, pose, torso_height, vertical) -> tuple:
@@ -230,7 +247,7 @@ class Stepping(CommandLaw):
         zero = xp.zeros_like(height)  # of the numbers without feedback: forward, left and yaw
         return pose_integral, pose + xp.concatenate([height, zero, zero, roll_and_pitch, zero], axis=-1)
 
-    def _next_feet(self, leg_phases, velocity, foothold_shift, gait_size, duty_factor, stance_duration):
+    def next_feet(self, leg_phases, velocity, foothold_shift, gait_size, duty_factor, stance_duration):
         """Return positions (environments, legs, 3) of the soles in the next control step, m, under a level torso.
 
         Args:
@@ -294,8 +311,8 @@ class Stepping(CommandLaw):
             "most_off": _MAX_POSE_INTEGRAL,
             "rate": self._rate_unit,
             "step": self.control_timestep,
-            "lean": self.parameters.lean * self._ride_height,
-            "capture": self.parameters.capture * self._pendulum_time,
+            "lean": self.parameters.lean * self.ride_height,
+            "capture": self.parameters.capture * self.pendulum_time,
             "slowing_tilt": _SLOWING_TILT,
             "take_off_share": _TAKE_OFF_SHARE,
         }

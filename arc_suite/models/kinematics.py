@@ -204,9 +204,9 @@ def tilt_heights(vertical, points):
 
     Args:
         vertical: (environments, 3) the world's, in the torso's frame.
-        points: (points, 2 or 3) m from the center.
+        points: (..., points, 2 or 3) m from the center.
     """
-    return vertical[:, :1] * points[:, 0] + vertical[:, 1:2] * points[:, 1]
+    return vertical[:, :1] * points[..., 0] + vertical[:, 1:2] * points[..., 1]
 
 
 def path_weights(paths, across: float, level: float = 1.0):

@@ -65,7 +65,7 @@ class Rough(CommandTask):
     command = AlongLane()
     ground = Lanes(("rough",))
     from_body = _FROM_BODY
-    demonstrators = ("surefooted",)
+    demonstrators = ("climbing", "surefooted")
 
 
 class Slopes(CommandTask):
@@ -76,7 +76,7 @@ class Slopes(CommandTask):
     command = AlongLane()
     ground = Lanes(("slopes",))
     from_body = _FROM_BODY
-    demonstrators = ("surefooted",)
+    demonstrators = ("climbing", "surefooted")
 
 
 class Stairs(CommandTask):
@@ -87,7 +87,7 @@ class Stairs(CommandTask):
     command = AlongLane()
     ground = Lanes(("stairs",), copies=(4, 1))
     from_body = _FROM_BODY
-    demonstrators = ("surefooted",)
+    demonstrators = ("climbing", "surefooted")
 
 
 class Gaps(CommandTask):
@@ -109,7 +109,7 @@ class Course(CommandTask):
     command = AlongLane()
     ground = Lanes(("rough", "slopes", "stairs", "gaps"), copies=(2, 1))
     from_body = _FROM_BODY
-    demonstrators = ("surefooted",)
+    demonstrators = ("climbing", "surefooted")
 
 
 class Leap(CommandTask):

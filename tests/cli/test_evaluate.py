@@ -67,7 +67,7 @@ def test_the_preset_is_the_one_that_suits_task_and_body(tmp_path):
     for arguments, preset in (
         (["--robot=queen"], "refined"),
         (["--legs=4"], "medium"),
-        (["--robot=leaper", "--task=rough"], "surefooted"),
+        (["--robot=leaper", "--task=rough"], "climbing"),
         (["--robot=queen", "--preset=slow"], "slow"),
     ):
         lines = evaluated(*arguments, "--episodes=1", "--set=time_limit=0.5", f"--json={path}")

@@ -35,7 +35,7 @@ def test_leaper_lifts_its_rear_feet():
     body, law = ROBOTS["leaper"], fitted(ROBOTS["leaper"])
     cycle = np.tile(np.linspace(0.0, 1.0, 21)[:, None], (1, len(body.legs)))
     rest = np.zeros((len(cycle), 3))
-    feet = law._next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), law.duty_factor, law.stance_duration)
+    feet = law.next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), law.duty_factor, law.stance_duration)
     weights = np.tile(np.eye(3), (len(body.legs), 1, 1))
     angles = np.tile(law.rest_angles, (len(cycle), 1, 1))
     soles, _ = law.legs.soles(law.legs.solve_joint_angles(angles, feet, weights, 0.01, 20))

@@ -87,6 +87,7 @@ def test_an_open_loop_does_not():
         ("queen", "gaps", "surefooted", 60),
         ("queen", "gaps", "sighted", 60),
         ("leaper", "rough", "balanced", 40),
+        ("leaper", "stairs", "climbing", 40),
         ("tick", "navigate", "planned", 40),
         (generator.generate(6, 3), "walk", "medium", 30),
     ],

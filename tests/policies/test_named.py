@@ -14,8 +14,11 @@ from arc_suite.evaluation import provenance
 from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 
-ALL = "slow, medium, fast, tuned, refined, steered, surefooted, braced, reactive, sighted, leaping, planned, balanced"
-GENERAL = "slow, medium, fast, steered, surefooted, braced, reactive, sighted, leaping, planned"
+ALL = (
+    "slow, medium, fast, tuned, refined, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, "
+    "balanced"
+)
+GENERAL = "slow, medium, fast, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned"
 
 JOINTS = "expected a body named 'queen' to have the 18 joints of queen"
 

@@ -1,0 +1,68 @@
+"""The demonstrator that climbs: four legs on stairs, feet at the height of the ground, poses that free the feet."""
+
+import numpy as np
+import pytest
+from crossings import crossed
+
+from arc_suite import registry
+from arc_suite.cpg.selection import law, presets_of
+from arc_suite.envs.setup import Setup
+from arc_suite.models import posture
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks.sensors import SCAN
+
+STAIRS = {"difficulty": 0.5, "terrain_seed": 1}
+CAUGHT = "varied:7010"  # a body whose rear legs are straight at rest, at the limits of their joints
+
+
+@pytest.mark.parametrize("name", ["varied:7012", "random:7031"])
+def test_four_legs_climb_stairs(name):
+    """Without sight they climb with the front feet, and hang with the rear ones."""
+    body = registry.body_of(name)
+    assert len(body.legs) == 4
+    blind_way, _ = crossed(body, "surefooted", "stairs", STAIRS, num_envs=2)
+    way, _ = crossed(body, "climbing", "stairs", STAIRS, num_envs=2)
+    assert blind_way < 0.4
+    assert way > 0.6
+
+
+def test_a_torso_sinks_until_every_leg_can_lift_its_foot():
+    body = registry.body_of(CAUGHT)
+    wide = posture.find_wide_pose(body, 0.2, 0.15)
+    climbing = posture.find_climbing_pose(body, 0.2, 0.15)
+    assert wide.ride_height == 1.0 and climbing.ride_height == 0.95
+
+
+def test_a_torso_does_not_sink_where_it_would_stand_less_firmly():
+    """Its rear feet would come so near to the front ones that it falls as it walks."""
+    body = registry.body_of("varied:9709")
+    assert posture.find_climbing_pose(body, 0.2, 0.15).ride_height == 1.0
+
+
+@pytest.mark.parametrize("name", ["tick", "varied:7012"])
+def test_legs_that_can_lift_their_feet_stay_as_wide(name):
+    body = registry.body_of(name)
+    wide = posture.find_wide_pose(body, 0.2, 0.15)
+    np.testing.assert_array_equal(posture.find_climbing_pose(body, 0.2, 0.15).joint_angles, wide.joint_angles)
+
+
+def _sole_heights(heights: np.ndarray) -> np.ndarray:
+    """Return heights (legs,) of Tick's soles in stance over a scan (points,), m from those on level ground."""
+    task = Setup.of("tick", "stairs").definition
+    climbing = law(task, presets_of(ROBOTS["tick"])["climbing"])
+    soles = climbing.rest_soles[None]
+    stance = np.zeros(soles.shape[:2])
+    grown = np.ones((1, 1))
+    plane = heights[None] @ climbing.ground_fit.T
+    level = np.array([[0.0, 0.0, 1.0]])
+    stepped = climbing.step_on_ground(soles, stance, np.zeros((1, 3)), grown, heights[None], plane, level)
+    return (stepped - soles)[0, :, 2]
+
+
+def test_feet_stand_at_the_height_of_the_ground_under_them():
+    ahead = SCAN[0] > 0.3
+    on_step = _sole_heights(np.where(ahead, 0.05, 0.0))
+    task = Setup.of("tick", "stairs").definition
+    is_front = law(task, presets_of(ROBOTS["tick"])["climbing"]).rest_soles[:, 0] > 0.1
+    assert on_step[is_front].min() - on_step[~is_front].max() == pytest.approx(0.05, abs=1e-9)
+    np.testing.assert_allclose(_sole_heights(np.full(len(ahead), 0.05)), 0.0, atol=1e-9)
