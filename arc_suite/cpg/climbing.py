@@ -27,6 +27,7 @@ from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
 _LOOKS_AHEAD = (0.0, 0.5, 1.0)  # shares of the look ahead at which a foot in swing sees the ground
 _MAX_STEP = 0.5  # standing heights, between the ground at a foot and that under the torso
 _MAX_LEVELING = 0.4  # standing heights, of a foot in swing
+_FULL_ROUGHNESS = 0.06  # standing heights, of the ground's deviation from a plane, at which corrections have full size
 _MAX_TILT_SUM = 0.4  # rad cycles
 _MIN_DIRECTION = 1e-9  # m/s, of a foot that moves
 
@@ -34,8 +35,12 @@ _MIN_DIRECTION = 1e-9  # m/s, of a foot that moves
 class ClimbingParameters(NamedTuple):
     """How a demonstrator that climbs walks.
 
+    The corrections `rough_lift`, `reserve`, `tilt_sum` and `leveling` grow with the ground's roughness: a plane, level
+    or not, needs none of them.
+
     Attributes:
         steps: how its feet step. Where legs cannot lift their feet in this pose, the torso is lower.
+        rough_lift: by how much a foot in mid-swing is higher on rough ground, in standing heights.
         reserve: largest request beyond the measured motion, in units of the command: where a step holds the body up,
             longer strides do not help.
         tilt_rate: shift of footholds, as a share of the distance by which the torso's rate of tilt moves its weight
@@ -47,6 +52,7 @@ class ClimbingParameters(NamedTuple):
     """
 
     steps: SteppingParameters
+    rough_lift: float = 0.0
     reserve: float = math.inf
     tilt_rate: float = 0.0
     tilt_sum: float = 0.0
@@ -72,6 +78,8 @@ class Climbing(Stepping):
 
     Attributes:
         climbing: parameters of this law; `parameters` are those of its steps.
+        scan_places: (2, points) of a scan, forward and left, m.
+        is_under_torso: (points,) whether a point of a scan lies between the feet.
         ground_fit: (3, points) takes a scan, m, to the plane under the feet: its height, m, and slopes.
     """
 
@@ -82,6 +90,10 @@ class Climbing(Stepping):
         super().__init__(task, parameters.steps)
         self.climbing = parameters
         self._reach = reach(self.body)  # m, the unit of a scan's points
+        self.scan_places = SCAN * self._reach
+        nearest = self.rest_soles[:, :2].min(axis=0)[:, None]
+        furthest = self.rest_soles[:, :2].max(axis=0)[:, None]
+        self.is_under_torso = ((self.scan_places >= nearest) & (self.scan_places <= furthest)).all(axis=0)
         self.ground_fit = self._fit_ground()
 
     def choose_rest_pose(self, body: Body) -> posture.RestPose:
@@ -90,12 +102,10 @@ class Climbing(Stepping):
 
     def _fit_ground(self) -> np.ndarray:
         """Return `ground_fit`, by least squares over the points of a scan between the feet."""
-        points = SCAN.T * self._reach
-        is_under_torso = (points >= self.rest_soles[:, :2].min(axis=0)) & (points <= self.rest_soles[:, :2].max(axis=0))
-        is_used = is_under_torso.all(axis=-1)
-        columns = np.column_stack([np.ones(is_used.sum()), points[is_used]])
-        fit = np.zeros((3, len(points)))
-        fit[:, is_used] = np.linalg.pinv(columns)
+        places = self.scan_places[:, self.is_under_torso]
+        columns = np.column_stack([np.ones(places.shape[1]), *places])
+        fit = np.zeros((3, len(self.is_under_torso)))
+        fit[:, self.is_under_torso] = np.linalg.pinv(columns)
         return fit
 
     def initial_paths(self, count: int) -> ClimbingState:
@@ -109,26 +119,37 @@ class Climbing(Stepping):
         plane = heights @ self.ground_fit.T
         leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
 
-        motion = self._limit_motion(request.motion, observation["command"][:, 3:])
+        roughness = self._measure_roughness(heights, plane)
+        motion = self._limit_motion(request.motion, observation["command"][:, 3:], roughness)
         velocity, foothold_shift = self.balance(motion, vertical, observation)
         tilt = vertical[:, :2] - self.climbing.slope * plane[:, 1:]
         is_grown = request.size >= 1.0
         tilt_sum = state.tilt_sum + self.cycles_per_step * tilt * is_grown
         tilt_sum = tilt_sum.clip(-_MAX_TILT_SUM, _MAX_TILT_SUM)
-        foothold_shift = foothold_shift - self._tilt_shift(tilt_sum, observation["velocities"][:, 3:5])
+        foothold_shift = foothold_shift - self._tilt_shift(roughness * tilt_sum, observation["velocities"][:, 3:5])
         soles = self.next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
         swing_progress = ((leg_phases - duty_factor) / (1.0 - duty_factor)).clip(0.0)
-        soles = self.step_on_ground(soles, swing_progress, velocity, request.size, heights, plane, vertical)
+        correction_size = roughness * request.size
+        soles = self.step_on_ground(soles, swing_progress, velocity, correction_size, heights, plane, vertical)
 
         joint_angles, target_angles, angle_changes = self.move_feet(state.joint_angles, soles, velocity)
         return ClimbingState(joint_angles, tilt_sum), target_angles, angle_changes
 
-    def _limit_motion(self, motion, measured):
-        """Return a requested motion (environments, 3) that is at most `reserve` beyond the measured one."""
+    def _measure_roughness(self, heights, plane):
+        """Return how far the ground between the feet deviates from a plane, (environments, 1) from 0 to 1."""
+        xp = heights.__array_namespace__()
+        deviations = heights - plane[:, :1] - plane[:, 1:] @ self.scan_places
+        squares = (deviations**2 * self.is_under_torso).sum(axis=-1, keepdims=True)
+        deviation = xp.sqrt(squares / self.is_under_torso.sum())  # m
+        return (deviation / (_FULL_ROUGHNESS * self.mechanics.height)).clip(max=1.0)
+
+    def _limit_motion(self, motion, measured, roughness):
+        """Return a requested motion (environments, 3) that on rough ground is at most `reserve` beyond the measured."""
         xp = motion.__array_namespace__()
         fastest = measured.clip(0.0) + self.climbing.reserve
         slowest = measured.clip(max=0.0) - self.climbing.reserve
-        return xp.minimum(xp.maximum(motion, slowest), fastest)
+        limited_motion = xp.minimum(xp.maximum(motion, slowest), fastest)
+        return motion + roughness * (limited_motion - motion)
 
     def _tilt_shift(self, tilt_sum, turning):
         """Return by how much the torso's tilt moves its weight, as footholds count it, (environments, 2) m.
@@ -143,14 +164,14 @@ class Climbing(Stepping):
         angle = parameters.tilt_sum * tilt_sum + parameters.tilt_rate * self.pendulum_time * tilt_rate
         return self.ride_height * angle
 
-    def step_on_ground(self, soles, swing_progress, velocity, gait_size, heights, plane, vertical):
+    def step_on_ground(self, soles, swing_progress, velocity, correction_size, heights, plane, vertical):
         """Return positions (environments, legs, 3) of soles over uneven ground, m.
 
         Args:
             soles: (environments, legs, 3) for level ground, m.
             swing_progress: (environments, legs) from 0 to 1; 0 in stance.
             velocity: (environments, 3) requested of the torso, m/s and rad/s.
-            gait_size: (environments, 1) from 0 to 1.
+            correction_size: (environments, 1) size of corrections, from 0 to 1.
             heights: (environments, points) of the scan, m.
             plane: (environments, 3) height, m, and slopes of the ground under the feet.
             vertical: (environments, 3) the world's, in the torso's frame.
@@ -172,11 +193,13 @@ class Climbing(Stepping):
         max_step = _MAX_STEP * standing_height
         sole_heights = soles[..., 2] + step.clip(-max_step, max_step)
 
-        foot_lift = soles[..., 2] - self.rest_soles[:, 2]
+        rough_lift = correction_size * self.climbing.rough_lift * standing_height * xp.sin(np.pi * swing_progress)
+        sole_heights = sole_heights + rough_lift
+        foot_lift = soles[..., 2] - self.rest_soles[:, 2] + rough_lift
         level_heights = ground - standing_height + foot_lift - tilt_heights(vertical, places)
         max_leveling = _MAX_LEVELING * standing_height
         leveling = (level_heights - sole_heights).clip(-max_leveling, max_leveling)
-        share = self.climbing.leveling * gait_size * (swing_progress > 0.0)
+        share = self.climbing.leveling * correction_size * (swing_progress > 0.0)
         sole_heights = sole_heights + share * leveling
         return xp.concatenate([places, sole_heights[..., None]], axis=-1)
 

@@ -55,11 +55,12 @@ DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_command_presets(_SIGH
 DEFAULTS_OF_FOUR_LEGS = {
     **DEFAULTS,
     "climbing": ClimbingParameters(
-        DEFAULTS["surefooted"]._replace(lift=0.5, gain=(2.0, 2.0, 1.0), lean=0.2, capture=0.4),
-        reserve=1.5,
+        DEFAULTS["surefooted"]._replace(gain=(2.0, 2.0, 1.0), lean=0.2, capture=0.4),
+        rough_lift=0.35,
+        reserve=1.3,
         tilt_rate=0.4,
-        tilt_sum=0.45,
-        leveling=0.45,
+        tilt_sum=0.5,
+        leveling=0.7,
         slope=0.2,
         preview=0.35,
     ),
