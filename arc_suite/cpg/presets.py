@@ -164,3 +164,11 @@ PRESETS["leaper"]["braced"] = PRESETS["leaper"]["steered"]
 PRESETS["leaper"]["surefooted"] = PRESETS["leaper"]["steered"]._replace(integral=0.2, lean=0.4)
 PRESETS["leaper"]["climbing"] = ClimbingParameters(PRESETS["leaper"]["surefooted"], tilt_rate=0.2)
 PRESETS["leaper"]["balanced"] = PRESETS["leaper"]["surefooted"]  # its former name
+
+# On level ground, with feet that touch down when the gait schedules it, for clips. Over the legs of Bastion, which have
+# two joints, `steered` rocks, and the feet in front touch down a third of a cycle late: it follows their paths at the
+# expense of their height. Leaper tips backward between the two feet of its trot; further ahead it does not.
+PRESETS["bastion"]["in_step"] = PRESETS["bastion"]["steered"]._replace(
+    across=0.15, lift=0.4, gain=(1.0, 1.0, 0.5), integral=0.1, lead=0.134, lean=1.0
+)
+PRESETS["leaper"]["in_step"] = PRESETS["leaper"]["steered"]._replace(ahead=0.12, higher=0.1, lead=0.08)

@@ -44,6 +44,10 @@ class SteppingParameters(NamedTuple):
             standing heights.
         lower: how much lower the torso is than in that pose, in standing heights. Of both numbers a body takes the
             share that its legs reach. Where a task commands the pose, they have no effect.
+        ahead: how much further ahead the torso is over the feet of the pose at rest, in standing heights.
+        higher: how much higher the torso is over them, in standing heights. Both numbers have no effect on a body that
+            stands wide, or where a task commands the pose.
+        across: weight of a foot's slip across its path, against its motion along it.
         lift: height of a foot in mid-swing, in standing heights.
         gain: gain of the feedback on the motion's error: forward, left and turning.
         integral: gain of the same error, added up over a cycle of the gait.
@@ -55,6 +59,9 @@ class SteppingParameters(NamedTuple):
 
     wider: float = 0.0
     lower: float = 0.0
+    ahead: float = 0.0
+    higher: float = 0.0
+    across: float = foot_paths.SLIP_WEIGHT
     lift: float = foot_paths.FOOT_CLEARANCE
     gain: tuple[float, float, float] = (3.0, 3.0, 1.5)
     integral: float = 0.6
@@ -136,9 +143,12 @@ class Stepping(CommandLaw):
 
     def choose_rest_pose(self, body: Body) -> posture.RestPose:
         """Return the pose over whose feet a body walks."""
+        parameters = self.parameters
         if self.directed:
             return posture.find_rest_pose(body)
-        return posture.find_wide_pose(body, self.parameters.wider, self.parameters.lower)
+        if parameters.wider or parameters.lower:
+            return posture.find_wide_pose(body, parameters.wider, parameters.lower)
+        return posture.find_shifted_pose(body, parameters.ahead, parameters.higher)
 
     def initial_paths(self, count: int) -> SteppingState:
         """Return the angles at rest and an integral of 0, for a number of environments."""
@@ -174,7 +184,7 @@ class Stepping(CommandLaw):
             soles: (environments, legs, 3) goals of the soles, m.
             velocity: (environments, 3) requested of the torso, m/s and rad/s.
         """
-        weights = path_weights(point_velocities(velocity, self.rest_soles), foot_paths.SLIP_WEIGHT)
+        weights = path_weights(point_velocities(velocity, self.rest_soles), self.parameters.across)
         next_angles = self.legs.solve_joint_angles(
             joint_angles, soles, weights, self._ik_damping, foot_paths.IK_ITERATIONS
         )
@@ -304,7 +314,7 @@ class Stepping(CommandLaw):
             "height": self.mechanics.height,
             "ride": self._rest_pose.ride_height,
             "lift": self.foot_lift,
-            "across": foot_paths.SLIP_WEIGHT,
+            "across": self.parameters.across,
             "damping_of_feet": self._ik_damping,
             "steps": foot_paths.IK_ITERATIONS,
             "largest": _MAX_POSE_ERROR,

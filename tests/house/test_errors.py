@@ -187,7 +187,7 @@ CASES = [
     (lambda w: w.envs.render([5]), "indices: expected integers from 0 to 2, got 5"),
     (lambda w: w.envs.render(["a"]), "indices: expected integers from 0 to 2, got 'a'"),
     # Presets and policies.
-    (lambda w: Demonstrator("bastion", "meduim"), f"unknown preset 'meduim'; did you mean 'medium'? {PRESETS}"),
+    (lambda w: Demonstrator("queen", "meduim"), f"unknown preset 'meduim'; did you mean 'medium'? {PRESETS}"),
     (lambda w: Demonstrator("bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (lambda w: w.walker(dm_env.restart(np.zeros(151))), f"{BLOCKS}, got ndarray"),
     (lambda w: w.walker.act({"posture": np.zeros(17)}), f"{BLOCKS}, got dict"),

@@ -18,3 +18,15 @@ def test_a_pose_is_as_wide_as_legs_reach_with_room_about_their_feet():
     for name, numbers in (("leaper", (0.2, 0.15)), ("tick", (0.0, 0.0))):
         kept = posture.find_wide_pose(ROBOTS[name], *numbers)
         np.testing.assert_array_equal(kept.joint_angles, posture.find_rest_pose(ROBOTS[name]).joint_angles)
+
+
+def test_a_torso_moves_ahead_and_up_over_its_feet():
+    leaper = ROBOTS["leaper"]
+    height = leaper.torso.standing_height
+    rest = posture.find_rest_pose(leaper)
+    shifted = posture.find_shifted_pose(leaper, 0.12, 0.1)
+    moved = rest.sole_positions - shifted.sole_positions
+    np.testing.assert_allclose(moved, np.tile((0.12 * height, 0.0, 0.1 * height), (4, 1)), atol=0.02 * height)
+    assert shifted.ride_height == pytest.approx(rest.ride_height + 0.1)
+    out_of_reach = posture.find_shifted_pose(leaper, 3.0, 0.0)
+    np.testing.assert_array_equal(out_of_reach.joint_angles, rest.joint_angles)

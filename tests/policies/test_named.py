@@ -16,7 +16,7 @@ from arc_suite.robots import ROBOTS
 
 ALL = (
     "slow, medium, fast, tuned, refined, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, "
-    "balanced"
+    "in_step, balanced"
 )
 GENERAL = "slow, medium, fast, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned"
 

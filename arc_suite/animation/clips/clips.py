@@ -12,11 +12,14 @@ from arc_suite.animation.clips.drafts import Draft, make_drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.animation.clips.root_motion import Motion
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
 
 FPS = 60  # frames a second
-_PRESET = "steered"  # the integral in its control brings the speeds of clips to those of their commands
+# Presets of clips, of which a body takes the first that it has. The integral in their control brings the speeds of
+# clips to those of their commands.
+_PRESETS = ("in_step", "steered")
 _PACE_RATE = 30.0  # Hz: a clip lasts a whole number of frames at this rate, and so at 60 Hz
 
 
@@ -81,8 +84,8 @@ def clips(
         setup: body and task.
         names: see `catalog.clip_of`.
         policy: see `policies.policy`.
-        preset: preset of the policy; None for `steered` on level ground with a command, elsewhere for the one that
-            suits the task and the body.
+        preset: preset of the policy; None for `in_step` or else `steered` on level ground with a command, elsewhere
+            for the one that suits the task and the body.
         fps: frames a second.
         progress: wraps the recordings, such as `tqdm`.
         straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body
@@ -107,7 +110,7 @@ def clips(
     has_command = "command" in setup.definition.blocks
     has_level_ground = not setup.kind.own_arena  # a task without an arena of its own
     if policy == "cpg" and preset is None and has_command and has_level_ground:
-        preset = _PRESET
+        preset = next(name for name in _PRESETS if name in presets_of(setup.body))
     recorder = Recorder(setup, policy, preset)
     left_out: dict[str, str] = {}
     drafts = make_drafts(recorder, names, progress, left_out, straight, plant)
