@@ -116,7 +116,8 @@ class Climbing(Stepping):
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
         heights = observation["scan"] * self.mechanics.height  # m, over the ground of a torso at the standing height
-        plane = heights @ self.ground_fit.T
+        # A product of matrices would round otherwise in a batch.
+        plane = (heights[:, None] * self.ground_fit).sum(axis=-1)
         leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
 
         roughness = self._measure_roughness(heights, plane)
@@ -138,7 +139,8 @@ class Climbing(Stepping):
     def _measure_roughness(self, heights, plane):
         """Return how far the ground between the feet deviates from a plane, (environments, 1) from 0 to 1."""
         xp = heights.__array_namespace__()
-        deviations = heights - plane[:, :1] - plane[:, 1:] @ self.scan_places
+        slopes = plane[:, 1:2] * self.scan_places[0] + plane[:, 2:3] * self.scan_places[1]
+        deviations = heights - plane[:, :1] - slopes
         squares = (deviations**2 * self.is_under_torso).sum(axis=-1, keepdims=True)
         deviation = xp.sqrt(squares / self.is_under_torso.sum())  # m
         return (deviation / (_FULL_ROUGHNESS * self.mechanics.height)).clip(max=1.0)

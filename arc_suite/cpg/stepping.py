@@ -283,22 +283,8 @@ class Stepping(CommandLaw):
 
     def constants(self) -> dict:
         """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
-        arrays_of_legs = {
-            "mount": self.legs.mounts,
-            "turn": self.legs.mount_rotations,
-            "axes": self.legs.axes,
-            "ends": self.legs.ends,
-            "radius": self.legs.radii,
-            "joints": self.legs.joint_indices,
-            "moves": self.legs.has_joint,
-            "low": self.legs.low,
-            "high": self.legs.high,
-            "place": self.rest_soles,
-            "angles": self.rest_angles,
-        }
-        leg_count = len(self.rest_soles)
         return {
-            "legs": [{name: array[leg] for name, array in arrays_of_legs.items()} for leg in range(leg_count)],
+            "legs": self._leg_constants(),
             "stiffness": self.drive.stiffness,
             "damping": self.drive.damping,
             "reach": self.drive.reach,
@@ -326,3 +312,21 @@ class Stepping(CommandLaw):
             "slowing_tilt": _SLOWING_TILT,
             "take_off_share": _TAKE_OFF_SHARE,
         }
+
+    def _leg_constants(self) -> list[dict]:
+        """Return the constants of each leg by name."""
+        arrays_of_legs = {
+            "mount": self.legs.mounts,
+            "turn": self.legs.mount_rotations,
+            "axes": self.legs.axes,
+            "ends": self.legs.ends,
+            "radius": self.legs.radii,
+            "joints": self.legs.joint_indices,
+            "moves": self.legs.has_joint,
+            "low": self.legs.low,
+            "high": self.legs.high,
+            "place": self.rest_soles,
+            "angles": self.rest_angles,
+        }
+        leg_count = len(self.rest_soles)
+        return [{name: array[leg] for name, array in arrays_of_legs.items()} for leg in range(leg_count)]

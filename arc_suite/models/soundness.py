@@ -48,8 +48,15 @@ class Flaw(NamedTuple):
 
 
 def flaws(body: Body) -> list[Flaw]:
-    """Return the flaws of a body, none for one that should walk."""
-    return [*_check_all_but_parts(body), *_check_parts(body)]
+    """Return the flaws of a body, none for one that should walk.
+
+    Overlaps are not among them where the standing height is far off, as the length of strides follows from it.
+    """
+    body_flaws = list(_check_all_but_parts(body))
+    height_flaws = _check_height(body, measure_standing(body))
+    if not any(flaw.hopeless for flaw in height_flaws):
+        body_flaws += _check_parts(body)
+    return body_flaws
 
 
 def has_flaws(body: Body) -> bool:

@@ -28,8 +28,8 @@ ALWAYS = {
     "evaluate": f"{COMMON} episodes seed json".replace(" preset", ""),
     "style": f"{COMMON} compare episodes json output page save".replace(" preset", ""),
     "collect": f"{BODY} {SET} num_envs threads verify",
-    "train": f"{BODY} {SET} algorithm hp train_set seed steps prior evaluate_every config modules minutes until_score "
-    "threads tensorboard output",
+    "train": f"{BODY} {SET} algorithm hp train_set seed seeds steps prior evaluate_every config modules minutes "
+    "until_score threads tensorboard output",
     "study": "runs results report",
     "benchmark": "results",
     "export": f"{BODY} {SET} vecnormalize output",
@@ -103,9 +103,11 @@ CASES = [
     ("train", "--config=a.json --palette=moss", f"--palette: {CONFIG}"),
     *(
         ("study", f"top-ppo --report --{flag}", f"--{flag.partition('=')[0]}: {OF_REPORT}")
-        for flag in ("jobs=2", "shard=0/2", "submit=2", "hours=3", "partition=a")
+        for flag in ("jobs=2", "shard=0/2", "submit=2", "hours=3", "partition=a", "device", "minutes=3")
     ),
     ("study", "top-ppo --hours=3", "--hours: goes with --submit"),
+    ("study", "top-ppo --minutes=3", "--minutes: goes with --device"),
+    ("study", "top-ppo --device --jobs=2", "--jobs: goes without --device, on which runs learn in this process"),
     ("study", "top-ppo --partition=a", "--partition: goes with --submit"),
     *(
         ("benchmark", f"--{flag}", f"--{flag.partition('=')[0]}: {DIVISION}")

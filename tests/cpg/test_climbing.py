@@ -53,7 +53,7 @@ def _sole_heights(heights: np.ndarray) -> np.ndarray:
     soles = climbing.rest_soles[None]
     stance = np.zeros(soles.shape[:2])
     grown = np.ones((1, 1))
-    plane = heights[None] @ climbing.ground_fit.T
+    plane = (climbing.ground_fit @ heights)[None]
     level = np.array([[0.0, 0.0, 1.0]])
     stepped = climbing.step_on_ground(soles, stance, np.zeros((1, 3)), grown, heights[None], plane, level)
     return (stepped - soles)[0, :, 2]

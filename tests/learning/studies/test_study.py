@@ -298,7 +298,7 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
     ("task", "presets"),
     [
         ("walk", {"zero", "refined", "tuned", "medium"}),
-        ("rough", {"zero", "surefooted", "steered", "refined", "tuned", "medium"}),
+        ("rough", {"zero", "climbing", "surefooted", "steered", "refined", "tuned", "medium"}),
         ("navigate", {"zero", "planned", "steered", "surefooted", "refined", "tuned", "medium"}),
     ],
 )
