@@ -17,7 +17,7 @@ from arc_suite import rotations
 from arc_suite.cpg.command_law import Request
 from arc_suite.cpg.footholds import grid_index
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
-from arc_suite.models import posture
+from arc_suite.models import foot_paths, posture
 from arc_suite.models.kinematics import point_velocities, tilt_heights
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -129,7 +129,7 @@ class Climbing(Stepping):
         tilt_sum = tilt_sum.clip(-_MAX_TILT_SUM, _MAX_TILT_SUM)
         foothold_shift = foothold_shift - self._tilt_shift(roughness * tilt_sum, observation["velocities"][:, 3:5])
         soles = self.next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
-        swing_progress = ((leg_phases - duty_factor) / (1.0 - duty_factor)).clip(0.0)
+        _, swing_progress = foot_paths.find_path_position(leg_phases, duty_factor)
         correction_size = roughness * request.size
         soles = self.step_on_ground(soles, swing_progress, velocity, correction_size, heights, plane, vertical)
 
