@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import mujoco
 
 from arc_suite import parsers
-from arc_suite.importing import bounds, urdf
+from arc_suite.importing import bounds, inertias, urdf
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.importing.tree import FREE
 from arc_suite.robots.spec import SpecError
@@ -75,7 +75,8 @@ def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
     bounds.check_mesh_files(mesh_files)
     model, mesh_notes = _compile(spec)
     model, torso, torso_notes = _free_torso(spec, model)
-    all_notes = (*notes, *mesh_notes, *torso_notes)
+    model, inertia_notes = inertias.correct_inertias(spec, model, torso)
+    all_notes = (*notes, *mesh_notes, *torso_notes, *inertia_notes)
     return RobotFile(model, torso, meshes_of(spec, model), order, all_notes, (*parts, *mesh_files))
 
 

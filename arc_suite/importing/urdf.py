@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from arc_suite.importing import inertias
 from arc_suite.robots.spec import SpecError
 
 # Roll, pitch and yaw, rad, of a robot's base in the torso's frame.
@@ -30,7 +31,6 @@ _JOINT_ATTRIBUTES = {
 _MOMENTS = ("ixx", "iyy", "izz")  # of inertia, the diagonal of the matrix
 _PRODUCTS = ("ixy", "ixz", "iyz")
 _INERTIA_ROWS = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
-_BALL_DENSITY = 1000.0  # kg/m^3, of the ball that stands for a link without inertia
 _MIN_MOMENT = 1e-6  # of the moment of that ball; a smaller one counts as none
 _ROUNDING = 1e-9  # of inertias in files, as a share of the largest moment
 _LIGHT_LINK = 1e-4  # of the robot's mass, of a link that moves and has no mass
@@ -227,12 +227,12 @@ def _breaks_triangle_rule(inertia: Mapping[str, float]) -> bool:
 def _has_vanishing_moment(inertia: Mapping[str, float], mass: float) -> bool:
     """Return whether the smallest principal moment is nothing for a link of this mass, kg."""
     smallest, _, largest = _principal_moments(inertia)
-    return smallest <= max(_ROUNDING * largest, _MIN_MOMENT * _ball_moment(mass))
+    return smallest <= max(_ROUNDING * largest, _MIN_MOMENT * inertias.ball_moment(mass))
 
 
 def _replace_vanishing_moments(inertia: Mapping[str, float], mass: float) -> dict[str, str]:
     """Return the texts of an inertia without products, and with the moment of a ball where a moment is nothing."""
-    ball_moment = _ball_moment(mass)
+    ball_moment = inertias.ball_moment(mass)
     texts = dict.fromkeys(_PRODUCTS, "0")
     for key in _MOMENTS:
         is_enough = inertia[key] > _MIN_MOMENT * ball_moment
@@ -244,12 +244,6 @@ def _principal_moments(inertia: Mapping[str, float]) -> np.ndarray:
     """Return the principal moments (3,) of an inertia, kg m^2, the smallest first."""
     matrix = np.array([[inertia[key] for key in row] for row in _INERTIA_ROWS])
     return np.linalg.eigvalsh(matrix)
-
-
-def _ball_moment(mass: float) -> float:
-    """Return the moment of inertia of a ball of a mass, kg m^2."""
-    radius_squared = (0.75 * mass / (math.pi * _BALL_DENSITY)) ** (2.0 / 3.0)
-    return 0.4 * mass * radius_squared
 
 
 def _add_missing_masses(links: Elements, joints: Elements) -> Iterator[str]:
@@ -278,7 +272,7 @@ def _add_missing_masses(links: Elements, joints: Elements) -> Iterator[str]:
     for name in light_links:
         inertial = ElementTree.SubElement(links[name], "inertial")
         ElementTree.SubElement(inertial, "mass", value=repr(mass))
-        texts = dict.fromkeys(_MOMENTS, repr(_ball_moment(mass))) | dict.fromkeys(_PRODUCTS, "0")
+        texts = dict.fromkeys(_MOMENTS, repr(inertias.ball_moment(mass))) | dict.fromkeys(_PRODUCTS, "0")
         ElementTree.SubElement(inertial, "inertia", texts)
     yield f"repaired: {len(light_links)} links that move and weigh nothing get {mass:.2g} kg, such as {light_links[0]}"
 
