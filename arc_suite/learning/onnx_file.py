@@ -2,10 +2,9 @@
 
 The graph includes the normalization of observations. The input `observations` is (num_envs, size) float32, flat: the
 task's blocks one after the other. The output `actions` is (num_envs, joints) in [-1, 1]. The metadata, JSON by name,
-hold the rest that a game needs; see `metadata`.
+hold the rest that a game or a robot needs; see `policy_metadata`.
 """
 
-import dataclasses
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,62 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import files, versions
-from arc_suite.models import sizing, source
+from arc_suite.learning.policy_metadata import metadata
 from arc_suite.policies.graph import EPSILON, INPUT, Graph
 from arc_suite.policies.network import Network
-from arc_suite.robots.spec import Body
 
 OUTPUT = "actions"
 OPSET = 17  # the first with LayerNormalization
 IR_VERSION = 8  # the format of the same release, so that older runtimes read it
-
-
-def metadata(network: Network) -> dict:
-    """Return the metadata of a policy's file, by name.
-
-    robot, task, task_kwargs    setup of the training, or the setup that the policy was exported for
-    blocks                      size of every block of the observation by name, in order
-    control_timestep            s between two actions
-    substeps                    simulation steps between two actions
-    joints                      names of the joints, in the order of the actions
-    gears                       torques of an action of 1 by joint, N m; only for motors
-    servos                      only for servos, by joint: alias, its name in the imported file; home, its angle in the
-                                standing pose, rad; reach, change of the angle by an action of 1, rad; stiffness,
-                                N m/rad; damping, N m s/rad; limit, N m
-    file_joints                 names of the joints in the order of the imported file
-    gait_clock                  frequency, Hz, and rule of the block of that name; only if the task has this block
-
-    Raises:
-        ValueError: a policy of many bodies.
-    """
-    if network.setup.several:
-        raise ValueError(f"policy of {network.setup.robot}: expected one of one body; see universal.for_body")
-    task, model = network.setup.prepare()
-    body = task.scene.body
-    control_timestep = task.scene.control_timestep
-    values = network.setup.to_dict()
-    values["blocks"] = dict(network.blocks)
-    values["control_timestep"] = control_timestep
-    values["substeps"] = round(control_timestep / model.opt.timestep)
-    values["joints"] = list(body.joint_names)
-    values |= _servo_metadata(body) if body.source else {"gears": model.actuator_gear[:, 0].tolist()}
-    if "gait_clock" in network.blocks and task.parameters is not None:
-        values["gait_clock"] = {
-            "frequency": task.parameters.gait_frequency,
-            "rule": "sine and cosine of 2 pi frequency t, t = control_timestep x control steps since the start",
-        }
-    return values
-
-
-def _servo_metadata(body: Body) -> dict:
-    """Return the metadata of the servos of an imported body."""
-    home_angles = source.angles_at_home(body)
-    reaches = sizing.action_reaches(body).tolist()
-    servos = {}
-    for name, joint, reach in zip(body.joint_names, body.joints, reaches, strict=True):
-        position = {"alias": joint.alias, "home": home_angles[name], "reach": reach}
-        servos[name] = position | dataclasses.asdict(joint.servo)
-    return {"servos": servos, "file_joints": list(body.file_joints)}
 
 
 def save(path: str | os.PathLike, network: Network) -> None:

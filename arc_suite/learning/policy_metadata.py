@@ -1,0 +1,122 @@
+"""What the file of a policy says of the machine that it is for: actions, observation, and timing."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from arc_suite.models import sizing, source
+from arc_suite.policies.network import Network
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import Task
+from arc_suite.tasks.modified_task import Modified
+from arc_suite.tasks.modifiers import Control, Delay, History
+
+
+def metadata(network: Network) -> dict:
+    """Return the metadata of a policy's file, by name.
+
+    robot, task, task_kwargs    setup of the training, or the setup that the policy was exported for
+    blocks                      size of every block of the observation by name, in order
+    control_timestep            s between two actions
+    substeps                    simulation steps between two actions
+    actions                     what an action is: "torque", or "position"
+    joints                      names of the joints, in the order of the actions
+    gears                       torques of an action of 1 by joint, N m; only for torques
+    servos                      only for positions, by joint: alias, its name in the imported file; home, its angle in
+                                the standing pose, rad; reach, change of the angle by an action of 1, rad; stiffness,
+                                N m/rad; damping, N m s/rad; limit, N m
+    torque_held                 how long a torque holds: "control step", or "substep" of servos of imported bodies
+    file_joints                 names of the joints in the order of the imported file; only of imported bodies
+    gait_clock                  frequency, Hz, and rule of the block of that name; only if the task has this block
+    history                     control steps, blocks and layout of the block of that name; only with a history
+    delay                       lowest and highest delay of actions in training, control steps; only with a delay
+
+    Raises:
+        ValueError: a policy of many bodies.
+    """
+    if network.setup.several:
+        raise ValueError(f"policy of {network.setup.robot}: expected one of one body; see universal.for_body")
+    task, model = network.setup.prepare()
+    body = task.scene.body
+    control_timestep = task.scene.control_timestep
+    values = network.setup.to_dict()
+    values["blocks"] = dict(network.blocks)
+    values["control_timestep"] = control_timestep
+    values["substeps"] = round(control_timestep / model.opt.timestep)
+    values["actions"] = task.actions
+    values["joints"] = list(body.joint_names)
+    if task.actions == "torque":
+        values["gears"] = model.actuator_gear[:, 0].tolist()
+    elif body.source:
+        values["servos"] = _imported_servos(body)
+    else:
+        values["servos"] = _servos_of_motors(task, model.actuator_gear[:, 0])
+    values["torque_held"] = "substep" if body.source else "control step"
+    if body.source:
+        values["file_joints"] = list(body.file_joints)
+    if "gait_clock" in network.blocks and task.parameters is not None:
+        values["gait_clock"] = {"frequency": task.parameters.gait_frequency, "rule": _clock_rule(task)}
+    return values | _timing(task)
+
+
+def _clock_rule(task: Task) -> str:
+    """Return the rule of the block `gait_clock`."""
+    if task.gait_and_pose is not None:
+        return "sine and cosine of the phase of the gait by command; zeros while the command is a stop"
+    rule = "sine and cosine of 2 pi frequency t, t = control_timestep x control steps since the start"
+    if "command" in task.unwrapped.blocks:
+        return f"{rule} in which the command is no stop; zeros while it is a stop"
+    return rule
+
+
+def _imported_servos(body: Body) -> dict[str, dict]:
+    """Return the servos of an imported body by joint."""
+    home_angles = source.angles_at_home(body)
+    reaches = sizing.action_reaches(body).tolist()
+    servos = {}
+    for name, joint, reach in zip(body.joint_names, body.joints, reaches, strict=True):
+        servos[name] = {
+            "alias": joint.alias,
+            "home": home_angles[name],
+            "reach": reach,
+            "stiffness": joint.servo.stiffness,
+            "damping": joint.servo.damping,
+            "limit": joint.servo.limit,
+        }
+    return servos
+
+
+def _servos_of_motors(task: Task, gears: np.ndarray) -> dict[str, dict]:
+    """Return by joint the servos that position control makes of motors, whose standing pose is 0."""
+    control = task.modifier(Control)  # type: ignore[attr-defined]  # positions of motors are a modifier
+    columns = {
+        "reach": control.reach,
+        "stiffness": control.stiffness * gears,
+        "damping": control.damping * gears,
+        "limit": gears,
+    }
+    servos = {}
+    for index, name in enumerate(task.scene.body.joint_names):
+        numbers = {column: float(values[index]) for column, values in columns.items()}
+        servos[name] = {"alias": None, "home": 0.0, **numbers}
+    return servos
+
+
+def _timing(task: Task) -> Mapping[str, Any]:
+    """Return the metadata of history and delay, where the task has them."""
+    if not isinstance(task, Modified):
+        return {}
+    values: dict[str, Any] = {}
+    history = task.modifier(History)
+    if history.is_active:
+        values["history"] = {
+            "steps": history.history,
+            "blocks": list(history.names),
+            "layout": "of each control step its blocks and the action after them, the newest step first; "
+            "before the start the first observation, with actions of 0",
+        }
+    delay = task.modifier(Delay)
+    if delay.is_active:
+        values["delay"] = list(delay.delay)
+    return values
