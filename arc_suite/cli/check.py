@@ -6,10 +6,11 @@
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
-nothing up, none that can step. With --walk the demonstrator walks it for 100 control steps. Where it falls,
-drags its torso, or stays below 0.7 of the target speed, the line names the fields to leave out, which are
-then sized to suit the body. With --tasks the demonstrator of each task walks it, too, in four episodes of 200
-control steps; a line for each task names the preset, its metric and how many episodes ended upright.
+nothing up, none that can step. An imported body stands for a second; a line tells whether its joints buzz.
+With --walk the demonstrator walks it for 100 control steps. Where it falls, drags its torso, or stays below
+0.7 of the target speed, the line names the fields to leave out, which are then sized to suit the body. With
+--tasks the demonstrator of each task walks it, too, in four episodes of 200 control steps; a line for each
+task names the preset, its metric and how many episodes ended upright.
 
 A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
 the line names the terms, metrics and blocks that differ.
@@ -26,6 +27,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance, cures, suitability
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body
+from arc_suite.simulation.stillness import calming_armature, measure_stillness
 from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
@@ -61,13 +63,27 @@ def _check_body(spec: str) -> bool:
         print(f"{spec}: {flaw.text}")
     if not body_flaws:
         print(f"{spec}: {body.name} stands and can take steps")
+    stands_still = _check_stillness(spec, body)
     walks_well = True
     can_walk = not any(flaw.hopeless for flaw in body_flaws)
     if FLAGS.walk and can_walk:
         walks_well = _check_walk(spec, body)
     if FLAGS.tasks and can_walk:
         _try_tasks(spec, body)
-    return walks_well and not body_flaws
+    return walks_well and stands_still and not body_flaws
+
+
+def _check_stillness(spec: str, body: Body) -> bool:
+    """Print whether the joints of a body with servos buzz as it stands; return whether they are still."""
+    if not body.source:
+        return True
+    stillness = measure_stillness(body)
+    if stillness.buzzes:
+        stiffness = max(joint.servo.stiffness for joint in body.joints)
+        armature = calming_armature(stiffness, body.simulation.timestep)
+        problem = f"buzzes as it stands: its joints shake at {stillness.joint_speed:.2g} rad/s"
+        print(f"{spec}: {body.name} {problem}: an armature of {armature:.2g} kg m^2 at each joint fits")
+    return not stillness.buzzes
 
 
 def _check_walk(spec: str, body: Body) -> bool:

@@ -22,6 +22,12 @@ FLAGS = flags.FLAGS
 flags.DEFINE_string("output", None, "File to write the body to, in JSON. [default: none]", short_name="o")
 flags.DEFINE_string("home", None, "Keyframe of the file in which the robot stands. [default: one that stands]")
 flags.DEFINE_list("feet", [], "Bodies or geoms at the ends of the legs. [default: those that reach lowest]")
+flags.DEFINE_float(
+    "armature",
+    None,
+    "Rotor inertia, kg m^2, of each joint for which the file has none. [default: a small one where joints buzz]",
+    lower_bound=0.0,
+)
 
 
 def main(robot: str | None = None) -> None:
@@ -37,7 +43,7 @@ def main(robot: str | None = None) -> None:
         if FLAGS.output is not None:
             checks.extension(FLAGS.output, [".json"])
             output_path = stack.enter_context(files.writing(FLAGS.output))
-        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet)
+        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet, FLAGS.armature)
         if output_path is not None:
             output_path.write_text(body_to_json(body), encoding="utf-8")
     print(f"{robot}: {body.name}")

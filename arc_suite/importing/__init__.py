@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import files, parsers
-from arc_suite.importing import motors, notes, opening, poses, sketch, tree, urdf, writing
+from arc_suite.importing import armatures, motors, notes, opening, poses, sketch, tree, urdf, writing
 from arc_suite.importing.naming import choose_names, clean_name
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
@@ -58,6 +58,14 @@ class _CachedBody(NamedTuple):
 _cached_bodies: dict[str, _CachedBody] = {}  # by path, the last one used last
 
 
+class _Choices(NamedTuple):
+    """What a user says of a file; see `import_robot`."""
+
+    home: str | None = None
+    feet: tuple[str, ...] = ()
+    armature: float | None = None
+
+
 class _StandingRobot(NamedTuple):
     """A file, its robot, and how it stands."""
 
@@ -66,19 +74,23 @@ class _StandingRobot(NamedTuple):
     stance: Stance
 
 
-def import_robot(path: str | os.PathLike, home: str | None = None, feet: Sequence[str] = ()) -> ImportedRobot:
+def import_robot(
+    path: str | os.PathLike, home: str | None = None, feet: Sequence[str] = (), armature: float | None = None
+) -> ImportedRobot:
     """Return the legged robot of an MJCF or URDF file.
 
     Args:
         path: path of the file.
         home: name of the keyframe in which it stands; None to find a pose.
         feet: names of bodies or geoms at the ends of its legs; none to find them.
+        armature: rotor inertia of each joint for which the file has none, kg m^2; None for none, or for a small one
+            where joints buzz without it.
 
     Raises:
         SpecError: it cannot come in; one line that names the file.
         OSError: the file cannot be read.
     """
-    imported_robot, _ = _import_file(Path(path), home, feet)
+    imported_robot, _ = _import_file(Path(path), _Choices(home, tuple(feet), armature))
     return imported_robot
 
 
@@ -92,7 +104,7 @@ def body_of(path: str | os.PathLike) -> Body:
     key = os.path.realpath(path)
     cached_body = _cached_bodies.pop(key, None)
     if cached_body is None or any(_digest(part) != digest for part, digest in cached_body.digests.items()):
-        imported_robot, parts = _import_file(Path(path), home=None, feet=())
+        imported_robot, parts = _import_file(Path(path), _Choices())
         cached_body = _CachedBody(imported_robot.body, {part: _digest(part) for part in parts})
     while len(_cached_bodies) >= _MAX_CACHED_BODIES:
         oldest_key = next(iter(_cached_bodies))
@@ -109,46 +121,56 @@ def _digest(path: Path) -> bytes | None:
         return hashlib.file_digest(file, "sha256").digest()
 
 
-def _import_file(path: Path, home: str | None, feet: Sequence[str]) -> tuple[ImportedRobot, tuple[Path, ...]]:
+def _import_file(path: Path, choices: _Choices) -> tuple[ImportedRobot, tuple[Path, ...]]:
     """Return the robot of a file, and all files that it depends on; errors name the file."""
     with warnings.catch_warnings(), parsers.guard(str(path), passes=(OSError,), raises=SpecError):
         warnings.simplefilter("ignore")  # MuJoCo warns about attributes that are dropped here
-        file, robot, stance = _find_standing_robot(path, home, feet)
-        return _describe_robot(path, file, robot, stance), file.parts
+        file, robot, stance = _find_standing_robot(path, choices)
+        return _describe_robot(path, file, robot, stance, choices.armature), file.parts
 
 
-def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance) -> ImportedRobot:
+def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, armature: float | None) -> ImportedRobot:
     """Return the body of a robot that stands, and notes."""
     _check_world(robot)
     _check_hinges(robot, stance)
-    names = choose_names(robot, stance.legs)
+    armature_notes: tuple[str, ...] = ()
+    if armature is not None:
+        robot, armature_notes = armatures.add_armature(robot, armature)
     servos, motor_notes = motors.find_motors(robot, stance)
+    names = choose_names(robot, stance.legs)
     order = _order_joints(robot, stance, file.order)
-    body = Body(
-        name=_choose_body_name(robot, path),
-        torso=sketch.sketch_torso(robot, stance),
-        legs=sketch.sketch_legs(robot, stance, names, servos),
-        camera=sketch.sketch_camera(stance),
-        simulation=_choose_simulation(float(robot.model.opt.timestep)),
-        source=writing.write_source(robot, stance, names, file.meshes),
-        held=tuple(Held(name=names.joints[joint], servo=servos[joint]) for joint in names.held),
-        file_joints=tuple(robot.joint_name(joint) for joint in order),
-    )
+
+    def write_body(robot: Robot) -> Body:
+        body = Body(
+            name=_choose_body_name(robot, path),
+            torso=sketch.sketch_torso(robot, stance),
+            legs=sketch.sketch_legs(robot, stance, names, servos),
+            camera=sketch.sketch_camera(stance),
+            simulation=_choose_simulation(float(robot.model.opt.timestep)),
+            source=writing.write_source(robot, stance, names, file.meshes),
+            held=tuple(Held(name=names.joints[joint], servo=servos[joint]) for joint in names.held),
+            file_joints=tuple(robot.joint_name(joint) for joint in order),
+        )
+        return sources.check(body)
+
+    body = write_body(robot)
+    if armature is None:
+        body, armature_notes = armatures.calm(body, robot, servos, write_body)
     first_notes = notes.import_notes(robot, stance, names, order)
     last_notes = notes.omission_notes(file, robot, stance, names)
-    return ImportedRobot(sources.check(body), (*first_notes, *motor_notes, *file.notes, *last_notes))
+    return ImportedRobot(body, (*first_notes, *motor_notes, *armature_notes, *file.notes, *last_notes))
 
 
-def _find_standing_robot(path: Path, home: str | None, feet: Sequence[str]) -> _StandingRobot:
+def _find_standing_robot(path: Path, choices: _Choices) -> _StandingRobot:
     """Return the robot of a file as it stands; the y axis of a URDF may point up."""
     try:
-        return _open_standing_robot(path, home, feet, urdf.LEVEL)
+        return _open_standing_robot(path, choices, urdf.LEVEL)
     except poses.NoStance as error:
         reason = str(error)
     if path.suffix.lower() == ".urdf":
         for turn in urdf.TURNS:
             with contextlib.suppress(SpecError):
-                file, robot, stance = _open_standing_robot(path, home, feet, turn)
+                file, robot, stance = _open_standing_robot(path, choices, turn)
                 extents = np.ptp([leg.center for leg in stance.legs], axis=0)  # (3,) of the feet, m
                 if extents.argmax() == 0:  # longest forward, as robots are
                     note = "turned: the file's y axis points up, the torso's frame has z there"
@@ -156,11 +178,11 @@ def _find_standing_robot(path: Path, home: str | None, feet: Sequence[str]) -> _
     raise SpecError(reason)
 
 
-def _open_standing_robot(path: Path, home: str | None, feet: Sequence[str], turn: str) -> _StandingRobot:
+def _open_standing_robot(path: Path, choices: _Choices, turn: str) -> _StandingRobot:
     """Return the robot of a file as it stands, with the base of a URDF turned."""
     file = opening.open_robot(path, turn)
     robot = tree.robot_of(file.model, file.root, file.notes)
-    return _StandingRobot(file, robot, poses.find_stance(robot, home, feet))
+    return _StandingRobot(file, robot, poses.find_stance(robot, choices.home, choices.feet))
 
 
 def _check_world(robot: Robot) -> None:

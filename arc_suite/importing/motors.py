@@ -233,7 +233,7 @@ def _limit_notes(joints_of_legs: Sequence[int], servos: dict[int, Servo], origin
     counts = Counter(origins[joint] for joint in joints_of_legs)
     for origin, count in counts.items():
         torques = [servos[joint].limit for joint in joints_of_legs if origins[joint] == origin]
-        span = _format_span(min(torques), max(torques))
+        span = format_span(min(torques), max(torques))
         if origin == _BY_RULE:
             text = f"none in the file for {count} motors, sized to {span} N m, {_LOADS_PER_LIMIT:g} times their load"
         elif origin == _PLACEHOLDER:
@@ -243,7 +243,7 @@ def _limit_notes(joints_of_legs: Sequence[int], servos: dict[int, Servo], origin
         yield f"limits: {text}"
 
 
-def _format_span(low: float, high: float) -> str:
+def format_span(low: float, high: float) -> str:
     """Return "low to high", or one number if both read the same."""
     low_text = f"{low:.4g}"
     high_text = f"{high:.4g}"
