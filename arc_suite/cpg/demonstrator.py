@@ -16,6 +16,8 @@ from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.soundness import hopeless_flaws
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
+from arc_suite.tasks.modified_task import has_active
+from arc_suite.tasks.modifiers import SensorsOnly
 
 
 class Demonstrator:
@@ -56,12 +58,16 @@ class Demonstrator:
             UserWarning: the task gives commands that the law of the preset does not read.
 
         Raises:
-            ValueError: no preset suits the task, an unknown name, a value out of range, a preset that does not fit, or
-                a body that cannot walk by any preset, as its feet hang far above the floor.
+            ValueError: no preset suits the task, an unknown name, a value out of range, a preset that does not fit, a
+                task with `sensors_only`, or a body that cannot walk by any preset, as its feet hang far above the
+                floor.
         """
         body, body_task = _body_and_task(task)
         if body_task is None:
             body_task, _ = prepare_task(body, "walk")
+        if has_active(body_task, SensorsOnly):
+            reason = "demonstrators read the torso's height and velocity; dagger imitates one that does"
+            raise ValueError(f"sensors_only: expected False, as {reason}")
         name = suited_preset(body_task) if preset is None else preset
         parameters = preset_of(body, name) if isinstance(name, str) else name
         # Who gives a `Preset`, parameters of the paper's law, has seen the body walk by it, whatever its flaws.

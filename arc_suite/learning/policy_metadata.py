@@ -9,7 +9,7 @@ from arc_suite.models import sizing, source
 from arc_suite.policies.network import Network
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
-from arc_suite.tasks.modified_task import Modified
+from arc_suite.tasks.modified_task import has_active
 from arc_suite.tasks.modifiers import Control, Delay, History
 
 
@@ -105,18 +105,15 @@ def _servos_of_motors(task: Task, gears: np.ndarray) -> dict[str, dict]:
 
 def _timing(task: Task) -> Mapping[str, Any]:
     """Return the metadata of history and delay, where the task has them."""
-    if not isinstance(task, Modified):
-        return {}
     values: dict[str, Any] = {}
-    history = task.modifier(History)
-    if history.is_active:
+    if has_active(task, History):
+        history = task.modifier(History)  # type: ignore[attr-defined]
         values["history"] = {
             "steps": history.history,
             "blocks": list(history.names),
             "layout": "of each control step its blocks and the action after them, the newest step first; "
             "before the start the first observation, with actions of 0",
         }
-    delay = task.modifier(Delay)
-    if delay.is_active:
-        values["delay"] = list(delay.delay)
+    if has_active(task, Delay):
+        values["delay"] = list(task.modifier(Delay).delay)  # type: ignore[attr-defined]
     return values

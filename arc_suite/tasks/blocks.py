@@ -31,10 +31,12 @@ class Block(NamedTuple):
     Attributes:
         parts: its parts, in order.
         noise: half-widths of the noise of each part at level 1, in its unit, or one number for all; None without noise.
+        sensed: whether the sensors of a robot give each part, or one value for all; see `modifiers.SensorsOnly`.
     """
 
     parts: tuple[Part, ...]
     noise: tuple[float, ...] | float | None = None
+    sensed: tuple[bool, ...] | bool = True
 
     @property
     def size(self) -> int:
@@ -65,8 +67,17 @@ class Block(NamedTuple):
     @property
     def widths(self) -> np.ndarray:
         """The half-widths (size,) of the noise at level 1 of a block that declares it."""
+        return self._repeat_by_size(self.noise)
+
+    @property
+    def are_sensed(self) -> np.ndarray:
+        """Whether (size,) the sensors of a robot give each number."""
+        return self._repeat_by_size(self.sensed)
+
+    def _repeat_by_size(self, values) -> np.ndarray:
+        """Return the values (size,) of all numbers, given that of each part, or one value for all."""
         sizes = [part.size for part in self.parts]
-        return np.repeat(np.broadcast_to(self.noise, len(self.parts)), sizes)
+        return np.repeat(np.broadcast_to(values, len(self.parts)), sizes)
 
     def mirror(self, image: Image) -> Mirror:
         """Return the left-right map.
@@ -90,7 +101,8 @@ def slices(sizes: Mapping[str, int]) -> dict[str, slice]:
 def posture(body: Body) -> Block:
     """Return the block of the torso's height and quaternion, and the joint angles: (5 + joints)."""
     parts = Scalar("torso height", "m"), Quaternion("torso quaternion"), Joints(body, "angle of {}", "rad")
-    return Block(parts, (HEIGHT_NOISE * body.torso.standing_height, ORIENTATION_NOISE, JOINT_ANGLE_NOISE))
+    noise = (HEIGHT_NOISE * body.torso.standing_height, ORIENTATION_NOISE, JOINT_ANGLE_NOISE)
+    return Block(parts, noise, sensed=(False, True, True))
 
 
 def velocities(body: Body, headed: bool = False) -> Block:
@@ -113,7 +125,7 @@ def velocities(body: Body, headed: bool = False) -> Block:
         ANGULAR_VELOCITY_NOISE * rate_unit,
         JOINT_VELOCITY_NOISE * rate_unit,
     )
-    return Block(parts, noise)
+    return Block(parts, noise, sensed=(False, True, True))
 
 
 def contact_forces(body: Body, headed: bool = False) -> Block:
@@ -127,7 +139,7 @@ def contact_forces(body: Body, headed: bool = False) -> Block:
     torque_unit, force_unit = ("weight x h", "weight") if headed else ("N m", "N")
     torque = Vector("torque on {}", torque_unit, axes, axial=True)
     force = Vector("force on {}", force_unit, axes)
-    return Block((RigidParts(body, (torque, force)),), CONTACT_FORCE_NOISE)
+    return Block((RigidParts(body, (torque, force)),), CONTACT_FORCE_NOISE, sensed=False)
 
 
 def gait_clock(phase_offsets: np.ndarray | None = None, default_angles: np.ndarray | None = None) -> Block:

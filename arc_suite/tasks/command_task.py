@@ -204,9 +204,12 @@ class CommandTask(Task):
         body = self.scene.body
         gait = self.parameters
         gait_and_pose = self.settings.gait_and_pose
+        desired = _velocity("desired")
+        measured = _velocity("measured")
+        sensed = (True,) * len(desired) + (False,) * len(measured)
         return {
             **blocks.of_gait(body, gait.phase_offsets, gait.default_angles, headed=True),
-            "command": Block((*_velocity("desired"), *_velocity("measured"))),
+            "command": Block((*desired, *measured), sensed=sensed),
             **self.settings.command.blocks(body),
             **({} if gait_and_pose is None else gait_and_pose.blocks(body)),
             **self.settings.ground.blocks,

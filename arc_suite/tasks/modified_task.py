@@ -17,7 +17,7 @@ from arc_suite.robots import mirror
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
-from arc_suite.tasks.modifiers import Control, Modifier, fit_modifiers
+from arc_suite.tasks.modifiers import Control, History, Modifier, fit_modifiers
 from arc_suite.tasks.modifiers.draws import draw_episode
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.wrapper import Wrapper
@@ -65,6 +65,19 @@ def add_modifiers(task: Task, settings: Mapping[str, Any]) -> Task:
     are_active = tuple(modifier.is_active for modifier in modifiers)
     # `Wrapper` is registered as a subclass of `Task`, which type checkers do not see.
     return Modified(task, modifiers, are_active)  # type: ignore[return-value]
+
+
+def has_active(task: Task, kind: type[Modifier]) -> bool:
+    """Return whether a task has a modifier of a class that steps have to call."""
+    return isinstance(task, Modified) and task.modifier(kind).is_active
+
+
+def sensed_numbers(task: Task) -> np.ndarray:
+    """Return which numbers (size,) of the observation a robot's sensors give; see `modifiers.SensorsOnly`."""
+    masks = {name: block.are_sensed for name, block in task.blocks.items()}
+    if has_active(task, History):
+        masks["history"] = task.modifier(History).repeat(masks)  # type: ignore[attr-defined]
+    return np.concatenate(list(masks.values()))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -95,7 +95,7 @@ def test_a_modifier_blows_on_any_task(folder):
     """In a batch as alone, among the suite's own; and the stream of seeds gives what it gave without it."""
     *_, settings, numbers, is_same_start, is_pushed = printed(USING_A_MODIFIER + MODIFIED, folder=folder)
     assert settings == "{'gales:wind': 0.2, 'kicks': 1.0} None"
-    assert (numbers, is_same_start, is_pushed) == ("0.2 12", "True", "True")
+    assert (numbers, is_same_start, is_pushed) == ("0.2 13", "True", "True")
 
 
 def test_programs_take_a_modifier(run):

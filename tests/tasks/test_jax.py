@@ -22,7 +22,14 @@ BODIES = {"queen": ROBOTS["queen"], "leaper": ROBOTS["leaper"], "random": genera
 NUM_ENVS, STEPS = 3, 60
 MODIFIERS = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "actuator_failure": True, "observation_noise": 1.0}
 MODIFIERS |= {"delay": (0, 3), "actions": "position", "exclude_blocks": "gait_clock"}
-MODIFIERS |= {"joint_offset": 0.05, "joint_strength": (0.5, 1.0), "gains": (0.8, 1.2), "force": 0.3, "history": 2}
+MODIFIERS |= {
+    "joint_offset": 0.05,
+    "joint_strength": (0.5, 1.0),
+    "sensors_only": True,
+    "gains": (0.8, 1.2),
+    "force": 0.3,
+    "history": 2,
+}
 
 
 def assert_close(ours, theirs):

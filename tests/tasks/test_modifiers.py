@@ -20,7 +20,7 @@ from refusals import refused
 from tiers import never, tiers, turn
 
 import arc_suite
-from arc_suite import rotations
+from arc_suite import policies, rotations
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.outline import torso_box
@@ -56,6 +56,7 @@ EACH = {
     "delay": {"delay": (0, 3)},
     "actions": {"actions": "position"},
     "exclude_blocks": {"exclude_blocks": ("contact_forces",)},
+    "sensors_only": {"sensors_only": True},
     "payload": {"payload": (0.1, 0.4)},
     "center_of_mass": {"center_of_mass": 0.1},
     "joint_offset": {"joint_offset": 0.05},
@@ -120,7 +121,7 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
     own = {"kicks": 0.0, "actuator_failure": False}
     neutral = {"motor_strength": 1, "friction": 1.0, "mass": [1, 1], "observation_noise": 0, "delay": 0}
     neutral |= {"payload": 0, "center_of_mass": 0, "joint_offset": 0, "joint_strength": 1, "gains": 1, "armature": 1}
-    neutral |= {"force": 0, "history": 0}
+    neutral |= {"force": 0, "history": 0, "sensors_only": False}
     plain = load(BODIES[body], task_name, **(own if TASKS[task_name].modifiers else {}))
     one = load(BODIES[body], task_name, **neutral, **own, exclude_blocks=(), actions="torque")
     assert_array_equal(flat(one.reset()), flat(plain.reset()))
@@ -646,6 +647,45 @@ def test_a_history_holds_earlier_observations_and_the_actions_after_them():
             assert_array_equal(entries[:, place, :size], seen[before], err_msg="with its noise")
             assert_allclose(entries[:, place, size:], actions[before], atol=1e-7, err_msg="as it was sent")
         seen.append(observation[:, :size])
+
+
+UNSENSED = {"posture": slice(0, 1), "velocities": slice(0, 3), "contact_forces": slice(None), "command": slice(3, 6)}
+
+
+@pytest.mark.parametrize("task_name", ["walk", "steer", "rough"])
+def test_sensors_only_shows_what_sensors_give(task_name):
+    settings = {"observation_noise": 1.0, "history": 2}
+    full = arc_suite.load("tick", task_name, {"random": 0, **settings})
+    one = arc_suite.load("tick", task_name, {"random": 0, "sensors_only": True, **settings})
+    walk = policies.policy("cpg", "tick", task=full.task.definition)
+    act = policies.alone(walk)
+    timestep, sensed = full.reset(), one.reset()
+    size = 5 + 18 + 6 + 18 + 18  # posture, velocities and the action of each step
+    for _ in range(20):
+        expected = {name: block.copy() for name, block in timestep.observation.items()}
+        for name, part in UNSENSED.items():
+            if name in expected:
+                assert name == "command" or expected[name][part].any()
+                expected[name][part] = 0.0
+        past = expected["history"].reshape(2, size)
+        past[:, [0, 23, 24, 25]] = 0.0
+        for name, block in sensed.observation.items():
+            assert_array_equal(block, expected[name].ravel(), err_msg=name)
+        mask = modified_task.sensed_numbers(one.task.definition)
+        assert_array_equal(np.where(mask, flat(timestep), 0.0), flat(sensed))
+        action = act(timestep)
+        timestep, sensed = full.step(action), one.step(action)
+        assert timestep.reward == sensed.reward
+
+
+@pytest.mark.parametrize("preset", [None, "medium", "slow"])
+def test_demonstrators_read_more_than_sensors_give(preset):
+    for task_name in ("walk", "steer"):
+        task, _ = prepare_task("tick", task_name, {"sensors_only": True})
+        with pytest.raises(
+            ValueError, match=r"^sensors_only: expected False, as demonstrators read .*; dagger imitates one"
+        ):
+            policies.policy("cpg", "tick", preset, task=task)
 
 
 @pytest.mark.parametrize("name", [name for kind in modifiers.SUITE_MODIFIERS for name in kind.defaults])

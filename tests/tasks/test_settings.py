@@ -56,6 +56,7 @@ OTHER = {
     "force": 2.0,
     "delay": (2, 3),
     "exclude_blocks": ("posture",),
+    "sensors_only": True,
     "observation_noise": {"posture": 1.0},
     "history": 2,
     **dict.fromkeys((*parameters.SHARED_NOISE, *parameters.Noise._fields), 0.05),

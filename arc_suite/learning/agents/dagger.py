@@ -21,6 +21,8 @@ from arc_suite.learning.agents.hyperparameters import DAgger
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.learning.teachers import Teacher
+from arc_suite.tasks.modified_task import has_active, sensed_numbers
+from arc_suite.tasks.modifiers import SensorsOnly
 
 UPDATES_PER_CALL = 20  # of `fit`
 
@@ -43,7 +45,8 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
     Raises:
         ValueError: the body has no such preset, or the run is too short to learn.
     """
-    environment = context.environment(hp.num_envs)
+    environment = _open_environment(context, hp.num_envs)
+    sees = _seen_numbers(context)
     architecture = architectures.of_environment(environment)
     teacher = Teacher(environment, hp.preset)
     state = begin(architecture.draw_policy(generator(context.seed, "networks", 0), hp.hidden))
@@ -85,10 +88,11 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         for _ in range(min(hp.round, steps_to_evaluation)):
             teacher.reset(np.flatnonzero(age == 0))
             label = teacher.act(environment.task.split(observation), np.zeros(hp.num_envs)).clip(-1.0, 1.0)
+            seen_observation = np.where(sees, observation, 0.0)
             action = label.copy()
-            action[network_envs] = _act(architecture, state.layers, normalize(observation[network_envs]))
+            action[network_envs] = _act(architecture, state.layers, normalize(seen_observation[network_envs]))
             action += hp.noise * random.standard_normal(action.shape)
-            dataset["observations"][control_steps] = observation
+            dataset["observations"][control_steps] = seen_observation
             dataset["labels"][control_steps] = label
             dataset["ages"][control_steps] = age
             observation, reward, terminated, truncated, _ = environment.step(action.clip(-1.0, 1.0))
@@ -124,6 +128,29 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             **teacher.snapshot(),
         }
         yield Slice(step, metrics, architectures.policy_graph(architecture, normalize, state.layers), checkpoint)
+
+
+def _open_environment(context: RunContext, num_envs: int):
+    """Return the environments to learn in, whose observations the demonstrator reads.
+
+    Where the network sees what sensors give alone, the demonstrator sees everything.
+    """
+    if not _sees_sensors_only(context):
+        return context.environment(num_envs)
+    training = context.training.with_settings({"sensors_only": False})
+    return context._replace(training=training).environment(num_envs)
+
+
+def _seen_numbers(context: RunContext) -> np.ndarray:
+    """Return which numbers of the observation the network sees; others are 0 for it."""
+    if not _sees_sensors_only(context):
+        return np.ones(1, bool)
+    return sensed_numbers(context.training.definition)
+
+
+def _sees_sensors_only(context: RunContext) -> bool:
+    training = context.training
+    return not training.several and has_active(training.definition, SensorsOnly)
 
 
 def _learned_pairs(hp: DAgger, dataset, control_steps: int) -> tuple[np.ndarray, np.ndarray]:

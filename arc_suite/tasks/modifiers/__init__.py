@@ -23,6 +23,7 @@ from arc_suite.tasks.modifiers.motors import Motors
 from arc_suite.tasks.modifiers.observation_noise import ObservationNoise
 from arc_suite.tasks.modifiers.pushes import Pushes
 from arc_suite.tasks.modifiers.sensors import Sensors
+from arc_suite.tasks.modifiers.sensors_only import SensorsOnly
 
 # The suite's modifiers, from the body outwards. A modified task has all of them.
 SUITE_MODIFIERS: tuple[type[Modifier], ...] = (
@@ -36,6 +37,7 @@ SUITE_MODIFIERS: tuple[type[Modifier], ...] = (
     Delay,
     ExcludedBlocks,
     ObservationNoise,
+    SensorsOnly,
     History,
 )
 

@@ -32,6 +32,7 @@ class _HistoryFields(NamedTuple):
     history: int
     names: tuple[str, ...]
     size: int
+    joints: int
 
 
 class History(_HistoryFields, Modifier):
@@ -43,6 +44,7 @@ class History(_HistoryFields, Modifier):
             start, with actions of 0.
         names: names of the blocks that the history keeps.
         size: numbers of these blocks together.
+        joints: numbers of an action.
     """
 
     __slots__ = ()
@@ -61,7 +63,7 @@ class History(_HistoryFields, Modifier):
             expected = "expected blocks that measure joints, as posture and velocities do"
             raise ValueError(f"history: {expected}, got {observed}")
         size = sum(block.size for block in joint_blocks.values())
-        return cls(history, tuple(joint_blocks), size)
+        return cls(history, tuple(joint_blocks), size, len(body.joint_names))
 
     @property
     def is_active(self) -> bool:
@@ -94,6 +96,11 @@ class History(_HistoryFields, Modifier):
             parts += blocks[name].parts
         parts.append(Joints(body, "action of {}"))
         return {**blocks, "history": Block((Repeated(tuple(parts), self.history),))}
+
+    def repeat(self, masks: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return which numbers of the block `history` count, given the masks of other blocks; actions do."""
+        step = [*(masks[name] for name in self.names), np.ones(self.joints, bool)]
+        return np.tile(np.concatenate(step), self.history)
 
     def observe(self, state: HistoryState, observed: dict, elapsed) -> dict[str, Any]:
         """Return the blocks with the history."""
