@@ -30,8 +30,9 @@ export class Mind {
 export function shareOf(data, number, count) {
   const own = (values) => values.subarray((number * values.length) / count, ((number + 1) * values.length) / count);
   const from = (values, size) => values.subarray((number * (values.length - size)) / count);
-  const { qpos, qvel, ctrl, xpos, cfrc_ext } = data;
-  return { qpos: own(qpos), qvel: own(qvel), ctrl: own(ctrl), xpos: from(xpos, 3), cfrc_ext: from(cfrc_ext, 6) };
+  const { qpos, qvel, ctrl, xpos, xquat, cfrc_ext } = data;
+  const parts = { xpos: from(xpos, 3), xquat: from(xquat, 4), cfrc_ext: from(cfrc_ext, 6) };
+  return { qpos: own(qpos), qvel: own(qvel), ctrl: own(ctrl), ...parts };
 }
 
 // The MJCF of two bodies that meet, given that of one: it touches what touches it, as the ground does.

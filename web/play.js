@@ -103,15 +103,15 @@ class Play {
   pose() {
     const { joints, home } = this.body.task;
     this.figures.forEach(({ torso }, number) => {
-      const { qpos } = this.simulation.shares[number]();
-      torso.position.fromArray(qpos);
+      const { qpos } = this.simulation.shares[number](), { task } = this.simulation.minds[number];
+      torso.position.fromArray(task.torso(qpos, qpos.subarray(3, 7)));
       torso.quaternion.copy(quaternion(qpos.subarray(3, 7)));
       this.figures[number].bend(joints.map((place, joint) => qpos[place] - home[joint]));
     });
     const { pull } = this.simulation;
     this.rope.visible = pull !== null;
     if (pull) this.rope.geometry.setFromPoints([pull.point, pull.target].map((point) => new THREE.Vector3(...point)));
-    this.goals.show(this.simulation.data.qpos);
+    this.goals.show(this.parts[0].position);
   }
 
   // Shows the steps of some seconds.

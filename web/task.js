@@ -21,6 +21,16 @@ function headed(x, y, heading) {
   return [cosine * x + sine * y, cosine * y - sine * x];
 }
 
+function cross([ax, ay, az], [bx, by, bz]) {
+  return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
+}
+
+// A vector of a frame in the world, given the orientation of the frame.
+function rotated([w, x, y, z], vector) {
+  const twice = cross([x, y, z], vector).map((value) => 2 * value), turn = cross([x, y, z], twice);
+  return vector.map((value, i) => value + w * twice[i] + turn[i]);
+}
+
 // A body in a task. A task with a command observes in the frame of the torso's heading; one without a command, which
 // walks along x, in the frame of a course, by which it is steered. Some take a pose and a gait, too.
 export class Task {
@@ -39,9 +49,26 @@ export class Task {
     this.place = this.placed(data);
   }
 
-  placed({ xpos, qpos }) {
-    const torso = this.constants.parts[0];
-    return [xpos[3 * torso], xpos[3 * torso + 1], yaw(qpos.subarray(3, 7))];
+  placed({ xpos, xquat, qpos }) {
+    const { root } = this.constants;
+    const [x, y] = this.torso(xpos.subarray(3 * root, 3 * root + 3), xquat.subarray(4 * root, 4 * root + 4));
+    return [x, y, yaw(qpos.subarray(3, 7))];
+  }
+
+  // Returns the position of the torso, given the position and the orientation of its root body.
+  torso([x, y, z], orientation) {
+    const { torso_place: place } = this.constants;
+    if (!place) return [x, y, z];
+    const shift = rotated(orientation, place);
+    return [x + shift[0], y + shift[1], z + shift[2]];
+  }
+
+  // Returns the velocity of the torso.
+  velocity({ qpos, qvel }) {
+    const { torso_place: place } = this.constants, velocity = qvel.subarray(0, 3);
+    if (!place) return velocity;
+    const swing = rotated(qpos.subarray(3, 7), cross(qvel.subarray(3, 6), place));
+    return velocity.map((value, i) => value + swing[i]);
   }
 
   // Sets the commands of a control step: a velocity, from -1 to 1 each, a pose, and a gait.
@@ -76,7 +103,8 @@ export class Task {
   }
 
   height(qpos) {
-    return qpos[2] - this.ground(qpos[0], qpos[1]);
+    const [x, y, z] = this.torso(qpos, qpos.subarray(3, 7));
+    return z - this.ground(x, y);
   }
 
   // Returns the blocks of an observation by name.
@@ -85,10 +113,10 @@ export class Task {
     const heading = commanded ? yaw(qpos.subarray(3, 7)) : this.course;
     const shown = this.going ? 1 : 0;
     const angles = joints.map((place, joint) => qpos[place] - home[joint]);
-    const speeds = dofs.map((place) => qvel[place]);
+    const speeds = dofs.map((place) => qvel[place]), velocity = this.velocity(data);
     return {
       posture: [this.height(qpos), ...turned(qpos.subarray(3, 7), -heading), ...angles],
-      velocities: [...headed(qvel[0], qvel[1], heading), ...qvel.subarray(2, 6), ...speeds],
+      velocities: [...headed(velocity[0], velocity[1], heading), velocity[2], ...qvel.subarray(3, 6), ...speeds],
       contact_forces: this.forces(data.cfrc_ext, heading),
       gait_clock: [shown * Math.sin(this.phase), shown * Math.cos(this.phase)],
       command: [...this.desired, ...this.motion],

@@ -213,8 +213,8 @@ def _sketched_parts(model: mujoco.MjModel, body: Body) -> list[Part]:
     """
     data = mujoco.MjData(model)
     data.qpos[:] = standing_qpos(model)
-    mujoco.mj_kinematics(model, data)
-    bare_parts = _parts_without_shapes(body, data.body("torso").xpos, data.body("torso").xquat)
+    mujoco.mj_kinematics(model, data)  # of sites, too
+    bare_parts = _parts_without_shapes(body, data.site("torso").xpos, data.body("torso").xquat)
     part_of_body = _nearest_parts(model, body)
     positions, orientations = part_frames(bare_parts)
     shapes_of_part: list[list[Shape]] = [[] for _ in bare_parts]

@@ -29,7 +29,7 @@ from arc_suite.models.standing import GRAVITY
 from arc_suite.policies import other_libraries
 from arc_suite.policies.network import Network
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import Task, clock
+from arc_suite.tasks import Task, clock, readings
 
 GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
 
@@ -113,9 +113,10 @@ def _describe_ground(setup: Setup, arena: str) -> dict[str, Any]:
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
         xml = xml.replace('integrator="implicitfast"', 'integrator="Euler"')
     data = mujoco.MjData(model)
-    data.qpos[:] = task.scene.standing
+    layout = task.scene.layout
+    data.qpos[:] = readings.root_qpos(task.scene.standing, layout)
     mujoco.mj_forward(model, data)
-    start_qpos = task.raise_off_ground(task.read(data))
+    start_qpos = readings.root_qpos(task.raise_off_ground(task.read(data)), layout)
     return {"xml": xml, "start": pages.to_json_values(start_qpos, decimals=None)}
 
 
@@ -137,6 +138,8 @@ def _describe_task(task: Task, command_task: Task) -> dict[str, Any]:
     return {
         "headed": has_command,
         "parts": np.r_[layout.parts],
+        "root": layout.torso if layout.torso_place is None else layout.torso_place.root,
+        "torso_place": None if layout.torso_place is None else layout.torso_place.in_root,
         "joints": joint_positions,
         "dofs": np.r_[layout.joint_velocities],
         "home": scene.standing[joint_positions],

@@ -10,7 +10,7 @@ from arc_suite import models
 from arc_suite.animation.parts import KINDS
 from arc_suite.markers import Marker
 from arc_suite.style.tracks import Track
-from arc_suite.tasks import Task
+from arc_suite.tasks import Task, readings
 
 _GROUND_MARGIN = 12.0  # standing heights of ground around the path
 _MAX_REPLAY_ERROR = 1e-3  # standing heights, by which the torso of a replay may be off
@@ -145,7 +145,7 @@ def _replay(environment, track: Track) -> _Replay:
     failed = []
     for action, recorded_position in zip(track.actions, track.positions, strict=True):
         environment.step(action)
-        torso_position = environment.physics.data.qpos[:3]
+        torso_position = readings.torso_qpos(environment.physics.data.qpos, task.definition.scene.layout)[:3]
         if abs(torso_position - recorded_position).max() > max_error:
             break
         marks.append(_describe_marks(task.markers(environment.physics), styles))

@@ -18,6 +18,7 @@ from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_
 from arc_suite.envs.prepare import prepare_task, refuse_arguments
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import CURRICULUM
+from arc_suite.tasks.readings import torso_qpos
 
 
 class BodiesTask(NamedTuple):
@@ -235,7 +236,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
 
     def places(self) -> np.ndarray:
         """Return x and y, m, and yaw, rad, of the torsos in the world (num_envs, 3)."""
-        poses = np.array(self._of_each(lambda group: group.batch.data.qpos[:, :7]))
+        poses = np.array(self._of_each(_torso_poses))
         return np.column_stack([poses[:, :2], rotations.yaw(poses[:, 3:7])])
 
     def quaternions(self) -> np.ndarray:
@@ -454,3 +455,8 @@ def _spaces(flat: bool) -> tuple[gymnasium.Space, gymnasium.Space]:
 def _task_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a task, without that of the vector environment."""
     return {name: value for name, value in settings.items() if name != "on_divergence"}
+
+
+def _torso_poses(group: Group) -> np.ndarray:
+    """Return the positions and quaternions (environments of the group, 7) of the torsos in the world."""
+    return torso_qpos(group.batch.data.qpos, group._task.scene.layout)[:, :7]

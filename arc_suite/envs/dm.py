@@ -28,6 +28,7 @@ from arc_suite.simulation.model import check_fields
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM
+from arc_suite.tasks.readings import root_qpos, root_qvel
 
 _FLAT = "observations"  # dm_control's name of a flat observation
 _LEVEL = CURRICULUM[1]  # name of the setting that restarts the curriculum
@@ -401,8 +402,9 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         if start.model:  # fields of the model that modifiers have drawn
             physics.change_model(start.model)
         data = physics.data.ptr
-        data.qpos[:] = start.qpos
-        data.qvel[:] = start.qvel
+        layout = self.definition.scene.layout
+        data.qpos[:] = root_qpos(start.qpos, layout)
+        data.qvel[:] = root_qvel(start.qvel, data.qpos, layout)
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
         physics.shown_reward = None
@@ -562,7 +564,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         readings = self.definition.read(data)
         clear_qpos = self.definition.clear_spawn(self._now.memory, readings)
         if clear_qpos is not None:
-            data.qpos[:] = clear_qpos
+            data.qpos[:] = root_qpos(clear_qpos, self.definition.scene.layout)
             physics.after_reset()
             readings = self.definition.read(data)
         self._now.memory = self.definition.begin(self._now.memory, readings)

@@ -13,11 +13,10 @@ from arc_suite import checks, registry
 from arc_suite.models.sizing import simulation
 from arc_suite.models.standing import standing_qpos
 from arc_suite.simulation.model import compile_model
-from arc_suite.tasks import modified_task, parameters
+from arc_suite.tasks import modified_task, parameters, readings
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.modifiers import MODIFIERS
-from arc_suite.tasks.readings import layout
 from arc_suite.tasks.scene import CHANGEABLE, Scene
 
 _ROUNDING = 1e-6  # control steps, by which a time limit may exceed a number of steps without another one
@@ -52,11 +51,12 @@ def prepare_task(
     model = compile_model(body, arena)
     substeps = simulation(body).substeps
     control_timestep = substeps * model.opt.timestep
+    layout = readings.layout(model, body)
     scene = Scene(
         body=body,
         arena=arena,
-        layout=layout(model, body),
-        standing=standing_qpos(model),
+        layout=layout,
+        standing=readings.torso_qpos(standing_qpos(model), layout),
         control_timestep=control_timestep,
         substeps=substeps,
         model={name: getattr(model, name).copy() for name in CHANGEABLE},

@@ -32,6 +32,7 @@ from arc_suite.simulation.cores import usable_cores
 from arc_suite.simulation.model import check_fields
 from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM, Inputs
+from arc_suite.tasks.readings import root_qpos, root_qvel
 
 _MAX_THREADS = 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
@@ -580,7 +581,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         qpos, qvel, memories, mocap_positions, models = zip(*starts, strict=True)
         has_mocap = mocap_positions[0] is not None  # the same for all environments
         mocap_pos = np.stack(mocap_positions) if has_mocap else None
-        self.batch.reset(mask, np.stack(qpos), np.stack(qvel), mocap_pos, models)
+        layout = self._task.scene.layout
+        start_qpos = root_qpos(np.stack(qpos), layout)
+        start_qvel = root_qvel(np.stack(qvel), start_qpos, layout)
+        self.batch.reset(mask, start_qpos, start_qvel, mocap_pos, models)
 
         # A task that is the same for all environments gets those of the mask alone. A stacked task needs all of them.
         task = self._task
@@ -596,7 +600,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         readings = task.read(self.batch.part(part))
         clear_qpos = task.clear_spawn(memory, readings)
         if clear_qpos is not None:
-            self.batch.place(mask, clear_qpos[is_starting])
+            self.batch.place(mask, root_qpos(clear_qpos[is_starting], layout))
             readings = task.read(self.batch.part(part))
         memory = task.begin(memory, readings)
         observation[mask] = task.vector(task.observe(memory, readings), np.float32)[is_starting]

@@ -11,7 +11,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.models.stride import MIN_SPEED_SHARE
-from arc_suite.tasks import Task
+from arc_suite.tasks import Task, readings
 
 MAX_TOUCHING = 0.01  # share of the time that the torso may touch the ground
 MIN_UPRIGHTNESS = 0.5  # cosine of the torso's tilt; a body that tilts by more than 60 degrees has fallen
@@ -64,7 +64,7 @@ class WalkWatcher:
         self._physics = environment.physics
         self._data = environment.physics.data.ptr
         model = environment.physics.model.ptr
-        self._torso_geoms = np.flatnonzero(model.geom_bodyid == model.body("torso").id)
+        self._torso_geoms = np.flatnonzero(model.geom_bodyid == self._task.scene.layout.torso)
         self._poses = []  # (3,) of the torso: x and y, m, and yaw, rad; at the reset and after each step
         self._targets = []
         self._touching = []
@@ -78,7 +78,8 @@ class WalkWatcher:
         if self.ending != TIME:
             return
         data = self._data
-        pose = np.array((*data.qpos[:2], rotations.yaw(data.qpos[3:7])))
+        qpos = readings.torso_qpos(data.qpos, self._task.scene.layout)
+        pose = np.array((*qpos[:2], rotations.yaw(qpos[3:7])))
         self._poses.append(pose)
         if timestep.first():
             self._touching.append(False)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import files, parsers
-from arc_suite.importing import armatures, motors, notes, opening, poses, sketch, tree, urdf, writing
+from arc_suite.importing import armatures, motors, notes, opening, poses, sketch, tree, trunk, urdf, writing
 from arc_suite.importing.naming import choose_names, clean_name
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
@@ -181,7 +181,7 @@ def _find_standing_robot(path: Path, choices: _Choices) -> _StandingRobot:
 def _open_standing_robot(path: Path, choices: _Choices, turn: str) -> _StandingRobot:
     """Return the robot of a file as it stands, with the base of a URDF turned."""
     file = opening.open_robot(path, turn)
-    robot = tree.robot_of(file.model, file.root, file.notes)
+    robot = trunk.place_torso(tree.robot_of(file.model, file.root, file.notes))
     return _StandingRobot(file, robot, poses.find_stance(robot, choices.home, choices.feet))
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from arc_suite.importing import motors
+from arc_suite.importing import motors, trunk
 from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
@@ -35,6 +35,7 @@ def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int
     else:
         yield f"joint map: places of the file in an action: {action_indices}"
     yield f"standing pose: {stance.origin}, torso {stance.height:.3g} m above the floor"
+    yield from trunk.placement_notes(robot)
 
 
 def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) -> Iterator[str]:

@@ -8,13 +8,10 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.importing import tree
-from arc_suite.importing.tree import Robot
+from arc_suite.importing.tree import Chain, Robot
 from arc_suite.models.kinematics import least_changes
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots.spec import SpecError
-
-# Joints between the torso and a part, outwards.
-Chain = tuple[int, ...]
 
 # Checks of a pose, in standing heights.
 _MAX_FOOT_DIFFERENCE = 0.15  # in height, between feet on the floor
@@ -189,22 +186,13 @@ def _find_named_feet(robot: Robot, feet: Sequence[str]) -> dict[Chain, list[int]
     return foot_colliders
 
 
-def _find_end_colliders(robot: Robot) -> dict[Chain, list[int]]:
-    """Return the colliders at the end of every chain of joints that is not the beginning of another chain."""
-    colliders = {}
-    for geom in robot.colliders:
-        colliders.setdefault(robot.chain_of_geom(geom), []).append(geom)
-    beginnings = {chain[:size] for chain in colliders for size in range(len(chain))}
-    return {chain: geoms for chain, geoms in colliders.items() if chain not in beginnings}
-
-
 def _candidate_poses(robot: Robot, named_feet: dict[Chain, list[int]] | None) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the poses (nq,) to try, each with where it comes from: keyframes first, `home` before others."""
     model = robot.model
     for key in sorted(range(model.nkey), key=lambda key: model.key(key).name != "home"):
         yield f"keyframe {model.key(key).name or key}", model.key_qpos[key]
     yield "zero angles", model.qpos0
-    foot_colliders = _find_end_colliders(robot) if named_feet is None else named_feet
+    foot_colliders = robot.end_colliders() if named_feet is None else named_feet
     for front_sign, rear_sign in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
         qpos = _search_bent_knees(robot, foot_colliders, front_sign, rear_sign)
         if qpos is not None:
@@ -247,7 +235,7 @@ def _stance_of_pose(
     if is_checked:
         _check_limits(robot, qpos)
     data = robot.forward_kinematics(qpos)
-    foot_colliders = _find_end_colliders(robot) if named_feet is None else named_feet
+    foot_colliders = robot.end_colliders() if named_feet is None else named_feet
     ends = {}
     for chain, geoms in foot_colliders.items():
         if chain:

@@ -15,8 +15,11 @@ HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 DOWN = np.array((0.0, 0.0, -1.0))
 
+# Joints between the torso and a part, outwards.
+Chain = tuple[int, ...]
+
 _GEOM = mujoco.mjtGeom
-_IDENTITY_POSE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position and quaternion
+_NO_TURN = (1.0, 0.0, 0.0, 0.0)
 
 
 class Robot(NamedTuple):
@@ -29,6 +32,7 @@ class Robot(NamedTuple):
         joints: all except the free one, in the order of the file.
         colliders: geoms that collide with anything.
         chains: by body, the joints between the torso and it, outwards.
+        torso_place: (3,) origin of the torso's frame in that of its body, m; both have the same axes.
     """
 
     model: mujoco.MjModel
@@ -36,7 +40,8 @@ class Robot(NamedTuple):
     bodies: tuple[int, ...]
     joints: tuple[int, ...]
     colliders: tuple[int, ...]
-    chains: dict[int, tuple[int, ...]]
+    chains: dict[int, Chain]
+    torso_place: np.ndarray = np.zeros(3)
 
     def joint_name(self, joint: int) -> str:
         """Return the name of a joint in the file, or its number."""
@@ -53,9 +58,17 @@ class Robot(NamedTuple):
         """Return the index of a joint's angle in qpos."""
         return int(self.model.jnt_qposadr[joint])
 
-    def chain_of_geom(self, geom: int) -> tuple[int, ...]:
+    def chain_of_geom(self, geom: int) -> Chain:
         """Return the joints between the torso and a geom, outwards."""
         return self.chains[int(self.model.geom_bodyid[geom])]
+
+    def end_colliders(self) -> dict[Chain, list[int]]:
+        """Return the colliders at the end of every chain of joints that is not the beginning of another chain."""
+        colliders = {}
+        for geom in self.colliders:
+            colliders.setdefault(self.chain_of_geom(geom), []).append(geom)
+        beginnings = {chain[:size] for chain in colliders for size in range(len(chain))}
+        return {chain: geoms for chain, geoms in colliders.items() if chain not in beginnings}
 
     def clip_to_limits(self, qpos: np.ndarray) -> np.ndarray:
         """Return a pose (nq,) with all joints within their limits."""
@@ -72,7 +85,7 @@ class Robot(NamedTuple):
             data = mujoco.MjData(self.model)
         start = self.model.jnt_qposadr[self.model.body_jntadr[self.root]]  # of the torso's pose in qpos
         data.qpos[:] = qpos
-        data.qpos[start : start + 7] = _IDENTITY_POSE
+        data.qpos[start : start + 7] = (*(0.0 - self.torso_place), *_NO_TURN)
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_comPos(self.model, data)
         return data
@@ -89,7 +102,7 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
     Raises:
         SpecError: the robot has ball joints, or nothing that collides.
     """
-    chains: dict[int, tuple[int, ...]] = {root: ()}
+    chains: dict[int, Chain] = {root: ()}
     for body in range(root + 1, model.nbody):
         parent = int(model.body_parentid[body])
         if parent in chains:

@@ -80,7 +80,8 @@ def write_source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, M
     for body in robot.bodies:
         parent = world if body == robot.root else elements[int(robot.model.body_parentid[body])]
         elements[body] = _add_body(parent, robot, body, names, mesh_geoms)
-    SubElement(elements[robot.root], "site", name="torso", size=exact(0.01), **SITE)
+    torso_place = _format_differences({"pos": robot.torso_place}, _BODY_DEFAULTS)
+    SubElement(elements[robot.root], "site", name="torso", size=exact(0.01), **torso_place, **SITE)
     for label, leg in zip(names.legs, stance.legs, strict=True):
         _add_leg_bodies(elements, robot, stance, names, label, leg)
     keyframe = SubElement(root, "keyframe")
@@ -237,5 +238,6 @@ def _add_leg_bodies(
 
 def _home_qpos(robot: Robot, stance: Stance) -> list[float]:
     """Return qpos of the standing pose in the model of the source."""
-    torso_pose = [0.0, 0.0, stance.height, 1.0, 0.0, 0.0, 0.0]  # position and quaternion
-    return torso_pose + [stance.qpos[robot.qpos_index(joint)] for joint in robot.joints]
+    root_position = (0.0, 0.0, stance.height) - robot.torso_place  # where the torso's frame is level
+    root_pose = [*root_position, 1.0, 0.0, 0.0, 0.0]  # position and quaternion
+    return root_pose + [stance.qpos[robot.qpos_index(joint)] for joint in robot.joints]

@@ -93,6 +93,11 @@ def compile_source(body: Body) -> mujoco.MjModel:
     return model
 
 
+def torso_place(body: Body) -> np.ndarray:
+    """Return the origin (3,) of the torso's frame in that of the root body, m; 0 for a body without a source."""
+    return compile_source(body).site("torso").pos if body.source else np.zeros(3)
+
+
 def angles_at_home(body: Body) -> dict[str, float]:
     """Return the positions of a source's joints in the standing pose by name: rad, or m of a slide."""
     model = compile_source(body)
@@ -161,13 +166,15 @@ def _add_actuator(
 
 def _add_cameras(torso: ElementTree.Element, body: Body) -> None:
     """Add the cameras that ride along, and the eye."""
+    place = torso_place(body)
     for name, camera in _riding_cameras(body).items():
-        _add_camera(torso, name, "trackcom", camera)
-    _add_camera(torso, builder.EYE, "fixed", builder.eye(body))
+        _add_camera(torso, name, "trackcom", camera, place)
+    _add_camera(torso, builder.EYE, "fixed", builder.eye(body), place)
 
 
-def _add_camera(torso: ElementTree.Element, name: str, mode: str, camera: dict) -> None:
-    attributes = {key: exact(value) for key, value in camera.items()}
+def _add_camera(torso: ElementTree.Element, name: str, mode: str, camera: dict, place: np.ndarray) -> None:
+    """Add a camera in the torso's frame, which has a place (3,) in that of its body."""
+    attributes = {key: exact(value) for key, value in (camera | {"pos": camera["pos"] + place}).items()}
     SubElement(torso, "camera", name=name, mode=mode, **attributes)
 
 
@@ -188,7 +195,7 @@ def _riding_cameras(body: Body) -> dict[str, dict]:
     box_half_extents = model.geom_aabb[:, None, 3:]
     transposed_rotations = data.geom_xmat.reshape(-1, 3, 3).swapaxes(-1, -2)
     corners = (box_centers + CORNERS * box_half_extents) @ transposed_rotations
-    corners = corners + data.geom_xpos[:, None] - data.xpos[_TORSO]
+    corners = corners + data.geom_xpos[:, None] - data.site("torso").xpos
     points = np.concatenate([outline(body), corners.reshape(-1, 3)])
     cameras = builder.cameras(body, points)
     return {name: camera | {"pos": camera["pos"] + shift} for name, camera in cameras.items()}

@@ -92,7 +92,7 @@ def _measure(
 ) -> PoseMechanics:
     """Return the mechanics of the pose of the data."""
     torso = 1  # its index
-    origin = data.xpos[torso]
+    origin = data.xpos[torso] + source.torso_place(body)  # the torso is level
     soles = []
     jacobians = []
     for leg, foot, dofs in zip(body.legs, indices.feet, indices.dofs_by_leg, strict=True):

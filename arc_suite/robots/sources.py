@@ -140,7 +140,7 @@ _ELEMENTS = {
             **dict.fromkeys(("adhesion", "surfacevel"), _NUMBERS),
         },
     ),
-    "site": _Element(("body",), 1024, {"name": _NAME, "size": _SIZE, "group": ("4",)}),
+    "site": _Element(("body",), 1024, {"name": _NAME, "pos": _PLACE, "size": _SIZE, "group": ("4",)}),
     "keyframe": _Element(("mujoco",), 1, {}),
     "key": _Element(("keyframe",), 1, {"name": ("home",), "qpos": _Range(-1000.0, 1000.0)}),
 }

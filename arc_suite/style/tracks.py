@@ -160,10 +160,10 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
             continue
         readings = task.read(data)
         row = {
-            "positions": data.qpos[:3],
-            "quaternions": data.qpos[3:7],
-            "linear_velocities": data.qvel[:3],
-            "angular_velocities": data.qvel[3:6],
+            "positions": readings.torso_position,
+            "quaternions": readings.torso_quaternion,
+            "linear_velocities": readings.velocities[:3],
+            "angular_velocities": readings.velocities[3:6],
             "joint_angles": readings.joint_angles,
             "joint_velocities": data.qvel[layout.joint_velocities],
             "actions": data.ctrl[: len(body.joint_names)],

@@ -352,7 +352,7 @@ class CommandTask(Task):
         touches = self.settings.ground.touches(data)
         if self.settings.gait_and_pose is None:
             return Sensed(*readings, heading, touches, None)
-        feet_from_torso = data.xpos[..., layout.feet, :2] - data.xpos[..., layout.torso, None, :2]
+        feet_from_torso = data.xpos[..., layout.feet, :2] - readings.frame_position[..., None, :2]
         return Sensed(*readings, heading, touches, rotations.to_heading_frame(feet_from_torso, heading_of_parts))
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:

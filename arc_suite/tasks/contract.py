@@ -234,7 +234,10 @@ class Task(Observed):
     @property
     def reads(self) -> tuple[str, ...]:
         """The fields of the simulation that `read` takes."""
-        return reading.FIELDS if self.scene.layout.home is None else reading.FIELDS_OF_SERVOS
+        layout = self.scene.layout
+        if layout.torso_place is not None:
+            return reading.FIELDS_OF_PLACED_TORSOS
+        return reading.FIELDS if layout.home is None else reading.FIELDS_OF_SERVOS
 
     @property
     def actions(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.spec import Body
+from arc_suite.tasks import readings
 from arc_suite.tasks.blocks import Block, slices
 from arc_suite.tasks.parts import ROTATIONS, Legs, Vector
 
@@ -44,9 +45,11 @@ def read_observation(scene, data) -> dict:
     height = scene.standing[..., 2:3]  # h, m
     velocity_unit = (GRAVITY * height) ** 0.5
     rate_unit = (GRAVITY / height) ** 0.5
-    linear_velocity = data.qvel[..., :3]
-    angular_velocity = data.qvel[..., 3:6]
-    horizontal_velocity = rotations.to_heading_frame(linear_velocity[..., :2], rotations.yaw(data.qpos[..., 3:7]))
+    qpos = readings.torso_qpos(data.qpos, scene.layout)
+    qvel = readings.torso_qvel(data.qvel, data.qpos, scene.layout)
+    linear_velocity = qvel[..., :3]
+    angular_velocity = qvel[..., 3:6]
+    horizontal_velocity = rotations.to_heading_frame(linear_velocity[..., :2], rotations.yaw(qpos[..., 3:7]))
     velocity = [
         horizontal_velocity / velocity_unit,
         linear_velocity[..., 2:] / velocity_unit,
@@ -54,7 +57,7 @@ def read_observation(scene, data) -> dict:
     ]
     feet = data.xpos[..., scene.layout.feet, :]
     ground = scene.arena.height(feet[..., 0], feet[..., 1]) + 0.0 * feet[..., 0]  # level ground gives one number
-    torso_height = data.qpos[..., 2:3]
+    torso_height = qpos[..., 2:3]
     return {
         "velocity": xp.concatenate(velocity, axis=-1),
         "ground": (ground - torso_height) / height + 1.0,

@@ -8,11 +8,29 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.arenas import Arena
 from arc_suite.robots.spec import Body
 
 FIELDS = ("qpos", "qvel", "cfrc_ext", "xpos")  # fields of the simulation that `read` takes
 FIELDS_OF_SERVOS = (*FIELDS, "qfrc_actuator")
+FIELDS_OF_PLACED_TORSOS = (*FIELDS_OF_SERVOS, "xquat")  # see `TorsoPlace`
+
+
+class TorsoPlace(NamedTuple):
+    """The place of an imported torso whose root body has its frame elsewhere, as on the floor below the trunk.
+
+    The simulation has the root body's position and velocity, everything else of the suite has those of the torso.
+
+    Attributes:
+        root: index of the root body.
+        in_root: (3,) the place in the root body's frame, m; the axes are the same.
+        in_torso: (3,) the place in the frame of the body `Layout.torso`, m.
+    """
+
+    root: int
+    in_root: np.ndarray
+    in_torso: np.ndarray
 
 
 class Layout(NamedTuple):
@@ -21,11 +39,17 @@ class Layout(NamedTuple):
     joint_angles: slice | np.ndarray  # in qpos
     joint_velocities: slice | np.ndarray  # in qvel
     velocities: slice | np.ndarray  # in qvel: torso linear and angular, joints
-    torso: int  # in xpos
+    torso: int  # in xpos; of the bodies that the torso consists of, the heaviest
     parts: slice | np.ndarray  # in cfrc_ext; the first is the torso
     feet: slice | np.ndarray  # in xpos
     home: np.ndarray | None = None  # angles of the joints in the standing pose; None where they are 0
     limits: np.ndarray | None = None  # of the joints' torques, for servos; None for motors
+    torso_place: TorsoPlace | None = None  # None where the torso is at the origin of its body
+
+    @property
+    def place_in_torso(self) -> np.ndarray:
+        """Return the torso's place (3,) in the frame of the body `torso`, m."""
+        return np.zeros(3) if self.torso_place is None else self.torso_place.in_torso
 
 
 class Readings(NamedTuple):
@@ -35,7 +59,7 @@ class Readings(NamedTuple):
     behind the other readings, as in the published benchmark.
 
     Attributes:
-        qpos: (..., nq) qpos of the simulation.
+        qpos: (..., nq) qpos of the simulation, as `torso_qpos` returns it.
         posture: (..., 5 + joints): torso height over the ground, torso quaternion, joint angles.
         torso_position: (..., 3) in the world.
         torso_quaternion: (..., 4), w first.
@@ -112,20 +136,50 @@ def _imported_layout(model, body: Body, feet: list[int]) -> Layout:
     joints = [model.joint(name) for name in body.joint_names]
     angles = [int(joint.qposadr[0]) for joint in joints]
     velocities = [int(joint.dofadr[0]) for joint in joints]
-    parts = []
-    for name in body.part_names:
+    torso = _heaviest_torso_body(model)
+    parts = [torso]
+    for name in body.part_names[1:]:
         part = model.body(name).id
         parts.append(int(model.body_parentid[part]) if part in feet else part)
     return Layout(
         joint_angles=_as_slice(angles),
         joint_velocities=_as_slice(velocities),
         velocities=_as_slice([*range(6), *velocities]),
-        torso=parts[0],
+        torso=torso,
         parts=np.array(parts),
         feet=_as_slice(feet),
         home=model.key_qpos[0][angles],
         limits=model.jnt_actfrcrange[[joint.id for joint in joints], 1],
+        torso_place=_torso_place(model, torso),
     )
+
+
+def _heaviest_torso_body(model) -> int:
+    """Return the heaviest of the root body and of the bodies that are fixed to it."""
+    root = model.body("torso").id
+    torso_bodies = np.flatnonzero(model.body_weldid == root)
+    return int(torso_bodies[model.body_mass[torso_bodies].argmax()])
+
+
+def _torso_place(model, torso: int) -> TorsoPlace | None:
+    """Return the place of the torso, which a site has; None where it is the origin of the torso's body."""
+    root = int(model.body("torso").id)
+    in_root = model.site("torso").pos.copy()
+    if torso == root and not in_root.any():
+        return None
+    in_torso = in_root
+    for body in _bodies_below(model, root, torso):
+        in_torso = rotations.matrix(model.body_quat[body]).T @ (in_torso - model.body_pos[body])
+    return TorsoPlace(root, in_root, in_torso)
+
+
+def _bodies_below(model, root: int, body: int) -> list[int]:
+    """Return the bodies between a root and a body, outwards, with the body and without the root."""
+    bodies = []
+    while body != root:
+        bodies.append(body)
+        body = int(model.body_parentid[body])
+    return bodies[::-1]
 
 
 def _span(indices) -> slice:
@@ -150,24 +204,69 @@ def _as_slice(indices) -> slice | np.ndarray:
 
 
 def pose(qpos, layout: Layout):
-    """Return poses (..., 7 + joints) of positions (..., nq): the torso's position and quaternion, and joint angles.
+    """Return poses (..., 7 + joints) of the simulation's qpos (..., nq): position and quaternion of the torso, angles.
 
     Angles are relative to the standing pose, rad.
     """
     if layout.home is None:
         return qpos
     xp = qpos.__array_namespace__()
+    qpos = torso_qpos(qpos, layout)
     return xp.concatenate([qpos[..., :7], qpos[..., layout.joint_angles] - layout.home], axis=-1)
 
 
 def positions(poses, layout: Layout, standing):
-    """Return the positions (..., nq) of poses (..., 7 + joints); other joints are as in `standing` (nq,)."""
+    """Return the simulation's qpos (..., nq) of poses (..., 7 + joints); other joints are as in `standing` (nq,)."""
     if layout.home is None:
         return poses
     qpos = np.tile(standing, (*poses.shape[:-1], 1))
     qpos[..., :7] = poses[..., :7]
     qpos[..., layout.joint_angles] = poses[..., 7:] + layout.home
-    return qpos
+    return root_qpos(qpos, layout)
+
+
+def torso_qpos(qpos, layout: Layout):
+    """Return the simulation's qpos (..., nq) with the position of the torso in place of that of the root body."""
+    return qpos if layout.torso_place is None else _move_qpos(qpos, layout.torso_place.in_root)
+
+
+def root_qpos(qpos, layout: Layout):
+    """Return what `torso_qpos` takes: with the position of the root body in place of that of the torso."""
+    return qpos if layout.torso_place is None else _move_qpos(qpos, -layout.torso_place.in_root)
+
+
+def torso_qvel(qvel, qpos, layout: Layout):
+    """Return the simulation's qvel (..., nv) with the velocity of the torso in place of that of the root body."""
+    return qvel if layout.torso_place is None else _move_qvel(qvel, qpos, layout.torso_place.in_root)
+
+
+def root_qvel(qvel, qpos, layout: Layout):
+    """Return what `torso_qvel` takes: with the velocity of the root body in place of that of the torso."""
+    return qvel if layout.torso_place is None else _move_qvel(qvel, qpos, -layout.torso_place.in_root)
+
+
+def _move_qpos(qpos, shift: np.ndarray):
+    """Return qpos (..., nq) of a point that lies a shift (3,) away in the torso's frame."""
+    xp = qpos.__array_namespace__()
+    position = qpos[..., :3] + rotations.matrix(qpos[..., 3:7]) @ shift
+    return xp.concatenate([position, qpos[..., 3:]], axis=-1)
+
+
+def _move_qvel(qvel, qpos, shift: np.ndarray):
+    """Return qvel (..., nv) of a point that lies a shift (3,) away in the torso's frame."""
+    xp = qvel.__array_namespace__()
+    swing = xp.cross(qvel[..., 3:6], xp.asarray(shift))  # in the torso's frame
+    velocity = qvel[..., :3] + (rotations.matrix(qpos[..., 3:7]) @ swing[..., None])[..., 0]
+    return xp.concatenate([velocity, qvel[..., 3:]], axis=-1)
+
+
+def frame_position(data, layout: Layout):
+    """Return the position (..., 3) of the torso's frame at the start of the last substep, in the world."""
+    place = layout.torso_place
+    if place is None:
+        return data.xpos[..., layout.torso, :]
+    turn = rotations.matrix(data.xquat[..., place.root, :])
+    return data.xpos[..., place.root, :] + turn @ place.in_root
 
 
 def component(vectors, index: int):
@@ -188,11 +287,11 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         forces: (..., parts, 6) torque and force on each part in other units or another frame; None
             for those of the simulation, N m and N in the world.
     """
-    qpos = data.qpos
-    xpos = data.xpos
+    qpos = torso_qpos(data.qpos, layout)
+    qvel = torso_qvel(data.qvel, data.qpos, layout)
     torso_position = qpos[..., 0:3]
-    feet = xpos[..., layout.feet, :]
-    posture = pose(qpos, layout)[..., 2:]
+    feet = data.xpos[..., layout.feet, :]
+    posture = pose(data.qpos, layout)[..., 2:]
     foot_heights = feet[..., 2]
     if not arena.is_level:  # on level ground, heights are z
         xp = qpos.__array_namespace__()
@@ -209,9 +308,9 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         torso_position=torso_position,
         torso_quaternion=posture[..., 1:5],
         joint_angles=posture[..., 5:],
-        velocities=data.qvel[..., layout.velocities],
+        velocities=qvel[..., layout.velocities],
         contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),
-        frame_position=xpos[..., layout.torso, :],
+        frame_position=frame_position(data, layout),
         foot_heights=foot_heights,
         efforts=efforts,
         foot_positions=feet,

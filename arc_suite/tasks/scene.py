@@ -24,7 +24,7 @@ class Scene(NamedTuple):
         body: the body that moves.
         arena: the ground and obstacles.
         layout: indices of the body's parts in the simulation's arrays.
-        standing: (nq,) the standing pose: torso position and quaternion, joint angles.
+        standing: (nq,) the standing pose: torso position and quaternion, joint angles; see `readings.torso_qpos`.
         control_timestep: s between two actions.
         substeps: steps of the simulation between two actions.
         model: fields of the compiled `MjModel`, those of `CHANGEABLE`.
@@ -43,8 +43,8 @@ class Start(NamedTuple):
     """The start of one episode; without leading axes.
 
     Attributes:
-        qpos: (nq,) positions.
-        qvel: (nv,) velocities.
+        qpos: (nq,) positions, the first one the torso's; see `readings.root_qpos`.
+        qvel: (nv,) velocities, the first one the torso's.
         memory: numbers and arrays in a NamedTuple, which may hold further NamedTuples. Each step replaces it; nothing
             writes into it.
         mocap_pos: (mocap bodies, 3) positions of obstacles, m; None where the arena has none.

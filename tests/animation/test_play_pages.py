@@ -21,7 +21,8 @@ from arc_suite.models.kinematics import Legs
 from arc_suite.policies import alone, network, policy
 from arc_suite.robots import ROBOTS
 
-OTHERS = [imports.quadruped(), imports.hexapod(), imports.body("a1_like.urdf"), imports.with_arm()]
+OTHERS = [imports.quadruped(), imports.hexapod(), imports.body("a1_like.urdf")]
+OTHERS += [imports.with_arm(), imports.on_its_floor()]
 BODIES = {body.name: body for body in (*ROBOTS.values(), *map(generator.random_body, range(10)), *OTHERS)}
 STEPS = 200  # 10 s for the robots, 4 s for those of others
 BOUNDING = {"leaper": 48}  # steps: as it bounds, differences grow tenfold in ten
@@ -111,6 +112,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
         ("quadruped_15_kg", "steered", 100),
         pytest.param("hexapod_2kg", "steered", 80, marks=pytest.mark.release),
         ("with_arm", "steered", 100),
+        ("on_its_floor", "steered", 60),
     ],
 )
 def test_a_short_walk_is_that_of_python(script, name, preset, steps):

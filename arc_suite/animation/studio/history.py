@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.animation.episodes import Episodes
+from arc_suite.tasks import readings
 from arc_suite.tasks.clock import TWO_PI
 
 _MAX_STEPS = 120  # control steps of the history
@@ -64,7 +65,7 @@ class History:
             terms={name: weights[name] * float(value) for name, value in running_task.terms.items()},
             stance=stance,
             schedule=schedule,
-            position=data.qpos[:2].copy(),
+            position=readings.torso_qpos(data.qpos, task.scene.layout)[:2].copy(),
             desired_speed=self._desired_speed(),
         )
         self._moments.append(moment)

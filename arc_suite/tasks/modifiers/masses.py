@@ -119,11 +119,13 @@ class Masses(_MassesFields, Modifier):
         leg_parts = parts[1:]  # without the torso
         torso_mass = compiled_masses[torso]
         torso_center = scene.model["body_ipos"][torso]
+        torso_place = scene.layout.place_in_torso
         # The masses that the episode has drawn; of changed fields, those of the user.
         multiple = blocks["mass"]
         payload = body_mass * blocks["payload"][:1]  # kg
         moment = torso_mass * (torso_center + height * blocks["center_of_mass"])
-        center = (moment + payload * height * blocks["payload"][1:]) / (torso_mass + payload)
+        payload_place = torso_place + height * blocks["payload"][1:]
+        center = (moment + payload * payload_place) / (torso_mass + payload)
         if "body_mass" in fields:
             multiple = fields["body_mass"][leg_parts].sum(keepdims=True) / compiled_masses[leg_parts].sum()
             payload = fields["body_mass"][[torso]] / multiple - torso_mass
@@ -131,7 +133,7 @@ class Masses(_MassesFields, Modifier):
             center = fields["body_ipos"][torso]
         return {
             "mass": multiple,
-            "payload": xp.concatenate([payload / body_mass, center / height]),
+            "payload": xp.concatenate([payload / body_mass, (center - torso_place) / height]),
             "center_of_mass": (center - torso_center) / height,
         }
 
@@ -145,7 +147,7 @@ def _change_torso(scene: Scene, state: MassesState, model: Mapping[str, np.ndarr
     payload_share = state.payload[0]
     if payload_share > 0.0:
         payload = payload_share * state.mass[0] * measure_standing(scene.body).mass  # kg
-        torso = torso.with_point(payload, height * state.payload[1:])
+        torso = torso.with_point(payload, scene.layout.place_in_torso + height * state.payload[1:])
     fields = {name: model[name].copy() for name in _INERTIA_FIELDS}
     for name, value in zip(_INERTIA_FIELDS, torso, strict=True):
         fields[name][index] = value
