@@ -69,14 +69,15 @@ def add_modifiers(task: Task, settings: Mapping[str, Any]) -> Task:
 
 def has_active(task: Task, kind: type[Modifier]) -> bool:
     """Return whether a task has a modifier of a class that steps have to call."""
-    return isinstance(task, Modified) and task.modifier(kind).is_active
+    modifiers = task.changes if isinstance(task, Modified) else ()
+    return any(isinstance(modifier, kind) and modifier.is_active for modifier in modifiers)
 
 
-def sensed_numbers(task: Task) -> np.ndarray:
+def sensed_mask(task: Task) -> np.ndarray:
     """Return which numbers (size,) of the observation a robot's sensors give; see `modifiers.SensorsOnly`."""
     masks = {name: block.are_sensed for name, block in task.blocks.items()}
     if has_active(task, History):
-        masks["history"] = task.modifier(History).repeat(masks)  # type: ignore[attr-defined]
+        masks["history"] = task.modifier(History).repeat(masks, len(task.scene.body.joint_names))  # type: ignore[attr-defined]
     return np.concatenate(list(masks.values()))
 
 

@@ -671,7 +671,7 @@ def test_sensors_only_shows_what_sensors_give(task_name):
         past[:, [0, 23, 24, 25]] = 0.0
         for name, block in sensed.observation.items():
             assert_array_equal(block, expected[name].ravel(), err_msg=name)
-        mask = modified_task.sensed_numbers(one.task.definition)
+        mask = modified_task.sensed_mask(one.task.definition)
         assert_array_equal(np.where(mask, flat(timestep), 0.0), flat(sensed))
         action = act(timestep)
         timestep, sensed = full.step(action), one.step(action)

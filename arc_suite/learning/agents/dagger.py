@@ -21,7 +21,7 @@ from arc_suite.learning.agents.hyperparameters import DAgger
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
 from arc_suite.learning.teachers import Teacher
-from arc_suite.tasks.modified_task import has_active, sensed_numbers
+from arc_suite.tasks.modified_task import has_active, sensed_mask
 from arc_suite.tasks.modifiers import SensorsOnly
 
 UPDATES_PER_CALL = 20  # of `fit`
@@ -46,7 +46,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         ValueError: the body has no such preset, or the run is too short to learn.
     """
     environment = _open_environment(context, hp.num_envs)
-    sees = _seen_numbers(context)
+    is_visible = _visible_mask(context)
     architecture = architectures.of_environment(environment)
     teacher = Teacher(environment, hp.preset)
     state = begin(architecture.draw_policy(generator(context.seed, "networks", 0), hp.hidden))
@@ -88,7 +88,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         for _ in range(min(hp.round, steps_to_evaluation)):
             teacher.reset(np.flatnonzero(age == 0))
             label = teacher.act(environment.task.split(observation), np.zeros(hp.num_envs)).clip(-1.0, 1.0)
-            seen_observation = np.where(sees, observation, 0.0)
+            seen_observation = np.where(is_visible, observation, 0.0)
             action = label.copy()
             action[network_envs] = _act(architecture, state.layers, normalize(seen_observation[network_envs]))
             action += hp.noise * random.standard_normal(action.shape)
@@ -141,11 +141,11 @@ def _open_environment(context: RunContext, num_envs: int):
     return context._replace(training=training).environment(num_envs)
 
 
-def _seen_numbers(context: RunContext) -> np.ndarray:
+def _visible_mask(context: RunContext) -> np.ndarray:
     """Return which numbers of the observation the network sees; others are 0 for it."""
     if not _sees_sensors_only(context):
         return np.ones(1, bool)
-    return sensed_numbers(context.training.definition)
+    return sensed_mask(context.training.definition)
 
 
 def _sees_sensors_only(context: RunContext) -> bool:

@@ -32,7 +32,6 @@ class _HistoryFields(NamedTuple):
     history: int
     names: tuple[str, ...]
     size: int
-    joints: int
 
 
 class History(_HistoryFields, Modifier):
@@ -44,7 +43,6 @@ class History(_HistoryFields, Modifier):
             start, with actions of 0.
         names: names of the blocks that the history keeps.
         size: numbers of these blocks together.
-        joints: numbers of an action.
     """
 
     __slots__ = ()
@@ -63,7 +61,7 @@ class History(_HistoryFields, Modifier):
             expected = "expected blocks that measure joints, as posture and velocities do"
             raise ValueError(f"history: {expected}, got {observed}")
         size = sum(block.size for block in joint_blocks.values())
-        return cls(history, tuple(joint_blocks), size, len(body.joint_names))
+        return cls(history, tuple(joint_blocks), size)
 
     @property
     def is_active(self) -> bool:
@@ -97,9 +95,9 @@ class History(_HistoryFields, Modifier):
         parts.append(Joints(body, "action of {}"))
         return {**blocks, "history": Block((Repeated(tuple(parts), self.history),))}
 
-    def repeat(self, masks: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return which numbers of the block `history` count, given the masks of other blocks; actions do."""
-        step = [*(masks[name] for name in self.names), np.ones(self.joints, bool)]
+    def repeat(self, masks: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
+        """Return which numbers of the block `history` count, given the masks of other blocks; those of actions do."""
+        step = [*(masks[name] for name in self.names), np.ones(joints, bool)]
         return np.tile(np.concatenate(step), self.history)
 
     def observe(self, state: HistoryState, observed: dict, elapsed) -> dict[str, Any]:
