@@ -16,6 +16,7 @@ from absl import flags
 
 from arc_suite import checks, files, registry
 from arc_suite.importing import import_robot
+from arc_suite.importing.facing import AXES
 from arc_suite.robots.spec_files import body_to_json
 
 FLAGS = flags.FLAGS
@@ -27,6 +28,12 @@ flags.DEFINE_float(
     None,
     "Rotor inertia, kg m^2, of each joint for which the file has none. [default: a small one where joints buzz]",
     lower_bound=0.0,
+)
+flags.DEFINE_enum(
+    "forward",
+    None,
+    list(AXES),
+    "Axis of the file's torso that points ahead. [default: what names and hinges say, or x]",
 )
 
 
@@ -43,7 +50,7 @@ def main(robot: str | None = None) -> None:
         if FLAGS.output is not None:
             checks.extension(FLAGS.output, [".json"])
             output_path = stack.enter_context(files.writing(FLAGS.output))
-        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet, FLAGS.armature)
+        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet, FLAGS.armature, FLAGS.forward)
         if output_path is not None:
             output_path.write_text(body_to_json(body), encoding="utf-8")
     print(f"{robot}: {body.name}")

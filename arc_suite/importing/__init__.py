@@ -1,6 +1,5 @@
 """Robots of others: from an MJCF or URDF file to a body whose physics are those of the file."""
 
-import contextlib
 import hashlib
 import math
 import os
@@ -11,8 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import files, parsers
-from arc_suite.importing import armatures, motors, notes, opening, poses, sketch, tree, trunk, urdf, writing
+from arc_suite import checks, files, parsers
+from arc_suite.importing import armatures, motors, notes, opening, poses, sketch, tree, trunk, writing
+from arc_suite.importing.facing import AXES, LEVEL, Y_UP, Facing
+from arc_suite.importing.front import find_front
 from arc_suite.importing.naming import choose_names, clean_name
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
@@ -64,6 +65,7 @@ class _Choices(NamedTuple):
     home: str | None = None
     feet: tuple[str, ...] = ()
     armature: float | None = None
+    forward: str | None = None
 
 
 class _StandingRobot(NamedTuple):
@@ -75,7 +77,11 @@ class _StandingRobot(NamedTuple):
 
 
 def import_robot(
-    path: str | os.PathLike, home: str | None = None, feet: Sequence[str] = (), armature: float | None = None
+    path: str | os.PathLike,
+    home: str | None = None,
+    feet: Sequence[str] = (),
+    armature: float | None = None,
+    forward: str | None = None,
 ) -> ImportedRobot:
     """Return the legged robot of an MJCF or URDF file.
 
@@ -85,12 +91,16 @@ def import_robot(
         feet: names of bodies or geoms at the ends of its legs; none to find them.
         armature: rotor inertia of each joint for which the file has none, kg m^2; None for none, or for a small one
             where joints buzz without it.
+        forward: axis of the file's torso that points ahead, out of `facing.AXES`; None for x, or for another one where
+            names and hinges of the legs say so.
 
     Raises:
         SpecError: it cannot come in; one line that names the file.
         OSError: the file cannot be read.
     """
-    imported_robot, _ = _import_file(Path(path), _Choices(home, tuple(feet), armature))
+    if forward is not None:
+        checks.name(forward, AXES, "axis")
+    imported_robot, _ = _import_file(Path(path), _Choices(home, tuple(feet), armature, forward))
     return imported_robot
 
 
@@ -162,27 +172,44 @@ def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, a
 
 
 def _find_standing_robot(path: Path, choices: _Choices) -> _StandingRobot:
-    """Return the robot of a file as it stands; the y axis of a URDF may point up."""
-    try:
-        return _open_standing_robot(path, choices, urdf.LEVEL)
-    except poses.NoStance as error:
-        reason = str(error)
-    if path.suffix.lower() == ".urdf":
-        for turn in urdf.TURNS:
-            with contextlib.suppress(SpecError):
-                file, robot, stance = _open_standing_robot(path, choices, turn)
-                extents = np.ptp([leg.center for leg in stance.legs], axis=0)  # (3,) of the feet, m
-                if extents.argmax() == 0:  # longest forward, as robots are
-                    note = "turned: the file's y axis points up, the torso's frame has z there"
-                    return _StandingRobot(file._replace(notes=(*file.notes, note)), robot, stance)
-    raise SpecError(reason)
+    """Return the robot of a file as it stands; the file's y axis may point up."""
+    facings = (LEVEL, *Y_UP)
+    if choices.forward is not None:
+        facings = tuple(Facing(choices.forward, up) for up in ("z", "y") if up != choices.forward[-1])
+    reasons = []
+    for facing in facings:
+        try:
+            standing_robot = _open_standing_robot(path, choices, facing)
+        except poses.NoStance as reason:
+            reasons.append(reason)
+            continue
+        extents = np.ptp([leg.center for leg in standing_robot.stance.legs], axis=0)  # (3,) of the feet, m
+        is_longest_forward = extents.argmax() == 0  # as robots are
+        if facing not in Y_UP or choices.forward is not None or is_longest_forward:
+            return standing_robot
+    raise reasons[0]
 
 
-def _open_standing_robot(path: Path, choices: _Choices, turn: str) -> _StandingRobot:
-    """Return the robot of a file as it stands, with the base of a URDF turned."""
-    file = opening.open_robot(path, turn)
-    robot = trunk.place_torso(tree.robot_of(file.model, file.root, file.notes))
+def _open_standing_robot(path: Path, choices: _Choices, facing: Facing) -> _StandingRobot:
+    """Return the robot of a file as it stands, with its torso turned; names and hinges may turn it on."""
+    file, robot = _open_turned_robot(path, facing)
+    front_notes: tuple[str, ...] = ()
+    if facing.up == "y":
+        front_notes = ("turned: the file's y axis points up, the torso's frame has z there",)
+    if choices.forward is None:
+        front = find_front(robot)
+        if front.forward != "x":
+            facing = facing.turn(front.forward)
+            file, robot = _open_turned_robot(path, facing)
+        front_notes += front.notes(facing)
+    file = file._replace(notes=(*file.notes, *front_notes))
     return _StandingRobot(file, robot, poses.find_stance(robot, choices.home, choices.feet))
+
+
+def _open_turned_robot(path: Path, facing: Facing) -> tuple[RobotFile, Robot]:
+    """Return a file and its robot, with its torso turned."""
+    file = opening.open_robot(path, facing)
+    return file, trunk.place_torso(tree.robot_of(file.model, file.root, file.notes))
 
 
 def _check_world(robot: Robot) -> None:

@@ -10,6 +10,7 @@ import mujoco
 
 from arc_suite import parsers
 from arc_suite.importing import bounds, inertias, urdf
+from arc_suite.importing.facing import LEVEL, Facing, turn_torso
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.importing.tree import FREE
 from arc_suite.robots.spec import SpecError
@@ -57,12 +58,12 @@ class _Spec(NamedTuple):
     mesh_files: tuple[Path, ...]
 
 
-def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
+def open_robot(path: Path, facing: Facing = LEVEL) -> RobotFile:
     """Return the robot of an MJCF or a URDF file.
 
     Args:
         path: path of the file.
-        turn: roll, pitch and yaw, rad, of a URDF's base in the torso's frame.
+        facing: axes of the file's torso that point ahead and up.
 
     Raises:
         SpecError: the file is neither, or MuJoCo cannot compile it.
@@ -71,19 +72,20 @@ def open_robot(path: Path, turn: str = urdf.LEVEL) -> RobotFile:
     root_element, parts = bounds.parse(path)
     if root_element.tag not in ("mujoco", "robot"):
         raise SpecError(f"expected MJCF (mujoco) or URDF (robot), got an element {root_element.tag[:40]!r}")
-    spec, order, notes, mesh_files = _read_spec(path, root_element, turn)
+    spec, order, notes, mesh_files = _read_spec(path, root_element)
     bounds.check_mesh_files(mesh_files)
     model, mesh_notes = _compile(spec)
     model, torso, torso_notes = _free_torso(spec, model)
     model, inertia_notes = inertias.correct_inertias(spec, model, torso)
+    model = turn_torso(spec, model, torso, facing)
     all_notes = (*notes, *mesh_notes, *torso_notes, *inertia_notes)
     return RobotFile(model, torso, meshes_of(spec, model), order, all_notes, (*parts, *mesh_files))
 
 
-def _read_spec(path: Path, root_element: ElementTree.Element, turn: str) -> _Spec:
+def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:
     """Return the spec of a file."""
     if root_element.tag == "robot":
-        text, order, notes, mesh_files = urdf.repair_urdf(root_element, path.parent, turn)
+        text, order, notes, mesh_files = urdf.repair_urdf(root_element, path.parent)
         # The text is not the file: numbers of its lines would mislead.
         spec = _with_short_errors(lambda: mujoco.MjSpec.from_string(text), shows_line_numbers=False)
         return _Spec(spec, order, notes, mesh_files)

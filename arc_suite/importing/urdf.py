@@ -11,10 +11,6 @@ import numpy as np
 from arc_suite.importing import inertias
 from arc_suite.robots.spec import SpecError
 
-# Roll, pitch and yaw, rad, of a robot's base in the torso's frame.
-LEVEL = "0 0 0"
-TURNS = (f"{math.pi / 2} 0 {math.pi / 2}", f"{math.pi / 2} 0 0")  # the base's y axis up; ahead is its z axis, or x
-
 _ADDED_PREFIX = "arc_suite_"  # begins the names of links that are added
 _IGNORED_ELEMENTS = ("gazebo", "transmission", "mujoco")
 _MESH_EXTENSIONS = (".stl", ".obj", ".msh")
@@ -49,7 +45,7 @@ Elements = dict[str, ElementTree.Element]
 
 
 def repair_urdf(
-    robot: ElementTree.Element, folder: Path, turn: str = LEVEL
+    robot: ElementTree.Element, folder: Path
 ) -> tuple[str, tuple[str, ...], tuple[str, ...], tuple[Path, ...]]:
     """Return a URDF that MuJoCo reads, its moving joints in the order of the file, notes, and files of meshes.
 
@@ -58,7 +54,6 @@ def repair_urdf(
     Args:
         robot: the root element, which is changed.
         folder: folder of the file; meshes are searched there and upwards.
-        turn: roll, pitch and yaw, rad, of the base in the torso's frame, for files whose z axis does not point up.
 
     Raises:
         SpecError: it is no URDF; the message names the link or joint.
@@ -79,7 +74,7 @@ def repair_urdf(
         *_add_missing_masses(links, joints),
         *_mimic_notes(joints),
     )
-    _add_floating_root(robot, links, joints, turn)
+    _add_floating_root(robot, links, joints)
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _COMPILER)
     order = tuple(name for name, joint in joints.items() if joint.get("type") not in ("fixed", "floating"))
     return ElementTree.tostring(robot, encoding="unicode"), order, notes, tuple(mesh_files)
@@ -292,7 +287,7 @@ def _mimic_notes(joints: Elements) -> Iterator[str]:
         yield f"left out: {len(mimics)} mimic joints move on their own, such as {mimics[0]}"
 
 
-def _add_floating_root(robot: ElementTree.Element, links: Elements, joints: Elements, turn: str) -> None:
+def _add_floating_root(robot: ElementTree.Element, links: Elements, joints: Elements) -> None:
     """Let the base float on an empty link, unless it floats: MuJoCo welds the base of a URDF to the world."""
     if any(joint.get("type") == "floating" for joint in joints.values()):
         return
@@ -302,20 +297,7 @@ def _add_floating_root(robot: ElementTree.Element, links: Elements, joints: Elem
         raise SpecError(f"expected one link without a parent, got {len(bases)}: {', '.join(bases[:4]) or 'a loop'}")
     (base,) = bases
     world = f"{_ADDED_PREFIX}world"
-    torso = f"{_ADDED_PREFIX}torso"
     ElementTree.SubElement(robot, "link", name=world)
-    if turn == LEVEL:
-        _add_joint(robot, world, base, "floating")
-    else:
-        ElementTree.SubElement(robot, "link", name=torso)
-        _add_joint(robot, world, torso, "floating")
-        joint = _add_joint(robot, torso, base, "fixed")
-        ElementTree.SubElement(joint, "origin", rpy=turn)
-
-
-def _add_joint(robot: ElementTree.Element, parent: str, child: str, kind: str) -> ElementTree.Element:
-    """Add a joint between two links, and return it."""
-    joint = ElementTree.SubElement(robot, "joint", name=f"{parent}_joint", type=kind)
-    ElementTree.SubElement(joint, "parent", link=parent)
-    ElementTree.SubElement(joint, "child", link=child)
-    return joint
+    joint = ElementTree.SubElement(robot, "joint", name=f"{world}_joint", type="floating")
+    ElementTree.SubElement(joint, "parent", link=world)
+    ElementTree.SubElement(joint, "child", link=base)

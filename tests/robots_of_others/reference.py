@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import mujoco
 import numpy as np
 
-from arc_suite.importing import urdf
+from arc_suite.importing import facing, urdf
 from arc_suite.robots.spec import Body
 
 STATES = 200
@@ -21,11 +21,14 @@ def same_bits(path: pathlib.Path, body: Body) -> int:
     Motors are off, parts of the robot do not touch one another, and tendons and equalities are out of both.
 
     Args:
-        path: of an MJCF, or of a URDF, which is compared as `importing.urdf` repairs it, turned in any of its ways.
+        path: of an MJCF, or of a URDF, which is compared as `importing.urdf` repairs it. Its torso may be turned.
         body: as imported from it.
     """
-    turns = (urdf.LEVEL, *urdf.TURNS) if path.suffix == ".urdf" else (urdf.LEVEL,)
-    return max(_same(body, _robot(path, turn)) for turn in turns)
+    level = _same(body, _robot(path, facing.LEVEL))
+    if level == STATES:
+        return level
+    turned = [facing.LEVEL.turn(axis) for axis in ("-x", "y", "-y")]
+    return max(level, *(_same(body, _robot(path, one)) for one in (*facing.Y_UP, *turned)))
 
 
 def _same(body: Body, file: mujoco.MjSpec) -> int:
@@ -54,10 +57,10 @@ def _equal(ours: mujoco.MjModel, theirs: mujoco.MjModel, home: np.ndarray, rando
     return np.isfinite(found[0]).all() and np.array_equal(*found)
 
 
-def _robot(path: pathlib.Path, turn: str) -> mujoco.MjSpec:
+def _robot(path: pathlib.Path, turned: facing.Facing) -> mujoco.MjSpec:
     """Return the file's robot alone, free to move."""
     if path.suffix == ".urdf":
-        cured, *_ = urdf.repair_urdf(ElementTree.parse(path).getroot(), path.parent, turn)
+        cured, *_ = urdf.repair_urdf(ElementTree.parse(path).getroot(), path.parent)
         spec = mujoco.MjSpec.from_string(cured)
     else:
         spec = mujoco.MjSpec.from_file(str(path))
@@ -70,6 +73,8 @@ def _robot(path: pathlib.Path, turn: str) -> mujoco.MjSpec:
         spec.delete(element)
     if not root.joints:
         root.add_freejoint()
+    model = spec.compile()
+    facing.turn_torso(spec, model, model.body(root.name).id, turned)
     return spec
 
 
