@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from arc_suite import checks
-from arc_suite.arenas import ARENAS, Arena
+from arc_suite.arenas import ARENAS, Arena, ground_text
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json, load_body
@@ -37,6 +37,9 @@ FAMILIES: dict[str, Callable[[int], Body] | str] = {
 # Functions from the path of a foreign file to a body, by the file's extension, as texts for `resolve`.
 READERS = {".xml": "arc_suite.importing:body_of", ".urdf": "arc_suite.importing:body_of"}
 
+# Functions from the path of a file and a scale to ground as text, by the file's extension, as texts for `resolve`.
+GROUND_READERS = dict.fromkeys((".png", ".obj", ".stl", ".xml"), "arc_suite.importing.grounds:read")
+
 # The class of vector environments of different bodies, as a text for `resolve`.
 BODIES_ENV = "arc_suite.bodies:BodiesEnv"
 
@@ -53,6 +56,7 @@ MAX_BODIES = 1 << 16  # the most bodies that one text may name
 
 _MAX_QUOTE = 80  # characters of a name in an error
 _SEED_OR_RANGE = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")  # "7" or "0-9"
+_GROUND_FILE = re.compile(r"(.*?\.[a-zA-Z]\w{0,4})(?::([\d.][\d.ex+-]{0,100}))?", re.DOTALL)  # a path, and its scale
 _MARK_OF_SEVERAL_BODIES = re.compile(r",|:\d+-\d+$")  # a comma, or a range of seeds at the end
 
 
@@ -277,21 +281,59 @@ def task_of(name: str) -> type[Task]:
 
 
 def arena_of(arena: str | Arena, body: Body) -> Arena:
-    """Return the arena of a name in a size that suits a body; an `Arena` is returned as it is.
+    """Return the arena of a word in a size that suits a body; an `Arena` is returned as it is.
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: as `arena_maker`, or ground of a file that is too small for the body.
+        OSError: the file cannot be read.
     """
     return arena if isinstance(arena, Arena) else arena_maker(arena)(body)
 
 
-def arena_maker(name: str) -> Callable[[Body], Arena]:
-    """Return the function from a body to the arena of a name that suits it.
+def arena_maker(arena: str) -> Callable[[Body], Arena]:
+    """Return the function from a body to the arena that a word stands for.
+
+    Args:
+        arena: name of an arena, `module:name` for one of another package, path of a file with ground and its scale, or
+            ground as text.
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: an unknown name, or a file or a text without ground.
+        OSError: the file cannot be read.
     """
-    return _look_up(name, ARENAS, "arena")
+    word = arena_word(arena)
+    return ground_text.fit(word) if ground_text.is_text(word) else _look_up(word, ARENAS, "arena")
+
+
+def arena_word(arena: str) -> str:
+    """Return the word for an arena that files may contain: ground as text in place of its file.
+
+    Raises:
+        ValueError: as `arena_maker`.
+        OSError: as `arena_maker`.
+    """
+    ground_file = _ground_file(arena)
+    if ground_file is None:
+        return arena
+    path, scale = ground_file
+    reader = GROUND_READERS.get(path.suffix.lower())
+    if reader is None:
+        extensions = ", ".join(GROUND_READERS)
+        raise ValueError(f"arena {checks.preview(arena)}: expected a file {extensions}, or one of {', '.join(ARENAS)}")
+    return resolve(reader)(path, scale)
+
+
+def names_arena(arena: Any) -> bool:
+    """Return whether a word is the name of an arena, and neither a file nor ground as text."""
+    return isinstance(arena, str) and _ground_file(arena) is None and not ground_text.is_text(arena)
+
+
+def _ground_file(arena: str) -> tuple[Path, str | None] | None:
+    """Return the path and the scale of a word that stands for a file; None for other words."""
+    if not isinstance(arena, str) or ground_text.is_text(arena):
+        return None
+    match = _GROUND_FILE.fullmatch(arena)
+    return None if match is None else (Path(match[1]), match[2])
 
 
 def modifier_setting(name: str) -> str | None:
@@ -318,14 +360,19 @@ def task_setting_names() -> set[str]:
 
 
 def check_stored_settings(settings: Mapping[str, Any]) -> None:
-    """Check that settings of a task which come from a file cannot import modules.
+    """Check that settings of a task which come from a file cannot import modules or open other files.
 
     Raises:
+        ValueError: an arena that is a file.
         NotImported: the module of a modifier or of an arena has not been imported yet.
     """
     for name in settings:
         refuse_import("modifier", name)
-    refuse_import("arena", str(settings.get("arena", "flat")))
+    arena = str(settings.get("arena", "flat"))
+    if _ground_file(arena) is not None:
+        raise ValueError(f"arena {checks.preview(arena)}: files name no other files")
+    if names_arena(arena):
+        refuse_import("arena", arena)
 
 
 def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:

@@ -228,6 +228,7 @@ async function main() {
   const choice = byId("body"), ground = byId("ground"), mode = byId("mode");
   const lists = [choice, ground, mode];
   bodies.forEach(({ name }, index) => choice.append(new Option(name, index)));
+  Object.keys(bodies[0].grounds).forEach((name) => ground.append(new Option(name)));
   choice.parentElement.hidden = bodies.length === 1;
   byId("help").open = window.innerWidth > 700 && window.innerHeight > 500;
   panel.element.open = byId("help").open && window.innerWidth > 1000 && !inputs.shows;

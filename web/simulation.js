@@ -12,21 +12,12 @@ const STILL = { command: [0, 0, 0], pose: [0, 0, 0, 0, 0, 0] };
 const dot = (first, second) => first.reduce((sum, value, index) => sum + value * second[index], 0);
 const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
 
-// A height field, in whose cells two triangles meet from the corner of lowest to that of highest x and y.
+// Heights at the nodes of a grid, in rows along y. Two triangles meet in a cell from the corner of lowest to that of
+// highest x and y.
 export class Field {
-  constructor(model) {
-    const [halfX, halfY, top] = model.hfield_size;
-    this.rows = model.hfield_nrow[0];
-    this.columns = model.hfield_ncol[0];
-    this.low = [-halfX, -halfY];
-    this.cell = [(2 * halfX) / (this.columns - 1), (2 * halfY) / (this.rows - 1)];
-    this.nodes = Float64Array.from(model.hfield_data, (share) => top * share);
-  }
-
-  // Rows along y of heights along x.
-  get heights() {
-    const { rows, columns, nodes } = this;
-    return Array.from({ length: rows }, (_, row) => Array.from(nodes.subarray(row * columns, (row + 1) * columns)));
+  constructor({ low, cell, heights }) {
+    Object.assign(this, { low, cell, heights, rows: heights.length, columns: heights[0].length });
+    this.nodes = Float64Array.from(heights.flat());
   }
 
   // The height under a point, m; beyond the edge that of the edge.
@@ -42,6 +33,15 @@ export class Field {
   }
 }
 
+// The height field of a model, which lies around the start.
+function fieldOf(model) {
+  const [halfX, halfY, top] = model.hfield_size;
+  const [rows, columns] = [model.hfield_nrow[0], model.hfield_ncol[0]];
+  const nodes = Array.from(model.hfield_data, (share) => top * share);
+  const heights = Array.from({ length: rows }, (_, row) => nodes.slice(row * columns, (row + 1) * columns));
+  return new Field({ low: [-halfX, -halfY], cell: [(2 * halfX) / (columns - 1), (2 * halfY) / (rows - 1)], heights });
+}
+
 export class Simulation {
   // Takes the module of MuJoCo, a body of a page's data, one of its grounds, and how many bodies there are.
   constructor(mujoco, body, ground, count = 1) {
@@ -49,7 +49,7 @@ export class Simulation {
     this.body = body;
     this.model = mujoco.MjModel.from_xml_string(count > 1 ? doubled(ground.xml) : ground.xml);
     this.data = new mujoco.MjData(this.model);
-    this.field = this.model.nhfield ? new Field(this.model) : null;
+    this.field = ground.surface ? new Field(ground.surface) : this.model.nhfield ? fieldOf(this.model) : null;
     this.start = ground.start;
     this.shares = Array.from({ length: count }, (_, number) => () => shareOf(this.data, number, count));
     this.pull = null; // of the player

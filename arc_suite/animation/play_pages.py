@@ -14,8 +14,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from arc_suite import models, policies
+from arc_suite import models, policies, registry
 from arc_suite.animation import pages, player_controls
+from arc_suite.arenas import ground_text
+from arc_suite.arenas.mapped import sample_surface
 from arc_suite.bodies import universal
 from arc_suite.bodies.universal import Universal
 from arc_suite.cpg import Demonstrator, leaps
@@ -64,7 +66,7 @@ def licenses() -> str:
     return all_texts.replace("-->", "-- >")  # which would end the comment
 
 
-def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict[str, Any]:
+def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: str | None = None) -> dict[str, Any]:
     """Return a body with its grounds and policy, as a page takes them: values that JSON has.
 
     Args:
@@ -72,6 +74,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         policy: cpg, for a demonstrator that follows the command; or the name of a trained policy, as for
             `policies.policy`.
         preset: preset of the demonstrator: steered, which None stands for, surefooted, reactive or balanced.
+        arena: a further ground, on which the page begins; see `registry.arena_maker`.
 
     Raises:
         ValueError: a policy or preset that a page cannot run, or that does not fit the body.
@@ -97,7 +100,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         "timestep": scene.control_timestep / scene.substeps,
         "substeps": scene.substeps,
         "feet": feet,
-        "grounds": {name: _describe_ground(setup, arena) for name, arena in GROUNDS.items()},
+        "grounds": {name: _describe_ground(setup, word) for name, word in _grounds(arena).items()},
         "task": pages.to_json_values(_describe_task(task, command_task), decimals=None),
         "policy": pages.to_json_values(driver, decimals=None),
     }
@@ -106,8 +109,20 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
 # Grounds and tasks.
 
 
+def _grounds(arena: str | None) -> dict[str, str]:
+    """Return the arenas of a page by the names that it shows, a further one first."""
+    if arena is None or arena in GROUNDS.values():
+        return GROUNDS
+    word = registry.arena_word(arena)
+    name = ground_text.name_of(word) if ground_text.is_text(word) else word
+    return {name: word, **GROUNDS}
+
+
 def _describe_ground(setup: Setup, arena: str) -> dict[str, Any]:
-    """Return the MJCF of a body in an arena, with the integrator of simulations, and where the body starts."""
+    """Return the MJCF of a body in an arena, with the integrator of simulations, and where the body starts.
+
+    Ground that is no plane or field around the start comes with its heights, as `surface`.
+    """
     task, model = Setup.of(setup.body, setup.task, {"arena": arena}).prepare()
     xml = models.text(setup.body, task.scene.arena)
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
@@ -117,7 +132,14 @@ def _describe_ground(setup: Setup, arena: str) -> dict[str, Any]:
     data.qpos[:] = readings.root_qpos(task.scene.standing, layout)
     mujoco.mj_forward(model, data)
     start_qpos = readings.root_qpos(task.raise_off_ground(task.read(data)), layout)
-    return {"xml": xml, "start": pages.to_json_values(start_qpos, decimals=None)}
+    ground = {"xml": xml, "start": pages.to_json_values(start_qpos, decimals=None)}
+    if arena in GROUNDS.values():
+        return ground
+    surface = task.scene.arena.surface
+    has_plane = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).any()
+    if surface is None or has_plane:
+        surface = sample_surface(task.scene.arena, setup.body.torso.standing_height)
+    return ground | {"surface": pages.to_json_values(surface)}
 
 
 def _describe_task(task: Task, command_task: Task) -> dict[str, Any]:

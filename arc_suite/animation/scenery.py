@@ -13,6 +13,7 @@ from arc_suite.style.tracks import Track
 from arc_suite.tasks import Task, readings
 
 _GROUND_MARGIN = 12.0  # standing heights of ground around the path
+_DEPTH = 0.01  # standing heights, by which a plane lies below a surface that is drawn in place of its geoms
 _MAX_REPLAY_ERROR = 1e-3  # standing heights, by which the torso of a replay may be off
 _FLOOR_PREFIX = "floor"  # of the names of geoms of the ground and of obstacles
 
@@ -63,13 +64,18 @@ def describe_ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str,
     planes = []
     fields = []
     solids = []
+    if arena.surface is not None:
+        fields.append(arena.surface.crop(low, high)._asdict())
     for geom in range(model.ngeom):
         if not model.geom(geom).name.startswith(_FLOOR_PREFIX):
             continue
         kind = int(model.geom_type[geom])
         center = data.geom_xpos[geom]
         if kind == mujoco.mjtGeom.mjGEOM_PLANE:
-            planes.append(float(center[2]))
+            depth = 0.0 if arena.surface is None else _DEPTH * environment.task.body.torso.standing_height
+            planes.append(float(center[2]) - depth)
+        elif arena.surface is not None:
+            continue  # it is drawn
         elif kind == mujoco.mjtGeom.mjGEOM_HFIELD:
             fields.append(_describe_field(model, model.geom_dataid[geom], center, low, high))
         else:

@@ -4,7 +4,11 @@ import dataclasses
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
+import numpy as np
 from dm_control import mjcf
+
+_TORSO_MARGIN = 0.5  # distance from the center of the torso within which the ground is under it, standing heights
+_SQUARE = np.array([(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,3 +59,22 @@ class Arena(ABC):
         Planes and height fields are listed in any case.
         """
         return True
+
+    @property
+    def surface(self) -> Any:
+        """The `mapped.Surface` that pages draw in place of the geoms of the ground; None where they draw these."""
+        return None
+
+
+def clearance_over_highest(arena: Arena, positions, unit: float):
+    """Return the heights (...) of torsos over the highest ground near them, m.
+
+    Args:
+        arena: the ground.
+        positions: (..., 3) of torsos, m.
+        unit: the standing height of the body, m; ground within half of it counts.
+    """
+    offsets = positions.__array_namespace__().asarray(_TORSO_MARGIN * unit * _SQUARE)
+    x = positions[..., None, 0] + offsets[:, 0]
+    y = positions[..., None, 1] + offsets[:, 1]
+    return positions[..., 2] - arena.height(x, y).max(axis=-1)

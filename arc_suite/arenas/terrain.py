@@ -15,7 +15,7 @@ from dm_control import mjcf
 
 from arc_suite import checks
 from arc_suite.arenas import field
-from arc_suite.arenas.arena import Arena
+from arc_suite.arenas.arena import Arena, clearance_over_highest
 from arc_suite.robots.spec import Body
 
 DIFFICULTY = 2.0 / 3.0  # default
@@ -35,7 +35,6 @@ _THICKNESS = 2.0  # of the ground
 _TRENCH_DEPTH = 0.6
 _HURDLE_GRAINS = 4  # length of a hurdle in cells; points of a height scan are nearer to each other
 _RUN_UP = (7.0, 9.0)  # level ground before a trench or hurdle to leap over
-_TORSO_MARGIN = 0.5  # distance from the center of the torso within which the ground is under it
 
 
 class Obstacle(NamedTuple):
@@ -227,16 +226,7 @@ class Terrain(Arena):
 
     def torso_clearance(self, positions):
         """Return the heights (...) of torsos over the highest ground within half a standing height around them, m."""
-        offsets = positions.__array_namespace__().asarray(self._offsets_under_torso)
-        x = positions[..., None, 0] + offsets[:, 0]
-        y = positions[..., None, 1] + offsets[:, 1]
-        return positions[..., 2] - self.height(x, y).max(axis=-1)
-
-    @functools.cached_property
-    def _offsets_under_torso(self) -> np.ndarray:
-        """(9, 2) points of a square around the center of the torso, m."""
-        grid = np.array([(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
-        return _TORSO_MARGIN * self.unit * grid
+        return clearance_over_highest(self, positions, self.unit)
 
     @property
     def lists_contacts(self) -> bool:

@@ -91,11 +91,11 @@ def _check_flags() -> None:
     if not writes_text:
         refuse_flags(("json", "visuals", "no_arena"), "goes with --output, as no model is written")
         if FLAGS.render is None:
-            refuse_flags(("task", "set"), "goes with --output or --render, as no model is written")
+            refuse_flags(("task", "set", "arena"), "goes with --output or --render, as no model is written")
     if FLAGS.json:
         refuse_flags(("visuals", "no_arena"), "goes without --json, as a spec has no decorations and no arena")
         if FLAGS.render is None:
-            refuse_flags(("task", "set"), "goes without --json, as a spec has no arena")
+            refuse_flags(("task", "set", "arena"), "goes without --json, as a spec has no arena")
 
 
 def _body_from_flags() -> Body:
@@ -125,10 +125,10 @@ def _body_from_flags() -> Body:
 
 def _arena_from_flags(body: Body) -> Arena:
     """Return the arena of the task that flags name; the floor if they name none."""
-    if not (FLAGS["task"].present or FLAGS["set"].present):
+    if not any(FLAGS[name].present for name in ("task", "set", "arena")):
         return FLAT
     if FLAGS.no_arena:
-        raise ValueError("--no_arena: goes without --task and --set, which bring an arena")
+        raise ValueError("--no_arena: goes without --task, --set and --arena, which bring an arena")
     task, settings = task_from_flags()
     setup = Setup.of(body, task, settings)
     arena = setup.definition.scene.arena

@@ -50,7 +50,7 @@ def main(spec: str | None = None) -> int:
         if FLAGS[name].value and spec is None:
             raise ValueError(f"--{name}: expected a spec file, got --task")
     if spec is not None:
-        refuse_flags(("set", "robot"), "goes with --task, not with a spec file")
+        refuse_flags(("set", "arena", "robot"), "goes with --task, not with a spec file")
     is_sound = _check_task() if spec is None else _check_body(spec)
     return 0 if is_sound else 1
 

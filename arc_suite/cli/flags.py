@@ -8,6 +8,7 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, policies, registry
+from arc_suite.arenas import ARENAS
 from arc_suite.bodies import generator, shaping
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
@@ -52,8 +53,19 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     flags.DEFINE_string("palette", None, f"Colors of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
 
 
+def define_arena() -> None:
+    """Define --arena, for programs that take any ground."""
+    flags.DEFINE_string(
+        "arena",
+        None,
+        f"Ground in place of level floor: {', '.join(ARENAS)}; a height map such as ground.png:20x20x1.5, with its "
+        "length, width and height, m; a mesh .obj or .stl, in m or with a factor, ground.stl:0.001; a scene .xml.",
+    )
+
+
 def define_task(default: str = "walk") -> None:
-    """Define --task and --set, for programs that take any task."""
+    """Define --task, --set and --arena, for programs that take any task."""
+    define_arena()
     flags.DEFINE_string("task", default, f"Task: {', '.join(TASKS)}, or module:name of one that another package has.")
     flags.DEFINE_multi_string(
         "set",
@@ -316,6 +328,10 @@ def task_from_flags() -> tuple[str, dict[str, Any]]:
             f"--set random={checks.quote(settings['random'])}: programs seed every episode; "
             "see --help for the flag of the first seed"
         )
+    if FLAGS.arena is not None:
+        if "arena" in settings:
+            raise ValueError("expected one of --arena and --set arena, got both")
+        settings["arena"] = FLAGS.arena
     if "arena" in settings:
         registry.arena_maker(settings["arena"])
     return FLAGS.task, settings

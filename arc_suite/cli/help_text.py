@@ -19,7 +19,7 @@ _FILM_FLAGS = ("fps", "loop", "size", "transparent", "turntable", "directions")
 FLAGS_BY_GROUP = {
     "Body": _BODY_FLAGS + _BODY_FAMILY_FLAGS,
     "Policy": _POLICY_FLAGS + _COMPARISON_FLAGS,
-    "Task": ("task", "set", "train_set", "goal"),
+    "Task": ("task", "set", "arena", "train_set", "goal"),
     "Run": (),
     "Output": _FILE_FLAGS + _REPORT_FLAGS + _CLIP_FLAGS + _FILM_FLAGS,
     "Help": ("help", "version"),

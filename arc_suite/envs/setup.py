@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
 from arc_suite import checks, registry, versions
+from arc_suite.arenas import ground_text
 from arc_suite.envs import dm
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
@@ -69,7 +70,7 @@ class Setup:
     def _make(cls, domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None) -> "Setup":
         """Return the setup for arguments of `of`, without making several bodies."""
         has_several_bodies = registry.names_several_bodies(domain_name)
-        settings = checks.mapping("task_kwargs", task_kwargs)
+        settings = dict(checks.mapping("task_kwargs", task_kwargs))
         domain = domain_name if has_several_bodies else registry.body_of(domain_name)
         task = registry.task_of(task_name)
         if "random" in settings:
@@ -77,11 +78,11 @@ class Setup:
             raise ValueError(f"setting 'random': expected none, as every episode has a seed, got {random}")
         if has_several_bodies:
             checks.name(settings.get("actions", "position"), ["position"], "actions of different bodies")
+        if isinstance(settings.get("arena"), str):
+            settings["arena"] = registry.arena_word(settings["arena"])
+            registry.arena_maker(settings["arena"])  # raises an error for an unknown name
         importable_settings = {registry.importable_name("modifier", name): value for name, value in settings.items()}
         settings_json = checks.json_text("task_kwargs", importable_settings)
-        arena = settings.get("arena")
-        if isinstance(arena, str):
-            registry.arena_maker(arena)  # raises an error for an unknown name
         return cls(domain, registry.importable_name("task", task.name), settings_json)
 
     @property
@@ -294,8 +295,12 @@ class Setup:
         return self.task_kwargs | {"random": seed}
 
     def __str__(self) -> str:
-        settings = "" if self.settings_json == "{}" else f", {self.settings_json}"
-        return f"{self._label}, {self.kind.name}{settings}"
+        settings = self.task_kwargs
+        arena = settings.get("arena")
+        if ground_text.is_text(arena):
+            settings["arena"] = ground_text.name_of(arena)
+        settings_text = f", {json.dumps(settings)}" if settings else ""
+        return f"{self._label}, {self.kind.name}{settings_text}"
 
 
 def _sha256(content) -> str:

@@ -97,8 +97,8 @@ def _whole_mesh(spec: mujoco.MjSpec, mesh) -> dict[str, str]:
     return {name: text for name, text in attributes.items() if text}
 
 
-def _hull(model: mujoco.MjModel, geom: int) -> dict[str, str]:
-    """Return the attributes of a mesh of the corners of a compiled mesh's convex hull."""
+def hull_points(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Return the corners (points, 3) of the convex hull of a geom's mesh, in the frame of the geom, m."""
     mesh = int(model.geom_dataid[geom])
     points = vertices(model, mesh)
     graph = int(model.mesh_graphadr[mesh])
@@ -108,7 +108,12 @@ def _hull(model: mujoco.MjModel, geom: int) -> dict[str, str]:
         first = graph + 2 + count
         corners = np.sort(model.mesh_graph[first : first + count])
         points = points[corners]
-    return {"inertia": "convex", "vertex": _format(points.ravel())}
+    return points
+
+
+def _hull(model: mujoco.MjModel, geom: int) -> dict[str, str]:
+    """Return the attributes of a mesh of the corners of a compiled mesh's convex hull."""
+    return {"inertia": "convex", "vertex": _format(hull_points(model, geom).ravel())}
 
 
 def _format(numbers: Iterable) -> str:

@@ -90,7 +90,7 @@ def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:
         spec = _with_short_errors(lambda: mujoco.MjSpec.from_string(text), shows_line_numbers=False)
         return _Spec(spec, order, notes, mesh_files)
     spec = _with_short_errors(lambda: mujoco.MjSpec.from_file(str(path)))
-    _delete_visuals(spec)
+    delete_visuals(spec)
     mesh_files = tuple(file_of(spec, mesh) for mesh in spec.meshes if mesh.file)
     return _Spec(spec, order=(), notes=(), mesh_files=mesh_files)
 
@@ -111,7 +111,7 @@ def _with_short_errors(function: Callable[[], _Result], shows_line_numbers: bool
         raise SpecError(f"MuJoCo cannot read it: {reason}") from None
 
 
-def _delete_visuals(spec: mujoco.MjSpec) -> None:
+def delete_visuals(spec: mujoco.MjSpec) -> None:
     """Delete textures, materials, skins, height fields and visual meshes, so that no file is read for them."""
     for geom in list(spec.geoms):
         if geom.type == _HEIGHT_FIELD:

@@ -37,6 +37,8 @@ _LANE_MARGIN_FACTOR = 1.15  # of the length of a lane, over the distance at the 
 _LANE_MARGIN = 6.0  # added to the length of a lane, h
 SUNK_STEPS = 5  # consecutive control steps at this depth after which a foot is stuck
 
+SCAN_BLOCKS = {"scan": Block((Grid(SCAN, "ground {:.2f} R forward, {:.2f} R left", "h"),), noise=0.1)}
+
 
 class Nothing(NamedTuple):
     """Memory of a ground that needs none."""
@@ -48,11 +50,14 @@ class Ground:
 
     Attributes:
         own_arena: whether the ground is the only arena of the task.
-        blocks: the blocks that it adds to the observation, by name.
     """
 
     own_arena: ClassVar[bool] = False
-    blocks: ClassVar[Mapping[str, Block]] = {}
+
+    @property
+    def blocks(self) -> Mapping[str, Block]:
+        """The blocks that it adds to the observation, by name."""
+        return {}
 
     @property
     def adapts(self) -> bool:
@@ -188,6 +193,25 @@ def next_level(stream: Stream, chance, level_to_visit, down: float, up: float):
     return xp.where(ends_visit, highest, level), begins_visit | continues_visit
 
 
+def observe_scan(context: Context, place, readings: Readings) -> dict:
+    """Return the block `scan`: the heights (..., 175) of the ground at `sensors.SCAN`, in h, clipped to [-1, 1].
+
+    0 is the height of the ground if the torso is at its standing height.
+    """
+    position = readings.torso_position
+    heading = place[..., 2]
+    xp = position.__array_namespace__()
+    reach = xp.asarray(context.reach)[..., None]  # R, m
+    forward = xp.asarray(SCAN[0]) * reach
+    left = xp.asarray(SCAN[1]) * reach
+    cosine = xp.cos(heading)[..., None]
+    sine = xp.sin(heading)[..., None]
+    x = position[..., 0:1] + cosine * forward - sine * left
+    y = position[..., 1:2] + sine * forward + cosine * left
+    heights = (context.arena.height(x, y) - position[..., 2:3]) / context.height + 1.0
+    return {"scan": heights.clip(-1.0, 1.0)}
+
+
 class Widened(NamedTuple):
     """Memory of level ground with a curriculum.
 
@@ -208,18 +232,25 @@ class Level(Ground):
         start: "standing", or "belly": the body begins with its torso on the ground.
         curriculum: whether the ranges of commands widen from the default ones to those of the setting `commands`.
         level: level at which a curriculum begins.
+        scan: whether a body observes the heights of the ground around it.
         thresholds: outcomes below and above which its level falls and rises.
     """
 
     start: str = STARTS[0]
     curriculum: bool = False
     level: int = 0
+    scan: bool = False
     thresholds: tuple[float, float] = (0.25, 0.5)
 
     @property
     def settings(self) -> tuple[str, ...]:
         """The names of the fields that a caller may set."""
-        return ("start", *CURRICULUM)
+        return ("start", *CURRICULUM, "scan")
+
+    @property
+    def blocks(self) -> Mapping[str, Block]:
+        """The height scan, if there is one."""
+        return SCAN_BLOCKS if self.scan else {}
 
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the ground with checked settings."""
@@ -231,7 +262,12 @@ class Level(Ground):
             raise ValueError(f"curriculum: expected with {expected}, got {overrides['curriculum']}")
         if level and not curriculum:
             raise ValueError(f"level: expected with curriculum=True, got {overrides['level']}")
-        return dataclasses.replace(self, start=start, curriculum=curriculum, level=level)
+        scan = checks.boolean("scan", overrides.get("scan", self.scan))
+        return dataclasses.replace(self, start=start, curriculum=curriculum, level=level, scan=scan)
+
+    def observe(self, context: Context, memory, place, readings: Readings) -> dict:
+        """Return the height scan, if there is one."""
+        return observe_scan(context, place, readings) if self.scan else {}
 
     @property
     def adapts(self) -> bool:
@@ -310,9 +346,11 @@ class Lanes(Ground):
     roams: bool = False
 
     own_arena: ClassVar[bool] = True
-    blocks: ClassVar[Mapping[str, Block]] = {
-        "scan": Block((Grid(SCAN, "ground {:.2f} R forward, {:.2f} R left", "h"),), noise=0.1)
-    }
+
+    @property
+    def blocks(self) -> Mapping[str, Block]:
+        """The height scan."""
+        return SCAN_BLOCKS
 
     @property
     def settings(self) -> tuple[str, ...]:
@@ -436,19 +474,7 @@ class Lanes(Ground):
 
         0 is the height of the ground if the torso is at its standing height.
         """
-        arena = context.arena
-        position = readings.torso_position
-        heading = place[..., 2]
-        xp = position.__array_namespace__()
-        reach = xp.asarray(context.reach)[..., None]  # R, m
-        forward = xp.asarray(SCAN[0]) * reach
-        left = xp.asarray(SCAN[1]) * reach
-        cosine = xp.cos(heading)[..., None]
-        sine = xp.sin(heading)[..., None]
-        x = position[..., 0:1] + cosine * forward - sine * left
-        y = position[..., 1:2] + sine * forward + cosine * left
-        heights = (arena.height(x, y) - position[..., 2:3]) / arena.unit + 1.0
-        return {"scan": heights.clip(-1.0, 1.0)}
+        return observe_scan(context, place, readings)
 
     def progress(self, memory: Lane) -> dict:
         """Return whether a foot `sank`, and the `level` of a curriculum."""
@@ -481,9 +507,11 @@ class PillarField(Ground):
     """A floor with pillars, which a range sensor measures. Lengths are in R, as the legs must fit between pillars."""
 
     own_arena: ClassVar[bool] = True
-    blocks: ClassVar[Mapping[str, Block]] = {
-        "ranges": Block((Rays(RAYS, "range at {:.0f} degrees to the left", f"{SIGHT:g} R"),), noise=0.02)
-    }
+
+    @property
+    def blocks(self) -> Mapping[str, Block]:
+        """The ranges."""
+        return {"ranges": Block((Rays(RAYS, "range at {:.0f} degrees to the left", f"{SIGHT:g} R"),), noise=0.02)}
 
     def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return a floor with pillars that suits the body's size."""

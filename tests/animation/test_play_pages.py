@@ -4,6 +4,7 @@ import math
 import pathlib
 import re
 
+import ground_files
 import imports
 import networks
 import nodes
@@ -235,6 +236,23 @@ def test_heights_on_bumps_are_those_of_python(script):
     heights = [path["observations"][0]["posture"][0] for path in nodes.run(script, episodes)]
     np.testing.assert_allclose(heights, 1.0 - arena.height(*places.T), rtol=0.0, atol=1e-12)
     assert np.ptp(heights) > 0.02
+
+
+@pytest.mark.long
+@nodes.needs_node
+@pytest.mark.parametrize("name", ["hill.png", "yard.xml"])
+def test_heights_of_ground_from_files_are_those_of_python(script, tmp_path, name):
+    write = ground_files.write_png if name == "hill.png" else ground_files.write_yard
+    word = write(tmp_path / name)
+    creature = play_pages.creature(ROBOTS["tick"], arena=word)
+    surface = Setup.of("tick", "steer", {"arena": word}).definition.scene.arena
+    places = np.random.default_rng(0).uniform((-2.0, -2.0), (2.0, 2.0), (10, 2))
+    still = {"creature": creature, "ground": name.partition(".")[0], "qvel": [], "desired": [0.0] * 3}
+    still |= {"asked": [upright(creature, [0.0] * 3)]}
+    pose = next(iter(creature["grounds"].values()))["start"][3:]
+    paths = nodes.run(script, [still | {"qpos": [*place, 1.0, *pose]} for place in places])
+    heights = [path["observations"][0]["posture"][0] for path in paths]
+    np.testing.assert_allclose(heights, 1.0 - surface.height(*places.T), rtol=0.0, atol=1e-5)
 
 
 @pytest.mark.slow

@@ -103,7 +103,7 @@ def test_summary_prints_the_figures_alone():
         (["--legs=5", "--layout=pairs"], "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
         (
             ["--robot=tick", "--task=stairs", "--no_arena"],
-            "--no_arena: goes without --task and --set, which bring an arena",
+            "--no_arena: goes without --task, --set and --arena, which bring an arena",
         ),
         (["--legs=5", "--layout=row"], "flag --layout=row: expected pairs or radial"),
         (["--legs=4", "--render=x.txt"], "unknown extension '.txt' (there are: .png)"),

@@ -13,7 +13,7 @@ from arc_suite.cli.programs import PROGRAMS
 from arc_suite.robots import ROBOTS
 
 BODY = "robot spec legs links length palette"
-SET = "set task"
+SET = "set task arena"
 COMMON = f"{BODY} {SET} policy vecnormalize preset"
 # Flags by program: each has an effect with any others, or is refused as in a case below or in test_flags.py.
 ALWAYS = {
@@ -22,7 +22,7 @@ ALWAYS = {
     "check": "task tasks walk",
     "render": f"{COMMON} seed steps output".replace(" preset", ""),
     "animate": f"{COMMON} clips fps straight plant output".replace(" preset", ""),
-    "play": f"{BODY} policy vecnormalize output",
+    "play": f"{BODY} arena policy vecnormalize output",
     "view": COMMON.replace(" preset", ""),
     "studio": f"{COMMON} host port".replace(" preset", ""),
     "evaluate": f"{COMMON} episodes seed json".replace(" preset", ""),
@@ -57,6 +57,7 @@ CASES = [
     ("build_model", "--robot=tick --set=arena=bumps --summary", "--set: goes with --output or --render, as no model"),
     ("build_model", "--robot=tick --task=rough --summary", "--task: goes with --output or --render, as no model"),
     ("build_model", "--robot=tick --task=rough --json", "--task: goes without --json, as a spec has no arena"),
+    ("build_model", "--robot=tick --arena=rough --summary", "--arena: goes with --output or --render, as no model"),
     ("build_model", "--robot=tick --json --visuals", "--visuals: goes without --json"),
     ("build_model", "--robot=tick --json --no_arena", "--no_arena: goes without --json"),
     ("build_model", "--robot=tick --summary --no_arena", f"--no_arena: {NO_MODEL}"),
@@ -67,6 +68,7 @@ CASES = [
     ("build_model", "--seed=4 --palette=nonsense", "Body(random_4).palette: expected one of"),
     ("build_model", "--seed=4 --length=shin=2", "unknown link 'shin'"),
     ("check", "spider --robot=tick", "--robot: goes with --task, not with a spec file"),
+    ("check", "spider --arena=rough", "--arena: goes with --task, not with a spec file"),
     ("check", "spider --set=kicks=1", "--set: goes with --task, not with a spec file"),
     ("import", "robot.xml --feet=", "--feet=: expected a value, got none"),
     ("import", "robot.xml --feet=,", "--feet=,: expected names with commas between them"),
@@ -118,7 +120,7 @@ CASES = [
     ("benchmark", "samples --name=mine", "--name: goes with --policies"),
     ("benchmark", "samples --policies=", "--policies=: expected a value, got none"),
     ("export", "universal --robot=tick --set=a=1 --set=a=2", "--set a=2: a has a value already"),
-    ("export", "run --task=walk", "policy run: --task and --set go with the body of a policy of many bodies"),
+    ("export", "run --task=walk", "policy run: --task, --set and --arena go with the body of a policy of many bodies"),
     ("transfer", "--name=mine", "--name: goes with --output"),
     ("transfer", "--families=", "--families=: expected a value, got none"),
     ("design", "--amount=.2 --output=a", "--amount: goes with --around"),

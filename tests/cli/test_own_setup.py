@@ -65,5 +65,5 @@ def test_what_contradicts_the_run_is_one_line(folder, tmp_path, program, flags, 
 
 
 def test_an_exported_run_takes_no_other_task(folder):
-    message = f"policy {folder}: --task and --set go with the body of a policy of many bodies"
+    message = f"policy {folder}: --task, --set and --arena go with the body of a policy of many bodies"
     one_line(run("export", str(folder), "--task=walk"), f"arc-suite export: {message}")

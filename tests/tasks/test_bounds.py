@@ -31,7 +31,7 @@ BOUNDS = {
     "poses": (0.0, 1.0),
     "commands": ({"forward": -MAX_COMMAND}, {"left": MAX_COMMAND, "turning": (-MAX_COMMAND, MAX_COMMAND)}),
 }
-NOT_NUMBERS = ("gait", "gaits", "start", "curriculum")
+NOT_NUMBERS = ("gait", "gaits", "start", "curriculum", "scan")
 LEVEL = ("steer", "directed", "shoved", "limp")
 FEW = ("walk", "steer", "rough", "navigate")
 

@@ -25,7 +25,7 @@ _MEANINGS_WITHOUT_FIELD = {
     "joint_noise": f"one number for {', '.join(parameters.SHARED_NOISE['joint_noise'])}",
     "cost_limit": "bound of the weighted sum of the costs of a step",
     "time_limit": f"of an episode, s; {STEPS} control steps without it",
-    "arena": f"another ground: {', '.join(ARENAS)}",
+    "arena": f"another ground: {', '.join(ARENAS)}, or a file .png, .obj, .stl or .xml",
     "on_divergence": "raise, or truncate: what a step does whose physics diverges; truncate in vector environments",
     "random": "seed of the episodes, for `load`; Gymnasium takes it in `reset`",
 }

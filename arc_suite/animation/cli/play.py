@@ -5,6 +5,7 @@
   arc-suite play --spec spider -o spider.html
   arc-suite play --policy runs/queen-steer-ppo-0 -o trained.html
   arc-suite play --spec spider --policy universal -o universal.html
+  arc-suite play --robot tick --arena ground.png:20x20x1.5 -o ground.html
 
 The page holds MuJoCo itself and requests nothing: open it from disk, or send it. Arrows or WASD walk and turn, Q and
 E step to a side; dragging the body pulls it, B kicks it and R restarts. Bodies are chosen among those that the
@@ -19,6 +20,7 @@ from arc_suite.animation import play_pages
 from arc_suite.cli.flags import (
     bodies_from_flags,
     choose_bodies,
+    define_arena,
     define_body,
     define_policy,
     define_preset,
@@ -30,6 +32,7 @@ from arc_suite.cli.program import progress
 
 FLAGS = flags.FLAGS
 define_body(more=", or all of them to choose from")
+define_arena()
 define_policy()
 define_preset()
 flags.DEFINE_string("output", None, "File to write, .html. Required.", short_name="o")
@@ -47,7 +50,7 @@ def main() -> None:
     with files.writing(FLAGS.output) as temporary:
         creatures = []
         for body in progress(bodies.values(), "fitting", leave=False):
-            creatures.append(play_pages.creature(body, policy, preset))
+            creatures.append(play_pages.creature(body, policy, preset, FLAGS.arena))
         page = play_pages.page(creatures)
         temporary.write_text(page, encoding="utf-8")
     print(f"wrote {FLAGS.output}, {len(page.encode()) / 1e6:.1f} MB")

@@ -19,6 +19,7 @@ from absl import flags
 from arc_suite import versions
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, sources
+from arc_suite.arenas import ARENAS, ground_text
 from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name, preset_from_flags
 from arc_suite.cpg.selection import check_preset_name
 
@@ -49,6 +50,8 @@ def _sketch_from_flags() -> Sketch:
         check_preset_name(preset)
     settings = setup.task_kwargs
     ground = settings.pop("arena", "flat")
+    if ground_text.is_text(ground):
+        raise ValueError(f"arena {ground_text.name_of(ground)!r}: the studio takes one by name: {', '.join(ARENAS)}")
     kicks = settings.pop("kicks", 0.0)
     policy = policy_name(FLAGS.policy)
     has_default_task = policy == "cpg" and not FLAGS["task"].present

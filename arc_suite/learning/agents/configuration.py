@@ -230,7 +230,10 @@ class Configuration:
         ]
         if self.prior is not None:
             words.append(f"--prior={self.prior}")
-        words += _flags("set", self.setup.task_kwargs)
+        settings = self.setup.task_kwargs
+        if "arena" in settings:
+            words.append(f"--arena={settings.pop('arena')}")
+        words += _flags("set", settings)
         words += _flags("train_set", self.training)
         words += _flags("hp", changes)
         return shlex.join(words)
@@ -312,7 +315,8 @@ def _registered_names(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     names.append(("algorithm", fields.get("algorithm")))
     for settings_field in ("task_kwargs", "training"):
         settings = checks.mapping(settings_field, fields.get(settings_field))
-        names.append(("arena", settings.get("arena")))
+        if registry.names_arena(settings.get("arena")):
+            names.append(("arena", settings["arena"]))
         names += [("modifier", name) for name in settings]
     names += [(kind, hyperparameters.get(field)) for field, kind in _KINDS_OF_NAMES.items()]
     for kind, name in names:

@@ -55,8 +55,8 @@ def main(run: str | None = None) -> None:
         policy = universal.for_body(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")
-    elif FLAGS["task"].present or FLAGS["set"].present:
-        raise ValueError(f"policy {run}: --task and --set go with the body of a policy of many bodies")
+    elif any(FLAGS[flag].present for flag in ("task", "set", "arena")):
+        raise ValueError(f"policy {run}: --task, --set and --arena go with the body of a policy of many bodies")
     else:
         policy = policies.load_network(name)
     onnx_file.save(output, policy)

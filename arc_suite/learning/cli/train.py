@@ -146,6 +146,7 @@ _CONFIGURATION_FLAGS = (
     "palette",
     "task",
     "set",
+    "arena",
     "train_set",
     "algorithm",
     "hp",

@@ -116,8 +116,8 @@ def _move_margins_into_geoms(model: mujoco.MjModel) -> None:
 
 def _limit_cell_depth(model: mujoco.MjModel) -> None:
     """Make cells of height fields at most as deep as wide: in deeper ones Warp finds wrong contacts now and then."""
-    half_lengths = model.hfield_size[:, 0]  # along x; cells of the suite are square
-    cell_widths = 2.0 * half_lengths / np.maximum(model.hfield_ncol - 1, 1)
+    cells = np.stack([model.hfield_ncol - 1, model.hfield_nrow - 1], axis=-1)  # along x and y
+    cell_widths = (2.0 * model.hfield_size[:, :2] / np.maximum(cells, 1)).min(axis=-1)
     depths = model.hfield_size[:, 3]  # of the base below the lowest point
     model.hfield_size[:, 3] = np.minimum(depths, cell_widths)
 
