@@ -130,7 +130,7 @@ def _parse(data: bytes) -> ElementTree.Element:
     if data.count(b"<") > _MAX_TAGS:
         raise SpecError(f"expected at most {_MAX_TAGS} tags")
     try:
-        text = data.decode("utf-8")
+        text = data.rstrip(b"\0\r\n\t ").decode("utf-8")  # some writers end a file as C ends a text
     except UnicodeDecodeError:
         raise SpecError("expected text in UTF-8") from None
     if sources.ENTITY.search(text):

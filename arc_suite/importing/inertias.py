@@ -12,6 +12,7 @@ from arc_suite.robots.spec import SpecError
 
 # The radius of gyration of a solid that is as long as the robot's span, and has all its mass at its ends.
 _MAX_GYRATION = 0.5  # of the span
+_LEAST_MOMENT = 1e-13  # kg m^2; MuJoCo refuses those below 1e-15
 _BALL_DENSITY = 1000.0  # kg/m^3, of the ball that stands for a link without a shape
 
 
@@ -45,11 +46,11 @@ def correct_inertias(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int) -> 
         mass = float(model.body_mass[body])
         element.explicitinertial = True
         element.fullinertia[0] = np.nan
+        moments = np.full(3, ball_moment(mass))
         if body in bodies_with_colliders:
-            element.inertia = shapes.body_inertia[body] * mass / shapes.body_mass[body]
+            moments = shapes.body_inertia[body] * mass / shapes.body_mass[body]
             element.iquat = shapes.body_iquat[body]
-        else:
-            element.inertia = np.full(3, ball_moment(mass))
+        element.inertia = np.maximum(moments, _LEAST_MOMENT)
     with parsers.guard("MuJoCo cannot compile it with the inertias of its colliders", raises=SpecError):
         corrected_model = spec.compile()
     return corrected_model, (_correction_note(model, bodies),)

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import mujoco
 
 from arc_suite import parsers
-from arc_suite.importing import bounds, inertias, urdf
+from arc_suite.importing import bounds, inertias, references, urdf
 from arc_suite.importing.facing import LEVEL, Facing, turn_torso
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.importing.tree import FREE
@@ -17,6 +17,11 @@ from arc_suite.robots.spec import SpecError
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _HEIGHT_FIELD = mujoco.mjtGeom.mjGEOM_HFIELD
+# Errors of MuJoCo in words of ours, in which a name takes the place of {}.
+_REASONS = (
+    (r"mass and inertia of moving bodies.*?Element name '([^']*)'", "body {!r} moves, and has no mass or no inertia"),
+    (r"repeated name '(world)' in body", "a body has the name {!r}, which is that of the scene; rename it"),
+)
 _LINE_NUMBER = re.compile(r",? line \d+")  # in MuJoCo's errors
 
 _Result = TypeVar("_Result")
@@ -90,9 +95,10 @@ def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:
         spec = _with_short_errors(lambda: mujoco.MjSpec.from_string(text), shows_line_numbers=False)
         return _Spec(spec, order, notes, mesh_files)
     spec = _with_short_errors(lambda: mujoco.MjSpec.from_file(str(path)))
+    notes = references.delete_references(spec)
     delete_visuals(spec)
     mesh_files = tuple(file_of(spec, mesh) for mesh in spec.meshes if mesh.file)
-    return _Spec(spec, order=(), notes=(), mesh_files=mesh_files)
+    return _Spec(spec, order=(), notes=notes, mesh_files=mesh_files)
 
 
 def _with_short_errors(function: Callable[[], _Result], shows_line_numbers: bool = True) -> _Result:
@@ -105,10 +111,19 @@ def _with_short_errors(function: Callable[[], _Result], shows_line_numbers: bool
     try:
         return function()
     except Exception as error:  # MuJoCo has errors of its own, besides those of Python
-        reason = parsers.describe(error)
+        reason = _describe(error)
         if not shows_line_numbers:
             reason = _LINE_NUMBER.sub("", reason)
         raise SpecError(f"MuJoCo cannot read it: {reason}") from None
+
+
+def _describe(error: Exception) -> str:
+    """Return the reason of an error of MuJoCo as one line."""
+    for pattern, reason in _REASONS:
+        match = re.search(pattern, str(error), re.DOTALL)
+        if match:
+            return reason.format(match[1])
+    return parsers.describe(error)
 
 
 def delete_visuals(spec: mujoco.MjSpec) -> None:
@@ -152,7 +167,7 @@ def _compile(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     except Exception as error:
         unreadable_meshes = sorted(mesh.name for mesh in spec.meshes if not _compiles_alone(spec, mesh))
         if not unreadable_meshes:
-            raise SpecError(f"MuJoCo cannot compile it: {parsers.describe(error)}") from None
+            raise SpecError(f"MuJoCo cannot compile it: {_describe(error)}") from None
     for geom in list(spec.geoms):
         if geom.meshname in unreadable_meshes:
             spec.delete(geom)

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from arc_suite.importing import inertias
+from arc_suite.importing import inertias, world_link
+from arc_suite.importing.world_link import Elements
 from arc_suite.robots.spec import SpecError
 
 _ADDED_PREFIX = "arc_suite_"  # begins the names of links that are added
@@ -28,8 +29,12 @@ _MOMENTS = ("ixx", "iyy", "izz")  # of inertia, the diagonal of the matrix
 _PRODUCTS = ("ixy", "ixz", "iyz")
 _INERTIA_ROWS = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
 _MIN_MOMENT = 1e-6  # of the moment of that ball; a smaller one counts as none
+_LEAST_MASS = 1e-12  # kg, of a link that weighs anything
+_LEAST_MOMENT = 1e-15  # kg m^2; MuJoCo refuses smaller ones
+_MIN_BALL_MOMENT = 1e-14  # kg m^2, of the ball of a link that weighs anything
 _ROUNDING = 1e-9  # of inertias in files, as a share of the largest moment
 _LIGHT_LINK = 1e-4  # of the robot's mass, of a link that moves and has no mass
+_LIGHT_MASS = 1e-3  # kg, of the same where no link has a mass
 
 _COMPILER = {
     "strippath": "false",
@@ -39,9 +44,6 @@ _COMPILER = {
     "boundmass": "0",
     "boundinertia": "0",
 }
-
-# Elements by name, in the order of the file.
-Elements = dict[str, ElementTree.Element]
 
 
 def repair_urdf(
@@ -67,8 +69,10 @@ def repair_urdf(
     joints = _elements_by_name(robot, "joint")
     for name, joint in joints.items():
         _check_joint(name, joint, links)
+    world_notes = world_link.replace_world(robot, links, joints)
     mesh_files: list[Path] = []
     notes = (
+        *world_notes,
         *_repair_shapes(links, folder, mesh_files),
         *_repair_inertias(links),
         *_add_missing_masses(links, joints),
@@ -198,12 +202,13 @@ def _repair_inertias(links: Elements) -> Iterator[str]:
         texts = {key: inertia_element.get(key, "0") for key in _MOMENTS + _PRODUCTS}
         inertia = {key: _parse_numbers(f"link {name!r}: inertia {key}", text, 1)[0] for key, text in texts.items()}
         (mass,) = _parse_numbers(f"link {name!r}: mass value", mass_element.get("value", ""), 1)
-        if mass <= 0.0:
+        is_vanishing = _has_vanishing_moment(inertia, mass)
+        if mass < _LEAST_MASS or (is_vanishing and inertias.ball_moment(mass) < _MIN_BALL_MOMENT):
             link.remove(inertial)
             continue
         if _breaks_triangle_rule(inertia):  # MuJoCo's compiler balances the moments
             repaired_links.append(name)
-        if _has_vanishing_moment(inertia, mass):
+        if is_vanishing:
             repaired_links.append(name)
             texts = _replace_vanishing_moments(inertia, mass)
         for key, text in texts.items():
@@ -222,7 +227,7 @@ def _breaks_triangle_rule(inertia: Mapping[str, float]) -> bool:
 def _has_vanishing_moment(inertia: Mapping[str, float], mass: float) -> bool:
     """Return whether the smallest principal moment is nothing for a link of this mass, kg."""
     smallest, _, largest = _principal_moments(inertia)
-    return smallest <= max(_ROUNDING * largest, _MIN_MOMENT * inertias.ball_moment(mass))
+    return smallest <= max(_ROUNDING * largest, _MIN_MOMENT * inertias.ball_moment(max(mass, 0.0)), _LEAST_MOMENT)
 
 
 def _replace_vanishing_moments(inertia: Mapping[str, float], mass: float) -> dict[str, str]:
@@ -247,6 +252,9 @@ def _add_missing_masses(links: Elements, joints: Elements) -> Iterator[str]:
     for name, link in links.items():
         if link.find("inertial") is not None:
             masses[name] = float(link.find("inertial/mass").get("value"))
+    solid_links = {name for name, link in links.items() if link.find("collision") is not None}
+    if not masses:
+        yield "masses: none in the file; colliders get 1000 kg/m^3"
     fixed_children = collections.defaultdict(list)
     moving_links = []
     for joint in joints.values():
@@ -259,11 +267,12 @@ def _add_missing_masses(links: Elements, joints: Elements) -> Iterator[str]:
     light_links = []
     for name in moving_links:
         rigid_part = _links_fixed_to(name, fixed_children)
-        if not any(masses.get(link) for link in rigid_part):
+        has_mass = any(masses.get(link) for link in rigid_part)
+        if not has_mass and (masses or not solid_links.intersection(rigid_part)):
             light_links.append(name)
     if not light_links:
         return
-    mass = _LIGHT_LINK * sum(masses.values())
+    mass = _LIGHT_LINK * sum(masses.values()) or _LIGHT_MASS
     for name in light_links:
         inertial = ElementTree.SubElement(links[name], "inertial")
         ElementTree.SubElement(inertial, "mass", value=repr(mass))

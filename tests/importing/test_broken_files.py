@@ -20,11 +20,23 @@ MOTOR = '<motor name="FL_calf" class="knee" joint="FL_calf_joint"/>'
 MESH = '<asset><mesh name="shell" file="shell.stl"/>'
 TENDON = '<tendon><fixed><joint joint="FL_calf_joint" coef="1"/></fixed></tendon><actuator>'
 EQUALITY = '<equality><joint joint1="FL_hip_joint"/></equality><actuator>'
+SCENE, SCENE_JOINT = '<link name="world">{}</link>', '<joint name="to_world" type="{}"><parent link="world"/>{}</joint>'
+CHILD_BASE, TABLE = '<child link="base"/>', '<collision><geometry><box size="9 9 1"/></geometry></collision>'
+PAIR = '<contact><pair geom1="floor" geom2="FL"/></contact></mujoco>'
+EXCLUDE = '<contact><exclude body1="stairs" body2="FL_calf"/></contact></mujoco>'
+DISTANCE = '<sensor><distance geom1="floor" geom2="FL"/></sensor></mujoco>'
+WELD = '<equality><weld body1="base" body2="pole"/></equality></mujoco>'
+LIGHT = '<worldbody><light mode="targetbody" target="stairs"/>'
 UNREAD, REPAIRED = "1 colliders that cannot be read, such as of trunk", "inertias of 1 links that no solid has"
 
 
 def inertia(xx, yy, zz, xy=0.0):
     return f'<inertia ixx="{xx}" ixy="{xy}" ixz="0" iyy="{yy}" iyz="0" izz="{zz}"/>'
+
+
+def in_scene(kind, shape="", more=""):
+    """The end of a URDF with a link `world` that carries its base."""
+    return SCENE.format(shape) + SCENE_JOINT.format(kind, CHILD_BASE + more) + "</robot>"
 
 
 def broken(folder, file, old, new):
@@ -56,6 +68,51 @@ CURED = {
     "a tendon": (GO2, "<actuator>", TENDON, "left out: 1 tendons"),
     "an equality": (GO2, "<actuator>", EQUALITY, "left out: 1 equality constraints"),
     "a muscle": (GO2, MOTOR, '<muscle name="FL_calf" joint="FL_calf_joint"/>', "none in the file for 1 motors, sized"),
+    "the base is fixed to a world": (A1, "</robot>", in_scene("fixed"), "the torso base is fixed to the world"),
+    "the base is fixed to a table": (A1, "</robot>", in_scene("fixed", TABLE), "the torso base is fixed to the world"),
+    "a world and a post": (
+        A1,
+        "</robot>",
+        '<link name="post"/><joint name="p" type="fixed"><parent link="world"/><child link="post"/></joint>'
+        + in_scene("fixed"),
+        "the torso base is fixed to the world",
+    ),
+    "the base stands high in the world": (
+        A1,
+        "</robot>",
+        in_scene("fixed", more='<origin xyz="1 2 3" rpy="0 0 1"/>'),
+        "torso 0.269 m above the floor",
+    ),
+    "the base floats in a world": (A1, "</robot>", in_scene("floating"), "legs: 4"),
+    "the base is named world": (A1, '"base"', '"world"', "the torso trunk is fixed to the world"),
+    "the trunk is named world": (A1, '"trunk"', '"world"', "legs: 4"),
+    "a calf is named world": (A1, '"FR_calf"', '"world"', "legs: 4"),
+    "no link has a mass": (A1, "inertial", "nothing", "masses: none in the file; colliders get 1000 kg/m^3"),
+    "no link has a mass, and some have no shape": (HEXAPOD, "inertial", "nothing", "6 links that move and weigh noth"),
+    "a mass of nearly nothing": (
+        HEXAPOD,
+        'mass value="0.08"',
+        'mass value="1e-15"',
+        "6 links that move and weigh nothing",
+    ),
+    "a mass of a millionth of a gram": (
+        HEXAPOD,
+        'mass value="0.08"',
+        'mass value="1e-9"',
+        "inertias of 6 links, too large",
+    ),
+    "a pair with a floor that is not there": (
+        GO2,
+        "</mujoco>",
+        PAIR,
+        "1 references to parts that are not in the file, such as floor",
+    ),
+    "an excluded contact with a scene": (GO2, "</mujoco>", EXCLUDE, "1 references to parts that are not in the file"),
+    "a sensor of a scene": (GO2, "</mujoco>", DISTANCE, "1 references to parts that are not in the file"),
+    "a weld to a scene": (GO2, "</mujoco>", WELD, "1 references to parts that are not in the file"),
+    "a light on a part of a scene": (GO2, "<worldbody>", LIGHT, "1 references to parts that are not in the file"),
+    "zeros at the end": (GO2, "</mujoco>", "</mujoco>\0\0\n", "legs: 4"),
+    "a zero at the end of a URDF": (A1, "</robot>", "</robot>\0", "legs: 4"),
     "a home that hangs in the air": (GO2, "0 0.9 -1.8 0 0.9", "0 0.1 -0.9 0 2.9", "search for bent knees"),
 }
 
@@ -93,6 +150,25 @@ REFUSED = {
     "a ball joint in a leg": (GO2, KNEE, '<joint name="ball" type="ball" limited="false"/>', ""),
     "a slide in a leg": (GO2, KNEE, KNEE.replace("/>", ' type="slide"/>'), "'FL_calf_joint' of a leg is a slide"),
     "a motor without a joint": (GO2, MOTOR, '<motor joint="none"/>', "'none'"),
+    "a body named world": (
+        GO2,
+        'body name="base"',
+        'body name="world"',
+        "a body has the name 'world', which is that of the",
+    ),
+    "a rail in the world": (
+        A1,
+        "</robot>",
+        in_scene("prismatic"),
+        "the torso 'base' moves by the joint 'to_world' alone",
+    ),
+    "a zero within": (GO2, "<asset>", "\0<asset>", "expected XML"),
+    "masses of 1e-16": (
+        GO2,
+        'mass="0.2414" diaginertia="0.00149 0.00146 5.3e-05"',
+        'mass="1e-16" diaginertia="1 1 1"',
+        "body 'FL_calf' moves, and has no mass or no inertia",
+    ),
     "a link without mass": (GO2, 'mass="0.2414" diaginertia="0.00149 0.00146 5.3e-05"', 'mass="0"', "'FL_calf'"),
     "a plate thinner than none": (GO2, 'diaginertia="0.00149 0.00146 5.3e-05"', 'diaginertia="1 0.1 0.1"', "'FL_calf'"),
     "no legs": (GO2, None, '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>', "legs"),
