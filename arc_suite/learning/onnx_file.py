@@ -128,7 +128,9 @@ def _convert_graph(graph: Graph) -> tuple[list[_Node], dict[str, np.ndarray]]:
             same_operator = _Step(node.operator, range(len(inputs)))
             nodes += _apply_steps(_STEPS.get(node.operator, (same_operator,)), inputs, output)
         onnx_names[index] = output
-    return nodes, arrays
+    # A runtime warns of arrays that no node takes.
+    used_names = {name for node in nodes for name in node.inputs}
+    return nodes, {name: array for name, array in arrays.items() if name in used_names}
 
 
 def _apply_steps(steps: Sequence[_Step], inputs: list[str], output: str) -> Iterator[_Node]:

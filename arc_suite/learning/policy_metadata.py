@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from arc_suite.models import sizing, source
+from arc_suite.models.standing import measure_standing
 from arc_suite.policies.network import Network
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 from arc_suite.tasks.modified_task import has_active
-from arc_suite.tasks.modifiers import Control, Delay, History
+from arc_suite.tasks.modifiers import Delay, History
 
 
 def metadata(network: Network) -> dict:
@@ -51,7 +52,7 @@ def metadata(network: Network) -> dict:
     elif body.source:
         values["servos"] = _imported_servos(body)
     else:
-        values["servos"] = _servos_of_motors(task, model.actuator_gear[:, 0])
+        values["servos"] = servos_of_motors(body, model.actuator_gear[:, 0])
     values["torque_held"] = "substep" if body.source else "control step"
     if body.source:
         values["file_joints"] = list(body.file_joints)
@@ -87,17 +88,17 @@ def _imported_servos(body: Body) -> dict[str, dict]:
     return servos
 
 
-def _servos_of_motors(task: Task, gears: np.ndarray) -> dict[str, dict]:
-    """Return by joint the servos that position control makes of motors, whose standing pose is 0."""
-    control = task.modifier(Control)  # type: ignore[attr-defined]  # positions of motors are a modifier
+def servos_of_motors(body: Body, gears: np.ndarray) -> dict[str, dict]:
+    """Return by joint the servos that position control makes of motors, given their gears (joints,), N m."""
+    stiffness, damping = sizing.position_gains(sizing.size_body(body), measure_standing(body).inertias)
     columns = {
-        "reach": control.reach,
-        "stiffness": control.stiffness * gears,
-        "damping": control.damping * gears,
+        "reach": sizing.action_reaches(body),
+        "stiffness": stiffness * gears,
+        "damping": damping * gears,
         "limit": gears,
     }
     servos = {}
-    for index, name in enumerate(task.scene.body.joint_names):
+    for index, name in enumerate(body.joint_names):
         numbers = {column: float(values[index]) for column, values in columns.items()}
         servos[name] = {"alias": None, "home": 0.0, **numbers}
     return servos

@@ -6,7 +6,11 @@ gears of the motors and the rule of the gait's clock.
   arc-suite export runs/tick-walk-ppo-0
   arc-suite export runs/tick-walk-ppo-0 -o tick.onnx
   arc-suite export ppo.zip
+  arc-suite export runs/go2-steer-ppo-0 --runner robot
   arc-suite export universal --spec spider --task steer -o spider.onnx
+
+--runner writes a folder for the computer of a robot: policy.onnx, policy.json, and run.py, a file of Python that needs
+NumPy and onnxruntime alone. It prints which action moves which motor.
 
 A policy of many bodies is exported for the body of --robot, --spec or --legs.
 A zip of stable-baselines3 must have been trained in arc_suite.envs.sb3.VecEnv: then it holds its robot and task.
@@ -31,13 +35,16 @@ from arc_suite.cli.flags import (
     task_from_flags,
 )
 from arc_suite.envs.setup import Setup
-from arc_suite.learning import onnx_file
+from arc_suite.learning import onnx_file, runner_files
 
 FLAGS = flags.FLAGS
 define_body(None, "; for a policy of many bodies")
 define_vecnormalize()
 define_task()
 flags.DEFINE_string("output", None, "File to write (.onnx). [default: policy.onnx next to the policy]", short_name="o")
+
+
+flags.DEFINE_string("runner", None, "Folder to write for a robot: policy.onnx, policy.json and run.py.")
 
 
 def main(run: str | None = None) -> None:
@@ -59,5 +66,11 @@ def main(run: str | None = None) -> None:
         raise ValueError(f"policy {run}: --task, --set and --arena go with the body of a policy of many bodies")
     else:
         policy = policies.load_network(name)
+    if FLAGS.runner is not None:
+        if FLAGS.output is not None:
+            raise ValueError(f"--output {FLAGS.output}: goes without --runner, which names a folder")
+        notes = runner_files.save(FLAGS.runner, policy)
+        print(f"wrote {FLAGS.runner}: {', '.join(runner_files.FILES)}; {policy.size} observations", *notes, sep="\n")
+        return
     onnx_file.save(output, policy)
     print(f"wrote {output}: {policy.size} observations, {policy.joints} actions, {output.stat().st_size} bytes")
