@@ -38,10 +38,12 @@ export function shareOf(data, number, count) {
 // The MJCF of two bodies that meet, given that of one: it touches what touches it, as the ground does.
 export function doubled(xml) {
   const part = (from, to) => xml.slice(xml.indexOf(from), xml.lastIndexOf(to) + to.length);
-  const named = (text) => text.replace(/ (name|joint)="/g, ' $1="rival_');
+  const named = (text) => text.replace(/ (name|joint|joint[12]|site[12])="/g, ' $1="rival_');
   const touched = (text) => text.replace(/contype="1"([^>]*?)conaffinity="0"/g, 'contype="0"$1conaffinity="1"');
+  const sections = ["equality", "actuator"].filter((tag) => xml.includes(`<${tag}>`));
+  const further = sections.map((tag) => named(part(`<${tag}>`, `</${tag}>`))).join("");
   return xml
     .replace(/<keyframe>.*<\/keyframe>/s, "") // of one body
     .replace("</worldbody>", `${named(touched(part("<body ", "</body>")))}</worldbody>`)
-    .replace("</mujoco>", `${named(part("<actuator>", "</actuator>"))}</mujoco>`);
+    .replace("</mujoco>", `${further}</mujoco>`);
 }

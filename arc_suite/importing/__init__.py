@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, files, parsers
-from arc_suite.importing import armatures, motors, notes, opening, poses, sketch, tree, trunk, writing
+from arc_suite.importing import armatures, drives, loops, motors, notes, opening, poses, sketch, tree, trunk, writing
 from arc_suite.importing.facing import AXES, LEVEL, Y_UP, Facing
 from arc_suite.importing.front import find_front
 from arc_suite.importing.naming import choose_names, clean_name
@@ -203,7 +203,12 @@ def _open_standing_robot(path: Path, choices: _Choices, facing: Facing) -> _Stan
             file, robot = _open_turned_robot(path, facing)
         front_notes += front.notes(facing)
     file = file._replace(notes=(*file.notes, *front_notes))
-    return _StandingRobot(file, robot, poses.find_stance(robot, choices.home, choices.feet))
+    feet = trunk.find_feet(robot)
+    robot = drives.release_joints(robot, file.driven)
+    loops.check_legs(robot, feet)
+    stance = poses.find_stance(robot, choices.home, choices.feet)
+    loops.check_legs(robot, [leg.body for leg in stance.legs])
+    return _StandingRobot(file, robot, stance)
 
 
 def _open_turned_robot(path: Path, facing: Facing) -> tuple[RobotFile, Robot]:
@@ -262,7 +267,7 @@ def _order_joints(robot: Robot, stance: Stance, urdf_order: tuple[str, ...]) -> 
     joints_of_legs = set(stance.joints)
     joint_by_name = {robot.joint_name(joint): joint for joint in robot.joints}
     joints_in_urdf = [joint_by_name[name] for name in urdf_order if name in joint_by_name]
-    for order in (motors.actuated_joints(robot), joints_in_urdf):
+    for order in (drives.actuated_joints(robot), joints_in_urdf):
         if joints_of_legs <= set(order):
             return [joint for joint in order if joint in joints_of_legs]
     return [joint for joint in robot.joints if joint in joints_of_legs]

@@ -59,7 +59,9 @@ def calm(
 
 
 def _joints_without_armature(robot: Robot) -> list[int]:
-    return [joint for joint in robot.joints if robot.model.dof_armature[robot.model.jnt_dofadr[joint]] == 0.0]
+    dofs = robot.model.jnt_dofadr
+    motors = [joint for joint in robot.joints if joint not in robot.passive]
+    return [joint for joint in motors if robot.model.dof_armature[dofs[joint]] == 0.0]
 
 
 def _set_armatures(robot: Robot, armatures: Mapping[int, float]) -> Robot:

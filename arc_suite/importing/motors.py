@@ -7,6 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from arc_suite.importing.drives import find_drives
 from arc_suite.importing.poses import Leg, Stance
 from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import foot_loads
@@ -30,8 +31,6 @@ _MAX_LOADS_PER_LIMIT = 200.0  # in loads of the joint in the leg that bears most
 # Origins of a limit. Other origins are names of attributes in the file.
 _BY_RULE = "sized"
 _PLACEHOLDER = "placeholder"
-
-_JOINT_TRANSMISSIONS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
 class Motors(NamedTuple):
@@ -70,22 +69,8 @@ class _Limit(NamedTuple):
     origin: str
 
 
-class _Drive(NamedTuple):
-    """An actuator that drives a joint.
-
-    Attributes:
-        actuator: MuJoCo's index.
-        joint: MuJoCo's index.
-        gear: torque per force of the actuator.
-    """
-
-    actuator: int
-    joint: int
-    gear: float
-
-
 def find_motors(robot: Robot, stance: Stance) -> Motors:
-    """Return the servos of a robot's joints."""
+    """Return the servos of a robot's joints, without those that are passive."""
     inertias, loads = _mechanics(robot, stance)
     gains_of_file = _find_gains(robot)
     limits_of_file = _find_limits(robot)
@@ -112,10 +97,10 @@ def find_motors(robot: Robot, stance: Stance) -> Motors:
 
 
 def _group_joints(robot: Robot, stance: Stance) -> list[tuple[int, ...]]:
-    """Return the joints of each leg, then each joint that belongs to no leg."""
+    """Return the joints of each leg, then each joint that belongs to no leg and is not passive."""
     groups = [leg.joints for leg in stance.legs]
-    joints_of_legs = set(stance.joints)
-    groups += [(joint,) for joint in robot.joints if joint not in joints_of_legs]
+    grouped_joints = {*stance.joints, *robot.passive}
+    groups += [(joint,) for joint in robot.joints if joint not in grouped_joints]
     return groups
 
 
@@ -164,33 +149,11 @@ def _vertical_jacobian(model: mujoco.MjModel, data: mujoco.MjData, leg: Leg) -> 
     return jacobian[2]
 
 
-def actuated_joints(robot: Robot) -> list[int]:
-    """Return the joints that actuators drive, each once, in the order of the actuators."""
-    joints = [drive.joint for drive in _find_drives(robot)]
-    return list(dict.fromkeys(joints))
-
-
-def count_joint_actuators(robot: Robot) -> int:
-    """Return how many actuators drive a joint of the robot."""
-    return len(list(_find_drives(robot)))
-
-
-def _find_drives(robot: Robot) -> Iterator[_Drive]:
-    """Yield the actuators that drive a joint of the robot; muscles are none of them."""
-    model = robot.model
-    for actuator in range(model.nu):
-        joint = int(model.actuator_trnid[actuator, 0])
-        is_muscle = model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE
-        drives_joint = model.actuator_trntype[actuator] in _JOINT_TRANSMISSIONS and joint in robot.joints
-        if drives_joint and not is_muscle:
-            yield _Drive(actuator, joint, abs(float(model.actuator_gear[actuator, 0])))
-
-
 def _find_gains(robot: Robot) -> dict[int, _Gains]:
     """Return the gains of joints that a position actuator drives, by joint; the last actuator of a joint counts."""
     model = robot.model
     gains = {}
-    for drive in _find_drives(robot):
+    for drive in find_drives(robot):
         gain = float(model.actuator_gainprm[drive.actuator, 0])
         _, position_bias, velocity_bias = model.actuator_biasprm[drive.actuator, :3]
         is_affine = model.actuator_biastype[drive.actuator] == mujoco.mjtBias.mjBIAS_AFFINE
@@ -205,7 +168,7 @@ def _find_limits(robot: Robot) -> dict[int, _Limit]:
     """Return the least torque limit of each joint that has one above 0."""
     model = robot.model
     limits_of_joint = defaultdict(list)
-    for drive in _find_drives(robot):
+    for drive in find_drives(robot):
         if model.actuator_forcelimited[drive.actuator]:
             force = abs(model.actuator_forcerange[drive.actuator]).max()
             limits_of_joint[drive.joint].append(_Limit(drive.gear * float(force), "forcerange"))

@@ -20,7 +20,7 @@ class Names(NamedTuple):
         legs: one value for each leg, in the order of the legs.
         joints: all joints except the free one.
         bodies: all bodies of the robot.
-        held: joints outside of the legs.
+        held: joints outside of the legs that have motors.
     """
 
     legs: tuple[str, ...]
@@ -49,7 +49,7 @@ def choose_names(robot: Robot, legs: tuple[Leg, ...]) -> Names:
     for body in robot.bodies:
         if body not in bodies:
             bodies[body] = _add_unique_name(robot.model.body(body).name, "body", used_names)
-    return Names(labels, joints, bodies, held=other_joints)
+    return Names(labels, joints, bodies, tuple(joint for joint in other_joints if joint not in robot.passive))
 
 
 def _part_names(label: str, leg: Leg) -> Iterator[str]:

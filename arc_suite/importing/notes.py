@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from arc_suite.importing import motors, trunk
+from arc_suite.importing import drives, loops, trunk
 from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
@@ -54,6 +54,11 @@ def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) 
     gravity = float(np.linalg.norm(model.opt.gravity))
     if abs(gravity - GRAVITY) > _MAX_GRAVITY_DIFFERENCE * GRAVITY:
         yield f"units: the file's gravity is {gravity:g}; speeds and times of the tasks count on {GRAVITY:g} m/s^2"
+    if robot.loops:
+        yield f"kept: {len(robot.loops)} constraints between links ({loops.name_parts(robot, robot.loops[0])})"
+    if robot.passive:
+        passive_names = ", ".join(robot.joint_name(joint) for joint in robot.passive[:_MAX_NAMES])
+        yield f"passive: {len(robot.passive)} joints without a motor keep their springs and damping ({passive_names})"
     if names.held:
         held_names = ", ".join(robot.joint_name(joint) for joint in names.held[:_MAX_NAMES])
         yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({held_names})"
@@ -77,8 +82,8 @@ def _omission_counts(file: RobotFile, robot: Robot) -> dict[str, int]:
     bodies_in_world = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody))
     return {
         "tendons": model.ntendon,
-        "equality constraints": model.neq,
-        "actuators that are no motors of single joints": model.nu - motors.count_joint_actuators(robot),
+        "equality constraints": model.neq - len(robot.loops),
+        "actuators that are no motors of single joints": model.nu - drives.count_joint_actuators(robot),
         "shapes in a fluid": shapes_in_fluid,
         "sensors": model.nsensor,
         "other bodies in the world": bodies_in_world - 1,

@@ -35,6 +35,7 @@ class RobotFile(NamedTuple):
         root: body of the torso.
         meshes: meshes of geoms whose shape is a mesh, by geom.
         order: names of joints in the order of the file; empty if the model has that order.
+        driven: names of the joints that a URDF drives; empty if it does not say.
         notes: one line for each thing that is left out or repaired.
         parts: all files that it depends on, with those that were looked for and are missing.
     """
@@ -43,6 +44,7 @@ class RobotFile(NamedTuple):
     root: int
     meshes: dict[int, Mesh]
     order: tuple[str, ...]
+    driven: frozenset[str]
     notes: tuple[str, ...]
     parts: tuple[Path, ...]
 
@@ -77,6 +79,7 @@ def open_robot(path: Path, facing: Facing = LEVEL) -> RobotFile:
     root_element, parts = bounds.parse(path)
     if root_element.tag not in ("mujoco", "robot"):
         raise SpecError(f"expected MJCF (mujoco) or URDF (robot), got an element {root_element.tag[:40]!r}")
+    driven = urdf.find_driven_joints(root_element) if root_element.tag == "robot" else frozenset()
     spec, order, notes, mesh_files = _read_spec(path, root_element)
     bounds.check_mesh_files(mesh_files)
     model, mesh_notes = _compile(spec)
@@ -84,7 +87,7 @@ def open_robot(path: Path, facing: Facing = LEVEL) -> RobotFile:
     model, inertia_notes = inertias.correct_inertias(spec, model, torso)
     model = turn_torso(spec, model, torso, facing)
     all_notes = (*notes, *mesh_notes, *torso_notes, *inertia_notes)
-    return RobotFile(model, torso, meshes_of(spec, model), order, all_notes, (*parts, *mesh_files))
+    return RobotFile(model, torso, meshes_of(spec, model), order, driven, all_notes, (*parts, *mesh_files))
 
 
 def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:

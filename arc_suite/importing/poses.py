@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.importing import tree
+from arc_suite.importing import loops, tree
 from arc_suite.importing.tree import Chain, Robot
 from arc_suite.models.kinematics import least_changes
 from arc_suite.models.standing import stability_margin
@@ -191,14 +191,14 @@ def _candidate_poses(robot: Robot, named_feet: dict[Chain, list[int]] | None) ->
     model = robot.model
     for key in sorted(range(model.nkey), key=lambda key: model.key(key).name != "home"):
         yield f"keyframe {model.key(key).name or key}", model.key_qpos[key]
-    yield "zero angles", model.qpos0
+    yield "zero angles", _relax(robot, model.qpos0)
     foot_colliders = robot.end_colliders() if named_feet is None else named_feet
     for front_sign, rear_sign in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
         qpos = _search_bent_knees(robot, foot_colliders, front_sign, rear_sign)
         if qpos is not None:
             yield "search for bent knees", qpos
     yield "middle of the ranges", _middle_pose(robot)
-    yield "zero angles within the ranges", robot.clip_to_limits(model.qpos0)
+    yield "zero angles within the ranges", robot.clip_to_limits(_relax(robot, model.qpos0))
 
 
 def _middle_pose(robot: Robot) -> np.ndarray:
@@ -208,7 +208,17 @@ def _middle_pose(robot: Robot) -> np.ndarray:
         low, high = robot.limits(joint)
         if high - low < _MIN_WHEEL_RANGE:
             qpos[robot.qpos_index(joint)] = 0.5 * (low + high)
-    return robot.clip_to_limits(qpos)
+    return robot.clip_to_limits(_relax(robot, qpos))
+
+
+def _relax(robot: Robot, qpos: np.ndarray) -> np.ndarray:
+    """Return a pose (nq,) in which passive joints are where their springs have no load."""
+    relaxed_qpos = qpos.copy()
+    for joint in robot.passive:
+        index = robot.qpos_index(joint)
+        has_spring = robot.model.jnt_stiffness[joint] > 0.0
+        relaxed_qpos[index] = (robot.model.qpos_spring if has_spring else robot.model.qpos0)[index]
+    return relaxed_qpos
 
 
 def _stance_of_pose(
@@ -232,8 +242,11 @@ def _stance_of_pose(
     Raises:
         _Unfit: the robot does not stand in it, or has no legs.
     """
+    qpos, is_closed = loops.close(robot, qpos)
     if is_checked:
         _check_limits(robot, qpos)
+        if not is_closed:
+            raise _Unfit("its loops do not close")
     data = robot.forward_kinematics(qpos)
     foot_colliders = robot.end_colliders() if named_feet is None else named_feet
     ends = {}
@@ -378,7 +391,7 @@ def _search_bent_knees(
         front_sign: sign of the bend of legs in front of the torso's origin, 1 or -1.
         rear_sign: sign of the bend of the other legs.
     """
-    zero_qpos = robot.clip_to_limits(robot.model.qpos0 * 0.0)
+    zero_qpos = robot.clip_to_limits(_relax(robot, robot.model.qpos0 * 0.0))
     data = robot.forward_kinematics(zero_qpos)
     ends = {}
     for chain, geoms in foot_colliders.items():

@@ -104,7 +104,8 @@ def _link_radius(robot: Robot, leg: Leg, joint: int) -> float:
 def sketch_torso(robot: Robot, stance: Stance) -> Torso:
     """Return the torso: one box around its colliders, or around the mounts of its legs if it has none."""
     data = robot.forward_kinematics(stance.qpos)
-    torso_colliders = [geom for geom in robot.colliders if not robot.chain_of_geom(geom)]
+    bodies = robot.model.geom_bodyid
+    torso_colliders = [geom for geom in robot.colliders if not robot.lineage(int(bodies[geom]))]
     if torso_colliders:
         high_points = [_geom_bounds(robot, data, geom, side=1.0) for geom in torso_colliders]
         low_points = [_geom_bounds(robot, data, geom, side=-1.0) for geom in torso_colliders]

@@ -1,7 +1,7 @@
 """The tree of a compiled robot: its joints, its colliders, and which chains of joints end where."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -33,6 +33,8 @@ class Robot(NamedTuple):
         colliders: geoms that collide with anything.
         chains: by body, the joints between the torso and it, outwards.
         torso_place: (3,) origin of the torso's frame in that of its body, m; both have the same axes.
+        passive: joints without a motor, which are in no chain.
+        loops: constraints between parts of the robot; see `loops.Loop`.
     """
 
     model: mujoco.MjModel
@@ -42,6 +44,8 @@ class Robot(NamedTuple):
     colliders: tuple[int, ...]
     chains: dict[int, Chain]
     torso_place: np.ndarray = np.zeros(3)
+    passive: tuple[int, ...] = ()
+    loops: tuple[Any, ...] = ()
 
     def joint_name(self, joint: int) -> str:
         """Return the name of a joint in the file, or its number."""
@@ -61,6 +65,15 @@ class Robot(NamedTuple):
     def chain_of_geom(self, geom: int) -> Chain:
         """Return the joints between the torso and a geom, outwards."""
         return self.chains[int(self.model.geom_bodyid[geom])]
+
+    def lineage(self, body: int) -> Chain:
+        """Return all joints between the torso and a body, outwards, passive ones, too."""
+        joints: Chain = ()
+        while body != self.root:
+            first_joint = int(self.model.body_jntadr[body])
+            joints = (*range(first_joint, first_joint + int(self.model.body_jntnum[body])), *joints)
+            body = int(self.model.body_parentid[body])
+        return joints
 
     def end_colliders(self) -> dict[Chain, list[int]]:
         """Return the colliders at the end of every chain of joints that is not the beginning of another chain."""

@@ -21,7 +21,7 @@ _MIN_END_DEPTH = 0.7  # of the deepest end of a chain, below the trunk; chains t
 def place_torso(robot: Robot) -> Robot:
     """Return the robot with the place of its torso: the middle of its hips, unless the root body's origin will do."""
     data = robot.forward_kinematics(robot.model.qpos0)
-    chains = _find_leg_chains(robot, data)
+    chains = find_leg_chains(robot)
     if not chains:
         return robot
     hips = np.mean([data.xanchor[chain[0]] for chain in chains], axis=0)
@@ -44,8 +44,9 @@ def placement_notes(robot: Robot) -> Iterator[str]:
         )
 
 
-def _find_leg_chains(robot: Robot, data: mujoco.MjData) -> Mapping[Chain, np.ndarray]:
-    """Return the lowest points (3,) of the chains that end low, by chain."""
+def find_leg_chains(robot: Robot) -> Mapping[Chain, np.ndarray]:
+    """Return the lowest points (3,) of the chains that end low at zero angles, by chain."""
+    data = robot.forward_kinematics(robot.model.qpos0)
     ends = {}
     for chain, geoms in robot.end_colliders().items():
         if len(chain) > 1:
@@ -54,6 +55,12 @@ def _find_leg_chains(robot: Robot, data: mujoco.MjData) -> Mapping[Chain, np.nda
     deepest = min((end[2] for end in ends.values()), default=0.0)
     highest_end = trunk_height + _MIN_END_DEPTH * (deepest - trunk_height)
     return {chain: end for chain, end in ends.items() if end[2] <= highest_end}
+
+
+def find_feet(robot: Robot) -> list[int]:
+    """Return the bodies at the ends of the chains that end low at zero angles."""
+    colliders = robot.end_colliders()
+    return [int(robot.model.geom_bodyid[colliders[chain][-1]]) for chain in find_leg_chains(robot)]
 
 
 def _trunk_center(robot: Robot, data: mujoco.MjData) -> np.ndarray:

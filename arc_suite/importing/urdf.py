@@ -13,7 +13,7 @@ from arc_suite.importing.world_link import Elements
 from arc_suite.robots.spec import SpecError
 
 _ADDED_PREFIX = "arc_suite_"  # begins the names of links that are added
-_IGNORED_ELEMENTS = ("gazebo", "transmission", "mujoco")
+_IGNORED_ELEMENTS = ("gazebo", "transmission", "ros2_control", "mujoco")
 _MESH_EXTENSIONS = (".stl", ".obj", ".msh")
 _MESH_SCHEMES = ("package://", "file://", "model://")
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating")
@@ -82,6 +82,26 @@ def repair_urdf(
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _COMPILER)
     order = tuple(name for name, joint in joints.items() if joint.get("type") not in ("fixed", "floating"))
     return ElementTree.tostring(robot, encoding="unicode"), order, notes, tuple(mesh_files)
+
+
+def find_driven_joints(robot: ElementTree.Element) -> frozenset[str]:
+    """Return the names of the joints that a URDF drives; none if it does not say.
+
+    Joints have motors by `transmission` or by a command of `ros2_control`; else by an effort above 0, if some have 0.
+    """
+    joints = {*robot.findall("transmission/joint")}
+    for joint in robot.findall("ros2_control/joint"):
+        if joint.find("command_interface") is not None:
+            joints.add(joint)
+    if joints:
+        return frozenset(joint.get("name", "") for joint in joints)
+    efforts = {}
+    for joint in robot.findall("joint"):
+        limit = joint.find("limit")
+        if limit is not None and joint.get("type") not in ("fixed", "floating"):
+            efforts[joint.get("name", "")] = limit.get("effort", "").strip()
+    names = [name for name, effort in efforts.items() if _is_positive(effort)]
+    return frozenset(names) if any(_is_zero(effort) for effort in efforts.values()) else frozenset()
 
 
 def _elements_by_name(robot: ElementTree.Element, tag: str) -> Elements:
@@ -168,6 +188,13 @@ def _repair_shapes(links: Elements, folder: Path, mesh_files: list[Path]) -> Ite
 def _is_positive(text: str | None) -> bool:
     try:
         return float(text or "0") > 0.0
+    except ValueError:
+        return False
+
+
+def _is_zero(text: str) -> bool:
+    try:
+        return float(text) == 0.0
     except ValueError:
         return False
 

@@ -12,6 +12,8 @@ from xml.etree.ElementTree import SubElement
 import mujoco
 import numpy as np
 
+from arc_suite.importing import loops
+from arc_suite.importing.loops import Loop
 from arc_suite.importing.meshes import Mesh
 from arc_suite.importing.naming import Names
 from arc_suite.importing.poses import Leg, Stance
@@ -84,6 +86,7 @@ def write_source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, M
     SubElement(elements[robot.root], "site", name="torso", size=exact(0.01), **torso_place, **SITE)
     for label, leg in zip(names.legs, stance.legs, strict=True):
         _add_leg_bodies(elements, robot, stance, names, label, leg)
+    _add_loops(root, elements, robot, names)
     keyframe = SubElement(root, "keyframe")
     SubElement(keyframe, "key", name="home", qpos=exact(_home_qpos(robot, stance)))
     ElementTree.indent(root)
@@ -229,11 +232,47 @@ def _add_leg_bodies(
         body = int(robot.model.jnt_bodyid[joint])
         if names.bodies[body] != f"{label}_link{number}":
             SubElement(elements[body], "body", name=f"{label}_link{number}")
-    last_body = int(robot.model.jnt_bodyid[leg.joints[-1]])
+    last_body = _find_foot_body(robot, leg)
     data = robot.forward_kinematics(stance.qpos)
     foot_position = data.xmat[last_body].reshape(3, 3).T @ (leg.center - data.xpos[last_body])  # in the body's frame
     foot = SubElement(elements[last_body], "body", name=f"{label}_foot", pos=exact(foot_position))
     SubElement(foot, "site", name=f"{label}_foot", size=exact(leg.radius), **SITE)
+
+
+def _find_foot_body(robot: Robot, leg: Leg) -> int:
+    """Return the body that carries a foot: the last one that a joint of the leg moves, or a passive joint after it."""
+    leg_joints = {*leg.joints, *robot.passive}
+    last_joint = [joint for joint in robot.lineage(leg.body) if joint in leg_joints][-1]
+    return int(robot.model.jnt_bodyid[last_joint])
+
+
+def _add_loops(root: ElementTree.Element, elements: dict[int, ElementTree.Element], robot: Robot, names: Names) -> None:
+    """Add the constraints that are kept: of joints by name, of links by a site in each."""
+    if not robot.loops:
+        return
+    section = SubElement(root, "equality")
+    for number, loop in enumerate(robot.loops):
+        constraint = _add_constraint(section, robot, loop)
+        if loop.follower is not None:
+            constraint.attrib |= {f"joint{side}": names.joints[joint] for side, joint in enumerate(loop.parts, start=1)}
+            continue
+        for side, (body, pose) in enumerate(loops.find_frames(robot, loop), start=1):
+            site = f"loop{number}_{side}"
+            SubElement(elements[body], "site", name=site, **_format_differences(pose, _BODY_DEFAULTS), **SITE)
+            constraint.set(f"site{side}", site)
+
+
+def _add_constraint(section: ElementTree.Element, robot: Robot, loop: Loop) -> ElementTree.Element:
+    """Add a constraint without its parts."""
+    model = robot.model
+    data = model.eq_data[loop.equality]
+    values = {"solref": model.eq_solref[loop.equality], "solimp": model.eq_solimp[loop.equality]}
+    attributes = _format_differences(values, _GEOM_DEFAULTS)
+    if loop.follower is not None:
+        return SubElement(section, "joint", polycoef=exact(data[:5]), **attributes)
+    if model.eq_type[loop.equality] == mujoco.mjtEq.mjEQ_WELD:
+        return SubElement(section, "weld", torquescale=exact(data[10]), **attributes)
+    return SubElement(section, "connect", **attributes)
 
 
 def _home_qpos(robot: Robot, stance: Stance) -> list[float]:

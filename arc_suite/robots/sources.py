@@ -110,7 +110,7 @@ _ELEMENTS = {
     "body": _Element(("worldbody", "body"), 2048, {**_NAME_AND_POSE, "gravcomp": _NUMBERS}),
     "inertial": _Element(("body",), 2048, {"pos": _PLACE, "quat": _NUMBERS, "mass": _AMOUNT, "diaginertia": _AMOUNT}),
     "joint": _Element(
-        ("body",),
+        ("body", "equality"),
         1024,
         {
             "name": _NAME,
@@ -122,6 +122,8 @@ _ELEMENTS = {
             **dict.fromkeys(("axis", "range", "actuatorfrcrange", "margin", "ref", "springref"), _NUMBERS),
             **dict.fromkeys(("armature", "frictionloss", "stiffness", "damping"), _AMOUNT),
             **{f"{name}{what}": _NUMBERS for name in _SOLVER_PARAMETERS for what in ("limit", "friction")},
+            # Of a joint in `equality`, which MuJoCo's own check of the file keeps apart.
+            **{"joint1": _NAME, "joint2": _NAME, "polycoef": _NUMBERS, **_SOLVER_PARAMETERS},
         },
     ),
     "geom": _Element(
@@ -140,7 +142,12 @@ _ELEMENTS = {
             **dict.fromkeys(("adhesion", "surfacevel"), _NUMBERS),
         },
     ),
-    "site": _Element(("body",), 1024, {"name": _NAME, "pos": _PLACE, "size": _SIZE, "group": ("4",)}),
+    "site": _Element(("body",), 1024, {**_NAME_AND_POSE, "size": _SIZE, "group": ("4",)}),
+    "equality": _Element(("mujoco",), 1, {}),
+    "connect": _Element(("equality",), 256, {"site1": _NAME, "site2": _NAME, **_SOLVER_PARAMETERS}),
+    "weld": _Element(
+        ("equality",), 256, {"site1": _NAME, "site2": _NAME, "torquescale": _AMOUNT, **_SOLVER_PARAMETERS}
+    ),
     "keyframe": _Element(("mujoco",), 1, {}),
     "key": _Element(("keyframe",), 1, {"name": ("home",), "qpos": _Range(-1000.0, 1000.0)}),
 }
@@ -234,16 +241,14 @@ def _check_parts(root: ElementTree.Element, body: Body) -> None:
     world = root.find("worldbody")
     torso = world[0] if world is not None and len(world) == 1 else None
     first_joint = None if torso is None else torso.find("joint")
-    free_joints = [joint.get("name") for joint in root.iter("joint") if joint.get("type") == "free"]
+    joints = [] if torso is None else list(torso.iter("joint"))
+    free_joints = [joint.get("name") for joint in joints if joint.get("type") == "free"]
     if torso is None or torso.get("name") != "torso" or free_joints != ["root"] or first_joint.get("type") != "free":
         _fail("expected one body in the world, named 'torso', whose first joint 'root' is the one that is free")
 
-    hinge_names = [joint.get("name") for joint in root.iter("joint") if joint.get("name") != "root"]
-    joint_names = [*body.joint_names, *(joint.name for joint in body.held)]
-    _check_names("joint", hinge_names, joint_names)
-    for name in hinge_names:
-        if name not in joint_names:
-            _fail(f"expected no joint {name!r}, which the body has not")
+    # Joints that the body has not are passive.
+    hinge_names = [joint.get("name") for joint in joints if joint.get("name") != "root"]
+    _check_names("joint", hinge_names, [*body.joint_names, *(joint.name for joint in body.held)])
     _check_names("body", [part.get("name") for part in root.iter("body")], body.part_names)
     _check_names("site", [site.get("name") for site in root.iter("site")], ("torso", *body.foot_names))
 

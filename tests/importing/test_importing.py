@@ -148,9 +148,10 @@ def test_parts_of_an_odd_robot_have_names(odd):
     found = model(body)
     assert found.joint("l1_joint1").bodyid == found.joint("l1_joint2").bodyid == found.body("l1_link2").id
     assert found.body("l1_link1").mass == 0 and found.body("l1_link1").parentid == found.body("l1_link2").id
-    assert [joint.name for joint in body.held] == ["arm_joint", "grip"]
+    assert [joint.name for joint in body.held] == ["arm_joint"]
     assert found.joint("arm_joint").type == mujoco.mjtJoint.mjJNT_HINGE
-    assert "held: 2 joints outside of the legs stay in the standing pose (Arm joint, grip)" in notes
+    assert "held: 1 joints outside of the legs stay in the standing pose (Arm joint)" in notes
+    assert "passive: 1 joints without a motor keep their springs and damping (grip)" in notes
     assert "left out: 1 other bodies in the world" in notes
 
 

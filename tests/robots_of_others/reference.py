@@ -18,17 +18,19 @@ FLOOR |= {"gap": 0.0, "condim": 3, "priority": 0, "solmix": 1.0, "contype": 0, "
 def same_bits(path: pathlib.Path, body: Body) -> int:
     """Return in how many random states near the standing pose, on a floor, both have the same accelerations.
 
-    Motors are off, parts of the robot do not touch one another, and tendons and equalities are out of both.
+    Motors are off, parts of the robot do not touch one another, tendons are out of both, and so are equalities that
+    the body has not.
 
     Args:
         path: of an MJCF, or of a URDF, which is compared as `importing.urdf` repairs it. Its torso may be turned.
         body: as imported from it.
     """
-    level = _same(body, _robot(path, facing.LEVEL))
+    has_loops = "<equality>" in body.source
+    level = _same(body, _robot(path, facing.LEVEL, has_loops))
     if level == STATES:
         return level
     turned = [facing.LEVEL.turn(axis) for axis in ("-x", "y", "-y")]
-    return max(level, *(_same(body, _robot(path, one)) for one in (*facing.Y_UP, *turned)))
+    return max(level, *(_same(body, _robot(path, one, has_loops)) for one in (*facing.Y_UP, *turned)))
 
 
 def _same(body: Body, file: mujoco.MjSpec) -> int:
@@ -57,8 +59,8 @@ def _equal(ours: mujoco.MjModel, theirs: mujoco.MjModel, home: np.ndarray, rando
     return np.isfinite(found[0]).all() and np.array_equal(*found)
 
 
-def _robot(path: pathlib.Path, turned: facing.Facing) -> mujoco.MjSpec:
-    """Return the file's robot alone, free to move."""
+def _robot(path: pathlib.Path, turned: facing.Facing, has_loops: bool) -> mujoco.MjSpec:
+    """Return the file's robot alone, free to move, with its loops if the body has some."""
     if path.suffix == ".urdf":
         cured, *_ = urdf.repair_urdf(ElementTree.parse(path).getroot(), path.parent)
         spec = mujoco.MjSpec.from_string(cured)
@@ -68,7 +70,9 @@ def _robot(path: pathlib.Path, turned: facing.Facing) -> mujoco.MjSpec:
     tops = list(spec.worldbody.bodies)
     root = max(tops, key=lambda top: len(top.find_all("joint")))
     world = [*spec.worldbody.geoms, *(top for top in tops if top is not root)]
-    others = (spec.cameras, spec.lights, spec.keys, spec.tendons, spec.equalities, spec.pairs, spec.excludes)
+    others = (spec.cameras, spec.lights, spec.keys, spec.tendons, spec.pairs, spec.excludes)
+    if not has_loops:
+        others += (spec.equalities,)
     for element in (*spec.actuators, *spec.sensors, *(one for kind in others for one in kind), *world):
         spec.delete(element)
     if not root.joints:

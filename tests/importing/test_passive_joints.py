@@ -1,0 +1,212 @@
+"""Joints that a file does not drive are passive; constraints between links stay, or the robot is refused by name."""
+
+import imports
+import mujoco
+import numpy as np
+import pytest
+from robots_of_others import reference
+
+import arc_suite
+from arc_suite import models
+from arc_suite.importing import import_robot
+from arc_suite.robots.spec import SpecError
+
+ROBOT = """
+<mujoco model="built here">
+  <compiler angle="degree"/>
+  <default><joint armature="0.01" damping="0.3" range="-80 80" limited="true"/><motor ctrlrange="-20 20"/></default>
+  <worldbody><body name="trunk" pos="0 0 0.5"><freejoint/>
+    <geom type="box" size="0.2 0.1 0.05" mass="8"/>
+    {legs}{further}
+  </body></worldbody>
+  <equality>{equalities}</equality>
+  <actuator>{motors}</actuator>
+</mujoco>"""
+LEG = """
+<body name="{name}_thigh" pos="{x} {y} 0" euler="0 35 0">
+  <joint name="{name}_roll" axis="1 0 0"/><joint name="{name}_pitch" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.5"/>{thigh}
+  <body name="{name}_shank" pos="0 0 -0.2" euler="0 -70 0"><joint name="{name}_knee" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.015" mass="0.2"/>{foot}
+  </body>
+</body>"""
+FOOT = '<geom size="0.03" pos="0 0 -0.2" mass="0.05"/>'
+ANKLE = """<body name="{name}_foot" pos="0 0 -0.2" euler="0 35 0">
+  <joint name="{name}_ankle" axis="0 1 0" stiffness="30" springref="5" damping="0.4"/>
+  <geom type="capsule" fromto="-0.02 0 -0.03 0.04 0 -0.03" size="0.015" mass="0.05"/></body>"""
+# A shank in two parts, with a leg's spring between them.
+SHOCK = """<body name="{name}_shock" pos="0 0 -0.2">
+  <joint name="{name}_shock" type="slide" axis="0 0 1" range="-0.02 0.02" stiffness="20000" damping="60"/>
+  <geom size="0.03" mass="0.05"/></body>"""
+# A rod beside the thigh, whose lower end a connection holds at the shank, 0.05 behind the knee.
+CRANK = """<body name="{name}_rod" pos="-0.05 0 0"><joint name="{name}_rod" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.18" size="0.008" mass="0.05"/>
+  <body name="{name}_end" pos="0 0 -0.2"><joint name="{name}_end" axis="0 1 0"/><geom size="0.01" mass="0.02"/></body>
+</body>"""
+CONNECT = '<connect body1="{name}_end" body2="{name}_shank" anchor="0 0 0"/>'
+TAIL = """<body pos="-0.2 0 0.1"><joint name="tail" axis="0 1 0" stiffness="2"/>
+  <geom type="capsule" fromto="0 0 0 -0.2 0 0" size="0.01" mass="0.1"/></body>"""
+PLACES = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "HL": (-0.2, 0.1), "HR": (-0.2, -0.1)}
+DRIVEN = ("roll", "pitch", "knee")
+CASES = {
+    "sprung ankles": {"foot": ANKLE},
+    "sprung shanks": {"foot": SHOCK},
+    "rods that connections close": {"foot": FOOT, "thigh": CRANK, "equality": CONNECT},
+    "ankles that welds hold": {
+        "foot": ANKLE,
+        "thigh": CRANK,
+        "equality": '<weld body1="{name}_end" body2="{name}_shank" torquescale="0.5" solref="0.01 1"/>',
+    },
+    "a tail": {
+        "foot": FOOT,
+        "further": TAIL,
+    },
+}
+PASSIVE = {
+    "sprung ankles": 4,
+    "sprung shanks": 4,
+    "rods that connections close": 8,
+    "ankles that welds hold": 12,
+    "a tail": 1,
+}
+
+
+def write(folder, foot=FOOT, thigh="", equality="", further="", driven=DRIVEN):
+    """Write a robot whose legs are the same, and return the path."""
+    legs, motors, equalities = [], [], []
+    for name, (x, y) in PLACES.items():
+        parts = {"foot": foot.format(name=name), "thigh": thigh.format(name=name)}
+        legs.append(LEG.format(name=name, x=x, y=y, **parts))
+        motors += [f'<motor joint="{name}_{joint}"/>' for joint in driven]
+        equalities.append(equality.format(name=name))
+    texts = {"legs": legs, "motors": motors, "equalities": equalities}
+    path = folder / "robot.xml"
+    path.write_text(ROBOT.format(further=further, **{name: "".join(parts) for name, parts in texts.items()}))
+    return path
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_motors_are_the_files_and_other_joints_keep_their_springs(case, tmp_path):
+    path = write(tmp_path, **CASES[case])
+    body, notes = import_robot(path)
+    assert len(body.joint_names) == 12 and not body.held
+    assert {joint.alias.split("_")[1] for leg in body.legs for joint in leg.joints} == set(DRIVEN)
+    assert reference.same_bits(path, body) == reference.STATES
+    (note,) = [note for note in notes if note.startswith("passive:")]
+    assert note.startswith(f"passive: {PASSIVE[case]} joints without a motor keep their springs and damping (")
+    environment = arc_suite.load(body, "walk")
+    model, data = environment.physics.model.ptr, environment.physics.data.ptr
+    assert environment.action_spec().shape == (12,)
+    environment.reset()
+    environment.step(np.full(12, 0.2))
+    driven = [model.joint(name).dofadr[0] for name in body.joint_names]
+    passive = np.setdiff1d(np.arange(6, model.nv), driven)
+    assert len(passive) == PASSIVE[case] and (data.qfrc_actuator[passive] == 0.0).all()
+    assert data.qfrc_actuator[driven].all()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_robot_stands_with_its_springs_and_loops(case, tmp_path):
+    body = import_robot(write(tmp_path, **CASES[case])).body
+    model = mujoco.MjModel.from_xml_string(models.text(body))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    loops = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    assert model.neq == (4 if "equality" in CASES[case] else 0)
+    assert abs(data.efc_pos[loops]).max(initial=0.0) < 1e-4
+    for leg in body.legs:  # the feet of the sketch are those of the simulation
+        foot = data.body(leg.full_name(leg.foot)).xpos - data.body("torso").xpos
+        assert leg.foot_position == pytest.approx(foot, abs=1e-9)
+    mujoco.mj_step(model, data, 500)
+    assert data.qpos[2] > 0.8 * body.torso.standing_height
+
+
+FIVE_BAR = """
+<body name="{name}_front_thigh" pos="{x} {y} 0" euler="0 -40 0"><joint name="{name}_front_hip" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.15" size="0.015" mass="0.3"/>
+  <body name="{name}_front_shank" pos="0 0 -0.15" euler="0 75 0"><joint name="{name}_front_knee" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.25" size="0.012" mass="0.1"/><geom size="0.02" pos="0 0 -0.25"/></body>
+</body>
+<body name="{name}_rear_thigh" pos="{x} {y} 0" euler="0 40 0"><joint name="{name}_rear_hip" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.15" size="0.015" mass="0.3"/>
+  <body name="{name}_rear_shank" pos="0 0 -0.15" euler="0 -75 0"><joint name="{name}_rear_knee" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.24" size="0.012" mass="0.1"/></body></body>"""
+
+
+def refuse_five_bars(folder, motors=("front_hip", "rear_hip")):
+    """Import a robot of five-bar legs, and return the line that refuses it."""
+    legs, equalities, actuators = [], [], []
+    for name, (x, y) in PLACES.items():
+        legs.append(FIVE_BAR.format(name=name, x=x, y=y))
+        equalities.append(f'<connect body1="{name}_front_shank" body2="{name}_rear_shank" anchor="0 0 -0.25"/>')
+        actuators += [f'<motor joint="{name}_{motor}"/>' for motor in motors]
+    texts = {"legs": "".join(legs), "equalities": "".join(equalities), "motors": "".join(actuators), "further": ""}
+    path = folder / "minitaur.xml"
+    path.write_text(ROBOT.format(**texts))
+    with pytest.raises(SpecError) as error:
+        import_robot(path)
+    return str(error.value).removeprefix(f"{path}: ")
+
+
+LINE = "joint 'FL_{joint}' of a leg is moved by the loop of {parts}: "
+LINE += "expected a motor at each joint between the torso and a foot"
+
+
+def test_legs_that_a_loop_moves_are_refused_by_name(tmp_path):
+    parts = "FL_front_shank and FL_rear_shank"
+    assert refuse_five_bars(tmp_path) == LINE.format(joint="front_knee", parts=parts)
+    assert refuse_five_bars(tmp_path, motors=()) == LINE.format(joint="front_hip", parts=parts)
+    path = write(tmp_path, FOOT, CRANK, CONNECT, driven=("roll", "pitch", "rod"))  # a crank that drives the knee
+    with pytest.raises(SpecError) as error:
+        import_robot(path)
+    assert str(error.value) == f"{path}: {LINE.format(joint='knee', parts='FL_end and FL_shank')}"
+
+
+def toes(folder, declared="", limit="", joint=""):
+    """Write a URDF whose feet are sprung toes, with further elements, and return the path."""
+    text = (imports.FILES / "a1_like.urdf").read_text()
+    for name in ("FR", "FL", "RR", "RL"):
+        fixed = f'<joint name="{name}_foot_fixed" type="fixed">'
+        assert fixed in text
+        hinge = f'<joint name="{name}_toe" type="revolute"><axis xyz="0 1 0"/>{limit}'
+        hinge += '<dynamics damping="0.7" friction="0.2"/>'
+        text = text.replace(fixed, hinge)
+    path = folder / "toes.urdf"
+    path.write_text(text.replace("</robot>", f"{declared}</robot>"))
+    return path
+
+
+def declare(*tags, joints=("hip", "thigh", "calf")):
+    """Return elements that declare motors of joints; %s in the innermost tag stands for its name."""
+    names = [f"{leg}_{joint}_joint" for leg in ("FR", "FL", "RR", "RL") for joint in joints]
+    return "".join(tag % name if "%s" in tag else tag for name in names for tag in tags)
+
+
+TRANSMISSION = '<transmission name="t"><type>SimpleTransmission</type><joint name="%s"/></transmission>'
+COMMAND = (
+    '<ros2_control name="c" type="system"><joint name="%s"><command_interface name="effort"/></joint></ros2_control>'
+)
+LIMIT = '<limit lower="-0.3" upper="0.3" effort="{}" velocity="1"/>'
+
+
+@pytest.mark.parametrize(
+    ("declared", "effort"),
+    [(declare(TRANSMISSION), "20"), (declare(COMMAND), "20"), ("", "0")],
+    ids=["transmission", "ros2_control", "effort"],
+)
+def test_a_urdf_says_what_it_drives(declared, effort, tmp_path):
+    path = toes(tmp_path, declared, LIMIT.format(effort))
+    body, notes = import_robot(path)
+    assert len(body.joint_names) == 12 and not body.held
+    assert "passive: 4 joints without a motor keep their springs and damping (FR_toe, FL_toe, RR_toe, RL_toe)" in notes
+    model = mujoco.MjModel.from_xml_string(body.source)
+    toe = model.joint("fr_toe").dofadr[0]
+    assert (model.dof_damping[toe], model.dof_frictionloss[toe]) == (0.7, 0.2)
+
+
+def test_a_urdf_that_drives_no_legs_says_nothing_of_motors(tmp_path):
+    transmission = TRANSMISSION % "FR_toe"
+    body, notes = import_robot(toes(tmp_path, transmission, LIMIT.format("20")))
+    assert len(body.joint_names) == 16
+    assert not [note for note in notes if note.startswith("passive:")]
