@@ -17,6 +17,7 @@ from absl import flags
 from arc_suite import checks, files, registry
 from arc_suite.importing import import_robot
 from arc_suite.importing.facing import AXES
+from arc_suite.importing.units import SCALE_RANGE
 from arc_suite.robots.spec_files import body_to_json
 
 FLAGS = flags.FLAGS
@@ -35,6 +36,7 @@ flags.DEFINE_enum(
     list(AXES),
     "Axis of the file's torso that points ahead. [default: what names and hinges say, or x]",
 )
+flags.DEFINE_float("scale", 1.0, "Factor of all lengths: 0.01 for a file in cm.", *SCALE_RANGE)
 
 
 def main(robot: str | None = None) -> None:
@@ -50,7 +52,7 @@ def main(robot: str | None = None) -> None:
         if FLAGS.output is not None:
             checks.extension(FLAGS.output, [".json"])
             output_path = stack.enter_context(files.writing(FLAGS.output))
-        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet, FLAGS.armature, FLAGS.forward)
+        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet, FLAGS.armature, FLAGS.forward, FLAGS.scale)
         if output_path is not None:
             output_path.write_text(body_to_json(body), encoding="utf-8")
     print(f"{robot}: {body.name}")

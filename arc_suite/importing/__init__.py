@@ -11,7 +11,20 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, files, parsers
-from arc_suite.importing import armatures, drives, loops, motors, notes, opening, poses, sketch, tree, trunk, writing
+from arc_suite.importing import (
+    armatures,
+    drives,
+    loops,
+    motors,
+    notes,
+    opening,
+    poses,
+    sketch,
+    tree,
+    trunk,
+    units,
+    writing,
+)
 from arc_suite.importing.facing import AXES, LEVEL, Y_UP, Facing
 from arc_suite.importing.front import find_front
 from arc_suite.importing.naming import choose_names, clean_name
@@ -66,6 +79,7 @@ class _Choices(NamedTuple):
     feet: tuple[str, ...] = ()
     armature: float | None = None
     forward: str | None = None
+    scale: float = 1.0
 
 
 class _StandingRobot(NamedTuple):
@@ -82,6 +96,7 @@ def import_robot(
     feet: Sequence[str] = (),
     armature: float | None = None,
     forward: str | None = None,
+    scale: float = 1.0,
 ) -> ImportedRobot:
     """Return the legged robot of an MJCF or URDF file.
 
@@ -93,6 +108,7 @@ def import_robot(
             where joints buzz without it.
         forward: axis of the file's torso that points ahead, out of `facing.AXES`; None for x, or for another one where
             names and hinges of the legs say so.
+        scale: factor of all lengths: 0.01 for a file in cm.
 
     Raises:
         SpecError: it cannot come in; one line that names the file.
@@ -100,7 +116,10 @@ def import_robot(
     """
     if forward is not None:
         checks.name(forward, AXES, "axis")
-    imported_robot, _ = _import_file(Path(path), _Choices(home, tuple(feet), armature, forward))
+    min_scale, max_scale = units.SCALE_RANGE
+    if not min_scale <= scale <= max_scale:
+        raise SpecError(f"{path}: scale: expected a number from {min_scale:g} to {max_scale:g}, got {scale:g}")
+    imported_robot, _ = _import_file(Path(path), _Choices(home, tuple(feet), armature, forward, scale))
     return imported_robot
 
 
@@ -143,6 +162,7 @@ def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, a
     """Return the body of a robot that stands, and notes."""
     _check_world(robot)
     _check_hinges(robot, stance)
+    unit_notes = units.unit_notes(robot, stance)
     armature_notes: tuple[str, ...] = ()
     if armature is not None:
         robot, armature_notes = armatures.add_armature(robot, armature)
@@ -168,7 +188,7 @@ def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, a
         body, armature_notes = armatures.calm(body, robot, servos, write_body)
     first_notes = notes.import_notes(robot, stance, names, order)
     last_notes = notes.omission_notes(file, robot, stance, names)
-    return ImportedRobot(body, (*first_notes, *motor_notes, *armature_notes, *file.notes, *last_notes))
+    return ImportedRobot(body, (*first_notes, *unit_notes, *motor_notes, *armature_notes, *file.notes, *last_notes))
 
 
 def _find_standing_robot(path: Path, choices: _Choices) -> _StandingRobot:
@@ -192,7 +212,7 @@ def _find_standing_robot(path: Path, choices: _Choices) -> _StandingRobot:
 
 def _open_standing_robot(path: Path, choices: _Choices, facing: Facing) -> _StandingRobot:
     """Return the robot of a file as it stands, with its torso turned; names and hinges may turn it on."""
-    file, robot = _open_turned_robot(path, facing)
+    file, robot = _open_turned_robot(path, facing, choices.scale)
     front_notes: tuple[str, ...] = ()
     if facing.up == "y":
         front_notes = ("turned: the file's y axis points up, the torso's frame has z there",)
@@ -200,7 +220,7 @@ def _open_standing_robot(path: Path, choices: _Choices, facing: Facing) -> _Stan
         front = find_front(robot)
         if front.forward != "x":
             facing = facing.turn(front.forward)
-            file, robot = _open_turned_robot(path, facing)
+            file, robot = _open_turned_robot(path, facing, choices.scale)
         front_notes += front.notes(facing)
     file = file._replace(notes=(*file.notes, *front_notes))
     feet = trunk.find_feet(robot)
@@ -211,9 +231,9 @@ def _open_standing_robot(path: Path, choices: _Choices, facing: Facing) -> _Stan
     return _StandingRobot(file, robot, stance)
 
 
-def _open_turned_robot(path: Path, facing: Facing) -> tuple[RobotFile, Robot]:
+def _open_turned_robot(path: Path, facing: Facing, scale: float) -> tuple[RobotFile, Robot]:
     """Return a file and its robot, with its torso turned."""
-    file = opening.open_robot(path, facing)
+    file = opening.open_robot(path, facing, scale)
     return file, trunk.place_torso(tree.robot_of(file.model, file.root, file.notes))
 
 

@@ -62,6 +62,9 @@ def turn_torso(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int, facing: F
         for child in children:
             if child.frame is None:
                 child.set_frame(turned_frame)
+    for equality in spec.equalities:
+        if equality.type == mujoco.mjtEq.mjEQ_CONNECT and equality.name1 == body.name:
+            equality.data[:3] = facing.rotation @ equality.data[:3]  # the anchor, in the torso's frame
     if body.explicitinertial:
         body.fullinertia[0] = np.nan
         body.inertia = model.body_inertia[torso]

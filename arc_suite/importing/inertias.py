@@ -36,7 +36,7 @@ def correct_inertias(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int) -> 
     Raises:
         SpecError: MuJoCo cannot compile the corrected spec.
     """
-    bodies = _find_implausible_bodies(model, torso)
+    bodies = find_implausible_bodies(model, torso)
     if not bodies:
         return model, ()
     shapes = _compile_shapes(spec)
@@ -56,7 +56,7 @@ def correct_inertias(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int) -> 
     return corrected_model, (_correction_note(model, bodies),)
 
 
-def _find_implausible_bodies(model: mujoco.MjModel, torso: int) -> list[int]:
+def find_implausible_bodies(model: mujoco.MjModel, torso: int) -> list[int]:
     """Return the bodies of a robot whose inertia is too large for its span."""
     bodies = np.flatnonzero((model.body_rootid == torso) & (model.body_mass > 0.0))
     gyrations = np.sqrt(model.body_inertia[bodies].max(axis=1) / model.body_mass[bodies])

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import mujoco
 
 from arc_suite import parsers
-from arc_suite.importing import bounds, inertias, references, urdf
+from arc_suite.importing import bounds, inertias, references, units, urdf
 from arc_suite.importing.facing import LEVEL, Facing, turn_torso
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.importing.tree import FREE
@@ -65,12 +65,13 @@ class _Spec(NamedTuple):
     mesh_files: tuple[Path, ...]
 
 
-def open_robot(path: Path, facing: Facing = LEVEL) -> RobotFile:
+def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotFile:
     """Return the robot of an MJCF or a URDF file.
 
     Args:
         path: path of the file.
         facing: axes of the file's torso that point ahead and up.
+        scale: factor of all lengths.
 
     Raises:
         SpecError: the file is neither, or MuJoCo cannot compile it.
@@ -82,11 +83,15 @@ def open_robot(path: Path, facing: Facing = LEVEL) -> RobotFile:
     driven = urdf.find_driven_joints(root_element) if root_element.tag == "robot" else frozenset()
     spec, order, notes, mesh_files = _read_spec(path, root_element)
     bounds.check_mesh_files(mesh_files)
+    if scale != 1.0:
+        units.scale_lengths(spec, scale)
     model, mesh_notes = _compile(spec)
     model, torso, torso_notes = _free_torso(spec, model)
+    model, unit_notes = units.repair_meshes(spec, model, torso)
+    model = units.scale_inertias(spec, model, torso, scale)
     model, inertia_notes = inertias.correct_inertias(spec, model, torso)
     model = turn_torso(spec, model, torso, facing)
-    all_notes = (*notes, *mesh_notes, *torso_notes, *inertia_notes)
+    all_notes = (*notes, *mesh_notes, *torso_notes, *unit_notes, *inertia_notes)
     return RobotFile(model, torso, meshes_of(spec, model), order, driven, all_notes, (*parts, *mesh_files))
 
 
