@@ -19,7 +19,7 @@ class Drive(NamedTuple):
     Attributes:
         actuator: MuJoCo's index.
         joint: MuJoCo's index.
-        gear: torque per force of the actuator.
+        gear: torque per force of the actuator, of either sign.
     """
 
     actuator: int
@@ -45,10 +45,9 @@ def release_joints(robot: Robot, names_of_driven: frozenset[str]) -> Robot:
         driven = {joint for joint in robot.joints if robot.joint_name(joint) in names_of_driven}
     else:
         driven = _joints_of_actuators(robot)
-    driven |= loops.followers_in_legs(robot, leg_joints)
     passive = followers
     if sum(bool(driven.intersection(chain)) for chain in leg_chains) >= _MIN_DRIVEN_LEGS:
-        passive = followers | (set(robot.joints) - driven)
+        passive |= set(robot.joints) - driven - loops.followers_in_legs(robot, leg_joints)
     chains = {body: tuple(joint for joint in chain if joint not in passive) for body, chain in robot.chains.items()}
     return robot._replace(chains=chains, passive=tuple(sorted(passive)), loops=kept_loops)
 
@@ -71,7 +70,7 @@ def find_drives(robot: Robot) -> Iterator[Drive]:
         is_muscle = model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE
         drives_joint = model.actuator_trntype[actuator] in _JOINT_TRANSMISSIONS and joint in robot.joints
         if drives_joint and not is_muscle:
-            yield Drive(actuator, joint, abs(float(model.actuator_gear[actuator, 0])))
+            yield Drive(actuator, joint, float(model.actuator_gear[actuator, 0]))
 
 
 def _joints_of_actuators(robot: Robot) -> set[int]:

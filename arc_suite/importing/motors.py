@@ -2,7 +2,7 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import mujoco
 import numpy as np
@@ -27,6 +27,8 @@ _LOADS_PER_LIMIT = 30.0  # torque limit of a motor in loads, where the file has 
 # Limits that are placeholders, as some files have them for motors that nobody knew.
 _PLACEHOLDER_TORQUE = 1000.0  # N m, and more
 _MAX_LOADS_PER_LIMIT = 200.0  # in loads of the joint in the leg that bears most
+
+_MIN_RANGE_LOSS = 0.01  # rad, by which controls reach less far than a joint, for a note
 
 # Origins of a limit. Other origins are names of attributes in the file.
 _BY_RULE = "sized"
@@ -61,12 +63,25 @@ class _Limit(NamedTuple):
     """A torque limit.
 
     Attributes:
-        torque: N m.
+        low: least torque, N m.
+        high: largest torque, N m.
         origin: the attribute of the file that sets it, `_BY_RULE` or `_PLACEHOLDER`.
     """
 
-    torque: float
+    low: float
+    high: float
     origin: str
+
+    @property
+    def torque(self) -> float:
+        """Return the limit of a servo, which has the same torque both ways, N m."""
+        return max(abs(self.low), abs(self.high))
+
+    @classmethod
+    def of(cls, bounds, gear: float, origin: str) -> Self:
+        """Return the limit of an actuator with bounds (2,) of its force; a gear below 0 turns it round."""
+        low, high = sorted(gear * bounds)
+        return cls(float(low), float(high), origin)
 
 
 def find_motors(robot: Robot, stance: Stance) -> Motors:
@@ -82,7 +97,8 @@ def find_motors(robot: Robot, stance: Stance) -> Motors:
             load = max(loads[joint], _MIN_LOAD_SHARE * largest_load)
             limit = limits_of_file.get(joint)
             if limit is None:
-                limit = _Limit(_torque_by_rule(load, inertias[joint]), _BY_RULE)
+                torque = _torque_by_rule(load, inertias[joint])
+                limit = _Limit(-torque, torque, _BY_RULE)
             exceeds_load = largest_load > 0.0 and limit.torque > _MAX_LOADS_PER_LIMIT * largest_load
             if limit.torque >= _PLACEHOLDER_TORQUE or exceeds_load:
                 limit = limit._replace(origin=_PLACEHOLDER)
@@ -92,8 +108,14 @@ def find_motors(robot: Robot, stance: Stance) -> Motors:
                 gains = _gains_by_rule(load, inertias[joint], limit.torque, joint_damping)
             servos[joint] = Servo(stiffness=gains.stiffness, damping=gains.damping, limit=limit.torque)
             origins[joint] = limit.origin
-    limit_notes = _limit_notes(stance.joints, servos, origins)
-    return Motors(servos, (*limit_notes, _gain_note(stance.joints, gains_of_file)))
+    all_notes = (
+        *_limit_notes(stance.joints, servos, origins),
+        *_one_sided_notes(robot, stance.joints, limits_of_file),
+        *_mirror_notes(robot, stance.joints),
+        *_range_notes(robot, gains_of_file),
+        _gain_note(stance.joints, gains_of_file),
+    )
+    return Motors(servos, all_notes)
 
 
 def _group_joints(robot: Robot, stance: Stance) -> list[tuple[int, ...]]:
@@ -158,7 +180,7 @@ def _find_gains(robot: Robot) -> dict[int, _Gains]:
         _, position_bias, velocity_bias = model.actuator_biasprm[drive.actuator, :3]
         is_affine = model.actuator_biastype[drive.actuator] == mujoco.mjtBias.mjBIAS_AFFINE
         is_position_actuator = is_affine and gain > 0.0 and gain == -position_bias
-        if is_position_actuator and drive.gear > 0.0:
+        if is_position_actuator and drive.gear != 0.0:
             damping = max(float(-velocity_bias), 0.0)
             gains[drive.joint] = _Gains(gain * drive.gear**2, damping * drive.gear**2)
     return gains
@@ -170,17 +192,16 @@ def _find_limits(robot: Robot) -> dict[int, _Limit]:
     limits_of_joint = defaultdict(list)
     for drive in find_drives(robot):
         if model.actuator_forcelimited[drive.actuator]:
-            force = abs(model.actuator_forcerange[drive.actuator]).max()
-            limits_of_joint[drive.joint].append(_Limit(drive.gear * float(force), "forcerange"))
+            bounds = model.actuator_forcerange[drive.actuator]
+            limits_of_joint[drive.joint].append(_Limit.of(bounds, drive.gear, "forcerange"))
         is_motor = model.actuator_biastype[drive.actuator] == mujoco.mjtBias.mjBIAS_NONE
         if is_motor and model.actuator_ctrllimited[drive.actuator]:
-            control = abs(model.actuator_ctrlrange[drive.actuator]).max()
-            gain = abs(float(model.actuator_gainprm[drive.actuator, 0]))
-            limits_of_joint[drive.joint].append(_Limit(drive.gear * gain * float(control), "ctrlrange"))
+            gain = model.actuator_gainprm[drive.actuator, 0]
+            bounds = gain * model.actuator_ctrlrange[drive.actuator]
+            limits_of_joint[drive.joint].append(_Limit.of(bounds, drive.gear, "ctrlrange"))
     for joint in robot.joints:
         if model.jnt_actfrclimited[joint]:
-            effort = float(abs(model.jnt_actfrcrange[joint]).max())
-            limits_of_joint[joint].append(_Limit(effort, "actuatorfrcrange or effort"))
+            limits_of_joint[joint].append(_Limit.of(model.jnt_actfrcrange[joint], 1.0, "actuatorfrcrange or effort"))
 
     least_limits = {}
     for joint, limits in limits_of_joint.items():
@@ -204,6 +225,42 @@ def _limit_notes(joints_of_legs: Sequence[int], servos: dict[int, Servo], origin
         else:
             text = f"{span} N m of {count} motors, from {origin}"
         yield f"limits: {text}"
+
+
+def _one_sided_notes(robot: Robot, joints_of_legs: Sequence[int], limits: dict[int, _Limit]) -> Iterator[str]:
+    """Yield a line on motors of legs that are stronger one way than the other in the file."""
+    joints = [joint for joint in joints_of_legs if joint in limits and limits[joint].low != -limits[joint].high]
+    if joints:
+        limit = limits[joints[0]]
+        yield (
+            f"limits: {len(joints)} motors are stronger one way in the file, such as {robot.joint_name(joints[0])} "
+            f"with {limit.low:.4g} to {limit.high:.4g} N m; here they have {limit.torque:.4g} N m both ways"
+        )
+
+
+def _mirror_notes(robot: Robot, joints_of_legs: Sequence[int]) -> Iterator[str]:
+    """Yield a line on motors of legs that turn their joints backwards in the file."""
+    joints = [drive.joint for drive in find_drives(robot) if drive.gear < 0.0 and drive.joint in joints_of_legs]
+    if joints:
+        yield (
+            f"mirrored: {len(joints)} motors have a gear below 0 in the file, such as {robot.joint_name(joints[0])}; "
+            "actions count along the joints' axes"
+        )
+
+
+def _range_notes(robot: Robot, gains_of_file: dict[int, _Gains]) -> Iterator[str]:
+    """Yield a line on position actuators whose controls reach less far than their joints."""
+    model = robot.model
+    joints = []
+    for drive in find_drives(robot):
+        if drive.joint in gains_of_file and model.actuator_ctrllimited[drive.actuator]:
+            low, high = sorted(model.actuator_ctrlrange[drive.actuator] / drive.gear)
+            low_limit, high_limit = robot.limits(drive.joint)
+            if low > low_limit + _MIN_RANGE_LOSS or high < high_limit - _MIN_RANGE_LOSS:
+                joints.append(drive.joint)
+    if joints:
+        name = robot.joint_name(joints[0])
+        yield f"left out: ctrlrange of {len(joints)} position actuators, less than the joint's range, such as {name}"
 
 
 def format_span(low: float, high: float) -> str:

@@ -2,17 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 
+import mujoco
 import numpy as np
 
 from arc_suite.importing import drives, loops, trunk
 from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
-from arc_suite.importing.tree import Robot
+from arc_suite.importing.tree import Robot, colliding_geoms
 from arc_suite.models.standing import GRAVITY
 
 _MAX_GRAVITY_DIFFERENCE = 0.05  # of the suite's gravity, without a note
 _MAX_NAMES = 4  # of joints in one note
+_MAX_SLOPE = 0.01  # degrees, of a floor that counts as level
 
 
 def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int]) -> Iterator[str]:
@@ -44,24 +46,63 @@ def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) 
     hulls = _reduced_meshes(file, robot)
     if hulls:
         yield f"reduced: {len(hulls)} large meshes to their hulls, such as {hulls[0]}; contacts differ by some digits"
-    for kind, count in _omission_counts(file, robot).items():
+    for kind, count in _omission_counts(file, robot, stance).items():
         if count:
             yield f"left out: {count} {kind}"
     yield "left out: contacts of the robot with itself; looks, as pictures show the colliders"
+    yield from _world_notes(robot)
     wheels = _find_wheels(robot, stance)
     if wheels:
         yield f"left out: {len(wheels)} wheels, which are held, such as {robot.joint_name(wheels[0])}"
     gravity = float(np.linalg.norm(model.opt.gravity))
     if abs(gravity - GRAVITY) > _MAX_GRAVITY_DIFFERENCE * GRAVITY:
         yield f"units: the file's gravity is {gravity:g}; speeds and times of the tasks count on {GRAVITY:g} m/s^2"
-    if robot.loops:
-        yield f"kept: {len(robot.loops)} constraints between links ({loops.name_parts(robot, robot.loops[0])})"
-    if robot.passive:
-        passive_names = ", ".join(robot.joint_name(joint) for joint in robot.passive[:_MAX_NAMES])
-        yield f"passive: {len(robot.passive)} joints without a motor keep their springs and damping ({passive_names})"
+    yield from _loop_notes(robot, stance)
     if names.held:
-        held_names = ", ".join(robot.joint_name(joint) for joint in names.held[:_MAX_NAMES])
+        held_names = _name_joints(robot, names.held)
         yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({held_names})"
+
+
+def _loop_notes(robot: Robot, stance: Stance) -> Iterator[str]:
+    """Yield notes on closed loops, on joints that follow others, and on joints without a motor."""
+    closed_loops = [loop for loop in robot.loops if loop.follower is None]
+    followers = [loop.follower for loop in robot.loops if loop.follower is not None]
+    if closed_loops:
+        yield f"kept: {len(closed_loops)} closed loops, such as of {loops.name_parts(robot, closed_loops[0])}"
+    if followers:
+        yield f"kept: {len(followers)} joints follow others ({_name_joints(robot, followers)})"
+    freed = sorted(loops.followers_in_legs(robot, stance.joints))
+    if freed:
+        yield f"motors: {len(freed)} joints of legs follow others in the file, not here ({_name_joints(robot, freed)})"
+    passive = [joint for joint in robot.passive if joint not in followers]
+    if passive:
+        names_text = _name_joints(robot, passive)
+        yield f"passive: {len(passive)} joints without a motor keep their springs and damping ({names_text})"
+
+
+def _name_joints(robot: Robot, joints: Sequence[int]) -> str:
+    """Return the names of the first joints."""
+    return ", ".join(robot.joint_name(joint) for joint in joints[:_MAX_NAMES])
+
+
+def _world_notes(robot: Robot) -> Iterator[str]:
+    """Yield notes on floors that slope, on other shapes of the world, and on drag in a fluid."""
+    model = robot.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    shapes = [geom for geom in colliding_geoms(model) if model.geom_bodyid[geom] == 0]
+    planes = [geom for geom in shapes if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE]
+    vertical = -model.opt.gravity / np.linalg.norm(model.opt.gravity)
+    normals = data.geom_xmat[planes].reshape(-1, 3, 3)[..., 2]
+    slopes = np.degrees(np.arccos((normals @ vertical).clip(-1.0, 1.0)))
+    floors = 1 if len(planes) else 0  # the most level plane; others are walls
+    if floors and slopes.min() > _MAX_SLOPE:
+        yield f"left out: a floor that slopes by {slopes.min():.3g} degrees, as arenas have their own ground"
+    if len(shapes) > floors:
+        yield f"left out: {len(shapes) - floors} shapes of the world, as arenas have their own ground"
+    is_ellipsoid = (model.geom_fluid[:, 0] > 0.0) & np.isin(model.geom_bodyid, robot.bodies)
+    if is_ellipsoid.any() and (model.opt.density or model.opt.viscosity):
+        yield f"fluid: {is_ellipsoid.sum()} shapes have the drag of ellipsoids in the file, here that of their inertia"
 
 
 def _reduced_meshes(file: RobotFile, robot: Robot) -> list[str]:
@@ -74,17 +115,15 @@ def _reduced_meshes(file: RobotFile, robot: Robot) -> list[str]:
     return sorted(names)
 
 
-def _omission_counts(file: RobotFile, robot: Robot) -> dict[str, int]:
+def _omission_counts(file: RobotFile, robot: Robot, stance: Stance) -> dict[str, int]:
     """Return how many things of each kind are left out."""
     model = file.model
-    has_fluid = bool(model.opt.density or model.opt.viscosity)
-    shapes_in_fluid = int((model.geom_fluid[:, 0] > 0.0).sum()) if has_fluid else 0
+    followers = loops.followers_in_legs(robot, stance.joints)
     bodies_in_world = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody))
     return {
         "tendons": model.ntendon,
-        "equality constraints": model.neq - len(robot.loops),
+        "equality constraints": model.neq - len(robot.loops) - len(followers),
         "actuators that are no motors of single joints": model.nu - drives.count_joint_actuators(robot),
-        "shapes in a fluid": shapes_in_fluid,
         "sensors": model.nsensor,
         "other bodies in the world": bodies_in_world - 1,
     }

@@ -14,6 +14,7 @@ from arc_suite.robots.spec import SpecError
 
 _ADDED_PREFIX = "arc_suite_"  # begins the names of links that are added
 _IGNORED_ELEMENTS = ("gazebo", "transmission", "ros2_control", "mujoco")
+_REDUCTIONS = ("mechanicalReduction", "mechanical_reduction")
 _MESH_EXTENSIONS = (".stl", ".obj", ".msh")
 _MESH_SCHEMES = ("package://", "file://", "model://")
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating")
@@ -62,6 +63,7 @@ def repair_urdf(
     """
     if any("xacro" in str(element.tag) for element in robot.iter()):
         raise SpecError("has xacro macros; write the URDF with xacro first")
+    reduction_notes = tuple(_reduction_notes(robot))
     for tag in _IGNORED_ELEMENTS:
         for element in robot.findall(tag):
             robot.remove(element)
@@ -76,7 +78,7 @@ def repair_urdf(
         *_repair_shapes(links, folder, mesh_files),
         *_repair_inertias(links),
         *_add_missing_masses(links, joints),
-        *_mimic_notes(joints),
+        *reduction_notes,
     )
     _add_floating_root(robot, links, joints)
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _COMPILER)
@@ -101,7 +103,22 @@ def find_driven_joints(robot: ElementTree.Element) -> frozenset[str]:
         if limit is not None and joint.get("type") not in ("fixed", "floating"):
             efforts[joint.get("name", "")] = limit.get("effort", "").strip()
     names = [name for name, effort in efforts.items() if _is_positive(effort)]
-    return frozenset(names) if any(_is_zero(effort) for effort in efforts.values()) else frozenset()
+    return (
+        frozenset(names)
+        if any(_is_number(effort) and float(effort) == 0.0 for effort in efforts.values())
+        else frozenset()
+    )
+
+
+def _reduction_notes(robot: ElementTree.Element) -> Iterator[str]:
+    """Yield a note on the reductions of gears."""
+    texts = [element.text or "" for element in robot.iter() if element.tag in _REDUCTIONS]
+    reductions = [float(text) for text in texts if _is_number(text) and float(text) != 1.0]
+    if reductions:
+        yield (
+            f"reductions: {len(reductions)} transmissions have gears, such as {reductions[0]:g}; "
+            "effort is the torque at the joint, behind them"
+        )
 
 
 def _elements_by_name(robot: ElementTree.Element, tag: str) -> Elements:
@@ -186,15 +203,12 @@ def _repair_shapes(links: Elements, folder: Path, mesh_files: list[Path]) -> Ite
 
 
 def _is_positive(text: str | None) -> bool:
-    try:
-        return float(text or "0") > 0.0
-    except ValueError:
-        return False
+    return text is not None and _is_number(text) and float(text) > 0.0
 
 
-def _is_zero(text: str) -> bool:
+def _is_number(text: str) -> bool:
     try:
-        return float(text) == 0.0
+        return math.isfinite(float(text))
     except ValueError:
         return False
 
@@ -314,13 +328,6 @@ def _links_fixed_to(name: str, fixed_children: Mapping[str, list[str]]) -> list[
     for link in links:  # which grows on the way
         links += [child for child in fixed_children[link] if child not in links]
     return links
-
-
-def _mimic_notes(joints: Elements) -> Iterator[str]:
-    """Yield a note on mimic joints, if there are any."""
-    mimics = [name for name, joint in joints.items() if joint.find("mimic") is not None]
-    if mimics:
-        yield f"left out: {len(mimics)} mimic joints move on their own, such as {mimics[0]}"
 
 
 def _add_floating_root(robot: ElementTree.Element, links: Elements, joints: Elements) -> None:
