@@ -223,7 +223,7 @@ check-agents check-agents-release: EXTRAS := dev,learn
 check-agents check-agents-release: PACKAGES := onnxruntime rliable 'pandas<3' optuna==5.0.0
 check-agents check-agents-release: RUN = $(PYTEST) $(PARALLEL) -m "$(MARKS)" tests/learning/agents \
 	tests/learning/studies/test_study.py tests/learning/cli/test_train.py tests/learning/test_onnx_file.py \
-	tests/learning/test_runner.py tests/evaluation/test_statistics.py tests/examples/test_trackers.py
+	tests/learning/test_runner.py tests/learning/test_sim_to_sim.py tests/evaluation/test_statistics.py tests/examples/test_trackers.py
 check-agents: MARKS := not long and not release
 check-agents-release: MARKS := long or release
 
