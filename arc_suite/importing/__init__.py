@@ -14,6 +14,7 @@ from arc_suite import checks, files, parsers
 from arc_suite.importing import (
     armatures,
     drives,
+    kinds,
     loops,
     motors,
     notes,
@@ -234,6 +235,9 @@ def _open_standing_robot(path: Path, choices: _Choices, facing: Facing) -> _Stan
 def _open_turned_robot(path: Path, facing: Facing, scale: float) -> tuple[RobotFile, Robot]:
     """Return a file and its robot, with its torso turned."""
     file = opening.open_robot(path, facing, scale)
+    kind = kinds.describe_kind(file.model, file.root)
+    if kind:
+        raise SpecError(f"{kind}; {kinds.EXPECTED}")
     return file, trunk.place_torso(tree.robot_of(file.model, file.root, file.notes))
 
 

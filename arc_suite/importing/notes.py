@@ -13,6 +13,7 @@ from arc_suite.importing.tree import Robot, colliding_geoms
 from arc_suite.models.standing import GRAVITY
 
 _MAX_GRAVITY_DIFFERENCE = 0.05  # of the suite's gravity, without a note
+_BIPED = ": a biped, which no demonstrator walks"
 _MAX_NAMES = 4  # of joints in one note
 _MAX_SLOPE = 0.01  # degrees, of a floor that counts as level
 
@@ -28,7 +29,8 @@ def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int
     """
     joint_counts = sorted({len(leg.joints) for leg in stance.legs})
     counts_text = " or ".join(map(str, joint_counts))
-    yield f"legs: {len(stance.legs)} ({', '.join(names.legs)}), {counts_text} joints each"
+    kind = _BIPED if len(stance.legs) == 2 else ""
+    yield f"legs: {len(stance.legs)} ({', '.join(names.legs)}), {counts_text} joints each{kind}"
     pairs = ", ".join(f"{robot.joint_name(joint)} {names.joints[joint]}" for joint in order)
     yield f"joints in the file's order, each with its name in the suite: {pairs}"
     action_indices = [stance.joints.index(joint) for joint in order]

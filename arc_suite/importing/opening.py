@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import mujoco
 
 from arc_suite import parsers
-from arc_suite.importing import bounds, inertias, references, units, urdf
+from arc_suite.importing import bounds, inertias, kinds, references, units, urdf
 from arc_suite.importing.facing import LEVEL, Facing, turn_torso
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.importing.tree import FREE
@@ -213,10 +213,14 @@ def _free_torso(spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[mujoco.MjMo
     if free_robots:
         return model, free_robots[0], ()
     if not robots:
-        raise SpecError("no body in the world has two joints; expected a robot with legs")
+        joints = "one joint" if model.njnt else "no joint"
+        raise SpecError(f"a body with {joints}; {kinds.EXPECTED}")
     torso = max(robots, key=lambda body: model.body_subtreemass[body])
     name = model.body(torso).name
     if model.body_jntnum[torso]:
+        kind = kinds.describe_kind(model, torso)
+        if kind:
+            raise SpecError(f"{kind}; {kinds.EXPECTED}")
         joint = model.joint(model.body_jntadr[torso])
         raise SpecError(f"the torso {name!r} moves by the joint {joint.name!r} alone; expected a free or a fixed torso")
     body_of_spec = spec.body(name) if name else spec.bodies[torso]

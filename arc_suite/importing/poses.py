@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.importing import loops, tree
+from arc_suite.importing import kinds, loops, tree
 from arc_suite.importing.tree import Chain, Robot
 from arc_suite.models.kinematics import least_changes
 from arc_suite.models.standing import stability_margin
@@ -20,6 +20,7 @@ _MIN_MARGIN = 0.02  # of the center of mass inside of three or more feet
 _MAX_OVERHANG = 0.15  # of the center of mass from the line between two feet, which may be long
 _MIN_THIGH = 0.2  # a leg with a shorter thigh does not count as straight
 _MAX_STRAIGHTNESS = 0.96  # distance from hip to sole, as a share of thigh and shank
+_MAX_REASONS = 2  # of poses that do not stand, in one line
 _LIMIT_TOLERANCE = 1e-6  # rad or m, by which a joint may be out of its range
 
 # Shapes of feet.
@@ -129,21 +130,23 @@ def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
     if home is not None:
         return _stance_of_keyframe(robot, home, named_feet)
     # Straight legs are better than none: a second round admits them.
-    reasons = []
+    origins_by_reason: dict[str, str] = {}
     candidates = []
     for origin, qpos in _candidate_poses(robot, named_feet):
         try:
             return _stance_of_pose(robot, qpos, origin, named_feet)
         except _Unfit as reason:
-            reasons.append(f"{origin}: {reason}")
+            origins_by_reason.setdefault(str(reason), origin)
         candidates.append((origin, qpos))
     for origin, qpos in candidates:
         try:
             return _stance_of_pose(robot, qpos, origin, named_feet, admits_straight_legs=True)
         except _Unfit as reason:
-            reasons.append(f"{origin}: {reason}")
+            origins_by_reason.setdefault(str(reason), origin)
+    reasons = [f"{origin}: {reason}" for reason, origin in origins_by_reason.items()]
+    chains = kinds.describe_chains(robot.model, robot.root)
     cure = "name a keyframe that stands with --home, or the feet with --feet"
-    raise NoStance(f"no standing pose ({'; '.join(dict.fromkeys(reasons))}); {cure}")
+    raise NoStance(f"{chains}, and no standing pose ({'; '.join(reasons[:_MAX_REASONS])}); {cure}")
 
 
 def _stance_of_keyframe(robot: Robot, home: str, named_feet: dict[Chain, list[int]] | None) -> Stance:

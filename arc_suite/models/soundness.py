@@ -282,6 +282,8 @@ def _check_joints(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     if forward < _MIN_STROKE:
         text = "no leg has a joint that sweeps its foot forward and back: a hip about axis [0, 0, 1], both ways, fits"
         yield Flaw(text, True)
+    if body.source:  # straight legs lift feet only by turning far; families of generated bodies stay as they are
+        up = max(up, *(_largest_lift(leg) / pose.height for leg in body.legs))
     if up < _MIN_STROKE:
         yield Flaw("no joint lifts a foot: a second joint in each leg, about axis [-1, 0, 0], fits", False)
 
@@ -293,6 +295,19 @@ def _largest_strokes(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
     sweeps = abs(jacobian[0]) * np.minimum(-low, high)
     lifts = np.maximum(jacobian[2] * low, jacobian[2] * high)
     return sweeps.max(), lifts.max()
+
+
+def _largest_lift(leg: Leg) -> float:
+    """Return the largest height by which one joint lifts a foot from the standing pose, m."""
+    lifts = []
+    for joint, anchor in zip(leg.joints, leg.points, strict=False):
+        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+        arm = np.subtract(leg.foot_position, anchor)
+        for angle in np.radians(joint.range_deg).clip(-_MAX_TURN, _MAX_TURN):
+            sideways = np.sin(angle) * np.cross(axis, arm)
+            inwards = (np.cos(angle) - 1.0) * (arm - axis * (axis @ arm))
+            lifts.append(float((sideways + inwards)[2]))
+    return max(lifts)
 
 
 def _check_parts(body: Body) -> Iterator[Flaw]:

@@ -26,11 +26,13 @@ def same_bits(path: pathlib.Path, body: Body) -> int:
         body: as imported from it.
     """
     has_loops = "<equality>" in body.source
-    level = _same(body, _robot(path, facing.LEVEL, has_loops))
-    if level == STATES:
-        return level
     turned = [facing.LEVEL.turn(axis) for axis in ("-x", "y", "-y")]
-    return max(level, *(_same(body, _robot(path, one, has_loops)) for one in (*facing.Y_UP, *turned)))
+    best = 0
+    for one in (facing.LEVEL, *facing.Y_UP, *turned):
+        best = max(best, _same(body, _robot(path, one, has_loops)))
+        if best == STATES:
+            break
+    return best
 
 
 def _same(body: Body, file: mujoco.MjSpec) -> int:

