@@ -17,6 +17,7 @@ SENSOR = "sensor"
 _SITE_GROUP = 4  # which pictures do not show
 _TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
 
+DRAG = "-drag"  # ends the name of an actuator for the drag of a joint's motor
 EYE = "eye"  # the camera that looks ahead from the torso's front, for policies with pictures
 CAMERAS = ("tracking", "portrait", "profile", EYE)
 
@@ -96,6 +97,9 @@ def elements(body: Body) -> list[Element]:
     body_elements = parts(body, body.simulation)
     for name, joint in zip(body.joint_names, body.joints, strict=True):
         body_elements.append(_motor(name, joint))
+    for name, joint in zip(body.joint_names, body.joints, strict=True):
+        if joint.motor.drag is not None:
+            body_elements.append(_drag(name, joint.motor.drag))
     for name, camera in cameras(body).items():
         body_elements.append(Element("camera", "torso", {"name": name, "mode": "trackcom", **camera}))
     body_elements.append(Element("camera", "torso", {"name": EYE, "mode": "fixed", **eye(body)}))
@@ -193,12 +197,38 @@ def _joint(part: str, name: str, joint: Joint, simulation: Simulation | None) ->
         attributes["armature"] = joint.armature
         attributes["damping"] = joint.damping
         attributes["solreflimit"] = (simulation.contact_time, 1.0)
+        if joint.friction_loss:
+            attributes["frictionloss"] = joint.friction_loss
+        if joint.drive and joint.drive.drag is not None:  # of motor and drag together
+            attributes["actuatorfrclimited"] = True
+            attributes["actuatorfrcrange"] = (-joint.torque, joint.torque)
     return Element("joint", part, attributes)
 
 
 def _motor(name: str, joint: Joint) -> Element:
-    control = {"ctrllimited": True, "ctrlrange": (-1.0, 1.0)}
-    return Element("motor", ACTUATOR, {"name": name, "joint": name, "gear": (joint.motor.gear,), **control})
+    """Return the motor of a joint.
+
+    With a drag d, its torque at a control u and a speed v is g u + d v, at most the stall torque. Another actuator
+    takes d v away. Together they are the torque g u within limits that fall with speed, in every substep.
+    """
+    motor = joint.motor
+    attributes = {"name": name, "joint": name, "gear": (motor.gear,), "ctrllimited": True, "ctrlrange": (-1.0, 1.0)}
+    if motor.drag is None:
+        return Element("motor", ACTUATOR, attributes)
+    share = motor.stall_torque / motor.gear  # the gear multiplies forces, and speeds too
+    bias = (0.0, 0.0, motor.drag / motor.gear**2)
+    limits = {"biastype": "affine", "biasprm": bias, "forcelimited": True, "forcerange": (-share, share)}
+    return Element("general", ACTUATOR, {**attributes, **limits})
+
+
+def _drag(name: str, drag: float) -> Element:
+    """Return the actuator of the drag of a joint's motor; its control has no effect."""
+    bias = (0.0, 0.0, -drag)
+    return Element(
+        "general",
+        ACTUATOR,
+        {"name": f"{name}{DRAG}", "joint": name, "gainprm": (0.0,), "biastype": "affine", "biasprm": bias},
+    )
 
 
 def _site(part: str, radius: float) -> Element:

@@ -20,6 +20,7 @@ GEOMS = {
 }
 # MuJoCo's enumerations by the words of MJCF.
 _GEOMS = {**GEOMS, "plane": mujoco.mjtGeom.mjGEOM_PLANE}
+_BIASES = {"affine": mujoco.mjtBias.mjBIAS_AFFINE}
 _JOINTS = {"hinge": mujoco.mjtJoint.mjJNT_HINGE}
 _CAMERA_MODES = {"fixed": mujoco.mjtCamLight.mjCAMLIGHT_FIXED, "trackcom": mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM}
 _INTEGRATORS = {"implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST}
@@ -72,6 +73,11 @@ def _add_joint(part: mujoco.MjsBody, name: str, type: str, axis, limited: bool =
         joint.armature = dynamics["armature"]
         joint.damping[0] = dynamics["damping"]  # the linear term of a polynomial
         joint.solref_limit = dynamics["solreflimit"]
+    if "frictionloss" in dynamics:
+        joint.frictionloss = dynamics["frictionloss"]
+    if "actuatorfrcrange" in dynamics:
+        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        joint.actfrcrange = dynamics["actuatorfrcrange"]
 
 
 def _add_geom(part: mujoco.MjsBody, type: str, size, **attributes: Any) -> None:
@@ -96,6 +102,20 @@ def _add_motor(spec: mujoco.MjSpec, name: str, joint: str, gear, ctrllimited: bo
     motor.ctrlrange = ctrlrange
 
 
+def _add_general(spec: mujoco.MjSpec, name: str, joint: str, biastype: str, biasprm, **attributes: Any) -> None:
+    actuator = spec.add_actuator(name=name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    actuator.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+    actuator.gainprm[0] = attributes.get("gainprm", (1.0,))[0]
+    actuator.biastype = _BIASES[biastype]
+    actuator.biasprm[: len(biasprm)] = biasprm
+    if "gear" in attributes:
+        actuator.gear[0] = attributes["gear"][0]
+    for limited, limits in (("ctrllimited", "ctrlrange"), ("forcelimited", "forcerange")):
+        if attributes.get(limited):
+            setattr(actuator, limited, mujoco.mjtLimited.mjLIMITED_TRUE)
+            setattr(actuator, limits, attributes[limits])
+
+
 def _add_accelerometer(spec: mujoco.MjSpec, name: str, site: str) -> None:
     sensor = mujoco.mjtSensor.mjSENS_ACCELEROMETER
     spec.add_sensor(name=name, type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
@@ -110,5 +130,6 @@ _ADD = {
     "site": _add_site,
     "camera": _add_camera,
     "motor": _add_motor,
+    "general": _add_general,
     "accelerometer": _add_accelerometer,
 }

@@ -115,6 +115,8 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
     A servo holds its joint in the standing pose for a control of 0, and a reach away from it for 1. Its torque is
     k (reach u + home - q) - d v for a control u. That of its release is -r (k (home - q) - d v) for a control r. With
     controls s u and 1 - s a joint has the share s of its torque.
+
+    A servo whose torque falls with speed has a drag: see `builder.elements`. Its release cancels it for s = 0 alone.
     """
     actuators = SubElement(root, "actuator")
     joints = {joint.get("name"): joint for joint in root.iter("joint")}
@@ -129,6 +131,13 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
     for held_joint in body.held:
         name = held_joint.name
         _add_servo(actuators, joints[name], held_joint.servo, home[name], reach=0.0)
+    servos = {name: joint.servo for name, joint in leg_joints}
+    servos |= {held_joint.name: held_joint.servo for held_joint in body.held}
+    for name, servo in servos.items():
+        if servo.drag is not None:
+            bias = exact((0.0, 0.0, -servo.drag))
+            drag = {"gainprm": "0", "biastype": "affine", "biasprm": bias}
+            SubElement(actuators, "general", name=f"{name}{builder.DRAG}", joint=name, **drag)
 
 
 def _add_servo(
@@ -145,16 +154,26 @@ def _add_servo(
     """
     name = joint.get("name")
     gain = exact(servo.stiffness * reach)
-    bias = exact((servo.stiffness * home, -servo.stiffness, -servo.damping))
-    _add_actuator(actuators, name, name, (-1.0, 1.0), biastype="affine", gainprm=gain, biasprm=bias)
+    damping = servo.damping - (servo.drag or 0.0)
+    bias = exact((servo.stiffness * home, -servo.stiffness, -damping))
+    limits = _stall_limits(servo)
+    _add_actuator(actuators, name, name, (-1.0, 1.0), biastype="affine", gainprm=gain, biasprm=bias, **limits)
     torque_range = exact((-servo.limit, servo.limit))  # of all actuators of the joint together
     joint.attrib |= {"actuatorfrclimited": "true", "actuatorfrcrange": torque_range}
 
 
 def _add_release(actuators: ElementTree.Element, joint: str, servo: Servo, home: float) -> None:
     """Add the release of the servo of a joint, given by name; `home` is its angle in the standing pose, rad."""
-    gain = exact((-servo.stiffness * home, servo.stiffness, servo.damping))
-    _add_actuator(actuators, f"{joint}-release", joint, (0.0, 1.0), gaintype="affine", gainprm=gain)
+    gain = exact((-servo.stiffness * home, servo.stiffness, servo.damping - (servo.drag or 0.0)))
+    limits = _stall_limits(servo)
+    _add_actuator(actuators, f"{joint}-release", joint, (0.0, 1.0), gaintype="affine", gainprm=gain, **limits)
+
+
+def _stall_limits(servo: Servo) -> dict[str, str]:
+    """Return the attributes of an actuator that limit its force to the stall torque; none without a drag."""
+    if servo.drag is None:
+        return {}
+    return {"forcelimited": "true", "forcerange": exact((-servo.stall_torque, servo.stall_torque))}
 
 
 def _add_actuator(

@@ -49,6 +49,9 @@ _MAX_FILE_JOINTS = 1024
 _MIN_GEAR = 1e-20
 _MAX_GEAR = 1e30
 _MAX_JOINT_CONSTANT = 1e35  # of armature and damping
+_MIN_SPEED = 1e-3  # rad/s, at which a motor gives no torque
+_MAX_SPEED = 1e6  # rad/s, the same
+_MAX_LOSS = 1e6  # W/(N m)^2
 
 _NAME_PATTERN = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
 _SIZE_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}  # numbers in `Solid.size`
@@ -244,8 +247,49 @@ class _Spec:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Motor(_Spec):
-    """A torque motor.
+class _Drive(_Spec):
+    """What motors and servos have in common.
+
+    The torque that drives a joint is at most `stall` at rest and falls to 0 at `no_load_speed`, as that of a motor at a
+    constant voltage. It is never above the largest torque. A motor that is turned faster brakes.
+
+    Attributes:
+        no_load_speed: speed of the joint at which its motor gives no torque, rad/s; None: torques fall at no speed.
+        stall: torque at rest without the limit of the largest torque, N m; None: the largest torque.
+        winding_loss: heat of the windings per squared torque, W/(N m)^2, which counts as work of the motor.
+    """
+
+    no_load_speed: float | None = _number_field(low=_MIN_SPEED, high=_MAX_SPEED, default=None, optional=True)
+    stall: float | None = _number_field(low=_MIN_GEAR, high=_MAX_GEAR, default=None, optional=True)
+    winding_loss: float = _number_field(low=0.0, high=_MAX_LOSS, default=0.0)
+
+    @property
+    def largest_torque(self) -> float:
+        """The largest torque, N m."""
+        raise NotImplementedError
+
+    @property
+    def stall_torque(self) -> float:
+        """The torque at rest from which the limit falls, N m."""
+        return self.largest_torque if self.stall is None else self.stall
+
+    @property
+    def drag(self) -> float | None:
+        """The fall of the limit per speed, N m s/rad; None where torques do not fall with speed."""
+        return None if self.no_load_speed is None else self.stall_torque / self.no_load_speed
+
+    def _check_conditions(self):
+        if self.stall is None:
+            return
+        if self.no_load_speed is None:
+            self._fail("stall", f"expected none without a no_load_speed, got {self.stall:g}")
+        if self.stall < self.largest_torque:
+            self._fail("stall", f"expected at least the largest torque, {self.largest_torque:g}, got {self.stall:g}")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Motor(_Drive):
+    """A torque motor; see `_Drive` for torques that fall with speed.
 
     Attributes:
         gear: torque at a control of 1, N m; controls are in [-1, 1].
@@ -253,9 +297,14 @@ class Motor(_Spec):
 
     gear: float = _number_field(low=_MIN_GEAR, high=_MAX_GEAR)
 
+    @property
+    def largest_torque(self) -> float:
+        """The torque at a control of 1, N m."""
+        return self.gear
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Servo(_Spec):
+class Servo(_Drive):
     """A motor that holds its joint at an angle in every substep; a control of 0 is the standing pose.
 
     Attributes:
@@ -268,6 +317,11 @@ class Servo(_Spec):
     damping: float = _number_field(low=0.0, high=_MAX_JOINT_CONSTANT)
     limit: float = _number_field(low=_MIN_GEAR, high=_MAX_GEAR)
 
+    @property
+    def largest_torque(self) -> float:
+        """The limit, N m."""
+        return self.limit
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Joint(_Spec):
@@ -279,6 +333,7 @@ class Joint(_Spec):
         range_deg: lower and upper limit; zero, the standing pose, lies between them.
         armature: rotor inertia seen at the joint, kg m^2; None: sized to the body.
         damping: viscous torque per velocity, N m s/rad; None: sized to the body.
+        friction_loss: torque of dry friction, N m; a body with a source has that of the source.
         motor: the torque motor; None: a motor is sized to the body, unless the joint has a servo.
         servo: the servo of an imported body's joint.
         alias: name of the joint in the file that it was imported from.
@@ -289,6 +344,7 @@ class Joint(_Spec):
     range_deg: tuple[float, float] = _field(_check_vector, 2, -180.0, 180.0)
     armature: float | None = _number_field(low=0.0, high=_MAX_JOINT_CONSTANT, default=None, optional=True)
     damping: float | None = _number_field(low=0.0, high=_MAX_JOINT_CONSTANT, default=None, optional=True)
+    friction_loss: float = _number_field(low=0.0, high=_MAX_GEAR, default=0.0)
     motor: Motor | None = _field(_check_instance, Motor, default=None, optional=True)
     servo: Servo | None = _field(_check_instance, Servo, default=None, optional=True)
     alias: str | None = _field(_check_text, 1, MAX_ALIAS, default=None, optional=True)
@@ -305,11 +361,13 @@ class Joint(_Spec):
     @property
     def torque(self) -> float | None:
         """Return the largest torque of the motor or servo, N m; None if the motor has not been sized yet."""
-        if self.servo:
-            return self.servo.limit
-        if self.motor:
-            return self.motor.gear
-        return None
+        drive = self.drive
+        return None if drive is None else drive.largest_torque
+
+    @property
+    def drive(self) -> Motor | Servo | None:
+        """Return the motor or the servo; None if the motor has not been sized yet."""
+        return self.motor or self.servo
 
     def mirrored(self) -> Joint:
         """Return the joint of the leg across the x-z plane, so that equal angles give mirrored poses.
@@ -622,6 +680,8 @@ class Body(_Spec):
                     self._fail(field, "expected no values in a body without a source")
         elif not all(joints_have_servos):
             self._fail("legs", "expected a servo at every joint of a body with a source")
+        elif any(joint.friction_loss for joint in self.joints):
+            self._fail("legs", "expected no friction_loss in a body with a source, which has its own")
         elif self.ballast:
             self._fail("ballast", "expected none in a body with a source, which has its weights")
         elif self.agility != 1.0:

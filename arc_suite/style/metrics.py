@@ -9,6 +9,7 @@ per meter are infinite.
 import numpy as np
 
 from arc_suite import rotations
+from arc_suite.models.sizing import size_body
 from arc_suite.style.tracks import Track
 
 TWO_PI = 2.0 * np.pi
@@ -216,12 +217,14 @@ def asymmetry(track: Track) -> np.ndarray:
 
 
 def cost_of_transport(track: Track) -> float:
-    """Positive work of the motors, divided by weight and displacement, J/(N m).
+    """Positive work of the motors and heat of their windings, divided by weight and displacement, J/(N m).
 
     See Collins et al., "Efficient bipedal robots based on passive-dynamic walkers", 2005. Negative work does not count,
     as motors do not recover it. Torque is constant in a control step: its work is torque times the change of the angle.
     """
     work = (track.torques[1:] * np.diff(track.joint_angles, axis=0)).clip(0.0).sum()
+    losses = np.array([joint.drive.winding_loss for joint in size_body(track.body).joints])  # W/(N m)^2
+    work += (losses * track.torques[1:] ** 2).sum() * track.time_step
     return float(_per_meter(track, work / (track.mass * track.gravity)))
 
 

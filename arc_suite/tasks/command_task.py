@@ -404,6 +404,7 @@ class CommandTask(Task):
             gait_memory = gait_and_pose.after(context, gait_memory, readings, feet_in_schedule)
         followed = self.settings.command.follow(context, memory.command, steps, core.place, place, motion, readings)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
+        efforts = readings.effort(core.action)  # (..., joints) torques as shares of the largest
         core = Core(
             steps=steps,
             tick=tick,
@@ -411,7 +412,7 @@ class CommandTask(Task):
             previous_action=core.previous_action,
             schedule_errors=schedule_errors,
             all_schedule_errors=core.all_schedule_errors + schedule_errors,
-            energy=energy.after(core.energy, self._torques, readings.effort(core.action), readings.joint_angles),
+            energy=energy.after(core.energy, self._torques, self._heat, efforts, readings.joint_angles),
             path=core.path + context.pace * xp.hypot(motion[..., 0], motion[..., 1]),
             place=place,
             motion=motion,
@@ -424,6 +425,10 @@ class CommandTask(Task):
     @functools.cached_property
     def _torques(self) -> np.ndarray:
         return energy.torques(self.scene.body)
+
+    @functools.cached_property
+    def _heat(self) -> np.ndarray:
+        return energy.heat(self.scene.body)
 
     def _mean_motion(self, core: Core, place):
         """Return the mean velocity (..., 3); that of a step is relative to the heading at its start."""

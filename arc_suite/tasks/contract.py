@@ -237,7 +237,7 @@ class Task(Observed):
         layout = self.scene.layout
         if layout.torso_place is not None:
             return reading.FIELDS_OF_PLACED_TORSOS
-        return reading.FIELDS if layout.home is None else reading.FIELDS_OF_SERVOS
+        return reading.FIELDS if layout.limits is None else reading.FIELDS_OF_SERVOS
 
     @property
     def actions(self) -> str:

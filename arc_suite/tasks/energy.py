@@ -1,4 +1,4 @@
-"""Energy: the positive work of the motors, from which the cost of transport follows.
+"""Energy: the positive work of the motors and the heat of their windings, from which the cost of transport follows.
 
 Work is divided by the body's weight, so its unit is m. Negative work does not count, as in
 `style.metrics.cost_of_transport`.
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.models.sizing import size_body
+from arc_suite.models.sizing import control_timestep, size_body
 from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots.spec import Body
 
@@ -20,7 +20,7 @@ class Energy(NamedTuple):
 
     Attributes:
         angles: (..., joints) at the latest reading, rad.
-        step: (...) work of the latest step by weight, m.
+        step: (...) work and heat of the latest step by weight, m.
         total: (...) sum of `step` over the steps, m.
     """
 
@@ -39,16 +39,19 @@ def begin(memory: Energy, angles) -> Energy:
     return memory._replace(angles=angles + 0.0)  # a copy, as readings are views of the simulation
 
 
-def after(memory: Energy, torques: np.ndarray, action, angles) -> Energy:
+def after(memory: Energy, torques: np.ndarray, heat: np.ndarray, action, angles) -> Energy:
     """Return the memory after a control step, over which torques are constant.
 
     Args:
         memory: before it.
         torques: (joints,) torques of the body; see `torques`.
+        heat: (joints,) heat of a step at the largest torques; see `heat`.
         action: (..., joints) action of the step, or the torques of servos as shares of the largest.
         angles: (..., joints) angles of the joints after it, rad.
     """
     step = (torques * action * (angles - memory.angles)).clip(0.0).sum(axis=-1)
+    if heat.any():
+        step = step + (heat * action * action).sum(axis=-1)
     return Energy(angles + 0.0, step, memory.total + step)
 
 
@@ -68,3 +71,11 @@ def torques(body: Body) -> np.ndarray:
     """Return the greatest torques (joints,) of a body's motors over its weight, m."""
     gears = np.array([joint.torque for joint in size_body(body).joints])
     return gears / (measure_standing(body).mass * GRAVITY)
+
+
+def heat(body: Body) -> np.ndarray:
+    """Return the heat (joints,) of a control step at the greatest torques over the weight, m."""
+    sized_body = size_body(body)
+    losses = np.array([joint.drive.winding_loss for joint in sized_body.joints])  # W/(N m)^2
+    gears = np.array([joint.torque for joint in sized_body.joints])
+    return losses * gears * gears * control_timestep(body) / (measure_standing(body).mass * GRAVITY)

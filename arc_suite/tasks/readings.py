@@ -43,7 +43,7 @@ class Layout(NamedTuple):
     parts: slice | np.ndarray  # in cfrc_ext; the first is the torso
     feet: slice | np.ndarray  # in xpos
     home: np.ndarray | None = None  # angles of the joints in the standing pose; None where they are 0
-    limits: np.ndarray | None = None  # of the joints' torques, for servos; None for motors
+    limits: np.ndarray | None = None  # largest torques of joints; None for motors that give them at any speed
     torso_place: TorsoPlace | None = None  # None where the torso is at the origin of its body
 
     @property
@@ -68,7 +68,7 @@ class Readings(NamedTuple):
         contact_forces: (..., 6 * parts), torque and force on each part, clipped to [-1, 1].
         frame_position: (..., 3) position of the torso's frame, world.
         foot_heights: (..., feet) over the ground.
-        efforts: (..., joints) torques of servos, shares of the largest; None for motors, whose actions are the torques.
+        efforts: (..., joints) torques, shares of the largest; None for motors whose actions are the torques.
         foot_positions: (..., feet, 3) in the world.
     """
 
@@ -118,6 +118,9 @@ def layout(model, body: Body) -> Layout:
     if (angles.start, velocities.start) != (7, 6):
         raise ValueError(f"expected the joints next to the torso's, at 7 in qpos, got {angles.start}")
     parts = _span([model.body(name).id for name in body.part_names])
+    limits = None
+    if model.jnt_actfrclimited.any():  # motors whose torques fall with speed
+        limits = np.array([model.actuator(name).gear[0] for name in body.joint_names])
     return Layout(
         joint_angles=angles,
         joint_velocities=velocities,
@@ -125,6 +128,7 @@ def layout(model, body: Body) -> Layout:
         torso=parts.start,
         parts=parts,
         feet=_as_slice(feet),
+        limits=limits,
     )
 
 

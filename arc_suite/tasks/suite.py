@@ -9,7 +9,7 @@ from arc_suite.tasks.gait_and_pose import GaitAndPose
 from arc_suite.tasks.ground import Lanes, PillarField
 
 # Attributes that follow from body and settings; see `Task.from_body`.
-_FROM_BODY = ("clock", "clearances", "context", "_torques")
+_FROM_BODY = ("clock", "clearances", "context", "_torques", "_heat")
 
 
 class Steer(CommandTask):

@@ -66,7 +66,12 @@ class Walk(Task):
     """Walking forward at the target speed in the prescribed gait."""
 
     name = "walk"
-    from_body = ("clock", "clearances", "_torques")  # attributes that follow from the body; see `Task.from_body`
+    from_body = (
+        "clock",
+        "clearances",
+        "_torques",
+        "_heat",
+    )  # attributes that follow from the body; see `Task.from_body`
     # Section 4 of the paper. Each robot replaces "control" by a weight of its own.
     weights: ClassVar[Mapping[str, float]] = {
         "forward": 1.5,
@@ -120,6 +125,10 @@ class Walk(Task):
     @functools.cached_property
     def _torques(self) -> np.ndarray:
         return energy.torques(self.scene.body)
+
+    @functools.cached_property
+    def _heat(self) -> np.ndarray:
+        return energy.heat(self.scene.body)
 
     @property
     def target_velocity(self) -> float:
@@ -177,7 +186,7 @@ class Walk(Task):
             distance=memory.distance + displacement,
             all_schedule_errors=memory.all_schedule_errors + schedule_errors,
             healthy=(low <= height) & (height <= high),
-            energy=energy.after(memory.energy, self._torques, efforts, readings.joint_angles),
+            energy=energy.after(memory.energy, self._torques, self._heat, efforts, readings.joint_angles),
         )
 
     def terms(self, memory: WalkMemory, readings: Readings) -> dict:

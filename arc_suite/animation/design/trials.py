@@ -208,6 +208,7 @@ def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: in
     body = task.scene.body
     control_timestep = task.scene.control_timestep
     torques = energy.torques(body)
+    heat = energy.heat(body)
     work = energy.start(len(body.joint_names))  # of the motors, divided by weight, m
     for timestep in evaluation.rollout(environment, policy, seed, steps):
         joint_angles = data.qpos[7:]  # after the position and the quaternion of the torso
@@ -220,7 +221,7 @@ def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: in
             steps_taken += 1
             has_diverged = environment.physics.divergence is not None
             fell |= has_diverged or walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
-            work = energy.after(work, torques, data.ctrl, joint_angles)
+            work = energy.after(work, torques, heat, data.ctrl[: len(torques)], joint_angles)
     progress = environment.task.progress  # the task's metrics of the episode
     displacement = data.qpos[0] - start_x
     seconds = steps * control_timestep  # of an episode without a fall

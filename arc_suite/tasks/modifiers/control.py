@@ -74,6 +74,9 @@ class Control(_ControlFields, Modifier):
         if actions == "torque" and gains != (1.0, 1.0):
             value = checks.preview(settings["gains"])
             raise ValueError(f"gains: torques have none, expected actions='position', got {value}")
+        if body.source and gains != (1.0, 1.0) and any(joint.servo.drag is not None for joint in body.joints):
+            value = checks.preview(settings["gains"])
+            raise ValueError(f"gains: expected 1, as torques of {body.name} fall with speed, got {value}")
         stiffness, damping = position_gains(size_body(body), measure_standing(body).inertias)
         return cls(gains, actions, bool(body.source), stiffness, damping, action_reaches(body))
 

@@ -76,6 +76,11 @@ class Motors(_MotorsFields, Modifier):
         failure = settings["actuator_failure"]
         if not isinstance(failure, bool):
             checks.integer("actuator_failure", failure, 0, len(body.legs) - 1)
+        if body.source and any(joint.servo.drag is not None for joint in body.joints):
+            for name in ("motor_strength", "joint_strength"):
+                if cls.check_span(name, settings) != (1.0, 1.0):
+                    value = checks.preview(settings[name])
+                    raise ValueError(f"{name}: expected 1, as torques of {body.name} fall with speed, got {value}")
         return cls(
             motor_strength=cls.check_span("motor_strength", settings),
             joint_strength=cls.check_span("joint_strength", settings),
