@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from conftest import WORLDS, compiled
+from limited import with_drives
 
 import arc_suite
 from arc_suite.bodies import generator
@@ -16,6 +17,7 @@ from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.worlds import device, mjx
 from arc_suite.learning.worlds.randomization import randomization_fn
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import privileged
 
 ROBOT = "leaper"  # the fastest to compile
@@ -227,3 +229,28 @@ def test_sizes_of_tables(robot, sizes):
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.ncon < sizes[0] and data.nefc < sizes[1]
+
+
+@pytest.mark.parametrize("impl", ["jax", "warp"])
+def test_torques_fall_with_speed(impl):
+    """Worlds step bodies with such motors as C does."""
+    pytest.importorskip("warp" if impl == "warp" else "jax")
+    body = with_drives(ROBOTS["leaper"], no_load_speed=2.0, stall=1.5)
+    env = mjx.load(body, "walk", None, impl, num_starts=2, num_envs=2)
+    state = jax.jit(jax.vmap(env.start))(np.arange(2))
+    step = jax.jit(jax.vmap(env.step))
+    environments = VectorEnv(body, "walk", 2, 1)
+    environments.reset(seed=0)
+    free = VectorEnv(ROBOTS["leaper"], "walk", 2, 1)
+    free.reset(seed=0)
+    action = np.where(np.arange(env.action_size) % 2, 0.7, -0.7) * np.ones((2, 1))
+    for _ in range(2):
+        state = step(state, action)
+        observation, reward, *_ = environments.step(action)
+        other_observation, *_ = free.step(action)
+    # MJX's own implementation integrates motors at their limits more implicitly than C and Warp.
+    difference = abs(np.asarray(state.obs) - observation).max()
+    assert difference < 0.01 * abs(observation - other_observation).max()
+    np.testing.assert_allclose(state.reward, reward, atol=1e-3)
+    with pytest.raises(ValueError, match="motor_strength: expected motors whose torques do not fall with speed"):
+        randomization_fn(motor_strength=(0.5, 1.0))(env.mjx_model, jax.random.split(jax.random.key(0), 2))

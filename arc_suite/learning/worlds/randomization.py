@@ -7,6 +7,7 @@ keys of JAX, and all episodes of a world have the same fields. The fields are th
 from collections.abc import Callable
 
 import jax
+import numpy as np
 
 from arc_suite import checks
 from arc_suite.tasks.modifiers.contacts import FRICTION_FIELDS
@@ -37,7 +38,7 @@ def randomization_fn(**ranges: tuple[float, float]) -> Callable:
         axis (worlds,), and the axes to map over.
 
     Raises:
-        ValueError: another name, or no range.
+        ValueError: another name, or no range; the function raises it for motors whose torques fall with speed.
     """
     checked_ranges = {}
     for name, bounds in ranges.items():
@@ -45,6 +46,8 @@ def randomization_fn(**ranges: tuple[float, float]) -> Callable:
         checked_ranges[name] = checks.span(name, bounds, 0.0, _MAX_FACTOR)
 
     def randomize(model, rng):
+        if "motor_strength" in checked_ranges and np.any(model.actuator_forcelimited):
+            raise ValueError("motor_strength: expected motors whose torques do not fall with speed")
         fields = {}
         for number, (name, (low, high)) in enumerate(checked_ranges.items()):
             factors = _draw_factors(rng, number, low, high)
