@@ -178,7 +178,7 @@ def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, a
             legs=sketch.sketch_legs(robot, stance, names, servos),
             camera=sketch.sketch_camera(stance),
             simulation=_choose_simulation(float(robot.model.opt.timestep)),
-            source=writing.write_source(robot, stance, names, file.meshes),
+            source=writing.write_source(robot, stance, names, file),
             held=tuple(Held(name=names.joints[joint], servo=servos[joint]) for joint in names.held),
             file_joints=tuple(robot.joint_name(joint) for joint in order),
         )

@@ -29,6 +29,13 @@ class Facing(NamedTuple):
         up = np.array(AXES[self.up])
         return np.stack((forward, np.cross(up, forward), up))
 
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Return the same rotation as a quaternion (4,), w first."""
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, self.rotation.ravel())
+        return quaternion
+
     def turn(self, axis: str) -> "Facing":
         """Return the facing with another axis ahead, which is named in the frame of this one, and level there."""
         direction = self.rotation.T @ AXES[axis]
@@ -51,8 +58,7 @@ def turn_torso(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int, facing: F
     """
     if facing == LEVEL:
         return model
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, facing.rotation.ravel())
+    quaternion = facing.quaternion
     body = spec.bodies[torso]
     outer_frames = [frame for frame in body.frames if frame.frame is None]
     turned_frame = body.add_frame(quat=quaternion)

@@ -38,6 +38,7 @@ class RobotFile(NamedTuple):
         driven: names of the joints that a URDF drives; empty if it does not say.
         notes: one line for each thing that is left out or repaired.
         parts: all files that it depends on, with those that were looked for and are missing.
+        facing: axes of the file's torso that are x and z in the model.
     """
 
     model: mujoco.MjModel
@@ -47,6 +48,7 @@ class RobotFile(NamedTuple):
     driven: frozenset[str]
     notes: tuple[str, ...]
     parts: tuple[Path, ...]
+    facing: Facing
 
 
 class _Spec(NamedTuple):
@@ -92,7 +94,7 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     model, inertia_notes = inertias.correct_inertias(spec, model, torso)
     model = turn_torso(spec, model, torso, facing)
     all_notes = (*notes, *mesh_notes, *torso_notes, *unit_notes, *inertia_notes)
-    return RobotFile(model, torso, meshes_of(spec, model), order, driven, all_notes, (*parts, *mesh_files))
+    return RobotFile(model, torso, meshes_of(spec, model), order, driven, all_notes, (*parts, *mesh_files), facing)
 
 
 def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:

@@ -13,11 +13,14 @@ import mujoco
 import numpy as np
 
 from arc_suite.importing import loops
+from arc_suite.importing.facing import LEVEL
 from arc_suite.importing.loops import Loop
 from arc_suite.importing.meshes import Mesh
 from arc_suite.importing.naming import Names
+from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Leg, Stance
 from arc_suite.importing.tree import HINGE, Robot
+from arc_suite.models import source
 from arc_suite.models.mjcf_text import exact
 from arc_suite.robots import sources
 
@@ -64,19 +67,21 @@ _GEOM_DEFAULTS: dict[str, Any] = {
 }
 
 
-def write_source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, Mesh]) -> str:
+def write_source(robot: Robot, stance: Stance, names: Names, file: RobotFile) -> str:
     """Return the MJCF of a robot: one free body, its joints and colliders, a site in each foot, the keyframe `home`.
+
+    Where the torso is turned, a site has the orientation of the file's torso, which a robot's IMU shows.
 
     Args:
         robot: robot of the file.
         stance: stance in which it stands.
         names: names of its parts.
-        meshes: by geom.
+        file: file of the robot.
     """
     root = ElementTree.Element("mujoco")
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
     _add_option(root, robot.model)
-    mesh_geoms = _add_meshes(root, robot, meshes)
+    mesh_geoms = _add_meshes(root, robot, file.meshes)
     world = SubElement(root, "worldbody")
     elements = {}
     for body in robot.bodies:
@@ -84,6 +89,9 @@ def write_source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, M
         elements[body] = _add_body(parent, robot, body, names, mesh_geoms)
     torso_place = _format_differences({"pos": robot.torso_place}, _BODY_DEFAULTS)
     SubElement(elements[robot.root], "site", name="torso", size=exact(0.01), **torso_place, **SITE)
+    if file.facing != LEVEL:
+        orientation = exact(file.facing.quaternion)
+        SubElement(elements[robot.root], "site", name=source.FILE_FRAME, size=exact(0.01), quat=orientation, **SITE)
     for label, leg in zip(names.legs, stance.legs, strict=True):
         _add_leg_bodies(elements, robot, stance, names, label, leg)
     _add_loops(root, elements, robot, names)

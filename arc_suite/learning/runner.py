@@ -30,8 +30,8 @@ class Sensors(NamedTuple):
     Attributes:
         angles: (motors,) of the joints, as the robot's file counts them, rad.
         speeds: (motors,) rad/s.
-        quaternion: (4,) orientation of the torso in the world, w first.
-        rates: (3,) angular velocity of the torso in its own frame, rad/s.
+        quaternion: (4,) orientation in the world of the root frame of the robot's file, w first.
+        rates: (3,) angular velocity of this frame in itself, rad/s.
     """
 
     angles: np.ndarray
@@ -125,7 +125,8 @@ class Policy:
         """Return a reason to stop; empty without one."""
         if not all(np.isfinite(values).all() for values in sensors):
             return "a sensor shows no number"
-        tilt = math.degrees(math.acos(np.clip(_matrix(sensors.quaternion)[2, 2], -1.0, 1.0)))
+        up = _matrix(np.array(self.facts["imu"]))[2]  # of the torso, in the frame of the IMU
+        tilt = math.degrees(math.acos(np.clip((_matrix(sensors.quaternion) @ up)[2], -1.0, 1.0)))
         if tilt > MAX_TILT:
             return f"the torso tilts by {tilt:.0f} degrees"
         excess = np.maximum(self._low - sensors.angles, sensors.angles - self._high)
@@ -139,22 +140,25 @@ class Policy:
     def observe(self, sensors: Sensors, command=(0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the observation (size,) of the next control step."""
         facts = self.facts
+        imu = np.array(facts["imu"])
+        rates = _matrix(imu) @ sensors.rates
+        quaternion = _product(np.asarray(sensors.quaternion), imu * (1.0, -1.0, -1.0, -1.0))
         is_start = self._tick < 0
         self._tick += self._was_going
         desired = np.divide(command, facts["command_units"])
         self._was_going = not facts["follows_commands"] or bool(desired.any())
         angle = 2.0 * math.pi * facts["gait_frequency"] * facts["control_timestep"] * self._tick
         # Opposite quaternions are one orientation: take the one that continues.
-        sign = 1.0 if self._quaternion @ sensors.quaternion >= 0.0 else -1.0
-        self._quaternion = sign * np.asarray(sensors.quaternion)
+        sign = 1.0 if self._quaternion @ quaternion >= 0.0 else -1.0
+        self._quaternion = sign * quaternion
         if facts["follows_commands"] or self._heading is None:
             self._heading = _yaw(self._quaternion)
         orientation = _turn(self._quaternion, -self._heading)
         angles = (sensors.angles - self.home)[self._motor_of_action]
         speeds = np.asarray(sensors.speeds)[self._motor_of_action]
-        height, velocity = self._estimate(_matrix(orientation), angles, speeds, sensors.rates)
+        height, velocity = self._estimate(_matrix(orientation), angles, speeds, rates)
         if not is_start:
-            turning = _matrix(orientation)[2] @ sensors.rates
+            turning = _matrix(orientation)[2] @ rates
             motion = np.array((velocity[0], velocity[1], turning)) / facts["command_units"]
             self._motion += facts["leak"] * (motion - self._motion)
         parts = {
@@ -162,7 +166,7 @@ class Policy:
             "orientation": orientation,
             "angles": angles,
             "velocity": velocity,
-            "rates": sensors.rates,
+            "rates": rates,
             "speeds": speeds,
             "clock": self._was_going * np.array((math.sin(angle), math.cos(angle))),
             "desired": desired,
@@ -245,10 +249,13 @@ def _yaw(quaternion: np.ndarray) -> float:
 
 def _turn(quaternion: np.ndarray, angle: float) -> np.ndarray:
     """Return an orientation turned about the vertical."""
-    w, x, y, z = quaternion
-    cosine = math.cos(0.5 * angle)
-    sine = math.sin(0.5 * angle)
-    return np.array((cosine * w - sine * z, cosine * x - sine * y, cosine * y + sine * x, cosine * z + sine * w))
+    return _product(np.array((math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))), quaternion)
+
+
+def _product(second: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return the rotation that applies one quaternion and then another."""
+    vector = second[0] * first[1:] + first[0] * second[1:] + np.cross(second[1:], first[1:])
+    return np.array((second[0] * first[0] - second[1:] @ first[1:], *vector))
 
 
 def _matrix(quaternion: np.ndarray) -> np.ndarray:

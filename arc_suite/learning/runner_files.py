@@ -14,6 +14,7 @@ import numpy as np
 
 from arc_suite import files
 from arc_suite.learning import onnx_file, policy_metadata
+from arc_suite.models import source
 from arc_suite.policies.network import Network
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
@@ -65,6 +66,7 @@ def describe_machine(network: Network) -> dict[str, Any]:
     motors                      in the order of the robot's file: motor, its joint there; joint, its name in the suite;
                                 action, its index in an action; home, reach, stiffness, damping and limit as in
                                 `policy_metadata.metadata`; low and high, its range, rad
+    imu                         orientation of the file's root frame, in which the IMU measures, in the torso's frame
     observation                 [part, size] in order; parts that are not built from sensors are 0
     estimated                   parts that are estimated from the feet that stand, though training saw the simulation's
     history                     steps, and [part, size] of each
@@ -97,6 +99,7 @@ def describe_machine(network: Network) -> dict[str, Any]:
         "torque_held": metadata["torque_held"],
         "delay": metadata.get("delay", [0, 0]),
         "motors": _list_motors(body, metadata),
+        "imu": source.file_orientation(body).tolist(),
         "observation": [part for block_parts in parts.values() for part in block_parts],
         "estimated": [name for name in _ESTIMATED if name in names],
         "history": {

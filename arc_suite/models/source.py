@@ -20,6 +20,7 @@ from arc_suite.models.visuals import scene
 from arc_suite.robots.spec import Body, Servo, SpecError
 
 HOME = "home"  # keyframe of the standing pose
+FILE_FRAME = "file"  # site with the orientation of the torso in the robot's file, where it is turned
 
 _SECTIONS_OF_SCENES = ("option", "keyframe")  # a scene that takes the body has its own
 _TORSO = 1  # its index in the model
@@ -96,6 +97,16 @@ def compile_source(body: Body) -> mujoco.MjModel:
 def torso_place(body: Body) -> np.ndarray:
     """Return the origin (3,) of the torso's frame in that of the root body, m; 0 for a body without a source."""
     return compile_source(body).site("torso").pos if body.source else np.zeros(3)
+
+
+def file_orientation(body: Body) -> np.ndarray:
+    """Return the orientation (4,) of the torso's frame of the robot's file in that of the body, w first."""
+    level = np.array((1.0, 0.0, 0.0, 0.0))
+    if not body.source:
+        return level
+    model = compile_source(body)
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, FILE_FRAME)
+    return level if site < 0 else model.site_quat[site].copy()
 
 
 def angles_at_home(body: Body) -> dict[str, float]:

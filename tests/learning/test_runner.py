@@ -7,13 +7,14 @@ import subprocess
 import sys
 
 import imports
+import mujoco
 import numpy as np
 import programs
 import pytest
 from networks import made
 
 import arc_suite
-from arc_suite import policies
+from arc_suite import policies, rotations
 from arc_suite.bodies import generator
 from arc_suite.importing import import_robot
 from arc_suite.learning import runner, runner_files
@@ -90,6 +91,33 @@ def test_observations_and_actions_from_sensors_are_those_of_the_suite(name, task
             environment.command("command", command)
         timestep = environment.step(expected)
     assert step >= 5
+
+
+@pytest.mark.parametrize(
+    ("forward", "rows"),
+    [
+        ("y", ((0, 1, 0), (-1, 0, 0), (0, 0, 1))),
+        ("-x", ((-1, 0, 0), (0, -1, 0), (0, 0, 1))),
+        ("-y", ((0, -1, 0), (1, 0, 0), (0, 0, 1))),
+    ],
+)
+def test_an_imu_has_the_axes_of_the_robots_file(forward, rows):
+    """Where the front of the file is not x; the rows are axes of the torso in the frame of the file."""
+    body = import_robot(imports.FILES / "go2_like.xml", forward=forward).body
+    network, player, environment = machine(body, "steer", **SENSED)
+    act, timestep = alone(network), environment.reset(0)
+    for _ in range(5):
+        sensors = sense(environment, player)
+        matrix = rotations.matrix(sensors.quaternion) @ rows
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, matrix.ravel())
+        sensors = sensors._replace(quaternion=quaternion, rates=sensors.rates @ rows)
+        command = timestep.observation["command"][:3] * player.facts["command_units"]
+        assert player.find_fault(sensors) == ""
+        player.act(sensors, command)
+        np.testing.assert_allclose(player.seen[-1], flat(timestep), atol=1e-6)
+        timestep = environment.step(act(timestep))
+    assert runner_files.describe_machine(made(imports.quadruped(), **SENSED))["imu"] == [1.0, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(("name", "error"), [("go2", 0.13), ("a1", 0.13), ("tick", 0.05), ("hexapod", 0.3)])
