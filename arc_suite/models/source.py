@@ -130,7 +130,7 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
     A servo whose torque falls with speed has a drag: see `builder.elements`. Its release cancels it for s = 0 alone.
     """
     actuators = SubElement(root, "actuator")
-    joints = {joint.get("name"): joint for joint in root.iter("joint")}
+    joints = {joint.get("name"): joint for joint in root.find("worldbody").iter("joint")}
     home = angles_at_home(body)  # rad
     leg_joints = [(leg.full_name(joint), joint) for leg in body.legs for joint in leg.joints]
     for name, joint in leg_joints:

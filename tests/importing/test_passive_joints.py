@@ -8,6 +8,7 @@ from robots_of_others import reference
 
 import arc_suite
 from arc_suite import models
+from arc_suite.cpg import Demonstrator
 from arc_suite.importing import import_robot
 from arc_suite.robots.spec import SpecError
 
@@ -210,3 +211,16 @@ def test_a_urdf_that_drives_no_legs_says_nothing_of_motors(tmp_path):
     body, notes = import_robot(toes(tmp_path, transmission, LIMIT.format("20")))
     assert len(body.joint_names) == 16
     assert not [note for note in notes if note.startswith("passive:")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["sprung ankles", "rods that connections close"])
+def test_the_robot_walks(case, tmp_path):
+    environment = arc_suite.load(import_robot(write(tmp_path, **CASES[case])).body, "walk")
+    act = Demonstrator(environment, "medium")
+    timestep = environment.reset()
+    for _ in range(300):
+        timestep = environment.step(act(timestep))
+        assert not timestep.last()
+    target = environment.task.definition.target_velocity
+    assert environment.task.progress["speed"] > 0.75 * target

@@ -6,6 +6,7 @@ import pathlib
 import pytest
 from refusals import refused
 
+from arc_suite import models
 from arc_suite.importing import import_robot
 from arc_suite.robots import sources
 from arc_suite.robots.spec import MAX_SOURCE, SpecError
@@ -43,7 +44,22 @@ REFUSED = {
     ('name="home" qpos="0.0', 'name="home" qpos="0.0 0.0'): "expected a keyframe 'home' of 19 numbers",
     ('key name="home"', 'key name="other"'): "key 'other': name: expected one of home, got 'other'",
     ("<mujoco>", '<!DOCTYPE a [<!ENTITY b "c">]><mujoco>'): "expected XML without a document type and entities",
+    ("<keyframe>", '<equality><weld body1="torso" body2="world"/></equality><keyframe>'): (
+        "weld '': expected no attribute 'body1'"
+    ),
+    ("<keyframe>", "<equality><flex/></equality><keyframe>"): "expected no element 'flex' in 'equality'",
+    ('<site name="torso"', '<site pos="0 0 1e9" name="torso"'): (
+        "site 'torso': pos: expected numbers from -100 to 100, got '0 0 1e9'"
+    ),
     ("</mujoco>", ""): None,
+}
+
+
+# What MuJoCo refuses, as parts of names that the source has not.
+LOOPS = {
+    '<connect site1="a" site2="b"/>': "Error: unknown element 'a' in equality constraint",
+    '<joint joint1="l1_joint1" joint2="l1_knee"/>': "Error: unknown element 'l1_knee' in equality constraint",
+    "<joint/>": "XML Error: required attribute missing: 'joint1'",
 }
 
 
@@ -83,3 +99,10 @@ def test_files_with_a_source_may_be_longer(tmp_path):
 def test_bodies_without_a_source_are_not_looked_at():
     plain = load_body("spider")
     assert sources.check(plain) is plain
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_loop_of_parts_that_are_not_there_is_refused_in_one_line(loop):
+    body = body_from_json(changed("<keyframe>", f"<equality>{loop}</equality><keyframe>"))
+    with refused(f"Body(quadruped_15_kg).source: {LOOPS[loop]}", SpecError, begins=True):
+        models.model_spec(body)
