@@ -13,7 +13,8 @@ import numpy as np
 from arc_suite.importing import tree
 from arc_suite.importing.tree import Chain, Robot
 
-_MAX_DISTANCE = 0.125  # of the root body's origin from the trunk's center of mass or the hips, in depths of the legs
+# Of the root body's origin from the line between the hips and the trunk's center of mass, in depths of the legs.
+_MAX_DISTANCE = 0.15
 _MIN_DEPTH = 0.5  # of legs, as a share of their length: in some files the legs of the zero pose are level
 _MIN_END_DEPTH = 0.7  # of the deepest end of a chain, below the trunk; chains that end higher are arms and heads
 
@@ -28,8 +29,7 @@ def place_torso(robot: Robot) -> Robot:
     deepest = min(end[2] for end in chains.values())
     length = max(_chain_length(data, chain, end) for chain, end in chains.items())
     depth = max(hips[2] - deepest, _MIN_DEPTH * length)
-    distances = np.linalg.norm((hips, _trunk_center(robot, data)), axis=1)
-    if distances.min() <= _MAX_DISTANCE * depth:
+    if _distance_from_line(hips, _trunk_center(robot, data)) <= _MAX_DISTANCE * depth:
         return robot
     return robot._replace(torso_place=hips)
 
@@ -70,6 +70,13 @@ def _trunk_center(robot: Robot, data: mujoco.MjData) -> np.ndarray:
     if masses.sum() == 0.0:
         return np.zeros(3)
     return masses @ data.xipos[bodies] / masses.sum()
+
+
+def _distance_from_line(start: np.ndarray, end: np.ndarray) -> float:
+    """Return the distance of the origin from the line between two points (3,), m."""
+    line = end - start
+    share = np.clip(-start @ line / max(line @ line, 1e-12), 0.0, 1.0)  # of the line, up to the nearest point
+    return float(np.linalg.norm(start + share * line))
 
 
 def _chain_length(data: mujoco.MjData, chain: Chain, end: np.ndarray) -> float:
