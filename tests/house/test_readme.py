@@ -26,7 +26,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROO
 
 # Pages whose code needs files or packages of its own; tests of their own run it.
 ELSEWHERE = {"adding_a_robot", "adding_a_task", "adding_an_algorithm", "modifiers"}
-ELSEWHERE |= {"agents", "clients", "doors", "first_steps", "gpu", "study"}
+ELSEWHERE |= {"agents", "clients", "doors", "first_steps", "gpu", "imported", "study"}
 BLOCKS = [
     pytest.param(block, id=f"{page.stem}{place}", marks=() if page.stem == "README" else pytest.mark.slow)
     for page in PAGES

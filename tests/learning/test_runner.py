@@ -3,8 +3,11 @@
 import json
 import math
 import os
+import pathlib
+import re
 import subprocess
 import sys
+import types
 
 import imports
 import mujoco
@@ -268,6 +271,41 @@ def test_an_interrupt_relaxes_the_motors(robot):
     with pytest.raises(KeyboardInterrupt):
         robot.play(player, 10, stop)
     assert not robot.written[-1].stiffness.any()
+
+
+def test_the_page_of_imported_robots_plays_a_policy(tmp_path, monkeypatch):
+    """Its code, and its table of motors and actions, for a Go2 with the order of the SDK."""
+    pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
+    page = (pathlib.Path(__file__).parents[2] / "docs" / "imported.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([\d, ]+) \| `(\w+)` \| ([\d, ]+) \|$", page, re.MULTILINE)
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    network = made(import_robot(go2_of_an_sdk(tmp_path)).body, "steer", **SENSED)
+    runner_files.save(tmp_path, network)
+    facts = json.loads((tmp_path / "policy.json").read_text())
+    for numbers, leg, actions in rows:
+        for number, action, joint in zip(
+            numbers.split(", "), actions.split(", "), ("hip", "thigh", "calf"), strict=True
+        ):
+            motor = facts["motors"][int(number)]
+            assert (motor["motor"], motor["action"]) == (f"{leg}_{joint}_joint", int(action))
+    assert len(rows) == 4
+    robot = Robot(facts, np.array([motor["home"] for motor in facts["motors"]]))
+    calls = []
+
+    def send(*output):
+        if len(calls) >= 105:
+            robot.quaternion = np.array((0.0, 1.0, 0.0, 0.0))
+        calls.append(output)
+
+    monkeypatch.setitem(sys.modules, "my_robot", types.SimpleNamespace(read_state=robot.read, send=send))
+    monkeypatch.setitem(
+        sys.modules, "time", types.SimpleNamespace(perf_counter=lambda: 0.0, sleep=lambda seconds: None)
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "run", raising=False)
+    exec(compile(code, "imported.md", "exec"), {})
+    monkeypatch.delitem(sys.modules, "run")
+    assert len(calls) == 107 and not calls[-1][1].any()
 
 
 def test_export_writes_a_folder_that_needs_no_suite(tmp_path):
