@@ -14,7 +14,7 @@ from arc_suite.animation.clips import acting, gestures
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.envs.setup import Setup
 
-BODIES = {"four legs": imports.quadruped, "six legs": imports.hexapod}
+BODIES = {"four legs": imports.quadruped, "six legs": imports.hexapod, "on its floor": imports.on_its_floor}
 NAMES = ("walk", "idle", "hit_front", "rise", "death")
 EACH = tiers(BODIES, never, lambda name: name == "four legs")
 
