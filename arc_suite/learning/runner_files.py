@@ -67,6 +67,7 @@ def describe_machine(network: Network) -> dict[str, Any]:
                                 action, its index in an action; home, reach, stiffness, damping and limit as in
                                 `policy_metadata.metadata`; low and high, its range, rad
     imu                         orientation of the file's root frame, in which the IMU measures, in the torso's frame
+    held                        joints outside of the legs by name, and the angle at which training holds each, rad
     observation                 [part, size] in order; parts that are not built from sensors are 0
     estimated                   parts that are estimated from the feet that stand, though training saw the simulation's
     history                     steps, and [part, size] of each
@@ -99,6 +100,7 @@ def describe_machine(network: Network) -> dict[str, Any]:
         "torque_held": metadata["torque_held"],
         "delay": metadata.get("delay", [0, 0]),
         "motors": _list_motors(body, metadata),
+        "held": {joint.name: source.angles_at_home(body)[joint.name] for joint in body.held},
         "imu": source.file_orientation(body).tolist(),
         "observation": [part for block_parts in parts.values() for part in block_parts],
         "estimated": [name for name in _ESTIMATED if name in names],
@@ -161,9 +163,8 @@ def _list_motors(body: Body, metadata: dict[str, Any]) -> list[dict[str, Any]]:
         motor_name = servo.pop("alias") or name
         low, high = (servo["home"] + math.radians(limit) for limit in joint.range_deg)
         motors.append({"motor": motor_name, "joint": name, "action": index, **servo, "low": low, "high": high})
-    if body.file_joints:
-        motors.sort(key=lambda motor: body.file_joints.index(motor["motor"]))
-    return motors
+    places = {name: place for place, name in enumerate(body.file_joints)}
+    return sorted(motors, key=lambda motor: places.get(motor["motor"], len(places)))
 
 
 def _describe_legs(body: Body) -> Iterator[dict[str, Any]]:
@@ -195,6 +196,9 @@ def _notes(facts: dict[str, Any]) -> Iterator[str]:
     """Yield a line for each thing that the user of the files must know."""
     for index, motor in enumerate(facts["motors"]):
         yield f"motor {index} {motor['motor']}: action {motor['action']} {motor['joint']}"
+    if facts["held"]:
+        names = ", ".join(f"{name} at {angle:.3g}" for name, angle in facts["held"].items())
+        yield f"held in training, and not moved by run.py: {names}"
     if facts["estimated"]:
         names = ", ".join(_ESTIMATED[name] for name in facts["estimated"])
         yield f"estimated from the feet that stand: {names}; --set sensors_only=true trains without them"

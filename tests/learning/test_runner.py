@@ -170,6 +170,12 @@ def test_motors_are_in_the_order_of_the_robots_file(tmp_path):
         assert motor["home"] == home[model.joint(motor["joint"]).qposadr[0]]
 
 
+def test_joints_outside_of_the_legs_are_told(tmp_path):
+    pytest.importorskip("onnx", reason="of the extra learn: make check-agents")
+    notes = runner_files.save(tmp_path, made(imports.with_arm(), **SENSED))
+    assert notes[-1] == "held in training, and not moved by run.py: arm at 0"
+
+
 @pytest.mark.parametrize("settings", [{}, {"actions": "position"}])
 def test_motors_of_torque_get_the_torques_of_training(settings):
     network, player, environment = machine("tick", "walk", **SENSED, **settings)
