@@ -206,8 +206,6 @@ def run(
     write: Callable[[Output], None],
     command: Callable[[], tuple] = lambda: (0.0, 0.0, 0.0),
     steps: float = math.inf,
-    clock: Callable[[], float] = time.perf_counter,
-    sleep: Callable[[float], None] = time.sleep,
 ) -> str:
     """Ramp to the standing pose and act for some control steps, then relax. Return the reason of an earlier stop."""
     period = policy.facts["control_timestep"]
@@ -216,7 +214,7 @@ def run(
     sensors = read()
     first_angles = np.array(sensors.angles)
     step = 0
-    deadline = clock()
+    deadline = time.perf_counter()
     try:
         while step < ramp_steps + steps:
             sensors = read()
@@ -229,9 +227,9 @@ def run(
             else:
                 write(policy.act(sensors, command()))
             deadline += period
-            if clock() > deadline + MAX_LATENESS * period:
+            if time.perf_counter() > deadline + MAX_LATENESS * period:
                 return f"a control step took longer than {(1.0 + MAX_LATENESS) * period:g} s"
-            sleep(max(deadline - clock(), 0.0))
+            time.sleep(max(deadline - time.perf_counter(), 0.0))
         return ""
     finally:
         write(policy.relax(sensors))

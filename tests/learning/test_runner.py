@@ -223,14 +223,16 @@ class Robot:
         self.time += seconds
 
     def play(self, player, steps, command=lambda: (0.1, 0.0, 0.0)):
-        clock = {"clock": lambda: self.time, "sleep": self.sleep}
-        return runner.run(player, self.read, self.write, command, steps, **clock)
+        return runner.run(player, self.read, self.write, command, steps)
 
 
 @pytest.fixture
-def robot():
+def robot(monkeypatch):
     _, player, _ = machine(imports.quadruped(), "steer", **SENSED)
-    return player, Robot(player.facts, player.home + 0.1)
+    robot = Robot(player.facts, player.home + 0.1)
+    clock = types.SimpleNamespace(perf_counter=lambda: robot.time, sleep=robot.sleep)
+    monkeypatch.setattr(runner, "time", clock)
+    return player, robot
 
 
 def test_it_ramps_to_the_standing_pose_then_acts_at_the_rate(robot):
