@@ -20,6 +20,7 @@ KINDS = {int(geom): name for name, geom in GEOMS.items()}  # kinds of shapes by 
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))  # the quaternion of a part that is oriented as the one above
+_FIRST_HIDDEN_GROUP = 3  # of geoms; MuJoCo draws those below
 _TORSO_POSITIONS = 7  # numbers of the torso in qpos; those of the joints follow
 
 
@@ -166,7 +167,8 @@ def _shape(model: mujoco.MjModel, geom: int) -> Shape:
     kind = "hull"
     hull = None
     if model.geom_type[geom] == _MESH:
-        hull = _hull(model, model.geom_dataid[geom])
+        mesh = model.geom_dataid[geom]
+        hull = _hull(model, mesh) if model.mesh_graphadr[mesh] >= 0 else _whole_mesh(model, mesh)
     else:
         kind = KINDS[int(model.geom_type[geom])]
     return Shape(
@@ -194,6 +196,14 @@ def _hull(model: mujoco.MjModel, mesh: int) -> Hull:
     return Hull(points, triangles.reshape(-1, 3))
 
 
+def _whole_mesh(model: mujoco.MjModel, mesh: int) -> Hull:
+    """Return all triangles of a mesh that touches nothing, and hence has no hull."""
+    first_point = model.mesh_vertadr[mesh]
+    first_face = model.mesh_faceadr[mesh]
+    points = model.mesh_vert[first_point : first_point + model.mesh_vertnum[mesh]].astype(float)
+    return Hull(points, model.mesh_face[first_face : first_face + model.mesh_facenum[mesh]])
+
+
 def _material(model: mujoco.MjModel, name: str) -> Material:
     index = model.material(name).id
     return Material(
@@ -218,8 +228,8 @@ def _sketched_parts(model: mujoco.MjModel, body: Body) -> list[Part]:
     part_of_body = _nearest_parts(model, body)
     positions, orientations = part_frames(bare_parts)
     shapes_of_part: list[list[Shape]] = [[] for _ in bare_parts]
-    geoms_of_bodies = np.flatnonzero(model.geom_bodyid).tolist()  # without those of the world, which are the ground's
-    for geom in geoms_of_bodies:
+    is_shown = (model.geom_bodyid > 0) & (model.geom_group < _FIRST_HIDDEN_GROUP)  # those of the world are the ground's
+    for geom in np.flatnonzero(is_shown).tolist():
         part = part_of_body[int(model.geom_bodyid[geom])]
         to_part = orientations[part].T
         quaternion = np.empty(4)

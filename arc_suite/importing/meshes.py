@@ -73,6 +73,12 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
     return meshes
 
 
+def text_length(meshes: Mapping[int, Mesh]) -> int:
+    """Return how many characters meshes take in a source, each once."""
+    attributes_by_mesh = {(mesh.name, mesh.whole): mesh.attributes for mesh in meshes.values()}
+    return sum(_text_length(attributes) for attributes in attributes_by_mesh.values())
+
+
 def file_of(spec: mujoco.MjSpec, mesh) -> Path:
     """Return the file of a mesh."""
     return Path(spec.modelfiledir) / spec.meshdir / mesh.file

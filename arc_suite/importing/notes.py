@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
-from arc_suite.importing import drives, loops, trunk
+from arc_suite.importing import drives, loops, trunk, visual_meshes
 from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
@@ -51,7 +51,9 @@ def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) 
     for kind, count in _omission_counts(file, robot, stance).items():
         if count:
             yield f"left out: {count} {kind}"
-    yield "left out: contacts of the robot with itself; looks, as pictures show the colliders"
+    yield from visual_meshes.note(file.visuals)
+    lost_visuals = "" if file.visuals.meshes else "; looks, as pictures show the colliders"
+    yield f"left out: contacts of the robot with itself{lost_visuals}"
     yield from _world_notes(robot)
     wheels = _find_wheels(robot, stance)
     if wheels:

@@ -1,5 +1,6 @@
 """From the file of a robot to a compiled model with a free torso, whatever meshes the file names."""
 
+import copy
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -11,9 +12,10 @@ import mujoco
 from arc_suite import parsers
 from arc_suite.importing import bounds, inertias, kinds, references, units, urdf
 from arc_suite.importing.facing import LEVEL, Facing, turn_torso
-from arc_suite.importing.meshes import Mesh, file_of, meshes_of
+from arc_suite.importing.meshes import Mesh, file_of, meshes_of, text_length
 from arc_suite.importing.tree import FREE
-from arc_suite.robots.spec import SpecError
+from arc_suite.importing.visual_meshes import Visuals, read_visuals
+from arc_suite.robots.spec import MAX_SOURCE, SpecError
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _HEIGHT_FIELD = mujoco.mjtGeom.mjGEOM_HFIELD
@@ -22,6 +24,7 @@ _REASONS = (
     (r"mass and inertia of moving bodies.*?Element name '([^']*)'", "body {!r} moves, and has no mass or no inertia"),
     (r"repeated name '(world)' in body", "a body has the name {!r}, which is that of the scene; rename it"),
 )
+_MAX_TEXT_WITH_VISUALS = MAX_SOURCE // 2  # characters of the meshes of colliders, next to which visual ones have room
 _LINE_NUMBER = re.compile(r",? line \d+")  # in MuJoCo's errors
 
 _Result = TypeVar("_Result")
@@ -34,6 +37,7 @@ class RobotFile(NamedTuple):
         model: compiled, with a free joint at the torso.
         root: body of the torso.
         meshes: meshes of geoms whose shape is a mesh, by geom.
+        visuals: visual meshes.
         order: names of joints in the order of the file; empty if the model has that order.
         driven: names of the joints that a URDF drives; empty if it does not say.
         notes: one line for each thing that is left out or repaired.
@@ -44,6 +48,7 @@ class RobotFile(NamedTuple):
     model: mujoco.MjModel
     root: int
     meshes: dict[int, Mesh]
+    visuals: Visuals
     order: tuple[str, ...]
     driven: frozenset[str]
     notes: tuple[str, ...]
@@ -82,6 +87,7 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     root_element, parts = bounds.parse(path)
     if root_element.tag not in ("mujoco", "robot"):
         raise SpecError(f"expected MJCF (mujoco) or URDF (robot), got an element {root_element.tag[:40]!r}")
+    visual_element = copy.deepcopy(root_element)  # a URDF is changed as it is read
     driven = urdf.find_driven_joints(root_element) if root_element.tag == "robot" else frozenset()
     spec, order, notes, mesh_files = _read_spec(path, root_element)
     bounds.check_mesh_files(mesh_files)
@@ -93,8 +99,13 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     model = units.scale_inertias(spec, model, torso, scale)
     model, inertia_notes = inertias.correct_inertias(spec, model, torso)
     model = turn_torso(spec, model, torso, facing)
+    meshes = meshes_of(spec, model)
+    visuals = Visuals()
+    if text_length(meshes) < _MAX_TEXT_WITH_VISUALS:
+        visuals = read_visuals(path, visual_element, model, torso, facing, scale)
     all_notes = (*notes, *mesh_notes, *torso_notes, *unit_notes, *inertia_notes)
-    return RobotFile(model, torso, meshes_of(spec, model), order, driven, all_notes, (*parts, *mesh_files), facing)
+    all_parts = tuple(dict.fromkeys((*parts, *mesh_files, *visuals.files)))
+    return RobotFile(model, torso, meshes, visuals, order, driven, all_notes, all_parts, facing)
 
 
 def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:

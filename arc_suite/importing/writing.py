@@ -20,6 +20,7 @@ from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Leg, Stance
 from arc_suite.importing.tree import HINGE, Robot
+from arc_suite.importing.visual_meshes import Visuals
 from arc_suite.models import source
 from arc_suite.models.mjcf_text import exact
 from arc_suite.robots import sources
@@ -87,6 +88,7 @@ def write_source(robot: Robot, stance: Stance, names: Names, file: RobotFile) ->
     for body in robot.bodies:
         parent = world if body == robot.root else elements[int(robot.model.body_parentid[body])]
         elements[body] = _add_body(parent, robot, body, names, mesh_geoms)
+    _add_visuals(root, elements, file.visuals)
     torso_place = _format_differences({"pos": robot.torso_place}, _BODY_DEFAULTS)
     SubElement(elements[robot.root], "site", name="torso", size=exact(0.01), **torso_place, **SITE)
     if file.facing != LEVEL:
@@ -145,6 +147,21 @@ def _add_meshes(root: ElementTree.Element, robot: Robot, meshes: dict[int, Mesh]
         pose = {"pos": mesh.position, "quat": mesh.orientation}
         geoms[geom] = {"type": "mesh", "mesh": names[key], **_format_differences(pose, _BODY_DEFAULTS)}
     return geoms
+
+
+def _add_visuals(root: ElementTree.Element, elements: Mapping[int, ElementTree.Element], visuals: Visuals) -> None:
+    """Add the visual meshes, in numbers of four digits, as nothing is computed with them."""
+    shown_visuals = [visual for visual in visuals.meshes if visual.body in elements]
+    asset = root.find("asset")
+    if shown_visuals and asset is None:
+        asset = ElementTree.Element("asset")
+        root.insert(list(root).index(root.find("worldbody")), asset)
+    for number, visual in enumerate(shown_visuals):
+        name = f"{sources.VISUAL}{number}"
+        points = " ".join(f"{coordinate:.4g}" for coordinate in visual.points.ravel())
+        faces = " ".join(map(str, visual.faces.ravel().tolist()))
+        SubElement(asset, "mesh", name=name, inertia="shell", vertex=points, face=faces)
+        SubElement(elements[visual.body], "geom", name=name, mesh=name, **sources.VISUAL_GEOM)
 
 
 def _add_body(

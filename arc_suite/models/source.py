@@ -17,6 +17,7 @@ from arc_suite.models import builder, visuals
 from arc_suite.models.mjcf_text import exact, to_mjcf
 from arc_suite.models.outline import CORNERS, outline
 from arc_suite.models.visuals import scene
+from arc_suite.robots import sources
 from arc_suite.robots.spec import Body, Servo, SpecError
 
 HOME = "home"  # keyframe of the standing pose
@@ -25,6 +26,7 @@ FILE_FRAME = "file"  # site with the orientation of the torso in the robot's fil
 _SECTIONS_OF_SCENES = ("option", "keyframe")  # a scene that takes the body has its own
 _TORSO = 1  # its index in the model
 _DECORATION = {"mass": "0", "group": "2", "contype": "0", "conaffinity": "0"}
+_HIDDEN_GROUP = "4"  # of colliders of parts with visual meshes; pictures do not show it
 _FOOT_COVER = 1.04  # radius of the sphere around a foot, in radii of the foot
 
 
@@ -42,6 +44,8 @@ def mjcf_tree(body: Body, arena: Arena | None, decorated: bool = False, releases
     """
     compile_source(body)  # raises the error
     root = ElementTree.fromstring(body.source)
+    if not decorated:
+        sources.remove_visuals(root)
     root.set("model", body.name)
     parts = {part.get("name"): part for part in root.iter("body")}
     torso = parts["torso"]
@@ -82,7 +86,8 @@ def compile_source(body: Body) -> mujoco.MjModel:
         SpecError: MuJoCo cannot read it, or it lacks the keyframe, a part or a joint of the body.
     """
     try:
-        model = mujoco.MjModel.from_xml_string(body.source)
+        root = sources.remove_visuals(ElementTree.fromstring(body.source))
+        model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
         # MuJoCo raises a KeyError for each name that the source lacks.
         model.key(HOME)
         for name in body.part_names:
@@ -240,10 +245,14 @@ def _center_of_mass(model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
 
 
 def _show_colliders(parts: dict[str, ElementTree.Element], body: Body) -> None:
-    """Give the colliders materials, and the feet spheres that can show a reward."""
+    """Give shapes materials, hide colliders next to visual meshes, and give feet spheres that can show a reward."""
     for name, part in parts.items():
-        for geom in part.findall("geom"):
+        geoms = part.findall("geom")
+        visuals = [geom for geom in geoms if geom.get("group") == sources.VISUAL_GROUP]
+        for geom in geoms:
             geom.set("material", "shell" if name == "torso" else "limb")
+            if visuals:
+                geom.set("group", "0" if geom in visuals else _HIDDEN_GROUP)
     for leg, name in zip(body.legs, body.foot_names, strict=True):
         cover = {"name": f"visual-{name}", "type": "sphere", "size": exact(_FOOT_COVER * leg.foot.radius)}
         SubElement(parts[name], "geom", **cover, material="glow", **_DECORATION)

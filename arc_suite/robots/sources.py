@@ -72,6 +72,12 @@ FLAGS = (
 )
 
 
+# Visual meshes and their geoms: names begin with this, and they touch nothing and weigh nothing.
+VISUAL = "visual"
+VISUAL_GROUP = "2"
+VISUAL_GEOM = {"type": "mesh", "mass": "0", "contype": "0", "conaffinity": "0", "group": VISUAL_GROUP}
+
+
 class _Element(NamedTuple):
     """The valid elements of a tag.
 
@@ -134,8 +140,9 @@ _ELEMENTS = {
             **_SOLVER_PARAMETERS,
             "type": ("sphere", "capsule", "cylinder", "ellipsoid", "box", "mesh"),
             "mesh": _NAME,
-            "contype": ("1",),
+            "contype": ("0", "1"),
             "conaffinity": ("0",),
+            "group": (VISUAL_GROUP,),
             "size": _SIZE,
             **dict.fromkeys(("mass", "friction"), _AMOUNT),
             **dict.fromkeys(("condim", "priority", "solmix", "margin", "gap"), _NUMBERS),
@@ -167,6 +174,16 @@ def check(body: Body) -> Body:
         _check_elements(root)
         _check_parts(root, body)
     return body
+
+
+def remove_visuals(root: ElementTree.Element) -> ElementTree.Element:
+    """Remove the visual meshes of a source from its tree, and return it: no dynamics depend on them."""
+    for parent in [element for element in root.iter() if element.tag in ("asset", "body")]:
+        for child in list(parent):
+            is_visual_mesh = child.tag == "mesh" and child.get("name", "").startswith(VISUAL)
+            if is_visual_mesh or (child.tag == "geom" and child.get("group") == VISUAL_GROUP):
+                parent.remove(child)
+    return root
 
 
 def _fail(reason: str) -> NoReturn:

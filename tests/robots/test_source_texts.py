@@ -36,7 +36,7 @@ REFUSED = {
     (KNEE, 'name="l1_knee"'): "expected a joint 'l1_joint3'",
     (KNEE, 'name="l1_joint2"'): "the joint 'l1_joint2' occurs twice",
     ('name="l1_foot" size', 'name="l1_toe" size'): "expected a site 'l1_foot'",
-    ('contype="1"', 'contype="3"'): "geom 'torso_geom0': contype: expected one of 1, got '3'",
+    ('contype="1"', 'contype="3"'): "geom 'torso_geom0': contype: expected one of 0, 1, got '3'",
     ('cone="elliptic"', 'cone="elliptic" iterations="1000000000"'): (
         "option '': iterations: expected an integer up to 10000, got '1000000000'"
     ),

@@ -1,0 +1,193 @@
+"""Visual meshes of a robot's file, simplified so that they stay with the body: pictures, clips and pages show them."""
+
+import contextlib
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.importing import bounds, units, urdf
+from arc_suite.importing.facing import Facing
+from arc_suite.importing.meshes import file_of
+
+_MAX_MESHES = 100  # with more, a robot shows its colliders
+_MAX_FILE_BYTES = 1 << 25  # of all files; larger ones take too long to read
+_MAX_POINTS = 8000  # of all meshes of a body, about 400 kB of its source
+_MIN_POINTS = 60  # of one mesh
+_FINEST_GRID = 256  # cells along the longest side of a mesh
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
+
+
+class Visual(NamedTuple):
+    """A visual mesh.
+
+    Attributes:
+        body: body of the file's model that shows it.
+        points: (n, 3) in the body's frame, m.
+        faces: (m, 3) indices of points.
+    """
+
+    body: int
+    points: np.ndarray
+    faces: np.ndarray
+
+
+class Visuals(NamedTuple):
+    """The visual meshes of a robot.
+
+    Attributes:
+        meshes: simplified.
+        files: files that were read.
+        point_count: number of points in these files.
+    """
+
+    meshes: tuple[Visual, ...] = ()
+    files: tuple[Path, ...] = ()
+    point_count: int = 0
+
+
+def read_visuals(
+    path: Path, root_element: ElementTree.Element, model: mujoco.MjModel, torso: int, facing: Facing, scale: float
+) -> Visuals:
+    """Return the visual meshes of a file; none if any cannot be read.
+
+    Args:
+        path: path of the file.
+        root_element: its root, as in the file; a URDF is changed.
+        model: model of the file, in whose bodies they are.
+        torso: body of the torso.
+        facing: axes of the file's torso that point ahead and up.
+        scale: factor of all lengths.
+    """
+    with contextlib.suppress(Exception):  # no robot is refused for what it looks like
+        spec = _read_visual_urdf(root_element, path.parent) if root_element.tag == "robot" else _read_visual_mjcf(path)
+        files = tuple(dict.fromkeys(file_of(spec, mesh) for mesh in spec.meshes if mesh.file))
+        bounds.check_mesh_files(files)
+        is_small = sum(file.stat().st_size for file in files) <= _MAX_FILE_BYTES
+        if 0 < len(spec.meshes) <= _MAX_MESHES and is_small:
+            units.scale_lengths(spec, scale)
+            return _collect_visuals(spec, model, torso, facing, files)
+    return Visuals()
+
+
+def _read_visual_urdf(robot: ElementTree.Element, folder: Path) -> mujoco.MjSpec:
+    """Return the spec of a URDF with its visual shapes as its only shapes."""
+    for link in robot.findall("link"):
+        for collision in link.findall("collision"):
+            link.remove(collision)
+        for visual in link.findall("visual"):
+            visual.tag = "collision"
+    text, *_ = urdf.repair_urdf(robot, folder)
+    return _keep_meshes(mujoco.MjSpec.from_string(text))
+
+
+def _read_visual_mjcf(path: Path) -> mujoco.MjSpec:
+    """Return the spec of an MJCF file with its visual meshes as its only shapes."""
+    spec = mujoco.MjSpec.from_file(str(path))
+    for geom in list(spec.geoms):
+        if geom.contype or geom.conaffinity:
+            spec.delete(geom)
+    return _keep_meshes(spec)
+
+
+def _keep_meshes(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """Return a spec with its bodies and their meshes alone; masses do not matter here."""
+    for kind in (spec.actuators, spec.sensors, spec.tendons, spec.equalities, spec.pairs, spec.excludes, spec.keys):
+        for element in list(kind):
+            spec.delete(element)
+    for geom in list(spec.geoms):
+        geom.material = ""
+        if geom.type != _MESH:
+            spec.delete(geom)
+    for element in (*spec.materials, *spec.textures, *spec.skins, *spec.hfields, *spec.cameras, *spec.lights):
+        spec.delete(element)
+    names = {geom.meshname for geom in spec.geoms}
+    for mesh in list(spec.meshes):
+        if mesh.name not in names:
+            spec.delete(mesh)
+    spec.compiler.discardvisual = False
+    spec.compiler.boundmass = 1.0
+    spec.compiler.boundinertia = 1.0
+    return spec
+
+
+def _collect_visuals(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int, facing: Facing, files: tuple[Path, ...]
+) -> Visuals:
+    """Return the meshes of a spec whose bodies are those of the file's model."""
+    triangles = {mesh.name: _read_mesh(spec, mesh) for mesh in spec.meshes}
+    geoms = [(geom, geom.meshname) for geom in spec.geoms]
+    for geom, _ in geoms:  # balls lie where the file puts meshes, and are compiled at once
+        geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
+        geom.meshname = ""
+        geom.size[0] = 1.0
+    for mesh in list(spec.meshes):
+        spec.delete(mesh)
+    places = spec.compile()
+    if [places.body(body).name for body in range(places.nbody)] != [
+        model.body(body).name for body in range(model.nbody)
+    ]:
+        return Visuals()
+    whole_visuals = []
+    for geom, mesh_name in geoms:
+        body = int(places.geom_bodyid[geom.id])
+        if places.body_rootid[body] == torso:
+            points, faces = triangles[mesh_name]
+            points = points @ rotations.matrix(places.geom_quat[geom.id]).T + places.geom_pos[geom.id]
+            whole_visuals.append(Visual(body, points @ facing.rotation.T if body == torso else points, faces))
+    point_count = sum(len(visual.points) for visual in whole_visuals)
+    share = min(1.0, _MAX_POINTS / max(point_count, 1))
+    visuals = [_simplify(visual, max(_MIN_POINTS, int(share * len(visual.points)))) for visual in whole_visuals]
+    return Visuals(tuple(visual for visual in visuals if len(visual.faces)), files, point_count)
+
+
+def _read_mesh(spec: mujoco.MjSpec, mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points (n, 3) and faces (m, 3) of a mesh, as the file places it."""
+    whole_mesh = mujoco.MjSpec.from_file(str(file_of(spec, mesh))).meshes[0] if mesh.file else mesh
+    points = np.array(whole_mesh.uservert, np.float32).reshape(-1, 3).astype(float)
+    faces = np.array(whole_mesh.userface, np.int64).reshape(-1, 3)
+    points = (points - mesh.refpos) @ rotations.matrix(mesh.refquat)
+    return points * mesh.scale, faces
+
+
+def _simplify(visual: Visual, max_points: int) -> Visual:
+    """Return a mesh whose points in the same cell of a grid are one: the finest grid with few enough points."""
+    corner = visual.points.min(axis=0)
+    extent = max(float(np.ptp(visual.points, axis=0).max()), 1e-9)
+    clusters = np.zeros(len(visual.points), np.int64)
+    coarse_cells = 1
+    fine_cells = _FINEST_GRID
+    while fine_cells - coarse_cells > 1:
+        cells = (coarse_cells + fine_cells) // 2
+        finer_clusters = _cluster((visual.points - corner) * cells / extent)
+        if finer_clusters.max() < max_points:
+            clusters = finer_clusters
+            coarse_cells = cells
+        else:
+            fine_cells = cells
+    counts = np.bincount(clusters)
+    points = np.stack([np.bincount(clusters, column) / counts for column in visual.points.T], axis=1)
+    faces = clusters[visual.faces]
+    is_flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    return Visual(visual.body, points, np.unique(faces[~is_flat], axis=0))
+
+
+def _cluster(coordinates: np.ndarray) -> np.ndarray:
+    """Return the index of the cell of each point (n, 3), in which a cell is 1 wide."""
+    x, y, z = np.floor(coordinates).astype(np.int64).T
+    width = 2 * _FINEST_GRID
+    _, clusters = np.unique((x * width + y) * width + z, return_inverse=True)
+    return clusters
+
+
+def note(visuals: Visuals) -> Sequence[str]:
+    """Return a line on the visual meshes, if there are any."""
+    if not visuals.meshes:
+        return ()
+    count = sum(len(visual.points) for visual in visuals.meshes)
+    reduction = f", with {count} of {visuals.point_count} points" if count < visuals.point_count else ""
+    return (f"looks: {len(visuals.meshes)} visual meshes{reduction}, for pictures, clips and pages",)

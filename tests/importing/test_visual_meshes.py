@@ -1,0 +1,152 @@
+"""Visual meshes stay with an imported body: pictures, clips and pages show them, and no dynamics change."""
+
+import importlib.util
+import pathlib
+import struct
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+from arc_suite import models, registry
+from arc_suite.animation import parts
+from arc_suite.importing import import_robot
+from arc_suite.robots.spec_files import body_from_json, body_to_json
+
+TESTS = pathlib.Path(__file__).parents[1]
+FOLDER = TESTS / "fixtures" / "robots"
+GO2, A1 = FOLDER / "go2_like.xml", FOLDER / "a1_like.urdf"
+WEDGE = np.array([(-0.15, -0.1, 0.0), (0.15, -0.1, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.2)])
+FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+TRUNK_VISUAL = (
+    '<visual><origin xyz="0 0 0"/><geometry><mesh filename="package://quadruped_description/meshes/trunk.dae"/>'
+)
+LEFT_OUT = "left out: contacts of the robot with itself; looks, as pictures show the colliders"
+
+
+def write_stl(path, points, faces):
+    rows = [struct.pack("<12fH", 0, 0, 0, *points[list(face)].ravel(), 0) for face in faces]
+    path.write_bytes(bytes(80) + struct.pack("<I", len(faces)) + b"".join(rows))
+
+
+def write_urdf(folder, points=WEDGE, faces=FACES, origin="0.1 0 0", more=""):
+    """Write a robot with a visual mesh on its trunk, and return its path."""
+    write_stl(folder / "trunk.stl", points, faces)
+    text = A1.read_text()
+    assert TRUNK_VISUAL in text
+    visual = f'<visual><origin xyz="{origin}"/><geometry><mesh filename="trunk.stl"/>'
+    path = folder / "robot.urdf"
+    path.write_text(text.replace(TRUNK_VISUAL, visual).replace("</robot>", f"{more}</robot>"))
+    return path
+
+
+def write_mjcf(folder):
+    """Write a robot with a visual mesh on a calf, and return its path."""
+    write_stl(folder / "calf.stl", WEDGE, FACES)
+    calf = '<body name="FL_calf" pos="0 0 -0.213">'
+    text = GO2.read_text().replace(calf, f'{calf}<geom class="looks" type="mesh" mesh="calf" pos="0 0 -0.1"/>')
+    path = folder / "robot.xml"
+    path.write_text(text.replace("<asset>", '<asset><mesh name="calf" file="calf.stl" scale="0.2 0.2 0.5"/>'))
+    return path
+
+
+def visual_points(body, part):
+    """Return the points of a body's visual meshes on a part, in its frame."""
+    model = mujoco.MjModel.from_xml_string(body.source)
+    (geom,) = [
+        geom
+        for geom in range(model.ngeom)
+        if model.geom_group[geom] == 2 and model.geom_bodyid[geom] == model.body(part).id
+    ]
+    mesh = model.geom_dataid[geom]
+    points = model.mesh_vert[model.mesh_vertadr[mesh] : model.mesh_vertadr[mesh] + model.mesh_vertnum[mesh]]
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+    return points @ rotation.reshape(3, 3).T + model.geom_pos[geom]
+
+
+def in_order(points):
+    return np.array(sorted(np.round(points, 4).tolist()))
+
+
+def same_bits(path, body):
+    spec = importlib.util.spec_from_file_location("reference", TESTS / "robots_of_others" / "reference.py")
+    module = sys.modules.setdefault("reference", importlib.util.module_from_spec(spec))
+    spec.loader.exec_module(module)
+    return module.same_bits(path, body)
+
+
+def test_a_mesh_of_a_urdf_stays_in_its_place(tmp_path):
+    path = write_urdf(tmp_path)
+    body, notes = import_robot(path)
+    assert "looks: 1 visual meshes, for pictures, clips and pages" in notes
+    assert in_order(visual_points(body, "torso")) == pytest.approx(in_order(WEDGE + (0.1, 0.0, 0.0)), abs=1e-3)
+    assert same_bits(path, body) == 200
+    assert body_from_json(body_to_json(body)) == body
+
+
+def test_a_mesh_of_an_mjcf_file_stays_in_its_place(tmp_path):
+    body, notes = import_robot(write_mjcf(tmp_path))
+    assert "looks: 1 visual meshes, for pictures, clips and pages" in notes
+    points = WEDGE * (0.2, 0.2, 0.5) - (0.0, 0.0, 0.1)
+    assert in_order(visual_points(body, "l1_link3")) == pytest.approx(in_order(points), abs=1e-3)
+
+
+def test_it_turns_and_grows_with_the_robot(tmp_path):
+    turn = '<link name="first"/><joint name="turn" type="fixed"><origin rpy="0 0 1.5707963267948966"/>'
+    path = write_urdf(tmp_path, more=f'{turn}<parent link="first"/><child link="base"/></joint>')
+    points = visual_points(import_robot(path).body, "torso")
+    assert in_order(points) == pytest.approx(in_order(WEDGE + (0.1, 0.0, 0.0)), abs=1e-3)
+    points = visual_points(import_robot(path, scale=0.5).body, "torso")
+    assert in_order(points) == pytest.approx(in_order(0.5 * (WEDGE + (0.1, 0.0, 0.0))), abs=1e-3)
+
+
+def test_dynamics_have_no_visual_meshes_and_pictures_have_them_in_place_of_colliders(tmp_path):
+    body = import_robot(write_urdf(tmp_path)).body
+    bare = models.model_spec(body).compile()
+    assert bare.nmesh == 0 and bare.ngeom == models.model_spec(import_robot(A1).body).compile().ngeom
+    decorated = models.model_spec(body, decorated=True).compile()
+    groups = {decorated.geom(geom).name: decorated.geom_group[geom] for geom in range(decorated.ngeom)}
+    assert groups["visual0"] == 0 and groups["torso_geom0"] == 4 and groups["l1_link3_geom0"] == 0
+    torso = next(part for part in parts.describe_body(body)[0] if part.name == "torso")
+    (shape,) = torso.shapes
+    assert (shape.kind, len(shape.hull.points), len(shape.hull.triangles)) == ("hull", 4, 4)
+
+
+def test_a_large_mesh_gets_fewer_points(tmp_path):
+    rows, columns = 120, 160
+    polar, azimuth = np.meshgrid(np.linspace(0.0, np.pi, rows), np.linspace(0.0, 2.0 * np.pi, columns), indexing="ij")
+    ball = 0.2 * np.stack((np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)), axis=-1)
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    faces = np.concatenate(
+        [
+            np.stack((corner, corner + columns, corner + 1), 1),
+            np.stack((corner + 1, corner + columns, corner + columns + 1), 1),
+        ]
+    )
+    body, notes = import_robot(write_urdf(tmp_path, ball.reshape(-1, 3), faces.tolist()))
+    (note,) = [note for note in notes if note.startswith("looks: 1 visual meshes, with ")]
+    points = visual_points(body, "torso")
+    assert 2000 < len(points) <= 8000 and len(body.source) < 1_000_000, note
+    assert np.linalg.norm(points - (0.1, 0.0, 0.0), axis=1) == pytest.approx(0.2, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"solid nothing", bytes(80) + struct.pack("<I", 5_000_000)], ids=["empty", "text", "lie"]
+)
+def test_a_mesh_that_cannot_be_read_keeps_no_robot_out(data, tmp_path):
+    path = write_urdf(tmp_path)
+    (tmp_path / "trunk.stl").write_bytes(data)
+    body, notes = import_robot(path)
+    assert LEFT_OUT in notes and body.source == import_robot(A1).body.source
+    (tmp_path / "trunk.stl").unlink()
+    assert LEFT_OUT in import_robot(path).notes
+
+
+def test_the_file_of_a_mesh_is_followed(tmp_path):
+    path = write_urdf(tmp_path)
+    body = registry.body_of(path)
+    assert registry.body_of(path) is body
+    write_stl(tmp_path / "trunk.stl", 2.0 * WEDGE, FACES)
+    assert registry.body_of(path) != body
