@@ -26,6 +26,7 @@ from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
 
 _LOOKS_AHEAD = (0.0, 0.5, 1.0)  # shares of the look ahead at which a foot in swing sees the ground
 _MAX_STEP = 0.5  # standing heights, between the ground at a foot and that under the torso
+_TRENCH_DEPTH = 0.5  # standing heights below most of the ground under the torso; feet do not reach further down
 _MAX_LEVELING = 0.4  # standing heights, of a foot in swing
 _FULL_ROUGHNESS = 0.06  # standing heights, of the ground's deviation from a plane, at which corrections have full size
 _MAX_TILT_SUM = 0.4  # rad cycles
@@ -57,8 +58,8 @@ class ClimbingParameters(NamedTuple):
     tilt_rate: float = 0.0
     tilt_sum: float = 0.0
     leveling: float = 0.0
-    slope: float = 0.0
-    preview: float = 0.25
+    slope: float = 0.6
+    preview: float = 0.4
 
 
 class ClimbingState(NamedTuple):
@@ -115,7 +116,8 @@ class Climbing(Stepping):
     def follow_request(self, state: ClimbingState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
-        heights = observation["scan"] * self.mechanics.height  # m, over the ground of a torso at the standing height
+        scan = observation["scan"] * self.mechanics.height  # m, over the ground of a torso at the standing height
+        heights = self.fill_trenches(scan)
         # A product of matrices would round otherwise in a batch.
         plane = (heights[:, None] * self.ground_fit).sum(axis=-1)
         leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
@@ -135,6 +137,13 @@ class Climbing(Stepping):
 
         joint_angles, target_angles, angle_changes = self.move_feet(state.joint_angles, soles, velocity)
         return ClimbingState(joint_angles, tilt_sum), target_angles, angle_changes
+
+    def fill_trenches(self, heights):
+        """Return heights of the ground (environments, points), m, where trenches are as high as the ground about them."""
+        xp = heights.__array_namespace__()
+        level = xp.median(heights[:, self.is_under_torso], axis=-1)[:, None]
+        is_trench = heights < level - _TRENCH_DEPTH * self.mechanics.height
+        return xp.where(is_trench, level, heights)
 
     def _measure_roughness(self, heights, plane):
         """Return how far the ground between the feet deviates from a plane, (environments, 1) from 0 to 1."""

@@ -10,6 +10,7 @@ from arc_suite.cpg.planner import PlanningParameters
 from arc_suite.cpg.prescribed import Bend, Preset
 from arc_suite.cpg.sighted import SightedParameters
 from arc_suite.cpg.stepping import SteppingParameters
+from arc_suite.cpg.straight import StraightParameters
 from arc_suite.robots.gaits import TRIPOD, TROT
 
 # Leaps that a generated body chooses from. Its feet stand wide, so that it steps over trenches of the standing height.
@@ -35,6 +36,7 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
     reactive = steered._replace(integral=0.0)
     planned = PlanningParameters(steered)
     return {
+        "straight": StraightParameters(steered),
         "steered": steered,
         "surefooted": surefooted,
         "climbing": climbing,
@@ -72,9 +74,10 @@ DEFAULTS_OF_SERVOS = {
     "slow": 0.18,
     "medium": 0.24,
     "fast": 0.3,
+    "straight": StraightParameters(_STEERED._replace(lift=0.3, integral=0.3)),
     "steered": _STEERED,
     "surefooted": _STEERED,  # a wide stance costs some of the way over uneven ground
-    "climbing": ClimbingParameters(_STEERED),
+    "climbing": ClimbingParameters(_STEERED, slope=0.0, preview=0.25),
     "braced": _STEERED._replace(wider=0.5, lower=0.25),
     "balanced": _STEERED,  # the former name of surefooted
     "reactive": _STEERED._replace(integral=0.0),
@@ -162,7 +165,9 @@ PRESETS["leaper"] |= _command_presets(
 )
 PRESETS["leaper"]["braced"] = PRESETS["leaper"]["steered"]
 PRESETS["leaper"]["surefooted"] = PRESETS["leaper"]["steered"]._replace(integral=0.2, lean=0.4)
-PRESETS["leaper"]["climbing"] = ClimbingParameters(PRESETS["leaper"]["surefooted"], tilt_rate=0.2)
+PRESETS["leaper"]["climbing"] = ClimbingParameters(
+    PRESETS["leaper"]["surefooted"], tilt_rate=0.2, slope=0.0, preview=0.25
+)
 PRESETS["leaper"]["balanced"] = PRESETS["leaper"]["surefooted"]  # its former name
 
 # On level ground, with feet that touch down when the gait schedules it, for clips. Over the legs of Bastion, which have

@@ -12,6 +12,7 @@ from arc_suite.cpg.prescribed import PrescribedLaw, Preset
 from arc_suite.cpg.presets import DEFAULTS, DEFAULTS_OF_FOUR_LEGS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
+from arc_suite.cpg.straight import Straight, StraightParameters
 from arc_suite.cpg.stride_law import StrideLaw
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -21,15 +22,21 @@ LAWS: dict[type, Any] = {
     Preset: PrescribedLaw,
     float: StrideLaw,
     SteppingParameters: Stepping,
+    StraightParameters: Straight,
     ClimbingParameters: Climbing,
     SightedParameters: Sighted,
     LeapingParameters: Leaping,
     PlanningParameters: Planned,
 }
 
-_STRAIGHT_PRESETS = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
+_STRAIGHT_PRESETS = ("refined", "tuned", "straight", "medium")  # presets that walk straight ahead, the best first
 # Presets in place of others whose state networks without memory cannot learn.
-_MEMORYLESS = {"steered": "reactive", "braced": "reactive", "climbing": "surefooted"}
+_MEMORYLESS = {
+    "straight": "medium",
+    "steered": "reactive",
+    "braced": "reactive",
+    "climbing": "surefooted",
+}
 _COMMAND_BLOCKS = ("command", "pose", "gait", "goal")  # blocks of the observation that show what a task commands
 
 

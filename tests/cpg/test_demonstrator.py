@@ -61,7 +61,7 @@ LEFT = ("l1", "l2", "l3", "fl", "rl")
         (ROBOTS["leaper"], "rough", {}, "climbing"),
         (ROBOTS["tick"], "gaps", {}, "sighted"),
         (ROBOTS["tick"], "navigate", {}, "planned"),
-        (generator.generate(4, 2), "walk", {}, "medium"),
+        (generator.generate(4, 2), "walk", {}, "straight"),
     ],
 )
 def test_whom_to_watch_and_to_imitate(body, task, settings, preset):

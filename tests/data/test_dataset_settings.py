@@ -12,7 +12,7 @@ from arc_suite.envs.setup import Setup
 def test_ids_by_default_are_minaris():
     named = {
         "arc_suite/queen/walk/cpg-refined-v0": data.DatasetSettings(QUEEN),
-        "arc_suite/spider/walk/cpg-medium-v0": data.DatasetSettings(SPIDER),
+        "arc_suite/spider/walk/cpg-straight-v0": data.DatasetSettings(SPIDER),
         "arc_suite/tick/steer/cpg-steered-v0": data.DatasetSettings(Setup.of("tick", "steer")),
         "arc_suite/tick/steer/random-v0": data.DatasetSettings(Setup.of("tick", "steer"), "random", ()),
         "arc_suite/queen/walk/cpg-medium-fast-noise0_1-v0": data.DatasetSettings(

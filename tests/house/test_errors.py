@@ -26,7 +26,7 @@ PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 TASK_NAMES = f"(there are: {', '.join(TASKS)})"
 DOMAINS = f"(there are: {', '.join(registry.robot_words())})"
 PRESETS = (
-    "(there are: slow, medium, fast, tuned, refined, steered, surefooted, climbing, braced, reactive, sighted, "
+    "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, "
     "leaping, planned)"
 )
 CAMERAS, NAMED = "['tracking', 'portrait', 'profile', 'eye']", "(there are: tracking, portrait, profile, eye)"
