@@ -139,7 +139,7 @@ class Climbing(Stepping):
         return ClimbingState(joint_angles, tilt_sum), target_angles, angle_changes
 
     def fill_trenches(self, heights):
-        """Return heights of the ground (environments, points), m, where trenches are as high as the ground about them."""
+        """Return heights of the ground (environments, points), m, with trenches as high as the ground about them."""
         xp = heights.__array_namespace__()
         level = xp.median(heights[:, self.is_under_torso], axis=-1)[:, None]
         is_trench = heights < level - _TRENCH_DEPTH * self.mechanics.height

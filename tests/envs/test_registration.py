@@ -188,8 +188,8 @@ for program, *arguments in (
     assert lines == [
         *(f"{program} 0" for program in ("evaluate", "style", "style", "collect", "collect", "render")),
         "evaluate 1 arc-suite evaluate: unknown preset 'prwl'; did you mean 'prowl'? "
-        "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, "
-        "leaping, planned, in_step, balanced, prowl)",
+        "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, "
+        "sighted, leaping, planned, in_step, balanced, prowl)",
     ]
 
 

@@ -15,8 +15,8 @@ from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 
 ALL = (
-    "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, "
-    "in_step, balanced"
+    "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, "
+    "planned, in_step, balanced"
 )
 GENERAL = "slow, medium, fast, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned"
 
