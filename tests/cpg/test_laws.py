@@ -20,6 +20,7 @@ from arc_suite.tasks.suite import Rough
 PRESETS = [
     ("queen", "walk", "refined"),
     (generator.generate(6, 3), "walk", "medium"),
+    (generator.generate(4, 3), "walk", "straight"),
     ("tick", "steer", "steered"),
     ("leaper", "steer", "surefooted"),
     ("queen", "gaps", "sighted"),
