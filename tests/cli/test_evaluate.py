@@ -66,7 +66,7 @@ def test_the_preset_is_the_one_that_suits_task_and_body(tmp_path):
     path = tmp_path / "a.json"
     for arguments, preset in (
         (["--robot=queen"], "refined"),
-        (["--legs=4"], "medium"),
+        (["--legs=4"], "straight"),
         (["--robot=leaper", "--task=rough"], "climbing"),
         (["--robot=queen", "--preset=slow"], "slow"),
     ):
