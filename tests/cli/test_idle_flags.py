@@ -32,7 +32,7 @@ ALWAYS = {
     "until_score threads tensorboard output",
     "study": "runs results report",
     "benchmark": "results",
-    "export": f"{BODY} {SET} vecnormalize output",
+    "export": f"{BODY} {SET} vecnormalize output runner",
     "transfer": f"{SET} policy families output",
     "design": "goal task around mass span height power map bodies random steps seed processes pages output",
     "doctor": "",
