@@ -167,7 +167,7 @@ def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, a
     armature_notes: tuple[str, ...] = ()
     if armature is not None:
         robot, armature_notes = armatures.add_armature(robot, armature)
-    servos, motor_notes = motors.find_motors(robot, stance)
+    servos, motor_notes = motors.find_motors(robot, stance, file.speeds)
     names = choose_names(robot, stance.legs)
     order = _order_joints(robot, stance, file.order)
 

@@ -1,7 +1,8 @@
 """The servos of an imported robot: gains and torque limits of the file where it has them, else by rule."""
 
+import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple, Self
 
 import mujoco
@@ -10,7 +11,7 @@ import numpy as np
 from arc_suite.importing.drives import find_drives
 from arc_suite.importing.poses import Leg, Stance
 from arc_suite.importing.tree import Robot
-from arc_suite.models.standing import foot_loads
+from arc_suite.models.standing import GRAVITY, foot_loads
 from arc_suite.robots.spec import Servo
 
 # The rule for stiffness: an error of so many radians makes a servo give this multiple of the load. The load of a joint
@@ -29,6 +30,10 @@ _PLACEHOLDER_TORQUE = 1000.0  # N m, and more
 _MAX_LOADS_PER_LIMIT = 200.0  # in loads of the joint in the leg that bears most
 
 _MIN_RANGE_LOSS = 0.01  # rad, by which controls reach less far than a joint, for a note
+
+# Speeds that are placeholders: these and faster ones, and those below a share of sqrt(g / h) of the standing height h.
+_PLACEHOLDER_SPEED = 100.0  # rad/s
+_MIN_SWING = 0.5
 
 # Origins of a limit. Other origins are names of attributes in the file.
 _BY_RULE = "sized"
@@ -84,8 +89,14 @@ class _Limit(NamedTuple):
         return cls(float(low), float(high), origin)
 
 
-def find_motors(robot: Robot, stance: Stance) -> Motors:
-    """Return the servos of a robot's joints, without those that are passive."""
+def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Motors:
+    """Return the servos of a robot's joints, without those that are passive.
+
+    Args:
+        robot: robot of the file.
+        stance: stance in which it stands.
+        speeds: speeds, rad/s, at which joints get no torque, by name in the file.
+    """
     inertias, loads = _mechanics(robot, stance)
     gains_of_file = _find_gains(robot)
     limits_of_file = _find_limits(robot)
@@ -106,16 +117,31 @@ def find_motors(robot: Robot, stance: Stance) -> Motors:
             if gains is None:
                 joint_damping = float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
                 gains = _gains_by_rule(load, inertias[joint], limit.torque, joint_damping)
-            servos[joint] = Servo(stiffness=gains.stiffness, damping=gains.damping, limit=limit.torque)
+            speed = speeds.get(robot.joint_name(joint))
+            servos[joint] = Servo(
+                stiffness=gains.stiffness,
+                damping=gains.damping,
+                limit=limit.torque,
+                no_load_speed=speed if _is_speed(speed, stance.height) else None,
+            )
             origins[joint] = limit.origin
     all_notes = (
         *_limit_notes(stance.joints, servos, origins),
+        *_speed_notes(robot, stance.joints, servos, speeds),
         *_one_sided_notes(robot, stance.joints, limits_of_file),
         *_mirror_notes(robot, stance.joints),
         *_range_notes(robot, gains_of_file),
         _gain_note(stance.joints, gains_of_file),
     )
     return Motors(servos, all_notes)
+
+
+def _is_speed(speed: float | None, height: float) -> bool:
+    """Return whether a speed, rad/s, is one of a motor, and no placeholder, in a robot that stands at a height, m."""
+    if speed is None:
+        return False
+    slowest = _MIN_SWING * math.sqrt(GRAVITY / height)
+    return slowest <= speed < _PLACEHOLDER_SPEED
 
 
 def _group_joints(robot: Robot, stance: Stance) -> list[tuple[int, ...]]:
@@ -261,6 +287,24 @@ def _range_notes(robot: Robot, gains_of_file: dict[int, _Gains]) -> Iterator[str
     if joints:
         name = robot.joint_name(joints[0])
         yield f"left out: ctrlrange of {len(joints)} position actuators, less than the joint's range, such as {name}"
+
+
+def _speed_notes(
+    robot: Robot, joints_of_legs: Sequence[int], servos: dict[int, Servo], speeds: Mapping[str, float]
+) -> Iterator[str]:
+    """Yield a line on the speeds of legs' motors that are used, and on those that are placeholders."""
+    used = []
+    unused = []
+    for joint in joints_of_legs:
+        speed = speeds.get(robot.joint_name(joint))
+        if joint in servos and speed is not None:
+            (unused if servos[joint].no_load_speed is None else used).append(speed)
+    if used:
+        span = format_span(min(used), max(used))
+        yield f"speeds: torques of {len(used)} motors fall to 0 at {span} rad/s, from velocity"
+    if unused:
+        span = format_span(min(unused), max(unused))
+        yield f"speeds: {span} rad/s of {len(unused)} motors is a placeholder, torques do not fall with speed"
 
 
 def format_span(low: float, high: float) -> str:

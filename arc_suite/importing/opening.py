@@ -40,6 +40,7 @@ class RobotFile(NamedTuple):
         visuals: visual meshes.
         order: names of joints in the order of the file; empty if the model has that order.
         driven: names of the joints that a URDF drives; empty if it does not say.
+        speeds: speeds, rad/s, that a URDF gives as the limits of joints, by name.
         notes: one line for each thing that is left out or repaired.
         parts: all files that it depends on, with those that were looked for and are missing.
         facing: axes of the file's torso that are x and z in the model.
@@ -51,6 +52,7 @@ class RobotFile(NamedTuple):
     visuals: Visuals
     order: tuple[str, ...]
     driven: frozenset[str]
+    speeds: dict[str, float]
     notes: tuple[str, ...]
     parts: tuple[Path, ...]
     facing: Facing
@@ -88,7 +90,9 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     if root_element.tag not in ("mujoco", "robot"):
         raise SpecError(f"expected MJCF (mujoco) or URDF (robot), got an element {root_element.tag[:40]!r}")
     visual_element = copy.deepcopy(root_element)  # a URDF is changed as it is read
-    driven = urdf.find_driven_joints(root_element) if root_element.tag == "robot" else frozenset()
+    is_urdf = root_element.tag == "robot"
+    driven = urdf.find_driven_joints(root_element) if is_urdf else frozenset()
+    speeds = urdf.find_speeds(root_element) if is_urdf else {}
     spec, order, notes, mesh_files = _read_spec(path, root_element)
     bounds.check_mesh_files(mesh_files)
     if scale != 1.0:
@@ -105,7 +109,7 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
         visuals = read_visuals(path, visual_element, model, torso, facing, scale)
     all_notes = (*notes, *mesh_notes, *torso_notes, *unit_notes, *inertia_notes)
     all_parts = tuple(dict.fromkeys((*parts, *mesh_files, *visuals.files)))
-    return RobotFile(model, torso, meshes, visuals, order, driven, all_notes, all_parts, facing)
+    return RobotFile(model, torso, meshes, visuals, order, driven, speeds, all_notes, all_parts, facing)
 
 
 def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:

@@ -86,6 +86,19 @@ def repair_urdf(
     return ElementTree.tostring(robot, encoding="unicode"), order, notes, tuple(mesh_files)
 
 
+def find_speeds(robot: ElementTree.Element) -> dict[str, float]:
+    """Return the `velocity`, rad/s, of hinges that have one above 0, by name."""
+    speeds = {}
+    for joint in robot.findall("joint"):
+        limit = joint.find("limit")
+        if limit is None or joint.get("type") not in ("revolute", "continuous"):
+            continue
+        (speed,) = _parse_numbers(f"joint {joint.get('name')!r}: limit velocity", limit.get("velocity", "0"), 1)
+        if speed > 0.0:
+            speeds[joint.get("name", "")] = speed
+    return speeds
+
+
 def find_driven_joints(robot: ElementTree.Element) -> frozenset[str]:
     """Return the names of the joints that a URDF drives; none if it does not say.
 

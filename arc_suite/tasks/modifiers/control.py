@@ -10,6 +10,7 @@ from arc_suite.models.sizing import action_reaches, position_gains, size_body
 from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.modifiers.drags import SERVO_FIELDS, have_drags, scale_servos
 from arc_suite.tasks.modifiers.draws import Episode, interpolate
 from arc_suite.tasks.modifiers.modifier import Modifier
 from arc_suite.tasks.modifiers.multiples import find_multiples
@@ -18,9 +19,6 @@ from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.scene import Scene
 
 ACTIONS = ("torque", "position")
-
-# Fields of the model with a row for each servo. The first three columns are: offset, stiffness, damping.
-_SERVO_FIELDS = ("actuator_gainprm", "actuator_biasprm")
 
 
 class ControlState(NamedTuple):
@@ -64,7 +62,7 @@ class Control(_ControlFields, Modifier):
 
     defaults = {"gains": (1.0, 1.0), "actions": None}
     bounds = {"gains": (0.01, 10.0)}
-    read_back_fields = _SERVO_FIELDS
+    read_back_fields = SERVO_FIELDS
 
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
@@ -74,9 +72,6 @@ class Control(_ControlFields, Modifier):
         if actions == "torque" and gains != (1.0, 1.0):
             value = checks.preview(settings["gains"])
             raise ValueError(f"gains: torques have none, expected actions='position', got {value}")
-        if body.source and gains != (1.0, 1.0) and any(joint.servo.drag is not None for joint in body.joints):
-            value = checks.preview(settings["gains"])
-            raise ValueError(f"gains: expected 1, as torques of {body.name} fall with speed, got {value}")
         stiffness, damping = position_gains(size_body(body), measure_standing(body).inertias)
         return cls(gains, actions, bool(body.source), stiffness, damping, action_reaches(body))
 
@@ -104,7 +99,9 @@ class Control(_ControlFields, Modifier):
         columns = model["actuator_gainprm"].shape[1]
         multiples = np.ones(columns)
         multiples[:3] = (stiffness_gain, stiffness_gain, damping_gain)  # offset, stiffness, damping
-        return {name: multiples * model[name] for name in _SERVO_FIELDS}
+        if have_drags(scene.body):
+            return scale_servos(scene.body, model, multiples)
+        return {name: multiples * model[name] for name in SERVO_FIELDS}
 
     def act(self, state: ControlState, action, elapsed) -> tuple[ControlState, Any]:
         """Return the torques that hold the positions of an action."""

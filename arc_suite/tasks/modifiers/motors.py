@@ -9,6 +9,7 @@ from arc_suite import checks
 from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.modifiers.drags import have_drags, scale_servos
 from arc_suite.tasks.modifiers.draws import Episode, interpolate
 from arc_suite.tasks.modifiers.modifier import Modifier
 from arc_suite.tasks.modifiers.multiples import find_multiples
@@ -45,6 +46,7 @@ class _MotorsFields(NamedTuple):
     armature: tuple[float, float]
     actuator_failure: bool | int
     are_servos: bool
+    have_drags: bool = False
 
 
 class Motors(_MotorsFields, Modifier):
@@ -57,6 +59,8 @@ class Motors(_MotorsFields, Modifier):
         armature: range of the multiple of the armatures of all joints.
         actuator_failure: the index of a leg whose motors do nothing from step 40 on; True for a random leg.
         are_servos: whether the joints have servos in place of motors.
+        have_drags: whether torques of servos fall with speed. Their strengths are written into the model, as the share
+            of a limited torque is not the limit of a share.
     """
 
     __slots__ = ()
@@ -76,17 +80,13 @@ class Motors(_MotorsFields, Modifier):
         failure = settings["actuator_failure"]
         if not isinstance(failure, bool):
             checks.integer("actuator_failure", failure, 0, len(body.legs) - 1)
-        if body.source and any(joint.servo.drag is not None for joint in body.joints):
-            for name in ("motor_strength", "joint_strength"):
-                if cls.check_span(name, settings) != (1.0, 1.0):
-                    value = checks.preview(settings[name])
-                    raise ValueError(f"{name}: expected 1, as torques of {body.name} fall with speed, got {value}")
         return cls(
             motor_strength=cls.check_span("motor_strength", settings),
             joint_strength=cls.check_span("joint_strength", settings),
             armature=cls.check_span("armature", settings),
             actuator_failure=failure,
             are_servos=bool(body.source),
+            have_drags=have_drags(body),
         )
 
     @property
@@ -130,6 +130,10 @@ class Motors(_MotorsFields, Modifier):
             limits = state.motor_strength[0] * model[_TORQUE_LIMITS]
             limits[_find_joints_in_model(scene)] *= state.joint_strength[:, None]
             fields[_TORQUE_LIMITS] = limits
+            if self.have_drags:
+                multiples = np.ones((len(model["actuator_gainprm"]), 1))
+                multiples[: 2 * len(state.strength)] = np.tile(state.strength, 2)[:, None]  # servos and releases
+                fields |= scale_servos(scene.body, model, multiples)
         return fields
 
     def drive(self, state: MotorsState, inputs: Inputs, elapsed) -> Inputs:
@@ -138,6 +142,8 @@ class Motors(_MotorsFields, Modifier):
         Servos have a second input each, after those for their targets: the share of the torque that they do not give.
         """
         strength = state.strength
+        if self.have_drags:
+            strength = strength.__array_namespace__().ones_like(strength)
         ctrl = strength * inputs.ctrl
         if self.actuator_failure is not False:
             works = ~(state.failing & (elapsed >= FAILS_FROM))

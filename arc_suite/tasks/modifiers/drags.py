@@ -1,0 +1,46 @@
+"""Servos whose torques fall with speed: changes of their gains leave the drags of their motors as they are."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from arc_suite.robots.spec import Body
+
+SERVO_FIELDS = ("actuator_gainprm", "actuator_biasprm")  # of the model: offset, stiffness, damping in each row
+_DAMPING = 2  # column
+
+
+def have_drags(body: Body) -> bool:
+    """Return whether the torque of a servo of the body falls with speed."""
+    return any(servo.drag is not None for servo in _servos(body))
+
+
+def scale_servos(body: Body, model: Mapping[str, Any], multiples: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the fields of a model for servos that are stiffer or weaker.
+
+    Args:
+        body: the body of the model; see `models.source` for the order of its actuators.
+        model: fields by name.
+        multiples: of a row's numbers; they broadcast to a field.
+    """
+    drags = _find_drags(body, model)
+    return {name: multiples * (model[name] - drags[name]) + drags[name] for name in SERVO_FIELDS}
+
+
+def _servos(body: Body) -> list:
+    """Return the servos of all joints: those of legs, then those that are held."""
+    return [*(joint.servo for joint in body.joints if joint.servo), *(joint.servo for joint in body.held)]
+
+
+def _find_drags(body: Body, model: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Return the parts of the fields that are drags: of servos, their releases, and the actuators of drags."""
+    drags = np.array([servo.drag or 0.0 for servo in _servos(body)])
+    joints = len(body.joints)
+    fields = {name: np.zeros_like(model[name]) for name in SERVO_FIELDS}
+    bias = fields["actuator_biasprm"][:, _DAMPING]
+    bias[:joints] = drags[:joints]
+    bias[2 * joints : joints + len(drags)] = drags[joints:]
+    bias[joints + len(drags) :] = -drags[drags > 0.0]
+    fields["actuator_gainprm"][joints : 2 * joints, _DAMPING] = -drags[:joints]
+    return fields
