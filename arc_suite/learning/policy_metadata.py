@@ -8,7 +8,7 @@ import numpy as np
 from arc_suite.models import sizing, source
 from arc_suite.models.standing import measure_standing
 from arc_suite.policies.network import Network
-from arc_suite.robots.spec import Body
+from arc_suite.robots.spec import Body, Joint
 from arc_suite.tasks import Task
 from arc_suite.tasks.modified_task import has_active
 from arc_suite.tasks.modifiers import Delay, History
@@ -26,7 +26,8 @@ def metadata(network: Network) -> dict:
     gears                       torques of an action of 1 by joint, N m; only for torques
     servos                      only for positions, by joint: alias, its name in the imported file; home, its angle in
                                 the standing pose, rad; reach, change of the angle by an action of 1, rad; stiffness,
-                                N m/rad; damping, N m s/rad; limit, N m
+                                N m/rad; damping, N m s/rad; limit, N m; where torques fall with speed, no_load_speed,
+                                rad/s, and stall, N m
     torque_held                 how long a torque holds: "control step", or "substep" of servos of imported bodies
     file_joints                 names of the joints in the order of the imported file; only of imported bodies
     gait_clock                  frequency, Hz, and rule of the block of that name; only if the task has this block
@@ -84,6 +85,7 @@ def _imported_servos(body: Body) -> dict[str, dict]:
             "stiffness": joint.servo.stiffness,
             "damping": joint.servo.damping,
             "limit": joint.servo.limit,
+            **_speed_limit(joint),
         }
     return servos
 
@@ -100,8 +102,16 @@ def servos_of_motors(body: Body, gears: np.ndarray) -> dict[str, dict]:
     servos = {}
     for index, name in enumerate(body.joint_names):
         numbers = {column: float(values[index]) for column, values in columns.items()}
-        servos[name] = {"alias": None, "home": 0.0, **numbers}
+        servos[name] = {"alias": None, "home": 0.0, **numbers, **_speed_limit(body.joints[index])}
     return servos
+
+
+def _speed_limit(joint: Joint) -> dict[str, float]:
+    """Return the speed without load and the stall torque of a joint whose torque falls with speed; else nothing."""
+    drive = joint.drive
+    if drive is None or drive.no_load_speed is None:
+        return {}
+    return {"no_load_speed": drive.no_load_speed, "stall": drive.stall_torque}
 
 
 def _timing(task: Task) -> Mapping[str, Any]:

@@ -17,7 +17,12 @@ def torques(facts, action, angles, speeds):
         np.array([servo[name] for servo in facts["servos"].values()])
         for name in ("home", "reach", "stiffness", "damping", "limit")
     )
-    return (stiffness * (home + reach * action - angles) - damping * speeds).clip(-limit, limit)
+    wanted = stiffness * (home + reach * action - angles) - damping * speeds
+    for index, servo in enumerate(facts["servos"].values()):
+        if "no_load_speed" in servo:
+            fall = servo["stall"] * speeds[index] / servo["no_load_speed"]
+            wanted[index] = wanted[index].clip(-servo["stall"] - fall, servo["stall"] - fall)
+    return wanted.clip(-limit, limit)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,10 @@ def run(*arguments, cwd):
         ),
         (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
         (["--robot=tock"], f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? {WORDS}\n"),
-        (["--stps=5"], "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, config, "),
+        (
+            ["--stps=5"],
+            "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, arena, config, ",
+        ),
         (["--steps=abc"], "arc-suite train: flag --steps=abc: expected a positive integer\n"),
         (["--minutes=x"], "arc-suite train: flag --minutes=x: expected a non-negative number\n"),
         (["--config=none.json"], "arc-suite train: cannot read none.json: no such file or directory\n"),
