@@ -118,8 +118,10 @@ def test_the_text_of_an_imported_body_has_its_bits(body, decorated):
     body = body()
     text = models.text(body, FLAT, decorated)
     model, parsed = mujoco.MjModel.from_xml_string(text), models.model_spec(body, FLAT, decorated).compile()
-    servos = [*body.joint_names, *(joint.name for joint in body.held)]
-    assert [model.actuator(index).name for index in range(model.nu)] == servos
+    servos = {name: joint.servo for name, joint in zip(body.joint_names, body.joints, strict=True)}
+    servos |= {joint.name: joint.servo for joint in body.held}
+    drags = [f"{name}-drag" for name, servo in servos.items() if servo.drag is not None]
+    assert [model.actuator(index).name for index in range(model.nu)] == [*servos, *drags]
     for name in ("qpos0", "key_qpos", "body_mass", "body_inertia", "geom_pos", "geom_quat", "mesh_vert", "cam_pos"):
         np.testing.assert_array_equal(getattr(model, name), getattr(parsed, name))
     states = accelerations(model, ["root", *body.joint_names]), accelerations(parsed, ["root", *body.joint_names])
