@@ -90,7 +90,7 @@ MUTANTS = {
     "a live command counts as a new one": "return begins« & schedule_holds→»",
     "who rests has another command": "~«(self._ended | self._resting)→self._ended» & self._task.resampled(",
     "followed from behind": "cosine * x «+→-» sine * y",
-    "turned the wrong way": "2.0 * («w * z + x * y→x * y - w * z»)",
+    "turned the wrong way": "xp.arctan2(2.0 * («w * z + x * y→x * y - w * z»)",
     # Modifiers.
     "a leg limp from the start": "(elapsed >= «FAILS_FROM→0»",
     "kicks a step late": "step = elapsed % period« + 1→»",
@@ -115,7 +115,7 @@ MUTANTS = {
     "« if mask is None else trees.where(mask, changed_memory, memory)→»",
     "commands of environments replace one another": "value = «np.where(mask[:, None], value, earlier_value)→value»",
     "a copy resets the shared model": "        if «share_model→False»:\n            self._shared",
-    "kicks forgotten in batches": "«data.qvel[mask] += inputs.kick[mask]→pass»",
+    "kicks forgotten in batches": "«data.qvel[mask, : inputs.kick.shape[-1]] += inputs.kick[mask]→pass»",
     "two threads in one environment": "«not lock.acquire(False)→False»",
     # Demonstrators and policies.
     "sign of the sweep": "= «-→»1.0 if leg.side",

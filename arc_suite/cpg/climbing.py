@@ -95,6 +95,9 @@ class Climbing(Stepping):
         nearest = self.rest_soles[:, :2].min(axis=0)[:, None]
         furthest = self.rest_soles[:, :2].max(axis=0)[:, None]
         self.is_under_torso = ((self.scan_places >= nearest) & (self.scan_places <= furthest)).all(axis=0)
+        if not self.is_under_torso.any():
+            # The feet of a biped stand side by side, between two points of a scan.
+            self.is_under_torso[np.hypot(*self.scan_places).argmin()] = True
         self.ground_fit = self._fit_ground()
 
     def choose_rest_pose(self, body: Body) -> posture.RestPose:

@@ -428,7 +428,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         data = physics.data.ptr
         data.ctrl[: inputs.ctrl.shape[-1]] = inputs.ctrl
         if inputs.kick is not None:
-            data.qvel[:] += inputs.kick
+            data.qvel[: len(inputs.kick)] += inputs.kick
         if inputs.force is not None:
             data.xfrc_applied[self.definition.scene.layout.torso, :3] = inputs.force
 

@@ -640,7 +640,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         data = self.batch.data
         np.copyto(data.ctrl[:, : inputs.ctrl.shape[-1]], inputs.ctrl, where=mask[:, None])
         if inputs.kick is not None:
-            data.qvel[mask] += inputs.kick[mask]
+            data.qvel[mask, : inputs.kick.shape[-1]] += inputs.kick[mask]
         if inputs.force is not None:
             self.batch.xfrc_applied[mask, self._task.scene.layout.torso, :3] = inputs.force[mask]
 

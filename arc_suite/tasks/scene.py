@@ -63,7 +63,8 @@ class Inputs(NamedTuple):
 
     Attributes:
         ctrl: (..., motors) controls in [-1, 1].
-        kick: (..., nv) added to qvel before the first substep; None for no kick.
+        kick: (..., n) added to the first n numbers of qvel, the torso's velocity first, before the first substep; None
+            for no kick.
         force: (..., 3) on the torso's center of mass throughout the step, in the world, N; None for no force.
     """
 

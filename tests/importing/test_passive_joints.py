@@ -9,6 +9,7 @@ from robots_of_others import reference
 import arc_suite
 from arc_suite import models
 from arc_suite.cpg import Demonstrator
+from arc_suite.envs.vector import VectorEnv
 from arc_suite.importing import import_robot
 from arc_suite.robots.spec import SpecError
 
@@ -104,6 +105,25 @@ def test_motors_are_the_files_and_other_joints_keep_their_springs(case, tmp_path
     passive = np.setdiff1d(np.arange(6, model.nv), driven)
     assert len(passive) == PASSIVE[case] and (data.qfrc_actuator[passive] == 0.0).all()
     assert data.qfrc_actuator[driven].all()
+
+
+@pytest.mark.parametrize("case", ["sprung ankles", "rods that connections close"])
+def test_kicks_change_the_velocity_of_the_torso_alone(case, tmp_path):
+    """The simulation has more velocities than the robot has joints with a motor."""
+    body, _ = import_robot(write(tmp_path, **CASES[case]))
+    single = arc_suite.load(body, "walk", {"kicks": 1.0, "random": 3})
+    batch = VectorEnv(body, "walk", 1, task_kwargs={"kicks": 1.0})
+    timestep = single.reset()
+    batch.reset(seed=3)
+    for _ in range(60):
+        timestep = single.step(np.zeros(12))
+        observations, *_ = batch.step(np.zeros((1, 12)))
+    calm = arc_suite.load(body, "walk", {"random": 3})
+    calm.reset()
+    for _ in range(60):
+        calm.step(np.zeros(12))
+    assert abs(single.physics.data.qvel - calm.physics.data.qvel).max() > 0.02
+    assert np.isfinite(timestep.observation["velocities"]).all() and np.isfinite(observations).all()
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -352,7 +352,7 @@ def _with_inputs(data, inputs: Inputs, torso: int):
     controls = inputs.ctrl.shape[-1]  # those of the body come first
     data = data.replace(ctrl=data.ctrl.at[:controls].set(inputs.ctrl))
     if inputs.kick is not None:
-        data = data.replace(qvel=data.qvel + inputs.kick)
+        data = data.replace(qvel=data.qvel.at[..., : inputs.kick.shape[-1]].add(inputs.kick))
     if inputs.force is not None:
         data = data.replace(xfrc_applied=data.xfrc_applied.at[torso, :3].set(inputs.force))
     return data

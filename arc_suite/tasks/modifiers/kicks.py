@@ -53,7 +53,7 @@ class Kicks(_KicksFields, Modifier):
         kicks: the greatest change of the torso's velocity by a kick, sqrt(g h). The size of each kick is uniform from 0
             up to it, in any horizontal direction. Kicks are 40 to 120 control steps apart.
         height: (1,) the standing height, m.
-        velocities: nv, the number of velocities of the simulation.
+        velocities: the number of velocities of torso and joints; passive joints of a source come after them.
     """
 
     __slots__ = ()
@@ -81,7 +81,7 @@ class Kicks(_KicksFields, Modifier):
         return KicksState(stream.kick_steps, greatest * stream.kick_sizes[:, None] * directions)
 
     def drive(self, state: KicksState, inputs: Inputs, elapsed) -> Inputs:
-        """Return the inputs with the kick (..., nv) of this control step."""
+        """Return the inputs with the kick (..., velocities) of this control step."""
         planar_kick = state.kick_after(elapsed)
         xp = planar_kick.__array_namespace__()
         zeros = xp.zeros((*planar_kick.shape[:-1], self.velocities - 2))
