@@ -111,19 +111,21 @@ def test_motors_are_the_files_and_other_joints_keep_their_springs(case, tmp_path
 def test_kicks_change_the_velocity_of_the_torso_alone(case, tmp_path):
     """The simulation has more velocities than the robot has joints with a motor."""
     body, _ = import_robot(write(tmp_path, **CASES[case]))
-    single = arc_suite.load(body, "walk", {"kicks": 1.0, "random": 3})
-    batch = VectorEnv(body, "walk", 1, task_kwargs={"kicks": 1.0})
-    timestep = single.reset()
-    batch.reset(seed=3)
-    for _ in range(60):
-        timestep = single.step(np.zeros(12))
-        observations, *_ = batch.step(np.zeros((1, 12)))
+    kicked = arc_suite.load(body, "walk", {"kicks": 1.0, "random": 3})
     calm = arc_suite.load(body, "walk", {"random": 3})
+    batch = VectorEnv(body, "walk", 1, task_kwargs={"kicks": 1.0})
+    kicked.reset()
     calm.reset()
-    for _ in range(60):
+    batch.reset(seed=3)
+    largest_difference = 0.0  # m/s
+    for _ in range(125):
+        kicked.step(np.zeros(12))
         calm.step(np.zeros(12))
-    assert abs(single.physics.data.qvel - calm.physics.data.qvel).max() > 0.02
-    assert np.isfinite(timestep.observation["velocities"]).all() and np.isfinite(observations).all()
+        observations, *_ = batch.step(np.zeros((1, 12)))
+        difference = kicked.physics.data.qvel[:2] - calm.physics.data.qvel[:2]
+        largest_difference = max(largest_difference, abs(difference).max())
+    assert largest_difference > 0.02
+    assert np.isfinite(observations).all()
 
 
 @pytest.mark.parametrize("case", CASES)
