@@ -191,4 +191,4 @@ def test_families_of_other_packages_come_before_modules_of_their_names(tmp_path)
 def test_programs_take_bodies_of_families():
     done = programs.arc_suite("evaluate", "--robot=varied:3-4", "--episodes=1", "--set=time_limit=1")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "varied_3, medium" in done.stdout and "varied_4, medium" in done.stdout
+    assert "varied_3, straight" in done.stdout and "varied_4, straight" in done.stdout

@@ -297,9 +297,9 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("task", "presets"),
     [
-        ("walk", {"zero", "refined", "tuned", "medium"}),
-        ("rough", {"zero", "climbing", "surefooted", "steered", "refined", "tuned", "medium"}),
-        ("navigate", {"zero", "planned", "steered", "surefooted", "refined", "tuned", "medium"}),
+        ("walk", {"zero", "refined", "tuned", "straight", "medium"}),
+        ("rough", {"zero", "climbing", "surefooted", "steered", "refined", "tuned", "straight", "medium"}),
+        ("navigate", {"zero", "planned", "steered", "surefooted", "refined", "tuned", "straight", "medium"}),
     ],
 )
 def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, monkeypatch, task, presets):
