@@ -36,7 +36,7 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
     reactive = steered._replace(integral=0.0)
     planned = PlanningParameters(steered)
     return {
-        "straight": StraightParameters(steered),
+        "straight": StraightParameters(steered._replace(lift=0.2, gain=(1.0, 1.0, 0.5))),
         "steered": steered,
         "surefooted": surefooted,
         "climbing": climbing,

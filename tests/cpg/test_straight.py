@@ -38,7 +38,7 @@ def test_four_legs_reach_their_speed_and_keep_their_course():
 
 
 def test_a_negative_target_velocity_is_backwards():
-    body = registry.body_of("random:3")
+    body = registry.body_of("varied:7")
     target = Setup.of(body, "walk").definition.target_velocity
     velocity, _ = _walk(body, "straight", {"target_velocity": -target})
     assert velocity == pytest.approx((-1.0, 0.0), abs=0.06)

@@ -8,7 +8,8 @@ from networks import of_many_bodies as drawn
 
 from arc_suite import evaluation
 from arc_suite.bodies import families, generator, tokens
-from arc_suite.cpg import Demonstrator, suited_preset
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.selection import memoryless_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation.walking import WalkWatcher
 from arc_suite.learning import transfer
@@ -89,7 +90,7 @@ def test_a_walk_in_a_batch_is_judged_as_one_alone(monkeypatch):
     environment = Setup.of(body).load()
     watcher = WalkWatcher(environment)
     evaluation.run(
-        environment, Demonstrator(environment, suited_preset(environment.task.definition)), 0, 120, [watcher]
+        environment, Demonstrator(environment, memoryless_preset(environment.task.definition)), 0, 120, [watcher]
     )
     verdict = watcher.verdict(120)
     assert played.demonstrator.speed == pytest.approx(verdict.speed, rel=0.01)
