@@ -13,9 +13,9 @@ from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLawState
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
+from arc_suite.cpg.stride_law import SMOOTHING_CYCLES
 from arc_suite.tasks.contract import Task
 
-_SMOOTHING_CYCLES = 0.4  # cycles over which the motion is averaged
 _MAX_TURN = 1.0  # of the command, in its unit
 
 
@@ -53,7 +53,7 @@ class Straight:
         self._heading_gain = parameters.heading
         self._stepping = Stepping(task, parameters.steps)
         self._direction = np.sign(gait_of(task).target_velocity)
-        self._smoothing = min(1.0, self._stepping.cycles_per_step / _SMOOTHING_CYCLES)
+        self._smoothing = min(1.0, self._stepping.cycles_per_step / SMOOTHING_CYCLES)
 
     def initial(self, count: int) -> StraightState:
         """Return the state at the start of episodes in a number of environments, with a torso at rest."""

@@ -8,7 +8,7 @@ import mujoco
 from arc_suite.importing import loops, trunk
 from arc_suite.importing.tree import Robot
 
-_MIN_DRIVEN_LEGS = 2  # of which the file drives a joint, so that what it says of motors counts
+_MIN_DRIVEN_LEGS = 2  # legs with a motor; a file with fewer does not say which joints have motors
 _JOINT_TRANSMISSIONS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _TENDON_TRANSMISSION = int(mujoco.mjtTrn.mjTRN_TENDON)
 

@@ -78,10 +78,9 @@ def _list_branches(model: mujoco.MjModel, root: int) -> list[Branch]:
         parent = int(model.body_parentid[body])
         if parent in chains:
             chains[body] = chains[parent] + _hinges_and_slides(model, body)
-    beginnings = {chain[:size] for chain in chains.values() for size in range(len(chain))}
     branches: dict[int, Branch] = {}
-    for chain in dict.fromkeys(chains.values()):
-        if chain and chain not in beginnings:
+    for chain in tree.whole_chains(dict.fromkeys(chains.values())):
+        if chain:
             branches.setdefault(chain[0], []).append(chain)
     return list(branches.values())
 

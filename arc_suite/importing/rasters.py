@@ -47,7 +47,7 @@ def _draw(heights: np.ndarray, corners: np.ndarray, first: np.ndarray, extents: 
 
     Args:
         heights: heights of the grid.
-        corners: (triangles, 3, 3) of which x and y are in nodes.
+        corners: (triangles, 3, 3) corners of triangles: x and y in nodes, z in m.
         first: (triangles, 2) least node around each triangle, along x and y.
         extents: (triangles, 2) numbers of nodes around each triangle, along x and y.
     """

@@ -1,6 +1,6 @@
 """The tree of a compiled robot: its joints, its colliders, and which chains of joints end where."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -80,8 +80,7 @@ class Robot(NamedTuple):
         colliders = {}
         for geom in self.colliders:
             colliders.setdefault(self.chain_of_geom(geom), []).append(geom)
-        beginnings = {chain[:size] for chain in colliders for size in range(len(chain))}
-        return {chain: geoms for chain, geoms in colliders.items() if chain not in beginnings}
+        return {chain: colliders[chain] for chain in whole_chains(colliders)}
 
     def clip_to_limits(self, qpos: np.ndarray) -> np.ndarray:
         """Return a pose (nq,) with all joints within their limits."""
@@ -102,6 +101,13 @@ class Robot(NamedTuple):
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_comPos(self.model, data)
         return data
+
+
+def whole_chains(chains: Iterable[Chain]) -> list[Chain]:
+    """Return the chains that are not the beginning of another one."""
+    chains = list(chains)
+    beginnings = {chain[:size] for chain in chains for size in range(len(chain))}
+    return [chain for chain in chains if chain not in beginnings]
 
 
 def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Robot:

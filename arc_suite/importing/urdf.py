@@ -115,12 +115,10 @@ def find_driven_joints(robot: ElementTree.Element) -> frozenset[str]:
         limit = joint.find("limit")
         if limit is not None and joint.get("type") not in ("fixed", "floating"):
             efforts[joint.get("name", "")] = limit.get("effort", "").strip()
-    names = [name for name, effort in efforts.items() if _is_positive(effort)]
-    return (
-        frozenset(names)
-        if any(_is_number(effort) and float(effort) == 0.0 for effort in efforts.values())
-        else frozenset()
-    )
+    has_zero = any(_is_number(effort) and float(effort) == 0.0 for effort in efforts.values())
+    if not has_zero:
+        return frozenset()
+    return frozenset(name for name, effort in efforts.items() if _is_positive(effort))
 
 
 def _reduction_notes(robot: ElementTree.Element) -> Iterator[str]:

@@ -212,10 +212,14 @@ def pose(qpos, layout: Layout):
 
     Angles are relative to the standing pose, rad.
     """
+    return _relative_pose(torso_qpos(qpos, layout), layout)
+
+
+def _relative_pose(qpos, layout: Layout):
+    """Return the poses of `pose`, given qpos (..., nq) as `torso_qpos` returns it."""
     if layout.home is None:
         return qpos
     xp = qpos.__array_namespace__()
-    qpos = torso_qpos(qpos, layout)
     return xp.concatenate([qpos[..., :7], qpos[..., layout.joint_angles] - layout.home], axis=-1)
 
 
@@ -295,7 +299,7 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
     qvel = torso_qvel(data.qvel, data.qpos, layout)
     torso_position = qpos[..., 0:3]
     feet = data.xpos[..., layout.feet, :]
-    posture = pose(data.qpos, layout)[..., 2:]
+    posture = _relative_pose(qpos, layout)[..., 2:]
     foot_heights = feet[..., 2]
     if not arena.is_level:  # on level ground, heights are z
         xp = qpos.__array_namespace__()

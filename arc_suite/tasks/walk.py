@@ -66,12 +66,8 @@ class Walk(Task):
     """Walking forward at the target speed in the prescribed gait."""
 
     name = "walk"
-    from_body = (
-        "clock",
-        "clearances",
-        "_torques",
-        "_heat",
-    )  # attributes that follow from the body; see `Task.from_body`
+    # Attributes that follow from the body; see `Task.from_body`.
+    from_body = ("clock", "clearances", "_torques", "_heat")
     # Section 4 of the paper. Each robot replaces "control" by a weight of its own.
     weights: ClassVar[Mapping[str, float]] = {
         "forward": 1.5,

@@ -51,7 +51,7 @@ def test_the_physics_are_the_files_to_the_last_bit(case, moved):
 @ALL
 @pytest.mark.parametrize("task", ["walk", pytest.param("rough", marks=pytest.mark.slow)])
 def test_episodes_are_those_of_the_robot_with_its_frame_at_the_trunk(case, moved, task):
-    """Starts are the same with all noise; steps are but for the integration of another point of the same torso."""
+    """Starts are the same with all noise. Steps differ a little, as the simulation integrates another point."""
     _, (body, _), original = moved
     settings = {"payload": 0.2, "center_of_mass": 0.1}
     both = [VectorEnv(robot, task, 2, task_kwargs=settings, privileged=True) for robot in (body, original)]

@@ -52,7 +52,7 @@ def test_joints_of_legs_that_follow_others_get_motors_and_one_line(tmp_path):
 
 
 def gripper_of_mjcf(folder):
-    """Import the robot with two fingers, of which one has a motor and the other follows it."""
+    """Import the robot with two fingers. One finger has a motor, the other follows it."""
     text = (imports.FILES / "go2_like.xml").read_text()
     finger = '<body><joint name="{0}" range="-1 1"/><geom type="sphere" size="0.01" pos="0 0 0.05" mass="0.02"/></body>'
     fingers = f'<body pos="0.1 0 0.1">{finger.format("left")}{finger.format("right")}</body>'

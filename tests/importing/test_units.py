@@ -1,4 +1,4 @@
-"""Files in cm, mm, inches or grams, or with y up, are told with the flag that cures them, or cured."""
+"""Files in cm, mm, inches or grams, or with y up: the import repairs them, or names the flag that does."""
 
 import math
 import pathlib
