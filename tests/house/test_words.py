@@ -21,8 +21,8 @@ buffer_size; first_divergence: initial_desired_kl; last_divergence: final_desire
 last_std: final_std; mirrored: symmetry_augmentation; normalizing: normalize_until; warm_up: value_warm_up; imitation:
 dagger; cloning: bc; fenced: protected; beside: symmetric_sampling; stage: run context; felt: proprioception;
 following: feedback; manner, tread, balance, plan, build: parameters; look, looks: visuals; mark: debug marker; marks:
-debug markers; motions: root motion; footfalls, events: foot contact events; shot, take: recording; lift: spawn
-clearance; carry: stream state; limp: actuator_failure; without: exclude_blocks; wanted: desired; wrong_feet: contact
+debug markers; footfalls, events: foot contact events; shot, take: recording; lift: spawn clearance;
+carry: stream state; limp: actuator_failure; without: exclude_blocks; wanted: desired; wrong_feet: contact
 schedule errors; way: displacement or path; tent: triangular; census: survey; obedience: command tracking; judge:
 evaluator; grade, graded: quality; figures: metrics; fitted: settings_for; scene: prepare
 """
@@ -43,7 +43,6 @@ ALLOWED = {
     "plan": r"\(\) plan$",  # a path around obstacles
     "balance": r"\.(Balanced|Stepping) balance$",  # steps that keep a body from falling
     "trace": r"\.leg_networks trace_shared_layers$",  # records the operations of a function
-    "motions": r" ROOT_MOTIONS$",  # whether clips move the root
     "events": r"cli\.train events$",  # files of TensorBoard
     "lift": r"cpg\.|models\.stride|LIFT_OFF$",  # height of a foot in swing; the end of a stance
     "limp": r" Limp$|^README|^studies",  # the task

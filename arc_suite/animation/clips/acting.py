@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite.animation.clips import gestures
 from arc_suite.animation.clips.recordings import Recording
-from arc_suite.animation.clips.root_motion import Motion, Pose, advance_straight, stay_at_start
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, stay_at_start
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.selection import presets_of
@@ -31,7 +31,7 @@ _LYING_HEIGHT = 0.6  # of the torso's height at rest: a lower torso lies
 _LYING_CLEARANCE = 0.1  # of the torso's height at rest: a torso whose lowest point is nearer to the ground lies
 
 
-def rise(body: Body, rest: Pose) -> Motion:
+def rise(body: Body, rest: Pose) -> ClipMotion:
     """Return how a body rises from its belly, or as near to it as its legs fold.
 
     Raises:
@@ -49,7 +49,7 @@ def rise(body: Body, rest: Pose) -> Motion:
     return stay_at_start(recording, first, samples=last - first)
 
 
-def jump(body: Body, rest: Pose) -> Motion:
+def jump(body: Body, rest: Pose) -> ClipMotion:
     """Return how a body jumps on the spot.
 
     Raises:
@@ -59,7 +59,7 @@ def jump(body: Body, rest: Pose) -> Motion:
     return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
 
 
-def leap(body: Body, rest: Pose) -> Motion:
+def leap(body: Body, rest: Pose) -> ClipMotion:
     """Return how a body leaps ahead, over a root that goes along below its torso.
 
     Raises:
@@ -69,7 +69,7 @@ def leap(body: Body, rest: Pose) -> Motion:
     return advance_straight(_simulate_leap(body, rest, candidates, "distance"))
 
 
-def death(body: Body, rest: Pose) -> Motion:
+def death(body: Body, rest: Pose) -> ClipMotion:
     """Return how a body collapses: its legs give way, then its joints are without torque and nearly without damping.
 
     Raises:

@@ -7,7 +7,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips.catalog import Difference, WalkLoop, clip_of, is_additive
 from arc_suite.animation.clips.foot_contacts import sole_heights
-from arc_suite.animation.clips.root_motion import Motion, Pose
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 
@@ -17,7 +17,7 @@ _CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
 
 
 def find_bases(
-    body: Body, name: str, motion_of_clip: Mapping[str, Motion], loops: Mapping[str, bool], idle: Pose
+    body: Body, name: str, motion_of_clip: Mapping[str, ClipMotion], loops: Mapping[str, bool], idle: Pose
 ) -> list[str]:
     """Return the names of the loops over which an additive clip brings no sole deeper than 0.03 standing heights.
 
@@ -37,7 +37,9 @@ def find_bases(
     return bases
 
 
-def _measure_sole_depth(body: Body, name: str, base: str, motion_of_clip: Mapping[str, Motion], idle: Pose) -> float:
+def _measure_sole_depth(
+    body: Body, name: str, base: str, motion_of_clip: Mapping[str, ClipMotion], idle: Pose
+) -> float:
     """Return how deep a sole is below the ground, standing heights, while an additive clip plays over a base loop."""
     motion = motion_of_clip[name]
     base_motion = motion_of_clip[base]
@@ -56,7 +58,7 @@ def _measure_sole_depth(body: Body, name: str, base: str, motion_of_clip: Mappin
     return -lowest / body.torso.standing_height
 
 
-def add_clip(motion: Motion, idle: Pose, base_motion: Motion, base_frames: np.ndarray) -> np.ndarray:
+def add_clip(motion: ClipMotion, idle: Pose, base_motion: ClipMotion, base_frames: np.ndarray) -> np.ndarray:
     """Return the poses (frames, 7 + joints) of an additive clip over a base, with a root at 0.
 
     Args:

@@ -7,7 +7,7 @@ from typing import NamedTuple, get_args
 
 from arc_suite import registry
 from arc_suite.animation.clips import acting, gestures
-from arc_suite.animation.clips.root_motion import Motion, Pose
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.robots.spec import Body
 
 
@@ -58,7 +58,7 @@ class Acted(NamedTuple):
         additive: whether it is added to other clips, as its difference from the first pose of idle.
     """
 
-    play: Callable[[Body, Pose], Motion]
+    play: Callable[[Body, Pose], ClipMotion]
     ends: tuple[int, ...]
     loops: bool = False
     steps: bool = False

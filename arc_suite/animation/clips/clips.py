@@ -11,7 +11,7 @@ from arc_suite.animation.clips import additive, catalog, planting
 from arc_suite.animation.clips.drafts import Draft, make_drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
 from arc_suite.animation.clips.recorder import Recorder
-from arc_suite.animation.clips.root_motion import Motion
+from arc_suite.animation.clips.root_motion import ClipMotion
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
@@ -38,7 +38,7 @@ class Clip(NamedTuple):
     """
 
     name: str
-    motion: Motion
+    motion: ClipMotion
     loops: bool
     cycles: int
     foot_contacts: tuple[FootContact, ...]

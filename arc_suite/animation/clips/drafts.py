@@ -41,7 +41,7 @@ from arc_suite.animation.clips.loops import (
 )
 from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording, TurnRecording
 from arc_suite.animation.clips.recordings import Recording
-from arc_suite.animation.clips.root_motion import Motion, Pose
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 
@@ -65,7 +65,7 @@ class Draft(NamedTuple):
         stands: whether all feet stay on the ground, so that there are no foot contact events.
     """
 
-    motion: Motion
+    motion: ClipMotion
     cycles: int = 0
     cycle: float = math.nan
     loops: bool = True
@@ -258,7 +258,7 @@ def _find_first_touchdown(body: Body, draft: Draft) -> int:
     return 0
 
 
-def _straighten(name: str, motion: Motion) -> Motion:
+def _straighten(name: str, motion: ClipMotion) -> ClipMotion:
     """Return a loop that goes where its command says, unless that is a turn."""
     clip = clip_of(name)
     command = clip.command if isinstance(clip, WalkLoop) else WALK.command
@@ -359,8 +359,8 @@ def _play(body: Body, clip: Acted, rest: Pose) -> Draft:
         ValueError: the clip plays no motion, as one of another package may.
     """
     motion = clip.play(body, rest)
-    if not isinstance(motion, Motion):
-        raise ValueError(f"expected a Motion of its play, got {type(motion).__name__}")
+    if not isinstance(motion, ClipMotion):
+        raise ValueError(f"expected a ClipMotion of its play, got {type(motion).__name__}")
     return Draft(motion, loops=clip.loops, stands=not clip.steps)
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.animation.clips.root_motion import Motion
+from arc_suite.animation.clips.root_motion import ClipMotion
 from arc_suite.models.standing import standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import readings
@@ -138,7 +138,7 @@ def count_odd_feet(heights: np.ndarray, cycles: int, standing_height: float) -> 
 
 
 def find_foot_contacts(
-    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool, min_rise: float = MIN_RISE
+    motion: ClipMotion, body: Body, heights: np.ndarray, cycle: float, loops: bool, min_rise: float = MIN_RISE
 ) -> tuple[list[FootContact], np.ndarray]:
     """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.root_motion import Motion, Pose, fade_out
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
@@ -93,9 +93,9 @@ _TURN_HOLD_DURATION = 4.0
 # Gestures.
 
 
-def hold_pose(pose: Pose, samples: int, time_step: float) -> Motion:
+def hold_pose(pose: Pose, samples: int, time_step: float) -> ClipMotion:
     """Return a pose that stays for a number of samples after the first one, with a root that stays."""
-    return Motion(
+    return ClipMotion(
         time_step=time_step,
         root=np.zeros((samples + 1, 3)),
         positions=np.tile(pose.position, (samples + 1, 1)),
@@ -105,7 +105,7 @@ def hold_pose(pose: Pose, samples: int, time_step: float) -> Motion:
     )
 
 
-def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration: float) -> Motion:
+def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration: float) -> ClipMotion:
     """Return a torso that moves over standing feet, as far as the legs can follow.
 
     Args:
@@ -122,7 +122,7 @@ def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration:
     return _follow_with_legs(body, rest, poses, action="move so")
 
 
-def idle(body: Body, rest: Pose) -> Motion:
+def idle(body: Body, rest: Pose) -> ClipMotion:
     """Return a standing body as a loop that begins with the pose at rest: two breaths, and weight that shifts.
 
     The torso sinks and rises, and goes to either side, while joints bend so that the soles stay where they are; less
@@ -141,7 +141,7 @@ def idle(body: Body, rest: Pose) -> Motion:
     return _close_loop(_make_motion(body, rest, poses, joints))
 
 
-def glance(body: Body, rest: Pose) -> Motion:
+def glance(body: Body, rest: Pose) -> ClipMotion:
     """Return a standing body that looks to either side and down, as a loop.
 
     Raises:
@@ -152,7 +152,7 @@ def glance(body: Body, rest: Pose) -> Motion:
     return _close_loop(_follow_with_legs(body, rest, poses, action="look around"))
 
 
-def settle(body: Body, rest: Pose) -> Motion:
+def settle(body: Body, rest: Pose) -> ClipMotion:
     """Return a standing body that shifts its weight and sets two feet anew, one after the other, as a loop.
 
     Raises:
@@ -174,7 +174,7 @@ def settle(body: Body, rest: Pose) -> Motion:
     return _close_loop(_follow_with_legs(body, rest, poses, action="shift its weight", lifts=lifts))
 
 
-def hit(body: Body, rest: Pose, side: str) -> Motion:
+def hit(body: Body, rest: Pose, side: str) -> ClipMotion:
     """Return how a body sways under a blow over planted feet: pushed and tilted away from it, while the knees give.
 
     Args:
@@ -202,7 +202,7 @@ def hit(body: Body, rest: Pose, side: str) -> Motion:
     return _follow_with_legs(body, rest, poses, action="sway")
 
 
-def strike(body: Body, rest: Pose) -> Motion:
+def strike(body: Body, rest: Pose) -> ClipMotion:
     """Return how a body raises its front leg and strikes the ground ahead.
 
     Raises:
@@ -218,7 +218,7 @@ def strike(body: Body, rest: Pose) -> Motion:
     return _follow_with_legs(body, rest, poses, action="strike", lifts=lifts)
 
 
-def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> Motion:
+def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> ClipMotion:
     """Return how a torso turns over its feet, stays so, and turns back.
 
     Args:
@@ -306,7 +306,7 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
 
 def _follow_with_legs(
     body: Body, rest: Pose, poses: np.ndarray, action: str, lifts: np.ndarray | None = None
-) -> Motion:
+) -> ClipMotion:
     """Return a gesture that is as large as standing legs can follow.
 
     Args:
@@ -342,7 +342,7 @@ def _allowed_misses(lifts: np.ndarray) -> np.ndarray:
     return np.where(is_limited, (_MAX_SLIDE, _MAX_SLIDE, _MAX_SINK), np.inf)
 
 
-def _make_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> Motion:
+def _make_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> ClipMotion:
     """Return a motion of the torso (samples, 6) from rest, and of joints (samples, joints), rad."""
     up, forward, left = (poses[:, [column]] for column in range(3))
     offsets = body.torso.standing_height * np.concatenate([forward, left, up], axis=-1)
@@ -363,7 +363,7 @@ def _smooth(joints: np.ndarray) -> np.ndarray:
     return joints
 
 
-def _close_loop(motion: Motion) -> Motion:
+def _close_loop(motion: ClipMotion) -> ClipMotion:
     """Return the motion with its first sample as its last one, too."""
     return motion.map_arrays(lambda values: np.concatenate([values[:-1], values[:1]]))
 

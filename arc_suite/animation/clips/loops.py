@@ -12,7 +12,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import (
-    Motion,
+    ClipMotion,
     compose,
     ground_poses,
     integrate_twist,
@@ -154,7 +154,7 @@ def choose_start(recording: Recording, samples: int, starts: np.ndarray) -> int:
     return int(starts[best])
 
 
-def cut_loop(recording: Recording, first: int, samples: int) -> Motion:
+def cut_loop(recording: Recording, first: int, samples: int) -> ClipMotion:
     """Return a part of a recording as a loop: a root of constant velocity, and a pose that returns exactly.
 
     Args:
@@ -170,7 +170,7 @@ def cut_loop(recording: Recording, first: int, samples: int) -> Motion:
     return motion._replace(twist=displacement / motion.seconds, seam=float(seam))
 
 
-def close_loop(motion: Motion) -> Motion:
+def close_loop(motion: ClipMotion) -> ClipMotion:
     """Close a loop: spread the difference between its last pose and its first over it, half to either end."""
     difference = motion.pose(0).relative(motion.pose(-1))
     motion = motion.add_difference(difference, np.linspace(-0.5, 0.5, len(motion.joints)))
@@ -179,7 +179,7 @@ def close_loop(motion: Motion) -> Motion:
     return motion
 
 
-def straighten_loop(motion: Motion, course: float) -> Motion:
+def straighten_loop(motion: ClipMotion, course: float) -> ClipMotion:
     """Return a loop whose root goes in a constant direction, without turning, at the same speed.
 
     Args:

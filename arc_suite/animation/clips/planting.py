@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.root_motion import Motion, fade_out, integrate_twist
+from arc_suite.animation.clips.root_motion import ClipMotion, fade_out, integrate_twist
 from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
 
@@ -26,7 +26,7 @@ _MAX_SINK = 0.005  # standing heights, by which a foot may miss its goal in heig
 _MAX_SPEED_RATIO = 6.0  # of the fastest joint of a leg, with and without planting
 
 
-def plant_feet(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
+def plant_feet(body: Body, motion: ClipMotion, cycle: float, loops: bool) -> ClipMotion:
     """Return the motion with feet that neither slide nor sink in stance.
 
     A foot in stance stays in the middle of its positions. Between two stances the correction of one changes over into
@@ -54,7 +54,7 @@ def plant_feet(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     return motion._replace(joints=motion.joints + smooth_changes)
 
 
-def slip(body: Body, motion: Motion) -> float | None:
+def slip(body: Body, motion: ClipMotion) -> float | None:
     """Return the mean path of a foot in stance over the ground, m a meter of the root; None if the root stays."""
     legs = Legs.of(body)
     max_height = _STANCE_HEIGHT * body.torso.standing_height
@@ -82,7 +82,7 @@ def _to_foot_centers(legs: Legs) -> Legs:
     return legs._replace(radii=np.zeros_like(legs.radii))
 
 
-def _foot_positions(legs: Legs, motion: Motion) -> np.ndarray:
+def _foot_positions(legs: Legs, motion: ClipMotion) -> np.ndarray:
     """Return the positions (samples, legs, 3) of the centers of feet in the world, m."""
     poses = motion.poses()
     torso_positions = poses[:, None, :3]
@@ -96,7 +96,7 @@ def _largest_joint_steps(angles: np.ndarray) -> np.ndarray:
     return abs(np.diff(angles, axis=0)).max(axis=(0, 2))
 
 
-def _repeat_three_times(loop: Motion) -> Motion:
+def _repeat_three_times(loop: ClipMotion) -> ClipMotion:
     """Return a loop three times over, on one path of the root."""
     loop_samples = len(loop.joints) - 1
     samples = np.arange(3 * loop_samples + 1)
@@ -105,7 +105,7 @@ def _repeat_three_times(loop: Motion) -> Motion:
 
 
 def _find_stances_of_legs(
-    legs: Legs, standing_height: float, motion: Motion, min_swing: int, loops: bool
+    legs: Legs, standing_height: float, motion: ClipMotion, min_swing: int, loops: bool
 ) -> list[list[tuple[int, int]]]:
     """Return the stances of each leg; of a loop, those in three rounds.
 
@@ -149,8 +149,8 @@ def _find_stances(is_low: np.ndarray, min_swing: int, max_stance: int | None) ->
 
 
 def _move_feet_nearer(
-    legs: Legs, standing_height: float, motion: Motion, stances, max_joint_steps: np.ndarray, loops: bool
-) -> Motion:
+    legs: Legs, standing_height: float, motion: ClipMotion, stances, max_joint_steps: np.ndarray, loops: bool
+) -> ClipMotion:
     """Return the motion with feet in stance nearer to a point of the ground that is the same throughout the stance.
 
     Args:

@@ -37,7 +37,7 @@ class Pose(NamedTuple):
         )
 
 
-class Motion(NamedTuple):
+class ClipMotion(NamedTuple):
     """A body over the time of a clip, at even time steps, both ends included.
 
     Attributes:
@@ -76,28 +76,28 @@ class Motion(NamedTuple):
         world_quaternions = rotations.turn_about_z(self.quaternions, yaw)
         return np.concatenate([world_positions, world_quaternions, self.joints], axis=-1)
 
-    def lower(self, height: float) -> "Motion":
+    def lower(self, height: float) -> "ClipMotion":
         """Return the motion with the torso lower by a height, m."""
         return self._replace(positions=self.positions - (0.0, 0.0, height))
 
-    def map_arrays(self, change: Callable[[np.ndarray], np.ndarray]) -> "Motion":
+    def map_arrays(self, change: Callable[[np.ndarray], np.ndarray]) -> "ClipMotion":
         """Return the motion with positions, quaternions and joints, (samples, ...) each, changed by a function."""
         return self._replace(
             positions=change(self.positions), quaternions=change(self.quaternions), joints=change(self.joints)
         )
 
-    def start_at(self, sample: int) -> "Motion":
+    def start_at(self, sample: int) -> "ClipMotion":
         """Return the loop with another of its samples first."""
         order = np.roll(np.arange(len(self.joints) - 1), -sample)
         closed_order = [*order, order[0]]
         return self.map_arrays(lambda values: values[closed_order])
 
-    def stretch_to(self, seconds: float) -> "Motion":
+    def stretch_to(self, seconds: float) -> "ClipMotion":
         """Return the motion over another duration, s."""
         ratio = seconds / self.seconds
         return self._replace(time_step=self.time_step * ratio, twist=self.twist / ratio)
 
-    def sample_at(self, times: np.ndarray) -> "Motion":
+    def sample_at(self, times: np.ndarray) -> "ClipMotion":
         """Return the motion at even times (frames,), s, interpolated between samples."""
         sample_count = len(self.joints)
         fractional_samples = (np.asarray(times) / self.time_step).clip(0.0, sample_count - 1)
@@ -114,7 +114,7 @@ class Motion(NamedTuple):
             quaternions=motion.quaternions / np.linalg.norm(motion.quaternions, axis=-1, keepdims=True),
         )
 
-    def append(self, later: "Motion") -> "Motion":
+    def append(self, later: "ClipMotion") -> "ClipMotion":
         """Return this motion followed by another, which begins with its last pose and has the same time step."""
         later_root = compose(self.root[-1], later.root)
         return self._replace(
@@ -124,7 +124,7 @@ class Motion(NamedTuple):
             joints=np.concatenate([self.joints[:-1], later.joints]),
         )
 
-    def add_difference(self, difference: Pose, shares: np.ndarray) -> "Motion":
+    def add_difference(self, difference: Pose, shares: np.ndarray) -> "ClipMotion":
         """Return the motion with a share (samples,) of a difference of poses added to each sample."""
         shares = shares[:, None]
         sine = np.linalg.norm(difference.quaternion[1:])
@@ -139,14 +139,14 @@ class Motion(NamedTuple):
             joints=self.joints + shares * difference.joints,
         )
 
-    def put_on_root(self, root: np.ndarray) -> "Motion":
+    def put_on_root(self, root: np.ndarray) -> "ClipMotion":
         """Return the same motion in the world on another path of the root, ground poses (samples, 3)."""
         world_poses = self.poses()
         torso_on_root = relative_pose(root, ground_poses(world_poses))
         motion = put_on_root(self.time_step, world_poses, root, torso_on_root)
         return motion._replace(twist=self.twist, seam=self.seam)
 
-    def meet(self, pose: Pose, end: int, samples: int) -> "Motion":
+    def meet(self, pose: Pose, end: int, samples: int) -> "ClipMotion":
         """Return the motion with a pose at one of its ends, at which feet stay where they are in the world.
 
         The root takes up the difference on the ground, over the whole motion. The remaining difference is spread over
@@ -169,7 +169,7 @@ class Motion(NamedTuple):
         motion = motion._replace(root=root, twist=twist_to(root[-1]) / motion.seconds)
         return motion.end_with(pose, end, samples)
 
-    def end_with(self, pose: Pose, end: int, samples: int) -> "Motion":
+    def end_with(self, pose: Pose, end: int, samples: int) -> "ClipMotion":
         """Return the motion with a pose at one of its ends, on the same path of the root.
 
         Args:
@@ -205,7 +205,7 @@ def fade_out(share: np.ndarray) -> np.ndarray:
 # Motions from recordings.
 
 
-def follow_mean_path(recording: Recording, first: int, samples: int, window: int) -> Motion:
+def follow_mean_path(recording: Recording, first: int, samples: int, window: int) -> ClipMotion:
     """Return a part of a recording unchanged, whose root follows the moving average of the torso's path.
 
     Args:
@@ -228,7 +228,7 @@ def follow_mean_path(recording: Recording, first: int, samples: int, window: int
     return motion._replace(twist=twist_to(motion.root[-1]) / motion.seconds)
 
 
-def stay_at_start(recording: Recording, first: int, samples: int) -> Motion:
+def stay_at_start(recording: Recording, first: int, samples: int) -> ClipMotion:
     """Return a part of a recording whose root stays below the torso of its first sample."""
     poses = recording.poses[first : first + samples + 1]
     torso = ground_poses(poses)
@@ -236,7 +236,7 @@ def stay_at_start(recording: Recording, first: int, samples: int) -> Motion:
     return put_on_root(recording.time_step, poses, root, torso_on_root=relative_pose(torso[0], torso))
 
 
-def advance_straight(recording: Recording) -> Motion:
+def advance_straight(recording: Recording) -> ClipMotion:
     """Return a recording whose root goes straight ahead below the torso."""
     torso = ground_poses(recording.poses)
     root = (torso - torso[0]) * (1.0, 0.0, 0.0)
@@ -245,7 +245,7 @@ def advance_straight(recording: Recording) -> Motion:
     return motion._replace(twist=twist_to(root[-1]) / motion.seconds)
 
 
-def put_on_root(time_step: float, poses, root, torso_on_root) -> Motion:
+def put_on_root(time_step: float, poses, root, torso_on_root) -> ClipMotion:
     """Return the motion of poses in the world on a path of the root.
 
     Args:
@@ -255,7 +255,7 @@ def put_on_root(time_step: float, poses, root, torso_on_root) -> Motion:
         torso_on_root: (samples, 3) ground poses of the torso in the root's frame.
     """
     turn = torso_on_root[:, 2] - rotations.yaw(poses[:, 3:7])
-    return Motion(
+    return ClipMotion(
         time_step=time_step,
         root=root,
         positions=np.concatenate([torso_on_root[:, :2], poses[:, 2:3]], axis=-1),

@@ -66,7 +66,7 @@ def test_a_name_may_have_its_module(monkeypatch, register):
         ("math:pi", "clip 'mine': expected one of WalkLoop, Passage, Turn, Acted, Difference, Showcase, got float"),
         ("math:tau_", "clip 'mine': cannot import math:tau_: module 'math' has no attribute 'tau_'"),
         ("no_such:a", "clip 'mine': cannot import no_such:a: No module named 'no_such'"),
-        (Acted(lambda body, rest: None, (0,)), "tick, clip mine: expected a Motion of its play, got NoneType"),
+        (Acted(lambda body, rest: None, (0,)), "tick, clip mine: expected a ClipMotion of its play, got NoneType"),
         (Difference("idle", "walk"), "tick, clip mine: idle is no loop that is recorded"),
         (Showcase("prowl"), "tick, clip mine: tick has no preset prowl"),
     ],

@@ -1,0 +1,273 @@
+"""A motion: frames of a body at a fixed rate, in the world, with the paths of its feet in standing heights."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import checks, rotations
+from arc_suite.models.kinematics import Legs
+from arc_suite.robots import mirror as mirrors
+from arc_suite.robots.spec import Body
+
+MAX_FRAMES = 1 << 16  # 18 minutes at 60 Hz
+MIN_RATE = 1.0  # Hz
+MAX_RATE = 1000.0  # Hz
+
+MAX_PLANTED_HEIGHT = 0.03  # standing heights: a sole that is lower is planted
+MAX_SEAM = 0.05  # rad, or standing heights, between the last frame of a loop and its first
+_MAX_QUOTE = 80  # characters of names in an error
+
+_REFLECTION = np.array((1.0, -1.0, 1.0))  # factors on a point
+_QUATERNION_REFLECTION = np.array((1.0, -1.0, 1.0, -1.0))  # w first
+
+
+class Motion(NamedTuple):
+    """Frames of a body at a fixed rate, both ends included. It starts above the origin and heads along +x.
+
+    A loop ends with its first frame, moved over the ground and turned about the vertical by the displacement of a
+    cycle. A frame is at `index / frame_rate` seconds.
+
+    Attributes:
+        name: of the motion.
+        body: name of the body that it was drawn for.
+        standing_height: of that body, m.
+        joint_names: names of its joints, in the order of `angles`.
+        leg_names: names of its legs, in the order of `soles`.
+        frame_rate: Hz.
+        loops: whether the motion repeats.
+        positions: (frames, 3) positions of the torso, m.
+        quaternions: (frames, 4) quaternions of the torso, w first, whose signs do not jump.
+        angles: (frames, joints) joint angles from the standing pose, rad.
+        planted: (frames, legs) whether a foot stands, booleans.
+        soles: (frames, legs, 3) positions of the soles in the world, standing heights.
+        rest_soles: (legs, 3) soles of the standing pose from the ground below the torso, standing heights.
+    """
+
+    name: str
+    body: str
+    standing_height: float
+    joint_names: tuple[str, ...]
+    leg_names: tuple[str, ...]
+    frame_rate: float
+    loops: bool
+    positions: np.ndarray
+    quaternions: np.ndarray
+    angles: np.ndarray
+    planted: np.ndarray
+    soles: np.ndarray
+    rest_soles: np.ndarray
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, both ends included."""
+        return len(self.positions)
+
+    @property
+    def seconds(self) -> float:
+        """Duration, s; of a loop, that of a cycle."""
+        return (self.frames - 1) / self.frame_rate
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement (3,) of the torso from the first frame to the last: forward and left, m, and turn, rad."""
+        headings = np.unwrap(rotations.yaw(self.quaternions))
+        shift = self.positions[-1, :2] - self.positions[0, :2]
+        return np.append(rotations.to_heading_frame(shift, headings[0]), headings[-1] - headings[0])
+
+
+def make(
+    body: Body,
+    name: str,
+    frame_rate: float,
+    loops: bool,
+    positions: np.ndarray,
+    quaternions: np.ndarray,
+    angles: np.ndarray,
+    planted: np.ndarray | None = None,
+) -> Motion:
+    """Return a motion of a body, moved to its start above the origin.
+
+    Args:
+        body: the body that moves.
+        name: of the motion.
+        frame_rate: Hz.
+        loops: whether the motion repeats; the last frame is the first one, moved by a cycle's displacement.
+        positions: (frames, 3) positions of the torso in the world, m.
+        quaternions: (frames, 4) quaternions of the torso, w first, of any length above 0.
+        angles: (frames, joints) joint angles from the standing pose, rad.
+        planted: (frames, legs) booleans; None for feet whose soles are near the ground.
+
+    Raises:
+        ValueError: too few or too many frames, other shapes, numbers that are not finite, a loop that does not close.
+    """
+    legs = Legs.of(body)
+    standing_height = body.torso.standing_height
+    positions = np.asarray(positions, float)
+    quaternions = _make_continuous(np.asarray(quaternions, float))
+    angles = np.asarray(angles, float)
+    positions, quaternions = _start_at_origin(positions, quaternions)
+    soles = find_soles(legs, positions, quaternions, angles) / standing_height
+    if planted is None:
+        planted = soles[..., 2] < MAX_PLANTED_HEIGHT
+    resting_soles, _ = legs.soles(np.zeros(legs.low.shape))
+    ground = (0.0, 0.0, resting_soles[:, 2].min())  # in the torso's frame; robots stand higher or lower than their h
+    motion = Motion(
+        name=name,
+        body=body.name,
+        standing_height=standing_height,
+        joint_names=body.joint_names,
+        leg_names=tuple([leg.name for leg in body.legs]),
+        frame_rate=float(frame_rate),
+        loops=loops,
+        positions=positions,
+        quaternions=quaternions,
+        angles=angles,
+        planted=np.asarray(planted, bool),
+        soles=soles,
+        rest_soles=(resting_soles - ground) / standing_height,
+    )
+    return check(motion)
+
+
+def check(motion: Motion) -> Motion:
+    """Return a motion after a check of its numbers.
+
+    Raises:
+        ValueError: see `make`.
+    """
+    checks.number("frame_rate", motion.frame_rate, MIN_RATE, MAX_RATE)
+    checks.number("standing_height", motion.standing_height, 1e-6, 1e3)
+    if not 2 <= motion.frames <= MAX_FRAMES:
+        raise ValueError(f"frames: expected from 2 to {MAX_FRAMES}, got {motion.frames}")
+    frames = motion.frames
+    joints = len(motion.joint_names)
+    legs = len(motion.leg_names)
+    shapes = {
+        "positions": (frames, 3),
+        "quaternions": (frames, 4),
+        "angles": (frames, joints),
+        "planted": (frames, legs),
+        "soles": (frames, legs, 3),
+        "rest_soles": (legs, 3),
+    }
+    for field, shape in shapes.items():
+        values = getattr(motion, field)
+        if values.shape != shape:
+            raise ValueError(f"{field}: expected numbers of shape {shape}, got {values.shape}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"{field}: expected finite numbers in frame {_first_bad_frame(values)}")
+    lengths = np.linalg.norm(motion.quaternions, axis=-1)
+    if abs(lengths - 1.0).max() > 1e-6:
+        raise ValueError("quaternions: expected unit quaternions")
+    if motion.loops:
+        _check_loop(motion)
+    return motion
+
+
+def check_body(motion: Motion, body: Body) -> None:
+    """Check that a motion was drawn for a body: the same joints and legs, and the same standing height.
+
+    Raises:
+        ValueError: the motion is of another body.
+    """
+    cure = f"; `arc-suite motion FILE --robot {body.name} -o OUT.npz` makes it one of {body.name}"
+    leg_names = tuple([leg.name for leg in body.legs])
+    for field, names, expected in (
+        ("joints", motion.joint_names, body.joint_names),
+        ("legs", motion.leg_names, leg_names),
+    ):
+        if names != expected:
+            raise ValueError(
+                f"motion {motion.name!r} is of {motion.body!r}: expected {field} {_list(expected)}, "
+                f"got {_list(names)}{cure}"
+            )
+    if not np.isclose(motion.standing_height, body.torso.standing_height, rtol=1e-6):
+        raise ValueError(
+            f"motion {motion.name!r} is of {motion.body!r}: expected a standing height of "
+            f"{body.torso.standing_height:g} m, got {motion.standing_height:g} m{cure}"
+        )
+
+
+def mirror(motion: Motion, body: Body) -> Motion:
+    """Return the left-right mirror image of a motion of a symmetric body.
+
+    Raises:
+        ValueError: the body has no left-right symmetry, or the motion is of another body.
+    """
+    check_body(motion, body)
+    image = mirrors.image(body)
+    return motion._replace(
+        positions=motion.positions * _REFLECTION,
+        quaternions=motion.quaternions * _QUATERNION_REFLECTION,
+        angles=motion.angles[:, image.joints] * image.signs,
+        planted=motion.planted[:, image.legs],
+        soles=motion.soles[:, image.legs] * _REFLECTION,
+        rest_soles=motion.rest_soles[image.legs] * _REFLECTION,
+    )
+
+
+def find_soles(legs: Legs, positions: np.ndarray, quaternions: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Return the positions (frames, legs, 3) of the soles in the world, m: the lowest points of feet.
+
+    Args:
+        legs: legs of the body.
+        positions: (frames, 3) of the torso, m.
+        quaternions: (frames, 4) of the torso.
+        angles: (frames, joints) rad.
+    """
+    below_foot = legs.radii[:, None] * (0.0, 0.0, 1.0)
+    soles, _ = legs.soles(legs.by_leg(angles))  # in the torso's frame; below the feet where the torso is level
+    centers = (rotations.matrix(quaternions)[:, None] @ (soles + below_foot)[..., None])[..., 0]
+    return positions[:, None] + centers - below_foot
+
+
+def _start_at_origin(positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions and quaternions moved over the ground: the first frame is above the origin and heads along x."""
+    heading = rotations.yaw(quaternions[0])
+    ground = rotations.to_heading_frame(positions[:, :2] - positions[0, :2], heading)
+    return np.concatenate([ground, positions[:, 2:]], axis=-1), rotations.turn_about_z(quaternions, -heading)
+
+
+def _make_continuous(quaternions: np.ndarray) -> np.ndarray:
+    """Return the same orientations (frames, 4) of length 1, with signs that do not jump, and w of the first positive.
+
+    Raises:
+        ValueError: a quaternion of length 0, or one that is not finite.
+    """
+    if quaternions.ndim != 2 or quaternions.shape[-1] != 4 or not len(quaternions):
+        raise ValueError(f"quaternions: expected numbers of shape (frames, 4), got {quaternions.shape}")
+    lengths = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    is_valid = np.isfinite(lengths) & (lengths > 1e-9)
+    if not is_valid.all():
+        raise ValueError(f"quaternions: expected finite ones above 0 in frame {int(is_valid[:, 0].argmin())}")
+    flips = (quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0.0
+    signs = np.concatenate([[1.0], np.cumprod(np.where(flips, -1.0, 1.0))])
+    if quaternions[0, 0] < 0.0:
+        signs = -signs
+    return quaternions * signs[:, None] / lengths
+
+
+def _check_loop(motion: Motion) -> None:
+    """Check that the last frame of a loop is its first one, up to a displacement over the ground."""
+    angle_seam = abs(motion.angles[-1] - motion.angles[0]).max(initial=0.0)
+    upright_seam = abs(_verticals(motion.quaternions[-1]) - _verticals(motion.quaternions[0])).max()
+    height_seam = abs(motion.positions[-1, 2] - motion.positions[0, 2]) / motion.standing_height
+    if max(angle_seam, upright_seam, height_seam) > MAX_SEAM:
+        raise ValueError(
+            f"loops: expected the last frame to be the first one: joints differ by {angle_seam:.3g} rad, "
+            f"the torso's tilt by {upright_seam:.3g} rad, its height by {height_seam:.3g} standing heights"
+        )
+
+
+def _verticals(quaternion: np.ndarray) -> np.ndarray:
+    """Return the world's vertical (3,) in the frame of the torso."""
+    return rotations.matrix(quaternion)[2]
+
+
+def _first_bad_frame(values: np.ndarray) -> int:
+    is_finite = np.isfinite(values).reshape(len(values), -1).all(axis=-1)
+    return int(is_finite.argmin())
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return ", ".join(names)[:_MAX_QUOTE]

@@ -1,0 +1,139 @@
+"""Other rates of motions, loops over several cycles, and velocities."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.motions.motion import Motion
+
+_CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
+
+
+class Velocities(NamedTuple):
+    """Velocities in the frames of a motion, by central differences; in the simulation's convention.
+
+    Attributes:
+        linear: (frames, 3) of the torso in the world, m/s.
+        angular: (frames, 3) of the torso in its own frame, rad/s.
+        joints: (frames, joints) rad/s.
+    """
+
+    linear: np.ndarray
+    angular: np.ndarray
+    joints: np.ndarray
+
+
+def resample(motion: Motion, rate: float) -> Motion:
+    """Return a motion with frames at another rate, such as that of control steps.
+
+    A motion lasts a whole number of frames; its duration changes by up to half a frame. Positions, angles and
+    quaternions are cubic between frames, and go through them.
+
+    Args:
+        motion: the motion.
+        rate: Hz.
+    """
+    frames = max(1, round(motion.seconds * rate)) + 1
+    places = np.linspace(0.0, motion.frames - 1, frames)  # in frames of the motion
+    longer = repeat(motion, -1, motion.frames + 1)
+    previous = np.minimum(places.astype(int), motion.frames - 2)
+    share = places - previous
+
+    def interpolate(values):
+        return _interpolate(values, previous + 1, share)
+
+    quaternions = interpolate(longer.quaternions)
+    return motion._replace(
+        frame_rate=float(rate),
+        positions=interpolate(longer.positions),
+        quaternions=quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True),
+        angles=interpolate(longer.angles),
+        planted=motion.planted[np.rint(places).astype(int)],
+        soles=interpolate(longer.soles),
+    )
+
+
+def repeat(motion: Motion, first: int, stop: int) -> Motion:
+    """Return the frames from `first` to `stop`, exclusive, which may lie before or behind the motion.
+
+    A loop goes on over the ground, cycle after cycle. Another motion holds its first and last frames.
+
+    Args:
+        motion: the motion.
+        first: index of the first frame; it may be negative.
+        stop: index of the frame behind the last.
+    """
+    indices = np.arange(first, stop)
+    last = motion.frames - 1
+    if not motion.loops:
+        return _take(motion, indices.clip(0, last))
+    cycles = indices // last
+    forward, left, turn = motion.displacement
+    turns = cycles * turn
+    # The start of a cycle is where a polygon of equal steps and turns has its corner.
+    corners = {0: np.zeros(2)}
+    step = np.array((forward, left))
+    for cycle in range(1, cycles.max(initial=0) + 1):
+        corners[cycle] = corners[cycle - 1] + rotations.to_heading_frame(step, -(cycle - 1) * turn)
+    for cycle in range(-1, cycles.min(initial=0) - 1, -1):
+        corners[cycle] = corners[cycle + 1] - rotations.to_heading_frame(step, -cycle * turn)
+    starts = np.array([corners[cycle] for cycle in cycles.tolist()])
+    frames = _take(motion, indices % last)
+    start_of_soles = starts[:, None] / motion.standing_height
+    return frames._replace(
+        positions=_move(frames.positions, turns, starts),
+        quaternions=rotations.turn_about_z(frames.quaternions, turns),
+        soles=_move(frames.soles, turns[:, None], start_of_soles),
+    )
+
+
+def velocities(motion: Motion) -> Velocities:
+    """Return the velocities of a motion in its frames. A loop moves through its ends; another one starts at rest."""
+    longer = repeat(motion, -1, motion.frames + 1)
+    rate = 0.5 * motion.frame_rate
+    before = longer.quaternions[:-2]
+    after = longer.quaternions[2:]
+    turns = rotations.product(before * _CONJUGATE, after)  # in the torso's frame
+    turns = np.where(turns[:, :1] < 0.0, -turns, turns)
+    sines = np.linalg.norm(turns[:, 1:], axis=-1, keepdims=True)
+    angles = 2.0 * np.arctan2(sines, turns[:, :1])
+    return Velocities(
+        linear=rate * (longer.positions[2:] - longer.positions[:-2]),
+        angular=rate * angles * turns[:, 1:] / np.maximum(sines, 1e-12),
+        joints=rate * (longer.angles[2:] - longer.angles[:-2]),
+    )
+
+
+def _take(motion: Motion, indices: np.ndarray) -> Motion:
+    return motion._replace(
+        positions=motion.positions[indices],
+        quaternions=motion.quaternions[indices],
+        angles=motion.angles[indices],
+        planted=motion.planted[indices],
+        soles=motion.soles[indices],
+    )
+
+
+def _move(points: np.ndarray, turns: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+    """Return points (..., 3) turned about the vertical and shifted over the ground."""
+    ground = rotations.to_heading_frame(points[..., :2], -turns) + shifts
+    return np.concatenate([ground, points[..., 2:]], axis=-1)
+
+
+def _interpolate(values: np.ndarray, previous: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return cubic interpolations between values, by Catmull and Rom.
+
+    Args:
+        values: (frames, ...)
+        previous: (n,) frame before each place; there are a frame before it and two behind it.
+        share: (n,) from the frame before the place, 0, to the frame behind it, 1.
+    """
+    s = share.reshape(-1, *[1] * (values.ndim - 1))
+    before, start, end, after = (values[previous + offset] for offset in (-1, 0, 1, 2))
+    start_slope = 0.5 * (end - before)
+    end_slope = 0.5 * (after - start)
+    change = end - start
+    return start + s * (
+        start_slope + s * (3.0 * change - 2.0 * start_slope - end_slope + s * (start_slope + end_slope - 2.0 * change))
+    )
