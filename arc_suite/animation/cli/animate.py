@@ -1,17 +1,18 @@
-"""Make animation clips for game engines (.glb), films and sheets of sprites of one.
+"""Make animation clips for game engines (.glb), and of one a motion to follow, a film or a sheet of sprites.
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
   arc-suite animate --legs 8 --links 3 --rig nodes --clips all --output spider.glb
+  arc-suite animate --robot tick --clips attack --output attack.npz
   arc-suite animate --policy runs/queen-steer-dagger-0 --output queen.glb
   arc-suite animate --robot queen --clips walk --turntable --transparent --output queen.webp
   arc-suite animate --spec spider --clips walk --fps 12 --size 128 --directions 8 --output sprites.png
 
 Metrics go to .clips.json. One policy makes all clips, each under a command of its own. Loops begin at the same phase
 of the gait and hold the same number of cycles. start and stop connect idle and walk. tuned and refined are presets of
-the four robots' demonstrators, with a gait of their own. A clip that cannot be made is left out with a line. A film
-(.mp4, .gif, .webp) shows one clip, in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row
-of frames for each direction.
+the four robots' demonstrators, with a gait of their own. A clip that cannot be made is left out with a line. A motion
+(.npz) is what `arc-suite motion` and tasks read. A film (.mp4, .gif, .webp) shows one clip, in place and as long as it
+lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction.
 """
 
 import math
@@ -59,7 +60,7 @@ flags.DEFINE_integer(
     "Of sheets: rows; the first goes to the right, the next to its left.",
     *clip_files.OPTION_BOUNDS["directions"],
 )
-flags.DEFINE_string("output", None, "File to write, .glb, .mp4, .gif, .webp or .png. Required.", short_name="o")
+flags.DEFINE_string("output", None, "File to write, .glb, .npz, .mp4, .gif, .webp or .png. Required.", short_name="o")
 
 
 def main() -> None:

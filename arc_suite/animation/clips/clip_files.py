@@ -1,4 +1,4 @@
-"""Files of clips: a glTF file with its metrics, a film, or a sheet of sprites."""
+"""Files of clips: a glTF file with its metrics, a motion, a film, or a sheet of sprites."""
 
 import contextlib
 import functools
@@ -9,13 +9,14 @@ from typing import Any
 
 from tqdm import tqdm
 
-from arc_suite import checks, files, versions
+from arc_suite import checks, files, motions, versions
 from arc_suite.animation.clips import catalog, filming
 from arc_suite.animation.clips.catalog import ALL, DEFAULT
 from arc_suite.animation.clips.clips import FPS, Clip
 from arc_suite.animation.clips.clips import clips as make_clips
 from arc_suite.animation.clips.creatures import RIGS, glb
 from arc_suite.animation.clips.metadata import ROOT_MOTIONS, sidecar
+from arc_suite.animation.clips.motion_of_clip import motion_of_clip
 from arc_suite.envs.setup import Setup
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
@@ -24,7 +25,8 @@ from arc_suite.simulation import films
 GLB_EXTENSION = ".glb"
 FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
 SHEET_EXTENSION = ".png"
-EXTENSIONS = (GLB_EXTENSION, *FILM_EXTENSIONS, SHEET_EXTENSION)
+MOTION_EXTENSION = ".npz"
+EXTENSIONS = (GLB_EXTENSION, MOTION_EXTENSION, *FILM_EXTENSIONS, SHEET_EXTENSION)
 
 # The extensions of files that take an option.
 OPTION_EXTENSIONS = {
@@ -63,8 +65,8 @@ def animate(
 ) -> list[Clip]:
     """Write animation clips of a body, as `arc-suite animate` does, and return them.
 
-    The extension of the path says what is written: `.glb`, with metrics in `.clips.json`; one clip as a film, `.mp4`,
-    `.gif` or `.webp`; or one as a sheet of sprites, `.png`.
+    The extension of the path says what is written: `.glb`, with metrics in `.clips.json`; one clip as a motion,
+    `.npz`, see `arc_suite.motions`; one as a film, `.mp4`, `.gif` or `.webp`; or one as a sheet of sprites, `.png`.
 
     Args:
         robot, task, task_kwargs: see `arc_suite.load`.
@@ -94,6 +96,8 @@ def animate(
         made_clips = make_clips(setup, names, policy, preset, fps, recording_progress, straight, plant)
         if extension == GLB_EXTENSION:
             metrics |= _write_glb(temporary, setup.body, made_clips, **options)
+        elif extension == MOTION_EXTENSION:
+            motions.save(motion_of_clip(setup.body, made_clips[0]), temporary)
         elif extension == SHEET_EXTENSION:
             _write_sheet(temporary, setup.body, made_clips[0], **options)
         else:

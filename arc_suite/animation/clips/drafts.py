@@ -23,6 +23,7 @@ from arc_suite.animation.clips.catalog import (
 )
 from arc_suite.animation.clips.foot_contacts import (
     MIN_RISE,
+    MIN_RISE_IN_GESTURE,
     TOUCH_DOWN,
     FootContact,
     count_odd_feet,
@@ -49,7 +50,6 @@ _MAX_CYCLES_IN_STEP = 4  # gait cycles of loops that stay in step
 _MAX_CYCLES_ALONE = 12  # gait cycles of a loop with a gait of its own
 _MIN_SPEED_SHARE = 0.25  # of its command's velocity, that a loop has at least
 _MAX_SOLE_DEPTH = 0.025  # standing heights, that a sole is below the ground where others are on it
-_MIN_RISE_IN_GESTURE = 0.05  # standing heights: a foot that rises less in a gesture does not step
 _MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
 _CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
 
@@ -86,7 +86,7 @@ class Draft(NamedTuple):
         heights = sole_heights(compile_model(body), body, self.motion.poses())
         if self.stands:
             return float(np.median(heights)), []
-        min_rise = MIN_RISE if self.cycles else _MIN_RISE_IN_GESTURE
+        min_rise = MIN_RISE if self.cycles else MIN_RISE_IN_GESTURE
         contacts, stance = find_foot_contacts(self.motion, body, heights, self.cycle, self.loops, min_rise)
         if not stance.any():
             return 0.0, contacts

@@ -13,6 +13,7 @@ from arc_suite.tasks import readings
 TOUCH_DOWN = "touch_down"
 LIFT_OFF = "lift_off"
 MIN_RISE = 0.005  # standing heights: a foot that rises less never leaves the ground
+MIN_RISE_IN_GESTURE = 0.05  # standing heights: a foot that rises less in a gesture does not step
 
 # Heights between which a foot swings, as shares of the range of its height: it rises above the upper one, and the
 # swing lasts while the foot is above the lower one.
