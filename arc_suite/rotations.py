@@ -63,6 +63,30 @@ def matrix(quaternion):
     return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def from_matrix(matrix):
+    """Return the quaternions (..., 4) of rotation matrices (..., 3, 3), w first."""
+    xp = matrix.__array_namespace__()
+    xx, yy, zz = (matrix[..., i, i] for i in range(3))
+    x_turn = matrix[..., 2, 1] - matrix[..., 1, 2]
+    y_turn = matrix[..., 0, 2] - matrix[..., 2, 0]
+    z_turn = matrix[..., 1, 0] - matrix[..., 0, 1]
+    xy = matrix[..., 0, 1] + matrix[..., 1, 0]
+    xz = matrix[..., 0, 2] + matrix[..., 2, 0]
+    yz = matrix[..., 1, 2] + matrix[..., 2, 1]
+    # Each row is the quaternion times four of its components; the longest row has no small divisor.
+    rows = (
+        (1.0 + xx + yy + zz, x_turn, y_turn, z_turn),
+        (x_turn, 1.0 + xx - yy - zz, xy, xz),
+        (y_turn, xy, 1.0 - xx + yy - zz, yz),
+        (z_turn, xz, yz, 1.0 - xx - yy + zz),
+    )
+    multiples = xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+    lengths = xp.sqrt((multiples * multiples).sum(axis=-1))
+    longest = lengths.argmax(axis=-1)[..., None]
+    multiple = xp.take_along_axis(multiples, longest[..., None], axis=-2)[..., 0, :]
+    return multiple / xp.take_along_axis(lengths, longest, axis=-1)
+
+
 def to_heading_frame(vectors, heading):
     """Return the forward and left components (..., 2) of world vectors (..., 2), given a heading (...), rad."""
     xp = vectors.__array_namespace__()

@@ -93,6 +93,27 @@ class Legs(NamedTuple):
             angles: (..., legs, links) rad.
         """
         xp = angles.__array_namespace__()
+        axes_and_anchors, end = self._follow_links(angles)
+        sole = end - self.radii[:, None] * _VERTICAL
+        jacobian = xp.stack([xp.cross(axis, sole - anchor) for axis, anchor in axes_and_anchors], axis=-1)
+        return sole, jacobian
+
+    def places(self, angles) -> tuple[np.ndarray, np.ndarray]:
+        """Return where links begin and feet are, (..., legs, links + 1, 3), m, and the axes of joints there.
+
+        An axis is 0 where a link is fixed, and of a foot. A foot is also where links begin that a leg does not have.
+
+        Args:
+            angles: (..., legs, links) rad.
+        """
+        xp = angles.__array_namespace__()
+        axes_and_anchors, end = self._follow_links(angles)
+        axes = [xp.broadcast_to(axis, end.shape) for axis, _ in axes_and_anchors]
+        anchors = [xp.broadcast_to(anchor, end.shape) for _, anchor in axes_and_anchors]
+        return xp.stack([*anchors, end], axis=-2), xp.stack([*axes, xp.zeros_like(end)], axis=-2)
+
+    def _follow_links(self, angles) -> tuple[list, np.ndarray]:
+        """Return pairs of the axis and the beginning (..., legs, 3) of each link, and the ends of legs, alike."""
         orientation = self.mount_rotations
         position = self.mounts
         axes_and_anchors = []
@@ -101,9 +122,7 @@ class Legs(NamedTuple):
             axes_and_anchors.append((axis, position))
             orientation = orientation @ _rotations(self.axes[:, link], angles[..., link])
             position = position + (orientation @ self.ends[:, link, :, None])[..., 0]
-        sole = position - self.radii[:, None] * _VERTICAL
-        jacobian = xp.stack([xp.cross(axis, sole - anchor) for axis, anchor in axes_and_anchors], axis=-1)
-        return sole, jacobian
+        return axes_and_anchors, position
 
     def solve_joint_angles(self, angles, goals, weights, damping: float, steps: int) -> np.ndarray:
         """Return the angles (..., legs, links) that bring soles near goals, by damped least squares.

@@ -1,7 +1,8 @@
 """Motions as values: frames of a torso, joints and feet, which a task follows and which files of others become."""
 
-from arc_suite.motions.motion import Motion, check_body, make, mirror
+from arc_suite.motions.motion import Motion, check_body, find_rest, make, mirror
 from arc_suite.motions.motion_files import digest, load, save
+from arc_suite.motions.retargeting import retarget
 from arc_suite.motions.sampling import Velocities, repeat, resample, velocities
 
 __all__ = [
@@ -9,11 +10,13 @@ __all__ = [
     "Velocities",
     "check_body",
     "digest",
+    "find_rest",
     "load",
     "make",
     "mirror",
     "repeat",
     "resample",
+    "retarget",
     "save",
     "velocities",
 ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from arc_suite import checks, rotations
 from arc_suite.models.kinematics import Legs
+from arc_suite.models.posture import find_rest_pose
 from arc_suite.robots import mirror as mirrors
 from arc_suite.robots.spec import Body
 
@@ -40,7 +41,8 @@ class Motion(NamedTuple):
         angles: (frames, joints) joint angles from the standing pose, rad.
         planted: (frames, legs) whether a foot stands, booleans.
         soles: (frames, legs, 3) positions of the soles in the world, standing heights.
-        rest_soles: (legs, 3) soles of the standing pose from the ground below the torso, standing heights.
+        rest_soles: (legs, 3) soles of that body at rest, from the ground below its torso, standing heights.
+        rest_height: height of the torso over the ground at rest, standing heights; of most bodies 1.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Motion(NamedTuple):
     planted: np.ndarray
     soles: np.ndarray
     rest_soles: np.ndarray
+    rest_height: float
 
     @property
     def frames(self) -> int:
@@ -103,14 +106,13 @@ def make(
     legs = Legs.of(body)
     standing_height = body.torso.standing_height
     positions = np.asarray(positions, float)
-    quaternions = _make_continuous(np.asarray(quaternions, float))
+    quaternions = make_continuous(np.asarray(quaternions, float))
     angles = np.asarray(angles, float)
     positions, quaternions = _start_at_origin(positions, quaternions)
     soles = find_soles(legs, positions, quaternions, angles) / standing_height
+    rest_soles, rest_height = find_rest(body)
     if planted is None:
         planted = soles[..., 2] < MAX_PLANTED_HEIGHT
-    resting_soles, _ = legs.soles(np.zeros(legs.low.shape))
-    ground = (0.0, 0.0, resting_soles[:, 2].min())  # in the torso's frame; robots stand higher or lower than their h
     motion = Motion(
         name=name,
         body=body.name,
@@ -124,7 +126,8 @@ def make(
         angles=angles,
         planted=np.asarray(planted, bool),
         soles=soles,
-        rest_soles=(resting_soles - ground) / standing_height,
+        rest_soles=rest_soles / standing_height,
+        rest_height=rest_height / standing_height,
     )
     return check(motion)
 
@@ -137,6 +140,7 @@ def check(motion: Motion) -> Motion:
     """
     checks.number("frame_rate", motion.frame_rate, MIN_RATE, MAX_RATE)
     checks.number("standing_height", motion.standing_height, 1e-6, 1e3)
+    checks.number("rest_height", motion.rest_height, 1e-3, 1e3)
     if not 2 <= motion.frames <= MAX_FRAMES:
         raise ValueError(f"frames: expected from 2 to {MAX_FRAMES}, got {motion.frames}")
     frames = motion.frames
@@ -206,6 +210,13 @@ def mirror(motion: Motion, body: Body) -> Motion:
     )
 
 
+def find_rest(body: Body) -> tuple[np.ndarray, float]:
+    """Return the soles (legs, 3) of a body at rest, from the ground below its torso, and the torso's height, m."""
+    soles = find_rest_pose(body).sole_positions
+    height = float(-soles[:, 2].min())
+    return soles + (0.0, 0.0, height), height
+
+
 def find_soles(legs: Legs, positions: np.ndarray, quaternions: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Return the positions (frames, legs, 3) of the soles in the world, m: the lowest points of feet.
 
@@ -228,7 +239,7 @@ def _start_at_origin(positions: np.ndarray, quaternions: np.ndarray) -> tuple[np
     return np.concatenate([ground, positions[:, 2:]], axis=-1), rotations.turn_about_z(quaternions, -heading)
 
 
-def _make_continuous(quaternions: np.ndarray) -> np.ndarray:
+def make_continuous(quaternions: np.ndarray) -> np.ndarray:
     """Return the same orientations (frames, 4) of length 1, with signs that do not jump, and w of the first positive.
 
     Raises:

@@ -17,7 +17,7 @@ _MAX_NAMES = 1024  # joints or legs
 _MAX_NAME = 200  # characters
 
 _TEXTS = ("name", "body")
-_NUMBERS = ("standing_height", "frame_rate")
+_NUMBERS = ("standing_height", "frame_rate", "rest_height")
 _NAMES = ("joint_names", "leg_names")
 _BOOLEANS = ("planted",)
 

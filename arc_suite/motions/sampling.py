@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
+from arc_suite.motions.ground_poses import compose, relative_pose
 from arc_suite.motions.motion import Motion
 
 _CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
@@ -67,24 +68,21 @@ def repeat(motion: Motion, first: int, stop: int) -> Motion:
     indices = np.arange(first, stop)
     last = motion.frames - 1
     if not motion.loops:
-        return _take(motion, indices.clip(0, last))
+        return _select(motion, indices.clip(0, last))
     cycles = indices // last
-    forward, left, turn = motion.displacement
-    turns = cycles * turn
-    # The start of a cycle is where a polygon of equal steps and turns has its corner.
-    corners = {0: np.zeros(2)}
-    step = np.array((forward, left))
+    starts = {0: np.zeros(3)}  # ground poses in which cycles begin
     for cycle in range(1, cycles.max(initial=0) + 1):
-        corners[cycle] = corners[cycle - 1] + rotations.to_heading_frame(step, -(cycle - 1) * turn)
+        starts[cycle] = compose(starts[cycle - 1], motion.displacement)
+    back = relative_pose(motion.displacement, np.zeros(3))
     for cycle in range(-1, cycles.min(initial=0) - 1, -1):
-        corners[cycle] = corners[cycle + 1] - rotations.to_heading_frame(step, -cycle * turn)
-    starts = np.array([corners[cycle] for cycle in cycles.tolist()])
-    frames = _take(motion, indices % last)
-    start_of_soles = starts[:, None] / motion.standing_height
+        starts[cycle] = compose(starts[cycle + 1], back)
+    start = np.array([starts[cycle] for cycle in cycles.tolist()])
+    frames = _select(motion, indices % last)
+    start_of_soles = start[:, None] / (motion.standing_height, motion.standing_height, 1.0)
     return frames._replace(
-        positions=_move(frames.positions, turns, starts),
-        quaternions=rotations.turn_about_z(frames.quaternions, turns),
-        soles=_move(frames.soles, turns[:, None], start_of_soles),
+        positions=_move(frames.positions, start),
+        quaternions=rotations.turn_about_z(frames.quaternions, start[:, 2]),
+        soles=_move(frames.soles, start_of_soles),
     )
 
 
@@ -105,7 +103,7 @@ def velocities(motion: Motion) -> Velocities:
     )
 
 
-def _take(motion: Motion, indices: np.ndarray) -> Motion:
+def _select(motion: Motion, indices: np.ndarray) -> Motion:
     return motion._replace(
         positions=motion.positions[indices],
         quaternions=motion.quaternions[indices],
@@ -115,10 +113,9 @@ def _take(motion: Motion, indices: np.ndarray) -> Motion:
     )
 
 
-def _move(points: np.ndarray, turns: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """Return points (..., 3) turned about the vertical and shifted over the ground."""
-    ground = rotations.to_heading_frame(points[..., :2], -turns) + shifts
-    return np.concatenate([ground, points[..., 2:]], axis=-1)
+def _move(points: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Return points (..., 3) in the world that are relative to ground poses (..., 3)."""
+    return np.concatenate([compose(start, points)[..., :2], points[..., 2:]], axis=-1)
 
 
 def _interpolate(values: np.ndarray, previous: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from arc_suite import motions, registry, rotations
+from arc_suite.models.posture import find_rest_pose
 
 TICK = registry.body_of("tick")
 QUEEN = registry.body_of("queen")
@@ -44,13 +45,14 @@ def test_make_puts_the_start_above_the_origin():
 
 
 def test_soles_at_rest_are_on_the_ground():
+    rest = find_rest_pose(TICK)
     height = TICK.torso.standing_height
-    rest = np.zeros((2, len(TICK.joint_names)))
-    motion = motions.make(TICK, "stand", 60.0, True, [(0, 0, height)] * 2, [(1, 0, 0, 0)] * 2, rest)
-    np.testing.assert_allclose(motion.rest_soles[:, 2], 0.0, atol=1e-9)
-    np.testing.assert_allclose(motion.rest_soles[:, :2], motion.soles[0, :, :2], atol=1e-12)
-    feet = np.array([leg.foot_position for leg in TICK.legs])
-    np.testing.assert_allclose(motion.rest_soles[:, :2] * height, feet[:, :2], atol=1e-12)
+    angles = np.tile(rest.legs.by_joint(rest.joint_angles), (2, 1))
+    place = (0.0, 0.0, rest.ride_height * height)
+    motion = motions.make(TICK, "stand", 60.0, True, [place] * 2, [(1, 0, 0, 0)] * 2, angles)
+    np.testing.assert_allclose(motion.soles[0], motion.rest_soles, atol=1e-4)
+    np.testing.assert_allclose(motion.rest_soles[:, 2], 0.0, atol=1e-3)
+    assert motion.rest_height == pytest.approx(rest.ride_height, abs=1e-3)
     assert motion.planted.all()
 
 
@@ -150,8 +152,9 @@ def test_digest_is_stable():
         zeros == 0,
         np.zeros((2, 2, 3)),
         np.zeros((2, 3)),
+        1.0,
     )
-    assert motions.digest(motion)[:16] == "51d16f86c1a7d6f0"
+    assert motions.digest(motion)[:16] == "cf4cbc6194c99254"
 
 
 def test_motion_of_another_body_is_one_line():

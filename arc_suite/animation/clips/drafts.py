@@ -43,6 +43,7 @@ from arc_suite.animation.clips.loops import (
 from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording, TurnRecording
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.motions.ground_poses import twist_to
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 
@@ -383,7 +384,7 @@ def _make_turn(body: Body, angle: float, turn: TurnRecording, idle: Pose) -> Dra
     motion = draft.motion.meet(idle, 0, cycle_samples).meet(idle, -1, cycle_samples)
     missing_angles = (angle - motion.root[-1, 2]) * np.linspace(0.0, 1.0, len(motion.root))
     root = motion.root + missing_angles[:, None] * (0.0, 0.0, 1.0)
-    twist = root_motion.twist_to(root[-1]) / motion.seconds
+    twist = twist_to(root[-1]) / motion.seconds
     return draft._replace(motion=motion._replace(root=root, twist=twist))
 
 

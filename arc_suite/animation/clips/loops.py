@@ -11,15 +11,8 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
-from arc_suite.animation.clips.root_motion import (
-    ClipMotion,
-    compose,
-    ground_poses,
-    integrate_twist,
-    put_on_root,
-    relative_pose,
-    twist_to,
-)
+from arc_suite.animation.clips.root_motion import ClipMotion, put_on_root
+from arc_suite.motions.ground_poses import compose, ground_poses, integrate_twist, relative_pose, twist_to
 
 GOOD_SEAM = np.radians(0.5)  # rad: up to this seam, loops are equally good
 MAX_SEAM = np.radians(2.0)  # rad: a loop with a larger seam is refused

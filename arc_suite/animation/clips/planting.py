@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.root_motion import ClipMotion, fade_out, integrate_twist
+from arc_suite.animation.clips.root_motion import ClipMotion, fade_out
 from arc_suite.models.kinematics import Legs
+from arc_suite.motions.ground_poses import integrate_twist
 from arc_suite.robots.spec import Body
 
 _STANCE_HEIGHT = 0.01  # standing heights: a lower sole is in stance

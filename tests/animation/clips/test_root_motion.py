@@ -8,6 +8,7 @@ import pytest
 from arc_suite import rotations
 from arc_suite.animation.clips import loops, root_motion
 from arc_suite.animation.clips.recordings import Recording
+from arc_suite.motions import ground_poses
 
 STEP, CYCLE = 0.002, 0.55  # s; a cycle is 11 control steps
 TWISTS = [(0.5, 0.0, 0.0), (0.4, -0.1, 0.8), (0.0, 0.2, -0.5), (-0.3, 0.0, 1e-12)]
@@ -18,10 +19,10 @@ def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
     """Two joints and a torso that sway once a cycle on a path of constant twist."""
     times = STEP * np.arange(round(seconds / STEP) + 1)
     phase = 2.0 * np.pi * times / cycle
-    root = root_motion.integrate_twist(np.array(twist), times)
+    root = ground_poses.integrate_twist(np.array(twist), times)
     sway = np.stack([0.02 * np.sin(2.0 * phase), 0.03 * np.cos(phase), 0.1 * np.sin(phase)], axis=-1)
     place = np.stack(
-        [root_motion.compose(root_motion.compose(np.array(start), a), b) for a, b in zip(root, sway, strict=True)]
+        [ground_poses.compose(ground_poses.compose(np.array(start), a), b) for a, b in zip(root, sway, strict=True)]
     )
     roll = 0.05 * np.sin(phase) + drift * times
     tilt = np.stack([np.cos(0.5 * roll), np.sin(0.5 * roll), 0.0 * roll, 0.0 * roll], axis=-1)
@@ -33,19 +34,19 @@ def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
 
 @pytest.mark.parametrize("twist", TWISTS)
 def test_logarithm_undoes_along(twist):
-    place = root_motion.integrate_twist(np.array(twist), np.array([0.0, 1.0]))
+    place = ground_poses.integrate_twist(np.array(twist), np.array([0.0, 1.0]))
     np.testing.assert_allclose(place[0], 0.0)
-    np.testing.assert_allclose(root_motion.twist_to(place[1]), twist, atol=1e-12)
+    np.testing.assert_allclose(ground_poses.twist_to(place[1]), twist, atol=1e-12)
 
 
 def test_along_adds_small_steps_and_relative_undoes_after():
     twist, place = np.array((0.4, -0.1, 0.8)), np.zeros(3)
-    small = root_motion.integrate_twist(twist, np.array([1e-3]))[0]
+    small = ground_poses.integrate_twist(twist, np.array([1e-3]))[0]
     for _ in range(1000):
-        place = root_motion.compose(place, small)
-    np.testing.assert_allclose(root_motion.integrate_twist(twist, np.array([1.0]))[0], place, atol=1e-12)
+        place = ground_poses.compose(place, small)
+    np.testing.assert_allclose(ground_poses.integrate_twist(twist, np.array([1.0]))[0], place, atol=1e-12)
     first, second = np.array((1.0, 2.0, 0.7)), np.array((-0.5, 0.2, 2.0))
-    np.testing.assert_allclose(root_motion.relative_pose(first, root_motion.compose(first, second)), second)
+    np.testing.assert_allclose(ground_poses.relative_pose(first, ground_poses.compose(first, second)), second)
 
 
 def test_the_period_is_the_cycle_if_the_pose_returns():
@@ -73,7 +74,7 @@ def test_a_loop(twist):
     poses = loop.poses()
     there = np.concatenate([recording.poses[:, :2], rotations.yaw(recording.poses[:, 3:7])[:, None]], axis=-1)[137:413]
     here = np.concatenate([poses[:, :2], rotations.yaw(poses[:, 3:7])[:, None]], axis=-1)
-    difference = root_motion.relative_pose(here[0], here) - root_motion.relative_pose(there[0], there)
+    difference = ground_poses.relative_pose(here[0], here) - ground_poses.relative_pose(there[0], there)
     np.testing.assert_allclose(difference[:, :2], 0.0, atol=1e-9)
     np.testing.assert_allclose(rotations.wrap_angle(difference[:, 2]), 0.0, atol=1e-9)
     np.testing.assert_allclose(poses[:, 7:], recording.poses[137:413, 7:], atol=1e-9)
@@ -154,9 +155,9 @@ def test_an_end_meets_a_pose_and_feet_stay_where_they_are(end):
     assert met.seam == pytest.approx(root_motion.seam_size(pose.relative(passage.pose(end))), rel=0.2)
     # Beyond the samples over which the pose fades, the motion in the world is as it was.
     rows = slice(220, 580) if end == 0 else slice(20, 380)
-    before, after = (root_motion.ground_poses(motion.poses()[rows]) for motion in (passage, met))
+    before, after = (ground_poses.ground_poses(motion.poses()[rows]) for motion in (passage, met))
     np.testing.assert_allclose(
-        root_motion.relative_pose(after[0], after), root_motion.relative_pose(before[0], before), atol=1e-9
+        ground_poses.relative_pose(after[0], after), ground_poses.relative_pose(before[0], before), atol=1e-9
     )
     np.testing.assert_allclose(met.joints[rows], passage.joints[rows], atol=1e-12)
 
@@ -167,7 +168,7 @@ def test_a_straight_loop_goes_where_it_is_to():
     np.testing.assert_allclose(straight.twist, (np.hypot(*loop.twist[:2]), 0.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(straight.root[:, 1:], 0.0, atol=1e-12)
     # In the first moment the torso moves over the ground in the direction that it had, seen from itself.
-    ways = [np.diff(root_motion.ground_poses(motion.poses())[:2], axis=0)[0] for motion in (loop, straight)]
+    ways = [np.diff(ground_poses.ground_poses(motion.poses())[:2], axis=0)[0] for motion in (loop, straight)]
     headings = [rotations.yaw(motion.poses()[0, 3:7]) for motion in (loop, straight)]
     seen = [rotations.to_heading_frame(way[:2], heading) for way, heading in zip(ways, headings, strict=True)]
     np.testing.assert_allclose(seen[0], seen[1], atol=1e-5)

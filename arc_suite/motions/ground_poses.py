@@ -1,0 +1,55 @@
+"""Poses on the ground and twists.
+
+A ground pose is (..., 3): x and y, m, and yaw, rad. A twist is (..., 3): the velocity forward and to the left in the
+moving frame, m/s, and the turning rate, rad/s.
+"""
+
+import numpy as np
+
+from arc_suite import rotations
+
+
+def ground_poses(poses) -> np.ndarray:
+    """Return the ground poses (samples, 3) of the torso in poses (samples, 7 + joints); yaw does not jump."""
+    yaw = np.unwrap(rotations.yaw(poses[:, 3:7]))
+    return np.concatenate([poses[:, :2], yaw[:, None]], axis=-1)
+
+
+def relative_pose(origin, ground_pose) -> np.ndarray:
+    """Return ground poses (..., 3) in the frames of others, `origin` (..., 3)."""
+    origin = np.asarray(origin, float)
+    ground_pose = np.asarray(ground_pose, float)
+    offset = rotations.to_heading_frame(ground_pose[..., :2] - origin[..., :2], origin[..., 2])
+    return np.concatenate([offset, ground_pose[..., 2:] - origin[..., 2:]], axis=-1)
+
+
+def compose(origin, local) -> np.ndarray:
+    """Return the ground poses (..., 3) in the world that are `local` (..., 3) in the frames of `origin` (..., 3)."""
+    origin = np.asarray(origin, float)
+    local = np.asarray(local, float)
+    position = origin[..., :2] + rotations.to_heading_frame(local[..., :2], -origin[..., 2])
+    return np.concatenate([position, origin[..., 2:] + local[..., 2:]], axis=-1)
+
+
+def integrate_twist(twist, times) -> np.ndarray:
+    """Return the ground poses (times, 3) to which a constant twist leads from 0.
+
+    Args:
+        twist: (3,) forward, left, m/s, and turning, rad/s.
+        times: (times,) s.
+    """
+    half_turn = 0.5 * twist[2] * times
+    # The path is an arc. Its chord is shorter by sin(a) / a, a being half the turn, and has the direction of half
+    # the turn.
+    chord_time = times * np.sinc(half_turn / np.pi)
+    chord = np.stack([chord_time * twist[0], chord_time * twist[1]], axis=-1)
+    displacement = rotations.to_heading_frame(chord, -half_turn)
+    return np.concatenate([displacement, 2.0 * half_turn[:, None]], axis=-1)
+
+
+def twist_to(ground_pose) -> np.ndarray:
+    """Return the constant twists (..., 3) that lead from 0 to ground poses (..., 3) in a unit of time."""
+    half_turn = 0.5 * ground_pose[..., 2]
+    chord = rotations.to_heading_frame(ground_pose[..., :2], half_turn)
+    velocity = chord / np.sinc(half_turn / np.pi)[..., None]
+    return np.concatenate([velocity, ground_pose[..., 2:]], axis=-1)

@@ -1,0 +1,248 @@
+"""Motions of one body for another, by the paths of feet in standing heights.
+
+Time is scaled as a pendulum of the standing height swings, so that speeds keep their Froude number. Joints follow the
+torso and the feet by inverse kinematics.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.models.kinematics import Legs
+from arc_suite.models.posture import find_rest_pose
+from arc_suite.models.standing import measure_standing, stability_margin
+from arc_suite.motions import gait_transfer
+from arc_suite.motions import motion as values
+from arc_suite.motions.motion import Motion
+from arc_suite.motions.paths import Paths, match_feet, scale_heights, shrink_turns
+from arc_suite.robots.spec import Body
+
+MAX_MISS = 0.05  # standing heights, of a foot from its path
+
+_MIN_TRAVEL = 0.3  # standing heights over the ground, over which a foot cannot stay planted
+_MIN_MARGIN = 0.05  # standing heights, of the center of mass from the edge of the feet that carry
+_SHIFT_TIME = 1.5  # sqrt(h / g), in which the torso shifts before a foot lifts
+_BISECTIONS = 12
+
+# Changes that are tried in this order until legs reach: heights of the torso, and sizes of paths.
+_LOWER_TORSOS = (0.0, 0.05, 0.1, 0.2, 0.3)  # standing heights
+_SIZES = (1.0, 0.85, 0.7, 0.55, 0.4)
+
+# Inverse kinematics.
+_FOOT_WEIGHTS = np.diag((1.0, 1.0, 2.0))
+_DAMPING = 0.02  # standing heights
+_ITERATIONS = 40
+_SEARCH_FRAMES = 24  # of a motion, for which changes are tried first
+_VERTICAL = np.array((0.0, 0.0, 1.0))
+
+
+class _Fit(NamedTuple):
+    """Joint angles (frames, joints), rad, and how far feet miss their paths, (frames, legs), standing heights."""
+
+    angles: np.ndarray
+    misses: np.ndarray
+
+
+def retarget(motion: Motion, body: Body) -> tuple[Motion, list[str]]:
+    """Return a motion of another body as one of this body, and a line for each thing that was changed.
+
+    In a loop of steps each foot follows the path of its partner by its own phase, in the gait of this body. In another
+    motion feet follow those that stand in the same place at rest; feet without a partner stay planted, and the torso
+    stays over the feet that carry.
+
+    Args:
+        motion: motion of any body.
+        body: the body that is to move.
+
+    Raises:
+        ValueError: legs do not reach the paths of their feet within `MAX_MISS`.
+    """
+    transfer = gait_transfer.transfer if gait_transfer.count_cycles(motion) else _transfer_gesture
+    paths, fit, notes = _fit_legs(body, motion, transfer)
+    height = body.torso.standing_height
+    retargeted = values.make(
+        body,
+        name=motion.name,
+        frame_rate=(len(paths.positions) - 1) / paths.seconds,
+        loops=motion.loops,
+        positions=paths.positions * height,
+        quaternions=paths.quaternions,
+        angles=fit.angles,
+    )
+    notes.append(f"feet miss their paths by up to {fit.misses.max():.3f} standing heights")
+    return retargeted._replace(planted=paths.planted), notes
+
+
+def time_scale(motion: Motion, body: Body) -> float:
+    """Return by how much longer the same motion of a body takes: as a pendulum of its standing height."""
+    return math.sqrt(body.torso.standing_height / motion.standing_height)
+
+
+# Gestures.
+
+
+def _transfer_gesture(motion: Motion, body: Body, size: float) -> tuple[Paths, list[str]]:
+    """Return the paths of a body's torso and feet in a motion without a gait; see `gait_transfer.transfer`."""
+    notes = []
+    height = body.torso.standing_height
+    rest_soles, rest_height = values.find_rest(body)
+    rest_soles = rest_soles / height
+    partners = match_feet(motion.rest_soles, rest_soles)
+    travel = np.linalg.norm(motion.displacement[:2]) / motion.standing_height
+    flies = not motion.planted.any(axis=-1).all()
+    alone = [index for index, partner in enumerate(partners) if partner is None]
+    offsets = size * (motion.soles - motion.rest_soles)
+    if travel > _MIN_TRAVEL or flies:  # feet cannot stay where they are
+        nearest = np.linalg.norm(motion.rest_soles[None] - rest_soles[:, None], axis=-1).argmin(axis=-1)
+        partners = [nearest[index] if partner is None else partner for index, partner in enumerate(partners)]
+        alone = []
+    if alone:
+        notes.append(f"without a partner, planted: {', '.join(body.legs[index].name for index in alone)}")
+    idle_feet = [name for index, name in enumerate(motion.leg_names) if index not in partners]
+    moving_feet = [name for name in idle_feet if not motion.planted[:, motion.leg_names.index(name)].all()]
+    if moving_feet:
+        notes.append(f"without a partner, left out: {', '.join(moving_feet)}")
+    lean = offsets[0, motion.planted[0], :2].mean(axis=0) if motion.planted[0].any() else np.zeros(2)
+    soles = np.tile(rest_soles, (motion.frames, 1, 1))
+    planted = np.ones(soles.shape[:2], bool)
+    for index, partner in enumerate(partners):
+        if partner is None:
+            soles[:, index, :2] += lean
+        else:
+            soles[:, index] += offsets[:, partner]
+            planted[:, index] = motion.planted[:, partner]
+    soles[..., 2] = np.where(planted, 0.0, soles[..., 2])
+    positions = size * motion.positions / motion.standing_height
+    heights = motion.positions[:, 2] / motion.standing_height
+    rest_height = rest_height / height
+    positions[:, 2] = rest_height + size * (scale_heights(heights, motion.rest_height, rest_height) - rest_height)
+    seconds = motion.seconds * time_scale(motion, body)
+    paths = Paths(seconds, positions, shrink_turns(motion.quaternions, size), soles, planted)
+    return _carry_torso(body, paths, notes), notes
+
+
+def _carry_torso(body: Body, paths: Paths, notes: list[str]) -> Paths:
+    """Return the paths with the torso shifted so that its center of mass is over the feet that carry."""
+    height = body.torso.standing_height
+    center = measure_standing(body).center / height
+    centers = paths.positions + (rotations.matrix(paths.quaternions) @ center[:, None])[..., 0]
+    shifts = np.zeros((len(centers), 2))
+    for frame, (center, soles, planted) in enumerate(zip(centers, paths.soles, paths.planted, strict=True)):
+        if planted.all() or planted.sum() < 3:  # it stands, or moves too fast to stand
+            continue
+        shifts[frame] = _find_shift(center[:2], soles[planted, :2])
+    if not shifts.any():
+        return paths
+    smooth_shifts = _spread(shifts, paths, height)
+    shifted = paths._replace(positions=paths.positions + np.pad(smooth_shifts, ((0, 0), (0, 1))))
+    margins = [
+        stability_margin(center[:2] + shift, soles[planted])
+        for center, shift, soles, planted in zip(centers, smooth_shifts, paths.soles, paths.planted, strict=True)
+        if planted.sum() >= 3
+    ]
+    largest_shift = np.linalg.norm(smooth_shifts, axis=-1).max()
+    notes.append(f"the torso shifts by up to {largest_shift:.2f} standing heights over the feet that carry")
+    if min(margins) < 0.0:
+        notes.append(f"the center of mass is {-min(margins):.2f} standing heights beyond the feet that carry")
+    return shifted
+
+
+def _find_shift(center: np.ndarray, soles: np.ndarray) -> np.ndarray:
+    """Return the least shift (2,) of a center towards the middle of the soles (n, 2) that gives it a margin."""
+    if stability_margin(center, soles) >= _MIN_MARGIN:
+        return np.zeros(2)
+    to_middle = soles.mean(axis=0) - center
+    low = 0.0
+    high = 1.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if stability_margin(center + middle * to_middle, soles) >= _MIN_MARGIN:
+            high = middle
+        else:
+            low = middle
+    return high * to_middle
+
+
+def _spread(shifts: np.ndarray, paths: Paths, height: float) -> np.ndarray:
+    """Return shifts (frames, 2) that begin before they are needed and end after it, smoothly."""
+    frames = len(shifts)
+    frame_time = paths.seconds / (frames - 1)
+    width = max(1, round(_SHIFT_TIME * math.sqrt(height / 9.81) / frame_time))
+    padded = np.pad(shifts, ((2 * width, 2 * width), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1, axis=0)
+    sizes = np.linalg.norm(windows, axis=1)
+    needed = np.take_along_axis(windows, sizes.argmax(axis=-1)[:, None, None], axis=-1)[..., 0]
+    return np.lib.stride_tricks.sliding_window_view(needed, 2 * width + 1, axis=0).mean(axis=-1)
+
+
+# Legs.
+
+
+def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _Fit, list[str]]:
+    """Return paths that legs reach, joint angles, and notes; the torso is lower and steps are smaller if needed.
+
+    Args:
+        body: the body that is to move.
+        motion: motion of any body.
+        transfer: makes the paths, of a size; see `gait_transfer.transfer`.
+
+    Raises:
+        ValueError: legs do not reach the paths.
+    """
+    least_miss = math.inf
+    worst_leg = ""
+    for size in _SIZES:
+        paths, notes = transfer(motion, body, size)
+        few_frames = np.unique(np.linspace(0, len(paths.positions) - 1, _SEARCH_FRAMES).astype(int))
+        for lower in _LOWER_TORSOS:
+            lower_paths = paths._replace(positions=paths.positions - (0.0, 0.0, lower))
+            fit = _solve(body, lower_paths.select(few_frames), follows=False)
+            if fit.misses.max() <= MAX_MISS:
+                fit = _solve(body, lower_paths, motion.loops)
+            if fit.misses.max() <= MAX_MISS:
+                if lower:
+                    notes.append(f"the torso is lower by {lower:g} standing heights, so that legs reach")
+                if size < 1.0:
+                    notes.append(f"steps and gestures are {size:g} of their size, so that legs reach")
+                return lower_paths, fit, notes
+            if fit.misses.max() < least_miss:
+                least_miss = fit.misses.max()
+                worst_leg = body.legs[int(fit.misses.max(axis=0).argmax())].name
+    raise ValueError(
+        f"motion {motion.name!r} of {motion.body}: {body.name} cannot follow it, {worst_leg} misses its path by "
+        f"{least_miss:.2f} standing heights"
+    )
+
+
+def _solve(body: Body, paths: Paths, loops: bool = False, follows: bool = True) -> _Fit:
+    """Return the joint angles that bring feet nearest to their paths.
+
+    Args:
+        body: the body that is to move.
+        paths: what it is to do.
+        loops: whether the last frame is the first one.
+        follows: whether the search in a frame starts from the frame before, so that legs do not jump.
+    """
+    height = body.torso.standing_height
+    legs = Legs.of(body, used=1.0)
+    centers = legs._replace(radii=np.zeros_like(legs.radii))  # of feet
+    goals = paths.soles * height + legs.radii[:, None] * _VERTICAL - paths.positions[:, None] * height
+    goals = (rotations.matrix(paths.quaternions).swapaxes(-1, -2)[:, None] @ goals[..., None])[..., 0]
+    rest_angles = find_rest_pose(body).joint_angles
+    damping = _DAMPING * height
+    weights = np.broadcast_to(_FOOT_WEIGHTS, (*goals.shape[:2], 3, 3))
+    if not follows:
+        start = np.broadcast_to(rest_angles, (len(goals), *rest_angles.shape))
+        angles = centers.solve_joint_angles(start, goals, weights, damping, _ITERATIONS)
+    else:
+        frame_angles = centers.solve_joint_angles(rest_angles, goals[0], weights[0], damping, _ITERATIONS)
+        for _ in range(2 if loops else 1):  # of a loop, the second round begins as the first one ends
+            angles = np.empty((len(goals), *rest_angles.shape))
+            for frame, frame_goals in enumerate(goals):
+                frame_angles = centers.solve_joint_angles(frame_angles, frame_goals, weights[0], damping, 6)
+                angles[frame] = frame_angles
+    reached, _ = centers.soles(angles)
+    return _Fit(legs.by_joint(angles), np.linalg.norm(reached - goals, axis=-1) / height)

@@ -1,0 +1,88 @@
+"""Motions of one body for another, by the paths of feet."""
+
+import drawn_motions
+import imports
+import numpy as np
+import pytest
+
+from arc_suite import motions, registry
+from arc_suite.models.standing import measure_standing, stability_margin
+from arc_suite.motions import gait_transfer
+from arc_suite.motions.paths import match_feet
+
+QUEEN = registry.body_of("queen")
+SPIDER = registry.body_of("spider")
+MAX_MISS = 0.05  # standing heights
+
+
+def froude(motion):
+    """Speed in sqrt(g h)."""
+    return motion.displacement[0] / motion.seconds / np.sqrt(9.81 * motion.standing_height)
+
+
+@pytest.mark.parametrize("body", [SPIDER, registry.body_of("varied:3"), imports.quadruped()], ids=lambda b: b.name)
+def test_loop_keeps_its_speed_and_strides_in_the_gait_of_the_other_body(body):
+    steps = drawn_motions.step_loop(QUEEN)
+    motion, notes = motions.retarget(steps, body)
+    motions.check_body(motion, body)
+    assert motion.loops and notes[-1].startswith("feet miss their paths by up to 0.0")
+    assert froude(motion) == pytest.approx(froude(steps), rel=1e-6)
+    gait = gait_transfer.find_gait(body)
+    assert motion.planted[:-1].mean() == pytest.approx(gait.duty_factor, abs=0.06)
+    # A foot in stance does not slide, and a swing is as high as that of the other body.
+    for leg in range(len(body.legs)):
+        planted = motion.planted[:-1, leg] & motion.planted[1:, leg]
+        slides = np.linalg.norm(np.diff(motion.soles[:, leg], axis=0), axis=-1)[planted]
+        assert slides.max() < 2 * MAX_MISS and abs(motion.soles[motion.planted[:, leg], leg, 2]).max() < MAX_MISS
+        assert motion.soles[:, leg, 2].max() == pytest.approx(drawn_motions.CLEARANCE, abs=MAX_MISS)
+    # Touchdowns have the order of the gait.
+    starts = [gait_transfer._find_steps(planted).starts[0] for planted in motion.planted[:-1].T]
+    phases = (np.array(starts) - starts[0] + np.array(gait.offsets) - gait.offsets[0] + 0.5) % 1.0 - 0.5
+    assert abs(phases).max() <= 1.5 / (motion.frames - 1)
+    np.testing.assert_allclose(motion.angles[-1], motion.angles[0], atol=0.01)
+
+
+def test_gesture_has_the_foot_that_stands_in_the_same_place():
+    raised = drawn_motions.raise_leg(QUEEN, 0)
+    motion, notes = motions.retarget(raised, SPIDER)
+    front_left = 0
+    heights = motion.soles[..., 2].max(axis=0)
+    assert heights[front_left] == pytest.approx(drawn_motions.RAISE, abs=0.01)
+    assert np.delete(heights, front_left).max() < 0.01
+    assert notes[0] == "without a partner, planted: l3, r3"
+    assert motion.seconds == pytest.approx(raised.seconds * np.sqrt(0.25 / 0.75), rel=1e-6)
+    assert not motion.planted[20, front_left] and motion.planted.sum(axis=1).min() == 7
+
+
+def test_torso_moves_over_the_feet_that_carry():
+    """Four legs would fall over the corner whose foot is raised."""
+    quadruped = imports.quadruped()
+    motion, notes = motions.retarget(drawn_motions.raise_leg(QUEEN, 0), quadruped)
+    (note,) = [note for note in notes if note.startswith("the torso shifts by up to")]
+    center = (motion.positions[20] + measure_standing(quadruped).center) / motion.standing_height
+    margin = stability_margin(center, motion.soles[20, motion.planted[20]])
+    assert motion.planted[20].sum() == 3 and margin == pytest.approx(0.05, abs=0.01), note
+    assert not [note for note in notes if note.startswith("the center of mass is")]
+
+
+def test_middle_legs_are_left_out_of_four_legs():
+    motion, notes = motions.retarget(drawn_motions.raise_leg(QUEEN, 1), imports.quadruped())
+    assert f"without a partner, left out: {QUEEN.legs[1].name}" in notes
+    assert motion.planted.all()
+
+
+@pytest.mark.slow
+def test_motion_that_legs_cannot_follow_is_one_line():
+    raised = drawn_motions.raise_leg(QUEEN, 0)
+    far = raised._replace(soles=raised.soles + (0.0, 3.0, 0.0) * (np.arange(6) == 0)[:, None])
+    with pytest.raises(ValueError, match="motion 'raise' of queen: spider cannot follow it, l1 misses its path by"):
+        motions.retarget(far, SPIDER)
+
+
+def test_feet_match_by_their_places():
+    rest = motions.find_rest(QUEEN)[0]
+    assert match_feet(rest, 0.3 * rest) == [0, 1, 2, 3, 4, 5]
+    assert match_feet(rest, rest[[0, 2, 3, 5]]) == [0, 2, 3, 5]
+    partners = match_feet(rest, motions.find_rest(SPIDER)[0])
+    assert sorted(partner for partner in partners if partner is not None) == [0, 1, 2, 3, 4, 5]
+    assert partners[0] == 0 and partners[3] == 2 and partners[4] == 3 and partners[7] == 5
