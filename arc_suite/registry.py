@@ -363,7 +363,7 @@ def check_stored_settings(settings: Mapping[str, Any]) -> None:
     """Check that settings of a task which come from a file cannot import modules or open other files.
 
     Raises:
-        ValueError: an arena that is a file.
+        ValueError: an arena or another setting that is a file.
         NotImported: the module of a modifier or of an arena has not been imported yet.
     """
     for name in settings:
@@ -373,6 +373,10 @@ def check_stored_settings(settings: Mapping[str, Any]) -> None:
         raise ValueError(f"arena {checks.preview(arena)}: files name no other files")
     if names_arena(arena):
         refuse_import("arena", arena)
+    for task in TASKS.values():
+        for name in task.file_settings.keys() & settings.keys():
+            if task.file_settings[name].names_file(settings[name]):
+                raise ValueError(f"{name} {checks.preview(settings[name])}: files name no other files")
 
 
 def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:

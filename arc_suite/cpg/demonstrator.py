@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import checks, registry
-from arc_suite.cpg.law import read_blocks, restart_where
+from arc_suite.cpg.law import proprioception, read_blocks, restart_where
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset
 from arc_suite.envs import trees
@@ -16,8 +16,8 @@ from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.soundness import hopeless_flaws
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.modified_task import has_active
-from arc_suite.tasks.modifiers import SensorsOnly
+from arc_suite.tasks.modified_task import Modified, has_active
+from arc_suite.tasks.modifiers import Control, SensorsOnly
 
 
 class Demonstrator:
@@ -26,7 +26,11 @@ class Demonstrator:
     Gait, control step, body and velocity units are those of the task. The presets `slow`, `medium`, `fast`, `tuned`
     and `refined` walk straight ahead by their own clock. They read the angles and velocities of joints and the torso's
     orientation alone. The other presets follow the velocity command that a task shows them, by the clock of its gait;
-    `planned` computes the command itself.
+    `planned` computes the command itself; `tracked` follows the motion of the task mimic.
+
+    Its actions are what the task takes. Laws of bodies with motors return torques. In a task of positions it returns
+    the positions at which the motors apply these torques: exactly if the observation is exact, and if the positions
+    are within the range of the joints.
 
     In a batch a demonstrator acts by `reset` and `act`, as every policy does. In one environment it is a function of a
     `TimeStep` with named blocks; the first `TimeStep` of an episode restarts it.
@@ -78,6 +82,9 @@ class Demonstrator:
         self.law = law(body_task, parameters)
         if preset is not None:
             _warn_of_ignored_commands(body_task, name, ignored_commands(body_task, self.law))
+        self._control: Control | None = None  # that positions of joints pass through
+        if isinstance(body_task, Modified) and has_active(body_task, Control):
+            self._control = body_task.modifier(Control)
         self._body = body
         self._starts_lying = body_task.lies
         self._state: Any = None  # of the law; None before the first action
@@ -113,6 +120,9 @@ class Demonstrator:
         if self._state is None or len(self._state[0]) != count:
             self._state = self.law.initial(count)
         self._state, actions = self.law(self._state, blocks)
+        if self._control is not None:
+            _, angles, velocities = proprioception(blocks)
+            actions = self._control.positions(actions.clip(-1.0, 1.0), angles, velocities)
         if self._reset_indices and not self._starts_lying:
             torso_heights = blocks["posture"][:, 0]
             self._check_heights(torso_heights[self._reset_indices])

@@ -11,6 +11,7 @@ from arc_suite.cpg.prescribed import Bend, Preset
 from arc_suite.cpg.sighted import SightedParameters
 from arc_suite.cpg.stepping import SteppingParameters
 from arc_suite.cpg.straight import StraightParameters
+from arc_suite.cpg.tracked import TrackingParameters
 from arc_suite.robots.gaits import TRIPOD, TROT
 
 # Leaps that a generated body chooses from. Its feet stand wide, so that it steps over trenches of the standing height.
@@ -45,6 +46,7 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
         "sighted": sighted,
         "leaping": leaping._replace(walk=sighted),
         "planned": planned,
+        "tracked": TrackingParameters(),
     }
 
 
@@ -84,6 +86,7 @@ DEFAULTS_OF_SERVOS = {
     "sighted": _SIGHTED,
     "leaping": _LEAPING._replace(walk=_SIGHTED),
     "planned": PlanningParameters(_STEERED),
+    "tracked": TrackingParameters(),
 }
 
 

@@ -14,6 +14,7 @@ from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.cpg.straight import Straight, StraightParameters
 from arc_suite.cpg.stride_law import StrideLaw
+from arc_suite.cpg.tracked import Tracked, TrackingParameters
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -27,6 +28,7 @@ LAWS: dict[type, Any] = {
     SightedParameters: Sighted,
     LeapingParameters: Leaping,
     PlanningParameters: Planned,
+    TrackingParameters: Tracked,
 }
 
 _STRAIGHT_PRESETS = ("refined", "tuned", "straight", "medium")  # presets that walk straight ahead, the best first

@@ -81,6 +81,8 @@ class Setup:
         if isinstance(settings.get("arena"), str):
             settings["arena"] = registry.arena_word(settings["arena"])
             registry.arena_maker(settings["arena"])  # raises an error for an unknown name
+        for name in task.file_settings.keys() & settings.keys():
+            settings[name] = task.file_settings[name].embed(settings[name])
         importable_settings = {registry.importable_name("modifier", name): value for name, value in settings.items()}
         settings_json = checks.json_text("task_kwargs", importable_settings)
         return cls(domain, registry.importable_name("task", task.name), settings_json)
@@ -299,6 +301,8 @@ class Setup:
         arena = settings.get("arena")
         if ground_text.is_text(arena):
             settings["arena"] = ground_text.name_of(arena)
+        for name in self.kind.file_settings.keys() & settings.keys():
+            settings[name] = self.kind.file_settings[name].label(settings[name])
         settings_text = f", {json.dumps(settings)}" if settings else ""
         return f"{self._label}, {self.kind.name}{settings_text}"
 

@@ -10,7 +10,6 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.selection import memoryless_preset
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.named import policy
-from arc_suite.policies.protocol import Positioned
 from arc_suite.tasks import Task
 
 PREFIX = "teacher/"  # prefix of the names in a snapshot
@@ -27,7 +26,7 @@ class _Group(NamedTuple):
 
     task: Task
     indices: np.ndarray
-    demonstrator: Demonstrator | Positioned
+    demonstrator: Demonstrator
 
 
 class Teacher:
@@ -66,7 +65,7 @@ class Teacher:
             name = preset or memoryless_preset(task)
             demonstrator = policy("cpg", task.scene.body, name, len(indices), task=task)
             # One preset gives one demonstrator, which has snapshots.
-            group = _Group(task, np.array(indices), cast(Demonstrator | Positioned, demonstrator))
+            group = _Group(task, np.array(indices), cast(Demonstrator, demonstrator))
             self._groups.append(group)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:

@@ -73,9 +73,9 @@ def _read(arrays: dict[str, np.ndarray]) -> Motion:
     for name in Motion._fields:
         array = arrays[name]
         if name in _TEXTS:
-            fields[name] = _read_names(name, array, 0)[0]
+            fields[name] = read_names(name, array, 0)[0]
         elif name in _NAMES:
-            fields[name] = _read_names(name, array, 1)
+            fields[name] = read_names(name, array, 1)
         elif name in _NUMBERS:
             fields[name] = checks.number(name, array.item() if array.shape == () else None)
         elif name == "loops":
@@ -88,7 +88,7 @@ def _read(arrays: dict[str, np.ndarray]) -> Motion:
     return values.check(Motion(**fields))
 
 
-def _read_names(field: str, array: np.ndarray, dimensions: int) -> tuple[str, ...]:
+def read_names(field: str, array: np.ndarray, dimensions: int) -> tuple[str, ...]:
     """Return the texts of an array; each is printable and not too long."""
     if array.dtype.kind != "U" or array.ndim != dimensions or array.size > _MAX_NAMES:
         raise ValueError(f"{field}: expected up to {_MAX_NAMES} texts, got {array.shape} of {array.dtype}")

@@ -15,7 +15,7 @@ from arc_suite.policies.named import (
     setup_of,
     training_seeds,
 )
-from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum, alone
 
 __all__ = [
     "policy",
@@ -32,7 +32,6 @@ __all__ = [
     "Policy",
     "Individuals",
     "Mixture",
-    "Positioned",
     "Script",
     "Sum",
     "acting",

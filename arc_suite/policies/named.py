@@ -21,7 +21,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, other_libraries
 from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.other_libraries import PolicyFile
-from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
@@ -35,12 +35,9 @@ def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
     if not presets:
         raise ValueError(f"preset: expected one or more of {', '.join(preset_names())}, got none")
     demonstrators = [Demonstrator(task or body, preset) for preset in presets]
-    policy = demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, num_envs)
-    # Demonstrators of imported bodies give positions to servos. Others give torques to motors.
-    has_servos = bool(body.source)
-    if task is not None and task.actions == "position" and not has_servos:
-        return Positioned(policy, task)
-    return policy  # type: ignore[return-value]
+    if len(demonstrators) == 1:
+        return demonstrators[0]
+    return Mixture(demonstrators, num_envs)
 
 
 def _zero(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -116,8 +113,7 @@ def policy(
             `cpg.Demonstrator`; None for the one that suits the task and the body.
         num_envs: number of environments.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
-        task: the task in which it acts. The demonstrator is fitted to it, and gives positions in place of torques
-            where the task takes them, as `protocol.Positioned`. None for walk with default settings.
+        task: the task in which it acts, to which the demonstrator is fitted. None for walk with default settings.
 
     Raises:
         ValueError: an unknown name, or a value out of range.

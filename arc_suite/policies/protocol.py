@@ -7,10 +7,7 @@ import dm_env
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg.law import Clocked, proprioception, read_blocks
 from arc_suite.envs.calls import checked_action
-from arc_suite.tasks.modified_task import Modified
-from arc_suite.tasks.modifiers import Control
 
 
 class Policy(Protocol):
@@ -82,44 +79,6 @@ class Sum:
         """Return the sum of the actions (num_envs, joints)."""
         first, second = self._policies
         return first.act(observation, rewards) + second.act(observation, rewards)
-
-
-class Positioned:
-    """A policy of torques that acts in a task of positions.
-
-    It returns the positions at which the motors apply its torques. The torques are exact if the observation is exact,
-    and if the positions are within the range of the joints.
-    """
-
-    def __init__(self, policy, task: Modified):
-        """Set a policy of torques, and a task with `actions="position"`."""
-        self._policy = policy
-        self._task = task
-
-    def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
-        """Start the episodes of seeds in some environments; demonstrators need no seeds."""
-        self._policy.reset(indices, seeds)
-
-    def act(self, observation, rewards=None) -> np.ndarray:
-        """Return the positions (num_envs, joints), as actions in [-1, 1].
-
-        Raises:
-            ValueError: an observation without the blocks of joint angles and velocities.
-        """
-        torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
-        joints = torques.shape[-1]
-        blocks = read_blocks(observation, Clocked.reads, joints)  # checked posture and velocities
-        _, angles, speeds = proprioception(blocks)  # the first is the torso's orientation
-        position_control = self._task.modifier(Control)  # the task's modifier of this class
-        return position_control.positions(torques, angles, speeds)
-
-    def snapshot(self) -> dict[str, np.ndarray]:
-        """Return the memory of the policy as arrays by name, if it has this method, as demonstrators do."""
-        return self._policy.snapshot()
-
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Continue from a snapshot."""
-        self._policy.restore(arrays)
 
 
 class Mixture:

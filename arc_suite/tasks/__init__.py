@@ -1,6 +1,7 @@
 """Tasks: what bodies are rewarded for, by name."""
 
 from arc_suite.tasks.contract import Task
+from arc_suite.tasks.mimic import Mimic
 from arc_suite.tasks.suite import (
     Course,
     Directed,
@@ -31,6 +32,7 @@ _TASK_CLASSES: tuple[type[Task], ...] = (
     Limp,
     Roam,
     Navigate,
+    Mimic,
 )
 TASKS = {task.name: task for task in _TASK_CLASSES}
 

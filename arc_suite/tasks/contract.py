@@ -30,8 +30,8 @@ import dataclasses
 import functools
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Hashable, Mapping
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -64,6 +64,20 @@ _POINTS_AROUND_FOOT = np.array(
     ]
 )
 _BALL_HEIGHTS = np.sqrt(1.0 - np.repeat(_RINGS, _DIRECTIONS) ** 2)
+
+
+class FileSetting(NamedTuple):
+    """Functions of a setting whose values may be paths of files. Stored settings hold the content of the files.
+
+    Attributes:
+        embed: function from a value to one with the content of files in place of their paths.
+        names_file: function from a value to whether it holds the path of a file.
+        label: function from a value to one that is short enough for people to read.
+    """
+
+    embed: Callable[[Any], Any]
+    names_file: Callable[[Any], bool]
+    label: Callable[[Any], Any]
 
 
 class Observed(ABC):
@@ -171,6 +185,7 @@ class Task(Observed):
             by name; see `with_command`.
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
+        file_settings: settings whose values may be paths of files, by name.
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
         gait_and_pose: gait and pose by command, see `gait_and_pose.GaitAndPose`; None where there are none.
         from_body: cached attributes with numbers that follow from the body or the settings. Where these and the
@@ -191,6 +206,7 @@ class Task(Observed):
     commands: ClassVar[Mapping[str, int]] = {}
     own_arena: ClassVar[bool] = False
     modifiers: ClassVar[Mapping[str, Any]] = {}
+    file_settings: ClassVar[Mapping[str, FileSetting]] = {}
     demonstrators: ClassVar[tuple[str, ...]] = ()
     gait_and_pose: ClassVar[Any] = None
     from_body: ClassVar[tuple[str, ...]] = ()

@@ -16,9 +16,9 @@ from arc_suite.robots import ROBOTS
 
 ALL = (
     "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, "
-    "planned, in_step, balanced"
+    "planned, tracked, in_step, balanced"
 )
-GENERAL = "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned"
+GENERAL = "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, tracked"
 
 JOINTS = "expected a body named 'queen' to have the 18 joints of queen"
 

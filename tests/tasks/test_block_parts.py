@@ -68,7 +68,8 @@ OUTSIDE = {
 
 def settings(task):
     """Settings in which legs of the body take turns, and the observation has a history."""
-    return {"history": 2, "phase_offsets": tuple(TRIPOD), "default_angles": (0.0,) * 18}
+    gait = {"phase_offsets": tuple(TRIPOD), "default_angles": (0.0,) * 18}
+    return {"history": 2} | {name: value for name, value in gait.items() if name in TASKS[task].names()}
 
 
 @functools.cache

@@ -73,7 +73,7 @@ def test_flat_observation_is_the_blocks_in_order(domain, task):
 
 @every_task
 def test_physics_is_25_plain_steps_of_2_ms(domain, task):
-    environment = begun(domain, task)
+    environment = begun(domain, task, actions="torque")
     model = environment.physics.model.ptr
     plain = mujoco.MjData(model)
     assert model.opt.timestep == 0.002

@@ -1,0 +1,137 @@
+"""Motions as text: settings of a task hold it in place of a file, so that runs and policy files need no other file."""
+
+import base64
+import functools
+import json
+import math
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from arc_suite import checks, parsers
+from arc_suite.motions import motion as values
+from arc_suite.motions.motion import Motion
+from arc_suite.motions.motion_files import load, read_names
+
+MAX_TEXT = 1 << 23  # characters
+EXTENSION = ".npz"
+
+_TEXTS = ("name", "body")
+_NAMES = ("joint_names", "leg_names")
+_MAX_COLUMNS = 1 << 12  # numbers of a frame
+
+
+def is_text(word: Any) -> bool:
+    """Return whether a motion is given as text."""
+    return isinstance(word, str) and word.startswith("{")
+
+
+def to_text(motion: Motion) -> str:
+    """Return a motion as text, without loss.
+
+    Raises:
+        ValueError: more frames than a text may have.
+    """
+    fields = motion._asdict()
+    arrays = [fields.pop(name) for name in _shapes(motion.frames, motion.joint_names, motion.leg_names)]
+    numbers = np.concatenate([array.astype("<f8").ravel() for array in arrays])
+    compressed = zlib.compress(numbers.tobytes(), 9)
+    fields |= {"frames": motion.frames, "numbers": base64.b64encode(compressed).decode()}
+    text = json.dumps(fields)
+    if len(text) > MAX_TEXT:
+        raise ValueError(f"motion {motion.name!r}: expected at most {MAX_TEXT} characters as text, got {len(text)}")
+    return text
+
+
+@functools.lru_cache(maxsize=32)
+def from_text(text: str) -> Motion:
+    """Return the motion of a text.
+
+    Raises:
+        ValueError: a text that is too long or damaged.
+    """
+    if len(text) > MAX_TEXT:
+        raise ValueError(f"motion: expected at most {MAX_TEXT} characters, got {len(text)}")
+    with parsers.guard("motion: expected a name, a file or a motion as text"):
+        return _read(checks.mapping("motion", json.loads(text)))
+
+
+def read(word: Any) -> Motion:
+    """Return the motion of a file's path, or of a text.
+
+    Raises:
+        ValueError: no path, or a file or a text without a motion.
+        OSError: the file cannot be read.
+    """
+    if not isinstance(word, str):
+        raise ValueError(f"motion: expected the path of a file or a motion as text, got {checks.preview(word)}")
+    return from_text(word) if is_text(word) else load(word)
+
+
+def embed(words: Any) -> Any:
+    """Return the words of a setting, one or a list, with the motion of every file as text.
+
+    Raises:
+        ValueError: as `read`.
+        OSError: a file cannot be read.
+    """
+    return _map_words(lambda word: to_text(load(word)) if names_file(word) else word, words)
+
+
+def names_file(words: Any) -> bool:
+    """Return whether a word, or one of a list, is the path of a file."""
+    if isinstance(words, list | tuple):
+        return any(map(names_file, words))
+    return isinstance(words, str) and words.endswith(EXTENSION) and not is_text(words)
+
+
+def label(words: Any) -> Any:
+    """Return the words of a setting with the name of every motion in place of its text."""
+    return _map_words(lambda word: from_text(word).name if is_text(word) else word, words)
+
+
+def _map_words(function: Callable[[Any], Any], words: Any) -> Any:
+    """Return the value of a function for a word, or a list of its values for those of a list."""
+    return [function(word) for word in words] if isinstance(words, list | tuple) else function(words)
+
+
+def _shapes(frames: int, joint_names: tuple[str, ...], leg_names: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    """Return the shape of every array of a motion by name."""
+    joints = len(joint_names)
+    legs = len(leg_names)
+    return {
+        "positions": (frames, 3),
+        "quaternions": (frames, 4),
+        "angles": (frames, joints),
+        "planted": (frames, legs),
+        "soles": (frames, legs, 3),
+        "rest_soles": (legs, 3),
+    }
+
+
+def _read(fields: dict[str, Any]) -> Motion:
+    """Return the motion of fields by name; damaged ones raise anything."""
+    names = {name: read_names(name, np.array(fields[name], str), 1) for name in _NAMES}
+    texts = {name: read_names(name, np.array(fields[name], str), 0)[0] for name in _TEXTS}
+    frames = checks.integer("frames", fields["frames"], 2, values.MAX_FRAMES)
+    shapes = _shapes(frames, **names)
+    sizes = [math.prod(shape) for shape in shapes.values()]
+    if sum(sizes) > frames * _MAX_COLUMNS:
+        raise ValueError(f"expected at most {_MAX_COLUMNS} numbers in a frame")
+    num_bytes = 8 * sum(sizes)
+    content = zlib.decompressobj().decompress(base64.b64decode(fields["numbers"], validate=True), num_bytes + 1)
+    if len(content) != num_bytes:
+        raise ValueError(f"expected {num_bytes} bytes of numbers, got {len(content)}")
+    numbers = np.split(np.frombuffer(content, "<f8").astype(float), np.cumsum(sizes)[:-1])
+    arrays = {name: part.reshape(shapes[name]) for name, part in zip(shapes, numbers, strict=True)}
+    motion = Motion(
+        **texts,
+        **names,
+        standing_height=checks.number("standing_height", fields["standing_height"]),
+        frame_rate=checks.number("frame_rate", fields["frame_rate"]),
+        loops=checks.boolean("loops", fields["loops"]),
+        **(arrays | {"planted": arrays["planted"] > 0.5}),
+    )
+    return values.check(motion)
