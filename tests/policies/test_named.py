@@ -18,7 +18,9 @@ ALL = (
     "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, "
     "planned, tracked, in_step, balanced"
 )
-GENERAL = "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, tracked"
+GENERAL = (
+    "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, tracked"
+)
 
 JOINTS = "expected a body named 'queen' to have the 18 joints of queen"
 

@@ -85,7 +85,8 @@ def test_runs_of_a_study_differ_in_name():
 
 
 def test_the_page_counts_runs():
-    rows = re.findall(r"^\| `([a-z-]+)` \| (\d+) \| (\d+) \|", (ROOT / "studies" / "catalog.md").read_text(), re.MULTILINE)
+    text = (ROOT / "studies" / "catalog.md").read_text()
+    rows = re.findall(r"^\| `([a-z-]+)` \| (\d+) \| (\d+) \|", text, re.MULTILINE)
     assert {name for name, *_ in rows} == catalog.STUDIES.keys()
     for name, runs, committed in rows:
         assert len(catalog.study(name).runs) == int(runs), name
