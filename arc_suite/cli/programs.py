@@ -15,6 +15,7 @@ PROGRAMS = {
     "check": "arc_suite.cli",
     "render": "arc_suite.animation.cli",
     "animate": "arc_suite.animation.cli",
+    "motion": "arc_suite.cli",
     "play": "arc_suite.animation.cli",
     "view": "arc_suite.animation.cli",
     "studio": "arc_suite.animation.cli",

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import checks, files, parsers
 from arc_suite.motions.motion import MAX_FRAMES
-from arc_suite.motions.skeletons import Skeleton
+from arc_suite.motions.skeletons import FROM_Y_UP, Skeleton
 
 EXTENSION = ".glb"
 FRAME_RATE = 60.0  # Hz, at which animations are sampled
@@ -22,6 +22,7 @@ _MAX_NODES = 4096
 _MAX_DEPTH = 256  # of nodes below each other
 _MAX_ANIMATIONS = 1024
 _MAX_VALUES = 1 << 26  # numbers of sampled poses: frames times nodes times 16
+_TIME_TOLERANCE = 1e-5  # s
 _LOOP_SUFFIX = "_loop"
 _IN_PLACE_SUFFIX = "_in_place"
 
@@ -38,9 +39,6 @@ _COMPONENTS = {
 }
 _SIZES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _TRACK_SIZES = {"translation": 3, "rotation": 4, "scale": 3}
-
-# From glTF's axes, y up and z ahead, to those of the suite, x ahead and z up.
-_TO_SUITE = np.array(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 
 
 class _File(NamedTuple):
@@ -211,11 +209,13 @@ def _interpolate(file: _File, sampler: dict, times: np.ndarray, sample_times: np
         raise ValueError(f"expected {keys_of_value * len(times)} values of a track, got {len(values)}")
     if len(times) == 1:
         return np.tile(values[len(values) // 2], (len(sample_times), 1))
-    previous = np.searchsorted(times, sample_times, side="right").clip(1, len(times) - 1) - 1
+    # Times of keys are 32-bit numbers: a sample at a key belongs to that key.
+    previous = np.searchsorted(times, sample_times + _TIME_TOLERANCE, side="right").clip(1, len(times) - 1) - 1
     duration = (times[previous + 1] - times[previous])[:, None]
     share = ((sample_times - times[previous])[:, None] / duration).clip(0.0, 1.0)
     if kind == "STEP":
-        return values[previous + (share[:, 0] >= 1.0)]
+        is_last = sample_times + _TIME_TOLERANCE >= times[-1]
+        return np.where(is_last[:, None], values[-1], values[previous])
     if kind == "CUBICSPLINE":
         arriving, points, leaving = values.reshape(len(times), 3, size).swapaxes(0, 1)
         start_slope = duration * leaving[previous]
@@ -362,7 +362,7 @@ def _make_skeleton(
         frame_rate=(len(poses) - 1) / seconds if seconds > 0.0 else FRAME_RATE,
         loops=loops,
         bones=tuple([str(nodes[joint].get("name", "")) for joint in joints]),
-        bind_positions=bind_poses[:, :3, 3] @ _TO_SUITE.T,
-        positions=poses[..., :3, 3] @ _TO_SUITE.T,
-        turns=_TO_SUITE @ (turns / scales[..., None, None]) @ _TO_SUITE.T,
+        bind_positions=bind_poses[:, :3, 3] @ FROM_Y_UP.T,
+        positions=poses[..., :3, 3] @ FROM_Y_UP.T,
+        turns=FROM_Y_UP @ (turns / scales[..., None, None]) @ FROM_Y_UP.T,
     )

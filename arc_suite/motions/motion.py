@@ -16,6 +16,7 @@ MAX_RATE = 1000.0  # Hz
 
 MAX_PLANTED_HEIGHT = 0.03  # standing heights: a sole that is lower is planted
 MAX_SEAM = 0.05  # rad, or standing heights, between the last frame of a loop and its first
+_MAX_HEIGHT_ERROR = 1e-6  # of a standing height, relative
 _MAX_QUOTE = 80  # characters of names in an error
 
 _REFLECTION = np.array((1.0, -1.0, 1.0))  # factors on a point
@@ -168,28 +169,36 @@ def check(motion: Motion) -> Motion:
     return motion
 
 
+def fits(motion: Motion, body: Body) -> bool:
+    """Return whether a motion was drawn for a body: the same joints and legs, and the same standing height."""
+    return _describe_misfit(motion, body) is None
+
+
 def check_body(motion: Motion, body: Body) -> None:
-    """Check that a motion was drawn for a body: the same joints and legs, and the same standing height.
+    """Check that a motion was drawn for a body; see `fits`.
 
     Raises:
         ValueError: the motion is of another body.
     """
-    cure = f"; `arc-suite motion FILE --robot {body.name} -o OUT.npz` makes it one of {body.name}"
-    leg_names = tuple([leg.name for leg in body.legs])
-    for field, names, expected in (
-        ("joints", motion.joint_names, body.joint_names),
-        ("legs", motion.leg_names, leg_names),
-    ):
-        if names != expected:
-            raise ValueError(
-                f"motion {motion.name!r} is of {motion.body!r}: expected {field} {_list(expected)}, "
-                f"got {_list(names)}{cure}"
-            )
-    if not np.isclose(motion.standing_height, body.torso.standing_height, rtol=1e-6):
+    misfit = _describe_misfit(motion, body)
+    if misfit is not None:
         raise ValueError(
-            f"motion {motion.name!r} is of {motion.body!r}: expected a standing height of "
-            f"{body.torso.standing_height:g} m, got {motion.standing_height:g} m{cure}"
+            f"motion {motion.name!r} is of {motion.body!r}: {misfit}; "
+            f"`arc-suite motion FILE --robot {body.name} -o OUT.npz` makes it one of {body.name}"
         )
+
+
+def _describe_misfit(motion: Motion, body: Body) -> str | None:
+    """Return the first difference of the bodies of a motion and of a spec; None if there is none."""
+    if motion.joint_names != body.joint_names:
+        return f"expected joints {_list(body.joint_names)}, got {_list(motion.joint_names)}"
+    leg_names = tuple([leg.name for leg in body.legs])
+    if motion.leg_names != leg_names:
+        return f"expected legs {_list(leg_names)}, got {_list(motion.leg_names)}"
+    height = body.torso.standing_height
+    if not np.isclose(motion.standing_height, height, rtol=_MAX_HEIGHT_ERROR):
+        return f"expected a standing height of {height:g} m, got {motion.standing_height:g} m"
+    return None
 
 
 def mirror(motion: Motion, body: Body) -> Motion:

@@ -12,7 +12,7 @@ from arc_suite.motions.motion import Motion
 
 FORMAT = "arc_suite motion 1"  # another number for every change of what a file holds
 
-_MAX_BYTES = 1 << 28  # bytes of all arrays
+MAX_BYTES = 1 << 28  # bytes of all arrays
 _MAX_NAMES = 1024  # joints or legs
 _MAX_NAME = 200  # characters
 
@@ -43,7 +43,7 @@ def load(path: str | os.PathLike) -> Motion:
     """
     files.read_bytes(path, 0)  # the file can be read; later errors mean that it is damaged
     with parsers.guard(f"{path}: no motion, or a damaged one"):
-        return _read(archives.read(path, _MAX_BYTES))
+        return _read(archives.read(path, MAX_BYTES))
 
 
 def digest(motion: Motion) -> str:

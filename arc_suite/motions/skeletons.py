@@ -14,6 +14,12 @@ from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
 from arc_suite.robots.spec import Body
 
+# From axes with y up and z ahead, as of glTF, to those of the suite, x ahead and z up.
+FROM_Y_UP = np.array(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+# From what these make of axes with z up and -y ahead, as of Blender.
+_FROM_Z_UP = np.array(((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
+_MIN_UPRIGHT = 0.7  # cosine of the torso's tilt in the bound pose
+
 _MAX_LENGTH_ERROR = 0.02  # standing heights, of a bone that belongs to the body
 _MAX_SCALE_ERROR = 0.01  # of a file whose unit is a meter
 _MAX_BIND_MISS = 0.02  # standing heights, of a bone in the bound pose
@@ -95,8 +101,13 @@ class _BindPose(NamedTuple):
     angles: np.ndarray
 
 
-def fit_skeleton(body: Body, skeleton: Skeleton) -> tuple[Motion, list[str]]:
+def fit_skeleton(body: Body, skeleton: Skeleton, may_turn: bool = True) -> tuple[Motion, list[str]]:
     """Return the motion of a body that a skeleton has, and a line for each thing that was changed.
+
+    Args:
+        body: the body that moves.
+        skeleton: its bones, with y up in the file, or else z.
+        may_turn: whether z may point up in the file.
 
     Raises:
         ValueError: a bone is missing or has another length than the body's, or a number is not finite.
@@ -113,6 +124,10 @@ def fit_skeleton(body: Body, skeleton: Skeleton) -> tuple[Motion, list[str]]:
     if abs(scale - 1.0) > _MAX_SCALE_ERROR:
         notes.append(f"lengths are divided by {scale:.4g}")
     bind_pose = _find_bind_pose(body, chain, bind_positions)
+    if bind_pose.orientation[2, 2] < _MIN_UPRIGHT:
+        if not may_turn:
+            raise ValueError(f"bones: expected a bound pose of {body.name} that stands upright")
+        return fit_skeleton(body, _turn(skeleton, _FROM_Z_UP), may_turn=False)
     angles, off_hinge = _find_angles(chain, bind_pose, turns)
     torso_turns = turns[:, 0] @ bind_pose.orientation
     quaternions = rotations.from_matrix(torso_turns)
@@ -136,6 +151,15 @@ def fit_skeleton(body: Body, skeleton: Skeleton) -> tuple[Motion, list[str]]:
             notes.append(f"the loop was open by {np.degrees(seam):.2g} degrees, which its end takes up")
     motion = values.make(body, skeleton.name, skeleton.frame_rate, skeleton.loops, positions, quaternions, angles)
     return motion, notes
+
+
+def _turn(skeleton: Skeleton, rotation: np.ndarray) -> Skeleton:
+    """Return a skeleton in other axes."""
+    return skeleton._replace(
+        bind_positions=skeleton.bind_positions @ rotation.T,
+        positions=skeleton.positions @ rotation.T,
+        turns=rotation @ skeleton.turns @ rotation.T,
+    )
 
 
 def close_loop(

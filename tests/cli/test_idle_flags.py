@@ -22,6 +22,7 @@ ALWAYS = {
     "check": "task tasks walk",
     "render": f"{COMMON} seed steps output".replace(" preset", ""),
     "animate": f"{COMMON} clips fps straight plant output".replace(" preset", ""),
+    "motion": f"{BODY} of clip loop fps output",
     "play": f"{BODY} arena policy vecnormalize output",
     "view": COMMON.replace(" preset", ""),
     "studio": f"{COMMON} host port".replace(" preset", ""),

@@ -19,12 +19,13 @@ from arc_suite.policies import POLICIES
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
-WITHOUT_TASK = {"import", "play", "study", "benchmark", "doctor"}
+WITHOUT_TASK = {"import", "motion", "play", "study", "benchmark", "doctor"}
 WRITING = (
     "build_model",
     "import",
     "render",
     "animate",
+    "motion",
     "play",
     "style",
     "train",
@@ -188,7 +189,7 @@ def test_help_says_what_each_policy_is():
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    taking = ("check", "import", "export", "study", "benchmark")  # an argument
+    taking = ("check", "import", "motion", "export", "study", "benchmark")  # an argument
     done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
     programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; see --help\n")
 

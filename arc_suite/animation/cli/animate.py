@@ -1,4 +1,4 @@
-"""Make animation clips for game engines (.glb), and of one a motion to follow, a film or a sheet of sprites.
+"""Make animation clips for game engines (.glb), and of one a motion, a film or sprites.
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb

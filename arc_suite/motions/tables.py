@@ -1,0 +1,163 @@
+"""Reads motions from tables of frames, as other tools write them: `.csv` and `.npz`, columns by name of the joint.
+
+Angles and the pose of the root are those of the robot's own file; the suite counts both from its standing pose.
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from arc_suite import checks, files, parsers, rotations
+from arc_suite.models import source
+from arc_suite.motions import motion as values
+from arc_suite.motions.motion import MAX_FRAMES, Motion
+from arc_suite.motions.skeletons import close_loop
+from arc_suite.robots.spec import Body
+
+EXTENSION = ".csv"
+
+_MAX_BYTES = 1 << 27
+_MAX_COLUMNS = 1024
+_CONJUGATE = (1.0, -1.0, -1.0, -1.0)
+_POSITION = ("x", "y", "z")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_TIME = "time"
+# Arrays of an .npz file: of mjlab's motions, root first among bodies.
+_RATE_ARRAY = "fps"
+_ANGLES_ARRAY = "joint_pos"
+_NAMES_ARRAY = "joint_names"
+_POSITIONS_ARRAY = "body_pos_w"
+_QUATERNIONS_ARRAY = "body_quat_w"
+
+
+def read_csv(path: str | os.PathLike, body: Body, rate: float | None, loops: bool) -> Motion:
+    """Read a table of frames.
+
+    Columns are `x`, `y`, `z`, `qw`, `qx`, `qy`, `qz` of the root and the joints' names; with `time`, s, also at an
+    uneven rate. Without a line of names the columns are x, y, z, qx, qy, qz, qw and the joints in the body's order.
+
+    Args:
+        path: path of the file.
+        body: the body that moves.
+        rate: frames a second; None where the file says it.
+        loops: whether the motion repeats.
+
+    Raises:
+        ValueError: a damaged file, or columns of another body; one line.
+        OSError: the file cannot be read.
+    """
+    text = files.read_utf8(path, _MAX_BYTES)
+    with parsers.guard(f"{path}"):
+        lines = [line for line in text.splitlines() if line.strip()]
+        if not 2 <= len(lines) <= MAX_FRAMES + 1:
+            raise ValueError(f"expected from 2 to {MAX_FRAMES} frames, got {len(lines)} lines")
+        first_words = [word.strip().strip('"') for word in lines[0].split(",")]
+        if len(first_words) > _MAX_COLUMNS:
+            raise ValueError(f"expected at most {_MAX_COLUMNS} columns, got {len(first_words)}")
+        has_names = not _is_number(first_words[0])
+        names = first_words if has_names else [*_POSITION, *_QUATERNION[1:], _QUATERNION[0], *body.joint_names]
+        frames = [_read_line(line, len(names), number) for number, line in enumerate(lines, 1) if number > has_names]
+        table = np.array(frames)
+        columns = {name: table[:, index] for index, name in enumerate(names)}
+        if len(columns) < len(names):
+            raise ValueError("expected each column once")
+        if _TIME in columns:
+            rate, columns = _even_rate(columns)
+        return _make(path, body, rate, loops, columns)
+
+
+def read_arrays(
+    path: str | os.PathLike, arrays: dict[str, np.ndarray], body: Body, rate: float | None, loops: bool
+) -> Motion:
+    """Return the motion of arrays by name: `fps`, `joint_pos`, `joint_names`, `body_pos_w` and `body_quat_w`.
+
+    Raises:
+        ValueError: arrays are missing, or do not fit the body.
+    """
+    with parsers.guard(f"{path}"):
+        names = body.joint_names
+        if _NAMES_ARRAY in arrays:
+            names = tuple([str(name) for name in arrays[_NAMES_ARRAY].ravel()])
+        angles = _numbers(arrays, _ANGLES_ARRAY, 2)
+        if angles.shape[1] != len(names):
+            raise ValueError(f"{_ANGLES_ARRAY}: expected {len(names)} joints, got {angles.shape[1]}")
+        positions = _numbers(arrays, _POSITIONS_ARRAY, 3)[:, 0]
+        quaternions = _numbers(arrays, _QUATERNIONS_ARRAY, 3)[:, 0]
+        if positions.shape != (len(angles), 3) or quaternions.shape != (len(angles), 4):
+            raise ValueError(f"expected {len(angles)} positions and quaternions of the root, w first")
+        if rate is None and _RATE_ARRAY in arrays:
+            rate = checks.number(_RATE_ARRAY, np.asarray(arrays[_RATE_ARRAY], float).ravel()[0].item(), 1.0)
+        columns = dict(zip(_POSITION, positions.T, strict=True))
+        columns |= zip(_QUATERNION, quaternions.T, strict=True)
+        columns |= zip(names, angles.T, strict=True)
+        return _make(path, body, rate, loops, columns)
+
+
+def _make(
+    path: str | os.PathLike, body: Body, rate: float | None, loops: bool, columns: dict[str, np.ndarray]
+) -> Motion:
+    """Return the motion of columns (frames,) by name."""
+    expected_names = (*_POSITION, *_QUATERNION, *body.joint_names)
+    for name in expected_names:
+        if name not in columns:
+            raise ValueError(
+                f"columns: expected those of {body.name}, and there is no {name}{checks.hint(name, columns)}"
+            )
+    for name in columns:
+        if name not in expected_names:
+            raise ValueError(
+                f"columns: {checks.preview(name)} is no joint of {body.name}{checks.hint(name, expected_names)}"
+            )
+    if rate is None:
+        raise ValueError("--fps: expected frames a second, as the file does not say them")
+    table = np.stack([columns[name] for name in expected_names], axis=-1)
+    if not np.isfinite(table).all():
+        frame = int(np.isfinite(table).all(axis=-1).argmin())
+        raise ValueError(f"expected finite numbers in frame {frame}")
+    quaternions = values.make_continuous(table[:, 3:7])
+    angles = table[:, 7:]
+    positions = table[:, :3]
+    if body.source:
+        home = source.angles_at_home(body)
+        angles = angles - np.array([home[name] for name in body.joint_names])
+        quaternions = rotations.product(quaternions, source.file_orientation(body) * _CONJUGATE)
+        place = source.torso_place(body)
+        positions = positions + (rotations.matrix(quaternions) @ place[:, None])[..., 0]
+    if loops:
+        positions, quaternions, angles, _ = close_loop(positions, quaternions, angles)
+    return values.make(body, Path(path).stem, rate, loops, positions, quaternions, angles)
+
+
+def _even_rate(columns: dict[str, np.ndarray]) -> tuple[float, dict[str, np.ndarray]]:
+    """Return the rate of a table with times, Hz, and its other columns at that rate."""
+    times = columns[_TIME]
+    if not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
+        raise ValueError(f"{_TIME}: expected numbers that grow")
+    frames = len(times)
+    rate = (frames - 1) / (times[-1] - times[0])
+    even_times = np.linspace(times[0], times[-1], frames)
+    even_columns = {name: np.interp(even_times, times, column) for name, column in columns.items() if name != _TIME}
+    return float(rate), even_columns
+
+
+def _read_line(line: str, columns: int, number: int) -> list[float]:
+    words = line.split(",")
+    if len(words) != columns:
+        raise ValueError(f"line {number}: expected {columns} numbers, got {len(words)}")
+    return [float(word) for word in words]
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(arrays: dict[str, np.ndarray], name: str, dimensions: int) -> np.ndarray:
+    array = arrays[name]
+    if array.ndim != dimensions or array.dtype.kind not in "fiu" or not 2 <= len(array) <= MAX_FRAMES:
+        raise ValueError(f"{name}: expected {dimensions} axes of numbers, got {array.shape} of {array.dtype}")
+    return array.astype(float)

@@ -1,0 +1,214 @@
+"""Motions from BVH and from tables of frames."""
+
+import drawn_motions
+import imports
+import numpy as np
+import pytest
+
+from arc_suite import motions, registry, rotations
+from arc_suite.models.standing import compile_body, standing_qpos
+from arc_suite.motions import reading, skeletons
+from arc_suite.tasks import readings
+
+TICK = registry.body_of("tick")
+NEAR = 1e-5
+
+
+@pytest.fixture(scope="module")
+def raised():
+    return drawn_motions.raise_leg(TICK, 0)
+
+
+def write_bvh(body, motion, to_file=skeletons.FROM_Y_UP.T) -> str:
+    """A file whose joints are bound in the first frame, in axes of the file."""
+    chain = skeletons._Chain.of(body)
+    places, axes = chain.place(motion.angles[0])
+    offsets = (places - places[chain.parents]) @ to_file.T
+    children = {index: np.flatnonzero(chain.parents == index) for index in range(len(places))}
+    children[0] = children[0][children[0] > 0]
+    lines = []
+
+    def write(index, indent, kind):
+        name, channels = body.part_names[index], "Zrotation Yrotation Xrotation"
+        lines.append(
+            f"{indent}{kind} {name}\n{indent}{{\n{indent} OFFSET {' '.join(f'{x:.9f}' for x in offsets[index])}"
+        )
+        channels = f"6 Xposition Yposition Zposition {channels}" if index == 0 else f"3 {channels}"
+        lines.append(f"{indent} CHANNELS {channels}")
+        for child in children[index]:
+            write(child, indent + " ", "JOINT")
+        if not len(children[index]):
+            lines.append(f"{indent} End Site\n{indent} {{\n{indent}  OFFSET 0 0 0\n{indent} }}")
+        lines.append(f"{indent}}}")
+
+    write(0, "", "ROOT")
+    frames = []
+    order = []
+
+    def visit(index):
+        order.append(index)
+        for child in children[index]:
+            visit(child)
+
+    visit(0)
+    joint = np.cumsum(axes.any(axis=-1)) - 1
+    for position, quaternion, angles in zip(motion.positions, motion.quaternions, motion.angles, strict=True):
+        numbers = list(to_file @ position)
+        for index in order:
+            if index == 0:
+                matrix = rotations.matrix(quaternion)
+            elif axes[index].any():
+                change = angles[joint[index]] - motion.angles[0, joint[index]]
+                matrix = skeletons._rotation_matrices(change * axes[index])
+            else:
+                matrix = np.eye(3)
+            m = to_file @ matrix @ to_file.T
+            turns = (np.arctan2(m[1, 0], m[0, 0]), np.arcsin(-m[2, 0]), np.arctan2(m[2, 1], m[2, 2]))
+            numbers += np.degrees(turns).tolist()
+        frames.append(" ".join(f"{number:.9f}" for number in numbers))
+    header = ["HIERARCHY", *lines, "MOTION", f"Frames: {motion.frames}", f"Frame Time: {1 / motion.frame_rate:.9f}"]
+    return "\n".join([*header, *frames])
+
+
+@pytest.mark.parametrize("axes", ["y up", "z up"])
+def test_bvh(axes, raised, tmp_path):
+    to_file = skeletons.FROM_Y_UP.T
+    if axes == "z up":  # -y ahead, as in Blender
+        to_file = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    path = tmp_path / "raise.bvh"
+    path.write_text(write_bvh(TICK, raised, to_file))
+    motion, notes = reading.read(path, TICK)
+    assert (motion.name, motion.frames, motion.loops, notes) == ("raise", raised.frames, False, [])
+    np.testing.assert_allclose(motion.angles, raised.angles, atol=NEAR)
+    np.testing.assert_allclose(motion.soles, raised.soles, atol=NEAR)
+
+
+BVH_DAMAGES = {
+    "Frames: 41": ("Frames: 1000000000", "Frames: expected an integer from 2 to 65536"),
+    "JOINT": ("KNOT", "unknown word 'KNOT'"),
+    "Frame Time: 0.050000000": ("Frame Time: nan", "number: expected a finite number, got nan"),
+    "MOTION": ("MOVES", "expected HIERARCHY and MOTION"),
+    "Zrotation": ("Wrotation", "'W' is missing"),
+    "CHANNELS 3": ("CHANNELS 9", "CHANNELS: expected an integer from 0 to 6"),
+    "HIERARCHY": ("}", "pop from an empty list|pop from empty list"),
+    "torso": ("trunk", "bones: expected those of tick, and there is no torso"),
+}
+
+
+@pytest.mark.parametrize("old", BVH_DAMAGES)
+def test_damaged_bvh_is_one_line(old, raised, tmp_path):
+    new, message = BVH_DAMAGES[old]
+    path = tmp_path / "raise.bvh"
+    text = write_bvh(TICK, raised)
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ValueError, match=message) as error:
+        reading.read(path, TICK)
+    assert str(error.value).startswith(f"{path}: ") and "\n" not in str(error.value)
+
+
+# Tables.
+
+QUADRUPED = imports.quadruped()
+
+
+def qpos_of(body, motion):
+    """Positions of the robot's own file (frames, nq), and the indices of the body's joints in them."""
+    model = compile_body(body)
+    layout = readings.layout(model, body)
+    poses = np.concatenate([motion.positions, motion.quaternions, motion.angles], axis=-1)
+    return readings.positions(poses, layout, standing_qpos(model)), layout.joint_angles
+
+
+@pytest.fixture(scope="module", params=["at the root", "elsewhere"])
+def robot(request, tmp_path_factory):
+    """An imported robot, whose trunk may be elsewhere than its root body."""
+    if request.param == "at the root":
+        return QUADRUPED
+    return registry.body_of(str(imports.move_root(tmp_path_factory.mktemp("robot"), "go2_like.xml", (0.1, 0.0, 0.4))))
+
+
+def assert_same(motion, expected):
+    np.testing.assert_allclose(motion.angles, expected.angles, atol=NEAR)
+    np.testing.assert_allclose(motion.positions, expected.positions, atol=NEAR)
+    np.testing.assert_allclose(motion.soles, expected.soles, atol=NEAR)
+    assert motion.frame_rate == pytest.approx(expected.frame_rate)
+
+
+def test_csv_of_a_robot(robot, tmp_path):
+    """The root and the angles are those of its file: home angles are not 0."""
+    steps = drawn_motions.step_loop(robot)
+    qpos, joints = qpos_of(robot, steps)
+    path = tmp_path / "steps.csv"
+    names = ["x", "y", "z", "qw", "qx", "qy", "qz", *robot.joint_names]
+    table = np.concatenate([qpos[:, :7], qpos[:, joints]], axis=-1)
+    order = np.random.default_rng(1).permutation(len(names))
+    lines = [",".join(np.array(names)[order]), *[",".join(map(repr, row[order].tolist())) for row in table]]
+    path.write_text("\n".join(lines))
+    with pytest.raises(ValueError, match="--fps: expected frames a second, as the file does not say them"):
+        reading.read(path, robot)
+    motion, _ = reading.read(path, robot, reading.Options(fps=20.0, loop=True))
+    assert motion.loops and motion.name == "steps"
+    assert_same(motion, steps)
+    timed = [f"time,{lines[0]}", *[f"{0.05 * index:.3f},{line}" for index, line in enumerate(lines[1:])]]
+    path.write_text("\n".join(timed))
+    assert_same(reading.read(path, robot)[0], steps)
+    # Without names: w of the quaternion is last.
+    columns = [*range(3), 4, 5, 6, 3, *range(7, len(names))]
+    path.write_text("\n".join(",".join(map(repr, row[columns].tolist())) for row in table))
+    assert_same(reading.read(path, robot, reading.Options(fps=20.0))[0], steps)
+
+
+def test_arrays_of_a_robot(robot, tmp_path):
+    steps = drawn_motions.step_loop(robot)
+    qpos, joints = qpos_of(robot, steps)
+    arrays = {
+        "fps": np.array([20]),
+        "joint_pos": qpos[:, joints],
+        "body_pos_w": np.tile(qpos[:, None, :3], (1, 13, 1)),
+        "body_quat_w": np.tile(qpos[:, None, 3:7], (1, 13, 1)),
+    }
+    np.savez(tmp_path / "steps.npz", **arrays)
+    assert_same(reading.read(tmp_path / "steps.npz", robot)[0], steps)
+    np.savez(tmp_path / "steps.npz", **arrays, joint_names=np.array(["a"] * 12))
+    with pytest.raises(ValueError, match="columns: expected those of .*, and there is no l1_joint1"):
+        reading.read(tmp_path / "steps.npz", robot)
+
+
+GOOD = ",".join(["x", "y", "z", "qw", "qx", "qy", "qz", *TICK.joint_names])
+LINE = ",".join(["0", "0", "0.2", "1", "0", "0", "0", *["0.1"] * len(TICK.joint_names)])
+BAD_TABLES = {
+    "\n".join([GOOD, LINE, LINE.replace(",0.1", ",nan")]): "expected finite numbers in frame 1",
+    "\n".join([GOOD, LINE, LINE[:-4]]): "line 3: expected 25 numbers, got 24",
+    "\n".join([GOOD.replace("l1_", "a1_"), LINE, LINE]): "columns: expected those of tick, and there is no l1_",
+    "\n".join([f"{GOOD},tail", f"{LINE},0", f"{LINE},0"]): "columns: 'tail' is no joint of tick",
+    "\n".join([GOOD, LINE, LINE.replace("1,0,0,0", "0,0,0,0")]): "quaternions: expected finite ones above 0 in frame 1",
+    "\n".join([GOOD, LINE, LINE.replace(",0.1", ",hip")]): "could not convert string to float: 'hip'",
+    "\n".join([GOOD, LINE]): "frames: expected from 2 to 65536, got 1",
+    "": "expected from 2 to 65536 frames, got 0 lines",
+    "\n".join(["1"] * 70_000): "expected from 2 to 65536 frames, got 70000 lines",
+    "\n".join([",".join("1" * 2000)] * 3): "expected at most 1024 columns, got 2000",
+    "\n".join([f"time,{GOOD}", f"1,{LINE}", f"0,{LINE}"]): "time: expected numbers that grow",
+}
+
+
+@pytest.mark.parametrize("index", range(len(BAD_TABLES)))
+def test_damaged_table_is_one_line(index, tmp_path):
+    text, message = list(BAD_TABLES.items())[index]
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message) as error:
+        reading.read(path, TICK, reading.Options(fps=30.0))
+    assert str(error.value).startswith(f"{path}: ") and "\n" not in str(error.value)
+
+
+def test_files_of_other_kinds_and_bodies(raised, tmp_path):
+    with pytest.raises(ValueError, match="unknown extension '.fbx'"):
+        reading.read(tmp_path / "a.fbx", TICK)
+    with pytest.raises(OSError, match="cannot read"):
+        reading.read(tmp_path / "a.csv", TICK)
+    motions.save(raised, tmp_path / "raise.npz")
+    motion, _ = reading.read(tmp_path / "raise.npz")
+    assert motion.body == "tick" and not reading.describe_limits(motion, TICK)
+    beyond = motion._replace(angles=motion.angles + 2.0)
+    assert reading.describe_limits(beyond, TICK)[0].startswith(f"{TICK.joint_names[0]} turns ")
