@@ -20,6 +20,7 @@ EXTENSION = ".npz"
 
 _TEXTS = ("name", "body")
 _NAMES = ("joint_names", "leg_names")
+_NUMBERS = ("standing_height", "frame_rate", "rest_height")
 _MAX_COLUMNS = 1 << 12  # numbers of a frame
 
 
@@ -129,8 +130,7 @@ def _read(fields: dict[str, Any]) -> Motion:
     motion = Motion(
         **texts,
         **names,
-        standing_height=checks.number("standing_height", fields["standing_height"]),
-        frame_rate=checks.number("frame_rate", fields["frame_rate"]),
+        **{name: checks.number(name, fields[name]) for name in _NUMBERS},
         loops=checks.boolean("loops", fields["loops"]),
         **(arrays | {"planted": arrays["planted"] > 0.5}),
     )
