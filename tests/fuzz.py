@@ -32,7 +32,8 @@ from dm_control.rl.control import PhysicsError
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import archives, data, evaluation, policies, style
+from arc_suite import archives, data, evaluation, motions, policies, registry, style
+from arc_suite.animation.clips.creatures import glb
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes
 from arc_suite.animation.design.search import Candidates, Search
@@ -43,6 +44,7 @@ from arc_suite.journal import Journal
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.training import train
 from arc_suite.learning.studies import benchmark, publication, results, tables
+from arc_suite.motions import reading
 from arc_suite.policies import network, zips
 from arc_suite.robots.spec_files import EXAMPLES, body_to_json, load_body
 
@@ -50,6 +52,8 @@ ROOT = pathlib.Path(__file__).parents[1]
 sys.path.append(str(ROOT / "tests" / "fixtures"))
 
 import damages  # noqa: E402
+import drawn_motions  # noqa: E402
+import gltf_editor  # noqa: E402
 import tiny_studies  # noqa: E402, F401  # registers the learner of the runs: a file that names it imports nothing
 
 LIMIT = 10.0  # s of a processor; the slowest sound file takes a tenth of one
@@ -222,6 +226,32 @@ def _begin_run() -> None:
     publication.publish([_run()], pathlib.Path("runs"), pathlib.Path("published"))
 
 
+def _make_motions() -> None:
+    """Leave a motion as files of all kinds; of the .glb, its JSON and its buffer, too."""
+    body = registry.body_of("tick")
+    motion = drawn_motions.raise_leg(body, 0)
+    motions.save(motion, "motion.npz")
+    content = glb(body, [drawn_motions.clip_of(body, motion)], "nodes", "moving")
+    pathlib.Path("motion.glb").write_bytes(content)
+    editor = gltf_editor.Editor(content)
+    pathlib.Path("motion.json").write_text(json.dumps(editor.json))
+    pathlib.Path("motion.bin").write_bytes(editor.buffer)
+    pathlib.Path("motion.bvh").write_text(drawn_motions.to_bvh(body, motion))
+    pathlib.Path("motion.csv").write_text(drawn_motions.to_csv(body, motion))
+
+
+def _read_motion(path: str) -> None:
+    motion, _ = reading.read(path, registry.body_of("tick"), reading.Options(fps=30.0))
+    motions.resample(motion, 50.0)
+
+
+def _read_json_of_motion() -> None:
+    editor = gltf_editor.Editor(pathlib.Path("motion.glb").read_bytes())
+    content = pathlib.Path("motion.json").read_bytes()
+    pathlib.Path("assembled.glb").write_bytes(gltf_editor.assemble(content, editor.buffer))
+    _read_motion("assembled.glb")
+
+
 def _copied_runs() -> pathlib.Path:
     shutil.rmtree("copy", ignore_errors=True)
     return pathlib.Path(shutil.copytree("runs", "copy"))
@@ -271,6 +301,11 @@ KINDS = {
     "imported body": Kind("imported.json", _make_imported_body, (_read_imported_body,), table=damages.IMPORTED),
     "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,), table=damages.JSON),
     "tracks": Kind("tracks.npz", _make_tracks, (lambda: style.load("tracks.npz"),), table=damages.ARCHIVES),
+    "motion": Kind("motion.npz", _make_motions, (lambda: _read_motion("motion.npz"),), table=damages.ARCHIVES),
+    "motion in glTF": Kind("motion.glb", _make_motions, (lambda: _read_motion("motion.glb"),)),
+    "JSON of a motion in glTF": Kind("motion.json", _make_motions, (_read_json_of_motion,), table=damages.JSON),
+    "motion in BVH": Kind("motion.bvh", _make_motions, (lambda: _read_motion("motion.bvh"),)),
+    "motion in CSV": Kind("motion.csv", _make_motions, (lambda: _read_motion("motion.csv"),), table=damages.CSV),
     "policy": Kind("policy.npz", _make_policy, (_act,), table=damages.ARCHIVES | damages.GRAPHS),
     "header of a policy": Kind("header.json", _make_policy, (_act_by_header,), table=damages.JSON),
     "zip of another library": Kind("data.json", _make_zip, (_read_zip,), table=damages.JSON),

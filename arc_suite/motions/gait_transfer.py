@@ -202,7 +202,8 @@ def _place(root: np.ndarray, points: np.ndarray) -> np.ndarray:
 def _hold_stances(soles: np.ndarray, planted: np.ndarray, root: np.ndarray) -> np.ndarray:
     """Return the path (frames, 3) of a sole that stays in one place in each stance, on the ground.
 
-    A stance takes place in the middle of its path. A swing takes up the differences at its ends.
+    A stance takes place in the middle of its path. A swing takes up the differences at its ends, and keeps its height
+    over the mean of stances.
 
     Args:
         soles: (frames, 3) in the world, of a loop with both ends.
@@ -221,14 +222,16 @@ def _hold_stances(soles: np.ndarray, planted: np.ndarray, root: np.ndarray) -> n
     standing = []
     corrections = []
     for start, end in edges.tolist():
-        place = np.append(path[start:end, :2].mean(axis=0), 0.0)
+        place = path[start:end, :2].mean(axis=0)
         standing += list(range(start, end))
-        corrections += list(place - path[start:end])
+        corrections += list(place - path[start:end, :2])
     if not standing:
         return soles
     indices = np.arange(len(path))
     correction = np.stack([np.interp(indices, standing, component) for component in np.array(corrections).T], axis=-1)
-    path = path + correction
+    heights = path[:, 2] - path[stands, 2].mean()
+    heights = np.where(stands, 0.0, heights.clip(0.0))
+    path = np.concatenate([path[:, :2] + correction, heights[:, None]], axis=-1)
     middle = path[frames : 2 * frames]
     last = _place(root[-1], _to_frame(middle[:1], root[0]))
     return np.concatenate([middle, last])

@@ -10,7 +10,8 @@ import pytest
 # has the others of runs and studies.
 QUICK = ("robot in MJCF", "robot in URDF", "mesh in STL", "journal of a search")
 LONG = (
-    *("imported body", "policy", "tracks"),
+    *("imported body", "policy", "tracks", "motion", "motion in glTF", "JSON of a motion in glTF", "motion in BVH"),
+    "motion in CSV",
     *("mesh in OBJ", "header of a policy", "zip of another library", "snapshot", "journal of a design"),
     *("config.json of a run", "checkpoint.npz of a run", "evaluations.csv of a run", "scores of a benchmark"),
     *("runs.csv of a study", "metadata of a dataset", "episodes of a dataset"),

@@ -29,12 +29,13 @@ def test_loop_keeps_its_speed_and_strides_in_the_gait_of_the_other_body(body):
     assert froude(motion) == pytest.approx(froude(steps), rel=1e-6)
     gait = gait_transfer.find_gait(body)
     assert motion.planted[:-1].mean() == pytest.approx(gait.duty_factor, abs=0.06)
-    # A foot in stance does not slide, and a swing is as high as that of the other body.
+    # A foot in stance does not slide, and a swing is as high over its stance as that of the other body.
+    swing_height = steps.soles[..., 2].max() - steps.soles[steps.planted][:, 2].mean()
     for leg in range(len(body.legs)):
         planted = motion.planted[:-1, leg] & motion.planted[1:, leg]
         slides = np.linalg.norm(np.diff(motion.soles[:, leg], axis=0), axis=-1)[planted]
         assert slides.max() < 2 * MAX_MISS and abs(motion.soles[motion.planted[:, leg], leg, 2]).max() < MAX_MISS
-        assert motion.soles[:, leg, 2].max() == pytest.approx(drawn_motions.CLEARANCE, abs=MAX_MISS)
+        assert motion.soles[:, leg, 2].max() == pytest.approx(swing_height, abs=0.03)
     # Touchdowns have the order of the gait.
     starts = [gait_transfer._find_steps(planted).starts[0] for planted in motion.planted[:-1].T]
     phases = (np.array(starts) - starts[0] + np.array(gait.offsets) - gait.offsets[0] + 0.5) % 1.0 - 0.5

@@ -5,7 +5,7 @@ import imports
 import numpy as np
 import pytest
 
-from arc_suite import motions, registry, rotations
+from arc_suite import motions, registry
 from arc_suite.models.standing import compile_body, standing_qpos
 from arc_suite.motions import reading, skeletons
 from arc_suite.tasks import readings
@@ -19,64 +19,13 @@ def raised():
     return drawn_motions.raise_leg(TICK, 0)
 
 
-def write_bvh(body, motion, to_file=skeletons.FROM_Y_UP.T) -> str:
-    """A file whose joints are bound in the first frame, in axes of the file."""
-    chain = skeletons._Chain.of(body)
-    places, axes = chain.place(motion.angles[0])
-    offsets = (places - places[chain.parents]) @ to_file.T
-    children = {index: np.flatnonzero(chain.parents == index) for index in range(len(places))}
-    children[0] = children[0][children[0] > 0]
-    lines = []
-
-    def write(index, indent, kind):
-        name, channels = body.part_names[index], "Zrotation Yrotation Xrotation"
-        lines.append(
-            f"{indent}{kind} {name}\n{indent}{{\n{indent} OFFSET {' '.join(f'{x:.9f}' for x in offsets[index])}"
-        )
-        channels = f"6 Xposition Yposition Zposition {channels}" if index == 0 else f"3 {channels}"
-        lines.append(f"{indent} CHANNELS {channels}")
-        for child in children[index]:
-            write(child, indent + " ", "JOINT")
-        if not len(children[index]):
-            lines.append(f"{indent} End Site\n{indent} {{\n{indent}  OFFSET 0 0 0\n{indent} }}")
-        lines.append(f"{indent}}}")
-
-    write(0, "", "ROOT")
-    frames = []
-    order = []
-
-    def visit(index):
-        order.append(index)
-        for child in children[index]:
-            visit(child)
-
-    visit(0)
-    joint = np.cumsum(axes.any(axis=-1)) - 1
-    for position, quaternion, angles in zip(motion.positions, motion.quaternions, motion.angles, strict=True):
-        numbers = list(to_file @ position)
-        for index in order:
-            if index == 0:
-                matrix = rotations.matrix(quaternion)
-            elif axes[index].any():
-                change = angles[joint[index]] - motion.angles[0, joint[index]]
-                matrix = skeletons._rotation_matrices(change * axes[index])
-            else:
-                matrix = np.eye(3)
-            m = to_file @ matrix @ to_file.T
-            turns = (np.arctan2(m[1, 0], m[0, 0]), np.arcsin(-m[2, 0]), np.arctan2(m[2, 1], m[2, 2]))
-            numbers += np.degrees(turns).tolist()
-        frames.append(" ".join(f"{number:.9f}" for number in numbers))
-    header = ["HIERARCHY", *lines, "MOTION", f"Frames: {motion.frames}", f"Frame Time: {1 / motion.frame_rate:.9f}"]
-    return "\n".join([*header, *frames])
-
-
 @pytest.mark.parametrize("axes", ["y up", "z up"])
 def test_bvh(axes, raised, tmp_path):
     to_file = skeletons.FROM_Y_UP.T
     if axes == "z up":  # -y ahead, as in Blender
         to_file = np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     path = tmp_path / "raise.bvh"
-    path.write_text(write_bvh(TICK, raised, to_file))
+    path.write_text(drawn_motions.to_bvh(TICK, raised, to_file))
     motion, notes = reading.read(path, TICK)
     assert (motion.name, motion.frames, motion.loops, notes) == ("raise", raised.frames, False, [])
     np.testing.assert_allclose(motion.angles, raised.angles, atol=NEAR)
@@ -99,7 +48,7 @@ BVH_DAMAGES = {
 def test_damaged_bvh_is_one_line(old, raised, tmp_path):
     new, message = BVH_DAMAGES[old]
     path = tmp_path / "raise.bvh"
-    text = write_bvh(TICK, raised)
+    text = drawn_motions.to_bvh(TICK, raised)
     assert old in text
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(ValueError, match=message) as error:
