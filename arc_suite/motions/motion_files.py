@@ -16,9 +16,9 @@ MAX_BYTES = 1 << 28  # bytes of all arrays
 _MAX_NAMES = 1024  # joints or legs
 _MAX_NAME = 200  # characters
 
-_TEXTS = ("name", "body")
-_NUMBERS = ("standing_height", "frame_rate", "rest_height")
-_NAMES = ("joint_names", "leg_names")
+TEXTS = ("name", "body")
+NUMBERS = ("standing_height", "frame_rate", "rest_height")
+NAMES = ("joint_names", "leg_names")
 _BOOLEANS = ("planted",)
 
 
@@ -61,7 +61,7 @@ def digest(motion: Motion) -> str:
 
 
 def _arrays(motion: Motion) -> dict[str, Any]:
-    return motion._asdict() | {name: np.array(getattr(motion, name), str) for name in _NAMES}
+    return motion._asdict() | {name: np.array(getattr(motion, name), str) for name in NAMES}
 
 
 def _read(arrays: dict[str, np.ndarray]) -> Motion:
@@ -72,11 +72,11 @@ def _read(arrays: dict[str, np.ndarray]) -> Motion:
     fields: dict[str, Any] = {}
     for name in Motion._fields:
         array = arrays[name]
-        if name in _TEXTS:
+        if name in TEXTS:
             fields[name] = read_names(name, array, 0)[0]
-        elif name in _NAMES:
+        elif name in NAMES:
             fields[name] = read_names(name, array, 1)
-        elif name in _NUMBERS:
+        elif name in NUMBERS:
             fields[name] = checks.number(name, array.item() if array.shape == () else None)
         elif name == "loops":
             fields[name] = checks.boolean(name, array.item() if array.shape == () else None)

@@ -13,14 +13,11 @@ import numpy as np
 from arc_suite import checks, parsers
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
-from arc_suite.motions.motion_files import load, read_names
+from arc_suite.motions.motion_files import NAMES, NUMBERS, TEXTS, load, read_names
 
 MAX_TEXT = 1 << 23  # characters
 EXTENSION = ".npz"
 
-_TEXTS = ("name", "body")
-_NAMES = ("joint_names", "leg_names")
-_NUMBERS = ("standing_height", "frame_rate", "rest_height")
 _MAX_COLUMNS = 1 << 12  # numbers of a frame
 
 
@@ -114,8 +111,8 @@ def _shapes(frames: int, joint_names: tuple[str, ...], leg_names: tuple[str, ...
 
 def _read(fields: dict[str, Any]) -> Motion:
     """Return the motion of fields by name; damaged ones raise anything."""
-    names = {name: read_names(name, np.array(fields[name], str), 1) for name in _NAMES}
-    texts = {name: read_names(name, np.array(fields[name], str), 0)[0] for name in _TEXTS}
+    names = {name: read_names(name, np.array(fields[name], str), 1) for name in NAMES}
+    texts = {name: read_names(name, np.array(fields[name], str), 0)[0] for name in TEXTS}
     frames = checks.integer("frames", fields["frames"], 2, values.MAX_FRAMES)
     shapes = _shapes(frames, **names)
     sizes = [math.prod(shape) for shape in shapes.values()]
@@ -130,7 +127,7 @@ def _read(fields: dict[str, Any]) -> Motion:
     motion = Motion(
         **texts,
         **names,
-        **{name: checks.number(name, fields[name]) for name in _NUMBERS},
+        **{name: checks.number(name, fields[name]) for name in NUMBERS},
         loops=checks.boolean("loops", fields["loops"]),
         **(arrays | {"planted": arrays["planted"] > 0.5}),
     )
