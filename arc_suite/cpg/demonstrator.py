@@ -82,9 +82,7 @@ class Demonstrator:
         self.law = law(body_task, parameters)
         if preset is not None:
             _warn_of_ignored_commands(body_task, name, ignored_commands(body_task, self.law))
-        self._control: Control | None = None  # that positions of joints pass through
-        if isinstance(body_task, Modified) and has_active(body_task, Control):
-            self._control = body_task.modifier(Control)
+        self._task = body_task
         self._body = body
         self._starts_lying = body_task.lies
         self._state: Any = None  # of the law; None before the first action
@@ -120,9 +118,7 @@ class Demonstrator:
         if self._state is None or len(self._state[0]) != count:
             self._state = self.law.initial(count)
         self._state, actions = self.law(self._state, blocks)
-        if self._control is not None:
-            _, angles, velocities = proprioception(blocks)
-            actions = self._control.positions(actions.clip(-1.0, 1.0), angles, velocities)
+        actions = _as_actions(self._task, actions, blocks)
         if self._reset_indices and not self._starts_lying:
             torso_heights = blocks["posture"][:, 0]
             self._check_heights(torso_heights[self._reset_indices])
@@ -161,6 +157,19 @@ class Demonstrator:
             start = "the torso starts below half or above twice that"
             text = f"{self._body.name} stands {standing_height:g} m high, and {start}"
             warnings.warn(f"{text}: is this the demonstrator of another robot?", stacklevel=3)
+
+
+def _as_actions(task: Task, outputs: np.ndarray, blocks: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return what a law gives, torques or positions of servos, as actions of a task."""
+    if not isinstance(task, Modified) or task.actions == "torque":
+        return outputs
+    control = task.modifier(Control)
+    positions = outputs
+    if control.is_active:
+        _, angles, velocities = proprioception(blocks)
+        positions = control.positions(outputs.clip(-1.0, 1.0), angles, velocities)
+    center = task.observed_position_center(blocks)
+    return positions if center is None else control.subtract_center(center, positions)
 
 
 def _warn_of_ignored_commands(task: Task, preset: Any, ignored: Sequence[str]) -> None:

@@ -360,6 +360,17 @@ class Task(Observed):
     def after(self, memory, readings: Readings) -> Any:
         """Return the memory after a control step."""
 
+    def position_center(self, memory) -> Any:
+        """Return the angles (..., joints) that positions of actions are relative to, rad from the standing pose.
+
+        None for the standing pose. See `modifiers.Control`.
+        """
+        return None
+
+    def observed_position_center(self, blocks: Mapping[str, np.ndarray]) -> Any:
+        """Return `position_center` given the blocks of the observation, as a demonstrator sees it."""
+        return None
+
     def with_command(self, memory, name: str, value) -> Any:
         """Return the memory with a live command: numbers (..., size) of one of `commands`, set from outside.
 

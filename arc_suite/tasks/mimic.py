@@ -4,6 +4,8 @@ An episode draws a motion, whether it is followed as its mirror image, and where
 motion does. The motion repeats. At the start of every cycle its place is set to that of the body, so that drift does
 not add up.
 
+Actions are positions about the next pose of the motion: an action of 0 holds it.
+
 The reward compares with the motion's spread: an error in a joint that hardly moves counts more than the same error in
 one that swings.
 """
@@ -234,6 +236,16 @@ class Mimic(Task):
     def begin(self, memory: MimicMemory, readings: Readings) -> MimicMemory:
         """Return the memory with the errors at the start."""
         return memory._replace(errors=self._compare(memory, readings))
+
+    def position_center(self, memory: MimicMemory):
+        """Return the angles (..., joints) of the motion at the end of the next control step, rad."""
+        return self.tables.at(self.tables.angles, self._row(memory) + 1)
+
+    def observed_position_center(self, blocks: Mapping[str, np.ndarray]):
+        """Return the same angles (..., joints) from the block `next_poses`, rad."""
+        joints = len(self.scene.body.joint_names)
+        size = self.blocks["next_poses"].size // POSES_AHEAD
+        return blocks["next_poses"][..., size - joints : size]
 
     def before(self, memory: MimicMemory, action) -> tuple[MimicMemory, Inputs]:
         """Return the memory with the action, and the action itself as what to write."""

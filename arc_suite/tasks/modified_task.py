@@ -203,6 +203,9 @@ class Modified(Wrapper):
         """
         elapsed = memory.changes.elapsed
         states = list(memory.changes.states)
+        center = self.task.position_center(memory.task)
+        if center is not None and self.actions == "position":
+            action = self.modifier(Control).add_center(center, action)
         for index in self._indices_to_act:
             states[index], action = self.changes[index].act(states[index], action, elapsed)
         task_memory, inputs = self.task.before(memory.task, action)

@@ -19,6 +19,7 @@ from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.scene import Scene
 
 ACTIONS = ("torque", "position")
+_OFFSET_SHARE = 0.3  # of a joint's reach: how far an action of 1 leads from the center that a task gives
 
 
 class ControlState(NamedTuple):
@@ -50,8 +51,9 @@ class Control(_ControlFields, Modifier):
     Attributes:
         gains: range of the multiple of the stiffness, and of that of the damping, of position control and servos.
         actions: "torque", or "position": an action is then the target angles of the joints. 0 is the standing pose, 1
-            and -1 are as far from it as the farther limit of the joint's range. The setting None stands for torques of
-            motors, and for positions of servos, which take nothing else.
+            and -1 are as far from it as the farther limit of the joint's range. Where a task gives another center, such
+            as the next pose of a motion, 0 is that center, and 1 leads 0.3 times as far. The setting None stands for
+            torques of motors, and for positions of servos, which take nothing else.
         is_of_servos: whether servos hold positions by themselves.
         stiffness: (joints,) action per rad.
         damping: (joints,) action per rad/s.
@@ -115,6 +117,14 @@ class Control(_ControlFields, Modifier):
         spring = stiffness_gain * (self.stiffness * (target_angles - state.angles))
         damper = damping_gain * (self.damping * state.speeds)
         return (spring - damper).clip(-1.0, 1.0)
+
+    def add_center(self, center, action):
+        """Return the position (..., joints) of an action (..., joints) about a center (..., joints), rad."""
+        return center / self.reach + _OFFSET_SHARE * action
+
+    def subtract_center(self, center, positions):
+        """Return the action (..., joints) in [-1, 1] for a position (..., joints): the inverse of `add_center`."""
+        return ((positions - center / self.reach) / _OFFSET_SHARE).clip(-1.0, 1.0)
 
     def positions(self, torques, angles, speeds):
         """Return the action (..., joints) by which position control gives some torques: the inverse of `torques`.
