@@ -6,6 +6,8 @@ import signal
 
 import pytest
 
+from arc_suite.simulation import falls
+
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in the background of a shell; programs would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -18,6 +20,14 @@ def pytest_collection(session):
     finally:
         gc.freeze()
         gc.enable()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def few_falls():
+    """Tables of falls from few drops, which take a tenth of a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(falls, "DROPS", 12)
+        yield
 
 
 @pytest.fixture(scope="session")

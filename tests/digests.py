@@ -26,12 +26,15 @@ import arc_suite
 from arc_suite.arenas import FLAT
 from arc_suite.cpg import Demonstrator
 from arc_suite.robots import ROBOTS
+from arc_suite.simulation import falls
 from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import TASKS
 
 FILE = pathlib.Path(__file__).parent / "golden" / "digests.json"
 SEEDS, STEPS, AFTER = (3, 40), 300, 60  # control steps of a stream, and those after one more reset
 FIRST = 20  # rewards that are compared at a tolerance
+
+falls.DROPS = 12  # as in all tests: tables of falls take a tenth of a second
 
 
 class Case(NamedTuple):

@@ -12,11 +12,17 @@ UNKNOWN = "training data unknown"
 
 
 def of_setup(setup: Setup) -> dict[str, Any]:
-    """Return what the results of a setup depend on, for JSON: names, settings, and hashes of body, model and task."""
-    settings = repr(setup.definition.settings)
+    """Return what the results of a setup depend on, for JSON: names, settings, and hashes of body, model and task.
+
+    A task that draws its starts from a table adds the hash of the table.
+    """
+    task = setup.definition
     values = setup.provenance()
-    values["task_sha256"] = hashlib.sha256(settings.encode()).hexdigest()
-    return {name: values[name] for name in _FIELDS}
+    values["task_sha256"] = hashlib.sha256(repr(task.settings).encode()).hexdigest()
+    record = {name: values[name] for name in _FIELDS}
+    if task.start_table is not None:
+        record["start_sha256"] = hashlib.sha256(task.start_table.tobytes()).hexdigest()
+    return record
 
 
 def policy_sha256(policy: str) -> str | None:

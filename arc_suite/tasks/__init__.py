@@ -2,6 +2,7 @@
 
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.mimic import Mimic
+from arc_suite.tasks.recover import Recover
 from arc_suite.tasks.suite import (
     Course,
     Directed,
@@ -33,6 +34,7 @@ _TASK_CLASSES: tuple[type[Task], ...] = (
     Roam,
     Navigate,
     Mimic,
+    Recover,
 )
 TASKS = {task.name: task for task in _TASK_CLASSES}
 

@@ -342,18 +342,13 @@ class CommandTask(Task):
         """Take the readings."""
         layout = self.scene.layout
         heading = rotations.yaw(data.qpos[..., 3:7])
-        heading_of_parts = heading[..., None]
-        wrenches = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit  # torque (3,), then force (3,), world
-        xp = wrenches.__array_namespace__()
-        horizontal_torque = rotations.to_heading_frame(wrenches[..., 0:2], heading_of_parts)
-        horizontal_force = rotations.to_heading_frame(wrenches[..., 3:5], heading_of_parts)
-        forces = xp.concatenate([horizontal_torque, wrenches[..., 2:3], horizontal_force, wrenches[..., 5:6]], axis=-1)
+        forces = reading.headed_forces(data, layout, self.context.force_unit, heading)
         readings = reading.read(data, layout, self.scene.arena, forces)
         touches = self.settings.ground.touches(data)
         if self.settings.gait_and_pose is None:
             return Sensed(*readings, heading, touches, None)
         feet_from_torso = data.xpos[..., layout.feet, :2] - readings.frame_position[..., None, :2]
-        return Sensed(*readings, heading, touches, rotations.to_heading_frame(feet_from_torso, heading_of_parts))
+        return Sensed(*readings, heading, touches, rotations.to_heading_frame(feet_from_torso, heading[..., None]))
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground.

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.fitting import velocity_units
 
@@ -47,7 +48,6 @@ class Context(NamedTuple):
     def of(cls, scene, parameters, step_limit: float, reference: Any = None) -> "Context":
         """Return the context of a task in a `contract.Scene` that prescribes `parameters.Parameters`."""
         body = scene.body
-        pose = measure_standing(body)
         units = velocity_units(body, parameters.target_velocity)
         leak = min(parameters.gait_frequency * scene.control_timestep, 1.0)
         return cls(
@@ -55,7 +55,7 @@ class Context(NamedTuple):
             height=body.torso.standing_height,
             reach=units[0] / units[2],
             units=units,
-            force_unit=pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3)[None],
+            force_unit=force_unit(body),
             step_units=scene.control_timestep * units,
             pace=float(units[0] * scene.control_timestep),
             leak=leak,
@@ -64,3 +64,9 @@ class Context(NamedTuple):
             tempo=float(np.sqrt(body.torso.standing_height / GRAVITY) / scene.control_timestep),
             reference=reference,
         )
+
+
+def force_unit(body: Body) -> np.ndarray:
+    """Return the unit (1, 6) of contact forces; see `Context.force_unit`."""
+    pose = measure_standing(body)
+    return pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3)[None]

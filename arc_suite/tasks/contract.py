@@ -186,6 +186,7 @@ class Task(Observed):
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         file_settings: settings whose values may be paths of files, by name.
+        training: settings that learners train with unless the caller gives others; policies are judged without them.
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
         gait_and_pose: gait and pose by command, see `gait_and_pose.GaitAndPose`; None where there are none.
         from_body: cached attributes with numbers that follow from the body or the settings. Where these and the
@@ -207,6 +208,7 @@ class Task(Observed):
     own_arena: ClassVar[bool] = False
     modifiers: ClassVar[Mapping[str, Any]] = {}
     file_settings: ClassVar[Mapping[str, FileSetting]] = {}
+    training: ClassVar[Mapping[str, Any]] = {}
     demonstrators: ClassVar[tuple[str, ...]] = ()
     gait_and_pose: ClassVar[Any] = None
     from_body: ClassVar[tuple[str, ...]] = ()
@@ -279,6 +281,11 @@ class Task(Observed):
     def lies(self) -> bool:
         """Whether an episode starts with the torso on the ground."""
         return False
+
+    @property
+    def start_table(self) -> np.ndarray | None:
+        """The table (n, ...) from which starts are drawn, whose hash records of results hold; None without one."""
+        return None
 
     @property
     def adapts(self) -> bool:

@@ -277,6 +277,16 @@ def frame_position(data, layout: Layout):
     return data.xpos[..., place.root, :] + turn @ place.in_root
 
 
+def headed_forces(data, layout: Layout, unit: np.ndarray, heading):
+    """Return the torque and force (..., parts, 6) on each part in a unit (1, 6), relative to a heading (...), rad."""
+    wrenches = data.cfrc_ext[..., layout.parts, :] / unit  # torque (3,), then force (3,), world
+    xp = wrenches.__array_namespace__()
+    heading_of_parts = heading[..., None]
+    horizontal_torque = rotations.to_heading_frame(wrenches[..., 0:2], heading_of_parts)
+    horizontal_force = rotations.to_heading_frame(wrenches[..., 3:5], heading_of_parts)
+    return xp.concatenate([horizontal_torque, wrenches[..., 2:3], horizontal_force, wrenches[..., 5:6]], axis=-1)
+
+
 def component(vectors, index: int):
     """Return one component (...) of vectors (..., n).
 

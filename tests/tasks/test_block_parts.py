@@ -67,7 +67,7 @@ OUTSIDE = {
 
 
 def settings(task):
-    """Settings in which legs of the body take turns, and the observation has a history."""
+    """Settings in which the observation has a history, and legs of the body take turns, if the task has a gait."""
     gait = {"phase_offsets": tuple(TRIPOD), "default_angles": (0.0,) * 18}
     return {"history": 2} | {name: value for name, value in gait.items() if name in TASKS[task].names()}
 

@@ -172,7 +172,7 @@ SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take
 def test_settings_check_themselves(task_name):
     own = f"arena: task {task_name} has a ground of its own, expected none" if TASKS[task_name].own_arena else None
     for settings, message in (
-        ({"joint_niose": 0.1}, f"unknown setting of {task_name} 'joint_niose'; did you mean 'joint_noise'?"),
+        ({"weigths": {}}, f"unknown setting of {task_name} 'weigths'; did you mean 'weights'?"),
         ({"weights": {"contrl": 1.0}}, "unknown term of weights 'contrl'; did you mean 'control'?"),
         ({"arena": "bump"}, own or f"unknown arena 'bump'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
         ({"time_limit": 0}, "time_limit: expected a number above 0, at most 1e+06, got 0"),

@@ -87,7 +87,8 @@ class Configuration:
             algorithm, seed, steps, evaluate_every, prior: see `Configuration`.
             hyperparameters: those that differ from the algorithm's. Where `start` names a policy of one body,
                 `network` and `hidden` are that policy's by default.
-            training: settings of the task in training alone, such as kicks or a curriculum.
+            training: settings of the task in training alone, such as kicks or a curriculum, in addition to those that
+                the task itself has for training.
 
         Raises:
             ValueError: an unknown algorithm or hyperparameter, a value out of its range, or a damaged policy to start
@@ -109,7 +110,7 @@ class Configuration:
         checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
             raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
-        training = checks.mapping("training", training)
+        training = {**setup.kind.training, **checks.mapping("training", training)}
         _check_training(setup, definition, training)
         return cls(
             setup=setup,
