@@ -17,7 +17,6 @@ MAX_RATE = 1000.0  # Hz
 MAX_PLANTED_HEIGHT = 0.03  # standing heights: a sole that is lower is planted
 MAX_SEAM = 0.05  # rad, or standing heights, between the last frame of a loop and its first
 _MAX_HEIGHT_ERROR = 1e-6  # of a standing height, relative
-_MAX_QUOTE = 80  # characters of names in an error
 
 _REFLECTION = np.array((1.0, -1.0, 1.0))  # factors on a point
 _QUATERNION_REFLECTION = np.array((1.0, -1.0, 1.0, -1.0))  # w first
@@ -190,11 +189,16 @@ def check_body(motion: Motion, body: Body) -> None:
 
 def _describe_misfit(motion: Motion, body: Body) -> str | None:
     """Return the first difference of the bodies of a motion and of a spec; None if there is none."""
-    if motion.joint_names != body.joint_names:
-        return f"expected joints {_list(body.joint_names)}, got {_list(motion.joint_names)}"
     leg_names = tuple([leg.name for leg in body.legs])
-    if motion.leg_names != leg_names:
-        return f"expected legs {_list(leg_names)}, got {_list(motion.leg_names)}"
+    for kind, names, expected_names in (
+        ("joint", motion.joint_names, body.joint_names),
+        ("leg", motion.leg_names, leg_names),
+    ):
+        if len(names) != len(expected_names):
+            return f"expected {len(expected_names)} {kind}s, got {len(names)}"
+        for name, expected_name in zip(names, expected_names, strict=True):
+            if name != expected_name:
+                return f"expected {kind} {expected_name}, got {name}"
     height = body.torso.standing_height
     if not np.isclose(motion.standing_height, height, rtol=_MAX_HEIGHT_ERROR):
         return f"expected a standing height of {height:g} m, got {motion.standing_height:g} m"
@@ -287,7 +291,3 @@ def _verticals(quaternion: np.ndarray) -> np.ndarray:
 def _first_bad_frame(values: np.ndarray) -> int:
     is_finite = np.isfinite(values).reshape(len(values), -1).all(axis=-1)
     return int(is_finite.argmin())
-
-
-def _list(names: tuple[str, ...]) -> str:
-    return ", ".join(names)[:_MAX_QUOTE]

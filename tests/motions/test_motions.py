@@ -162,8 +162,12 @@ def test_motion_of_another_body_is_one_line():
         ValueError, match="motion 'walk' is of 'tick': expected a standing height of 0.75 m, got 0.18 m;"
     ):
         motions.check_body(walk(), QUEEN)
-    with pytest.raises(ValueError, match="expected joints .*; `arc-suite motion FILE --robot leaper -o OUT.npz` makes"):
+    with pytest.raises(
+        ValueError, match="expected 12 joints, got 18; `arc-suite motion FILE --robot leaper -o OUT.npz`"
+    ):
         motions.check_body(walk(), registry.body_of("leaper"))
+    with pytest.raises(ValueError, match="expected joint l1_hip, got tail; `arc-suite motion"):
+        motions.check_body(walk()._replace(joint_names=("tail", *TICK.joint_names[1:])), TICK)
 
 
 def change(**fields):

@@ -11,8 +11,8 @@
 Metrics go to .clips.json. One policy makes all clips, each under a command of its own. Loops begin at the same phase
 of the gait and hold the same number of cycles. start and stop connect idle and walk. tuned and refined are presets of
 the four robots' demonstrators, with a gait of their own. A clip that cannot be made is left out with a line. A motion
-(.npz) is what `arc-suite motion` and tasks read. A film (.mp4, .gif, .webp) shows one clip, in place and as long as it
-lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction.
+(.npz) is what `arc-suite motion` and tasks read; --clips takes motions, too. A film (.mp4, .gif, .webp) shows one clip,
+in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction.
 """
 
 import math
@@ -31,8 +31,8 @@ define_walk(task="steer")
 flags.DEFINE_list(
     "clips",
     list(catalog.DEFAULT),
-    f"Which, with commas between them: {', '.join(catalog.CLIPS)}; module:name of one that another package has; or "
-    f"{catalog.ALL}.",
+    f"Which, with commas between them: {', '.join(catalog.CLIPS)}; module:name of one that another package has; "
+    f"a motion of the body, .npz; or {catalog.ALL}.",
 )
 flags.DEFINE_float("fps", catalog.FPS, "Frames a second.", lower_bound=1.0, upper_bound=1000.0)
 flags.DEFINE_string("rig", "skin", f"{' or '.join(catalog.RIGS)}: bones and one mesh, or rigid parts.")

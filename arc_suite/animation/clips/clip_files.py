@@ -16,7 +16,7 @@ from arc_suite.animation.clips.clips import FPS, Clip
 from arc_suite.animation.clips.clips import clips as make_clips
 from arc_suite.animation.clips.creatures import RIGS, glb
 from arc_suite.animation.clips.metadata import ROOT_MOTIONS, sidecar
-from arc_suite.animation.clips.motion_of_clip import motion_of_clip
+from arc_suite.animation.clips.motion_of_clip import clip_of_motion, motion_of_clip
 from arc_suite.envs.setup import Setup
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
@@ -71,7 +71,8 @@ def animate(
     Args:
         robot, task, task_kwargs: see `arc_suite.load`.
         path: path of the file.
-        clips: names of `CLIPS`, or `module:name` of clips of other packages, one or several; or "all".
+        clips: names of `CLIPS`, `module:name` of clips of other packages, or files of motions of the body, `.npz`;
+            one or several; or "all".
         policy, preset, fps, straight, plant: see `clips.clips`.
         progress: wraps what takes long, as `tqdm` does.
         options: options of a `.glb`, `rig`, `root_motion`, `triangles`, `uv` and `reduce`, see `creatures.glb`; of
@@ -93,7 +94,11 @@ def animate(
         metrics = stack.enter_context(files.writing_json(metrics_path))
         if names == [ALL]:
             names = catalog.clip_names()
-        made_clips = make_clips(setup, names, policy, preset, fps, recording_progress, straight, plant)
+        catalog_names = [name for name in names if not _is_motion(name)]
+        made_clips = [clip_of_motion(setup.body, motions.load(name), fps) for name in names if _is_motion(name)]
+        if catalog_names or not names:
+            made_clips += make_clips(setup, catalog_names, policy, preset, fps, recording_progress, straight, plant)
+        _check_names(made_clips)
         if extension == GLB_EXTENSION:
             metrics |= _write_glb(temporary, setup.body, made_clips, **options)
         elif extension == MOTION_EXTENSION:
@@ -103,6 +108,21 @@ def animate(
         else:
             _write_film(temporary, extension, setup.body, made_clips[0], progress, **options)
     return made_clips
+
+
+def _is_motion(name: str) -> bool:
+    return name.lower().endswith(MOTION_EXTENSION)
+
+
+def _check_names(clips: Sequence[Clip]) -> None:
+    """Check that clips have different names.
+
+    Raises:
+        ValueError: two have one name.
+    """
+    names = [clip.name for clip in clips]
+    if len(set(names)) < len(names):
+        raise ValueError(f"clips: expected each name once, got {', '.join(names)}")
 
 
 def metrics_file(path: str | os.PathLike) -> Path:

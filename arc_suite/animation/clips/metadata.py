@@ -4,7 +4,7 @@ import collections
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from arc_suite.animation.clips.catalog import WalkLoop, clip_of
+from arc_suite.animation.clips.catalog import WalkLoop, clip_names, clip_of
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
 from arc_suite.robots.spec import Body
@@ -125,5 +125,7 @@ def _make_blend_spaces(clips: Sequence[Clip], roots_move: Sequence[bool]) -> dic
 
 def _is_sound_walk(clip: Clip, zero_component: int) -> bool:
     """Return whether a clip is a walk of a sound body with a component of its command at 0."""
+    if clip.name not in clip_names():  # of a file
+        return False
     kind = clip_of(clip.name)
     return isinstance(kind, WalkLoop) and kind.failing is None and kind.command[zero_component] == 0.0

@@ -1,9 +1,11 @@
 """Clips of the suite as files of motions."""
 
+import drawn_motions
 import numpy as np
 import pytest
 
 from arc_suite import animation, motions, registry
+from arc_suite.motions import reading
 
 
 @pytest.mark.slow
@@ -32,3 +34,24 @@ def test_additive_clip_is_no_motion(tmp_path):
     with pytest.raises(ValueError, match="clips: hit_left is added to another clip, and is no motion by itself"):
         animation.animate("tick", tmp_path / "hit.npz", "hit_left")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_motion_becomes_a_clip_and_comes_back(tmp_path):
+    """Through a file that goes to Blender."""
+    tick = registry.body_of("tick")
+    steps = drawn_motions.step_loop(tick)
+    file = str(tmp_path / "steps.npz")
+    motions.save(steps, file)
+    (clip,) = animation.animate("tick", tmp_path / "steps.glb", file, fps=40, root_motion="moving")
+    assert (clip.name, clip.loops, clip.cycles, len(clip.times)) == ("walk", True, 1, 27)
+    assert [contact.event for contact in clip.foot_contacts].count("touch_down") == 6
+    assert clip.motion.twist[0] == pytest.approx(steps.displacement[0] / steps.seconds)
+    motion, notes = reading.read(tmp_path / "steps.glb", tick)
+    assert notes == [] and motion.loops
+    np.testing.assert_allclose(motion.displacement, steps.displacement, atol=1e-6)
+    np.testing.assert_allclose(motions.resample(motion, 20.0).angles, steps.angles, atol=2e-3)
+    with pytest.raises(ValueError, match="clips: expected each name once, got walk, walk"):
+        animation.animate("tick", tmp_path / "two.glb", [file] * 2)
+    with pytest.raises(ValueError, match="motion 'walk' is of 'tick': expected a standing height of 0.75 m"):
+        animation.animate("queen", tmp_path / "two.glb", file)
