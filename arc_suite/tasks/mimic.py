@@ -18,7 +18,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite import checks, rotations
-from arc_suite.models.standing import GRAVITY
+from arc_suite.models.sizing import position_gains, size_body
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.motions import Motion, check_body, motion_text, striding
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, parameters, parts
@@ -238,14 +239,28 @@ class Mimic(Task):
         return memory._replace(errors=self._compare(memory, readings))
 
     def position_center(self, memory: MimicMemory):
-        """Return the angles (..., joints) of the motion at the end of the next control step, rad."""
-        return self.tables.at(self.tables.angles, self._row(memory) + 1)
+        """Return targets (..., joints) by which position control brings joints to the next pose at its speed, rad."""
+        row = self._row(memory)
+        angles = self.tables.angles
+        return self._lead(self.tables.at(angles, row + 1), self.tables.at(angles, row + 2))
 
     def observed_position_center(self, blocks: Mapping[str, np.ndarray]):
         """Return the same angles (..., joints) from the block `next_poses`, rad."""
+        next_poses = blocks["next_poses"]
         joints = len(self.scene.body.joint_names)
-        size = self.blocks["next_poses"].size // POSES_AHEAD
-        return blocks["next_poses"][..., size - joints : size]
+        size = next_poses.shape[-1] // POSES_AHEAD
+        return self._lead(next_poses[..., size - joints : size], next_poses[..., -joints:])
+
+    def _lead(self, angles, later_angles):
+        """Return angles (..., joints) that are ahead of a pose, as position control damps the speed of joints."""
+        return angles + self._lead_steps * (later_angles - angles)
+
+    @functools.cached_property
+    def _lead_steps(self) -> np.ndarray:
+        """Control steps (joints,) that targets are ahead: damping over stiffness."""
+        body = self.scene.body
+        stiffness, damping = position_gains(size_body(body), measure_standing(body).inertias)
+        return damping / stiffness / self.scene.control_timestep
 
     def before(self, memory: MimicMemory, action) -> tuple[MimicMemory, Inputs]:
         """Return the memory with the action, and the action itself as what to write."""

@@ -19,7 +19,7 @@ from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.scene import Scene
 
 ACTIONS = ("torque", "position")
-_OFFSET_SHARE = 0.3  # of a joint's reach: how far an action of 1 leads from the center that a task gives
+_OFFSET_SHARE = 0.2  # of a joint's reach: how far an action of 1 leads from the center that a task gives
 
 
 class ControlState(NamedTuple):
@@ -52,7 +52,7 @@ class Control(_ControlFields, Modifier):
         gains: range of the multiple of the stiffness, and of that of the damping, of position control and servos.
         actions: "torque", or "position": an action is then the target angles of the joints. 0 is the standing pose, 1
             and -1 are as far from it as the farther limit of the joint's range. Where a task gives another center, such
-            as the next pose of a motion, 0 is that center, and 1 leads 0.3 times as far. The setting None stands for
+            as the next pose of a motion, 0 is that center, and 1 leads 0.2 times as far. The setting None stands for
             torques of motors, and for positions of servos, which take nothing else.
         is_of_servos: whether servos hold positions by themselves.
         stiffness: (joints,) action per rad.
