@@ -18,6 +18,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite import checks, rotations
+from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, size_body
 from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.motions import Motion, check_body, motion_text, striding
@@ -25,6 +26,8 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, parameters, parts
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import FileSetting, Inputs, Start, Task
+from arc_suite.tasks.fitting import reach
+from arc_suite.tasks.ghost import draw_pose
 from arc_suite.tasks.motion_tables import POSES_AHEAD, MotionTables
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings
@@ -42,6 +45,9 @@ _ATTITUDE_WIDTH = 0.2  # rad
 # An episode ends where the body is further from the motion than this.
 _MAX_DISTANCE = 0.5  # standing heights, of the torso
 _MAX_ATTITUDE = 1.0  # rad, about
+
+
+_GHOST_DISTANCE = 2.5  # of the motion's pose in pictures from the motion, mean distances of the feet
 
 
 class MimicSettings(NamedTuple):
@@ -381,6 +387,18 @@ class Mimic(Task):
             offset = self._torso_offset(memory, readings, row + ahead)
             numbers += [offset, sign * quaternion, tables.at(tables.angles, row + ahead)]
         return xp.concatenate(numbers, axis=-1)
+
+    def markers(self, memory: MimicMemory, readings: Readings) -> list[Marker]:
+        """Return the motion's pose as a ghost to the left of the body."""
+        tables = self.tables
+        index = self._row(memory)
+        heading = memory.origin[2]
+        ground = rotations.to_heading_frame(tables.places[index, :2], -heading) + memory.origin[:2]
+        quaternion = rotations.turn_about_z(tables.quaternions[index], heading)
+        aside = _GHOST_DISTANCE * reach(self.scene.body)
+        leftward = np.array((-math.sin(heading), math.cos(heading)))
+        position = np.append(ground + aside * leftward, tables.heights[index])
+        return draw_pose(self.scene.body, position, quaternion, tables.angles[index])
 
     def ended(self, memory: MimicMemory, readings: Readings) -> tuple:
         """Return whether the body has lost its motion, which terminates, or has left the ground, which truncates."""

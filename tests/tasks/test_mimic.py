@@ -195,3 +195,16 @@ def test_a_text_is_the_motion_to_the_bit():
     motion = nod(turn=0.5)
     again = motion_text.from_text(motion_text.to_text(motion))
     assert motions.digest(again) == motions.digest(motion)
+
+
+def test_pictures_show_the_motions_pose_beside_the_body():
+    environment, _ = opened([nod()])
+    torso, *links = environment.task.markers(environment.physics)
+    assert len(links) == sum(len(leg.links) for leg in TICK.legs)
+    position = environment.physics.data.qpos[:3]
+    assert 0.5 * (torso.start + torso.end)[1] - position[1] > TICK.torso.standing_height
+    ends = {tuple(np.round(link.end - torso.start, 6)) for link in links}
+    feet = environment.physics.named.data.xpos[list(TICK.foot_names)] - position
+    for foot in feet:
+        distances = [np.linalg.norm(np.array(end)[:2] - foot[:2]) for end in ends]
+        assert min(distances) < 0.02 * TICK.torso.standing_height
