@@ -10,6 +10,7 @@ from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, Diverged, RunContext, generator
+from arc_suite.learning.agents.motion_style import MotionStyle, pair_poses
 from arc_suite.learning.agents.normalizer import Normalizer
 
 # Names of the arrays of a rollout.
@@ -24,6 +25,7 @@ class EnvironmentRollouts:
         task: task of the environments.
         architecture: architecture of the networks.
         observation: (num_envs, ...) before the next step, as networks view it.
+        style: the motion whose style the policy learns; None for none.
     """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
@@ -38,7 +40,11 @@ class EnvironmentRollouts:
         self.architecture = architectures.of_environment(
             self.environment, hp.network, hp.critic_blocks, hp.symmetry_augmentation
         )
+        self.style = None
+        if hp.style:
+            self.style = MotionStyle.of(self.task, hp.style, hp.style_share, both_sides=hp.symmetry_augmentation)
         observation, info = self.environment.reset()
+        self._poses = self._read_poses(observation)
         self.observation = self._view(observation, info)
         ages = initial_ages(hp.num_envs, self.task.step_limit)
         self.environment.restore(self.environment.snapshot() | {"steps": ages})
@@ -55,13 +61,15 @@ class EnvironmentRollouts:
 
         Returns:
             Arrays (horizon, num_envs, ...) by the names of `ROLLOUT_ARRAYS`. A step that begins another command counts
-            as `ended`, and the observation before it as the next one; see `VectorEnv.resampled`.
+            as `ended`, and the observation before it as the next one; see `VectorEnv.resampled`. With a style also
+            `poses`, the poses before and after each step.
 
         Raises:
             Diverged: an action is not finite.
         """
         random = generator(self._seed, "noise", iteration)
-        rollout = {name: [] for name in ROLLOUT_ARRAYS}
+        names = ROLLOUT_ARRAYS if self.style is None else (*ROLLOUT_ARRAYS, "poses")
+        rollout: dict[str, list] = {name: [] for name in names}
         for _ in range(self._hp.horizon):
             means = np.asarray(ppo.predict_mean_actions(self.architecture, policy, normalize(self.observation)))
             if not np.isfinite(means).all():
@@ -78,6 +86,14 @@ class EnvironmentRollouts:
                 final_observation = info["final_obs"][index]
                 next_view[index] = self._view(final_observation, info["final_info"], index)
 
+            if self.style is not None:
+                poses = self._read_poses(observation)
+                poses_after = poses.copy()
+                for index in np.flatnonzero(has_ended):
+                    poses_after[index] = self._read_poses(info["final_obs"][index])
+                rollout["poses"].append(pair_poses(self._poses, poses_after))
+                self._poses = poses
+
             rollout["observations"].append(self.observation)
             rollout["actions"].append(actions)
             rollout["means"].append(means)
@@ -90,12 +106,22 @@ class EnvironmentRollouts:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the state of the environments as part of a checkpoint."""
-        return learner.environment_arrays(self.environment) | {f"{ENVIRONMENT_PREFIX}seen": self.observation}
+        arrays = learner.environment_arrays(self.environment)
+        arrays[f"{ENVIRONMENT_PREFIX}seen"] = self.observation
+        if self.style is not None:
+            arrays[f"{ENVIRONMENT_PREFIX}poses"] = self._poses
+        return arrays
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Restore the state of the environments from the arrays of a checkpoint."""
         learner.restore_environment(self.environment, arrays)
         self.observation = arrays[f"{ENVIRONMENT_PREFIX}seen"]
+        if self.style is not None:
+            self._poses = arrays[f"{ENVIRONMENT_PREFIX}poses"]
+
+    def _read_poses(self, observation: np.ndarray) -> np.ndarray:
+        """Return the poses (..., numbers) of observations (..., size) as a style sees them; (0,) without a style."""
+        return np.zeros(0) if self.style is None else self.style.poses(self.task, observation)
 
     def _view(self, observation: np.ndarray, info: Mapping, index: int | None = None) -> np.ndarray:
         """Return observations as networks view them.

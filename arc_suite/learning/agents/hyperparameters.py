@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from arc_suite import checks, registry
+from arc_suite.motions import motion_text
 
 _POSITIVE_RANGE = (1e-6, 1e3)  # of numbers that must not be 0
 # Blocks that networks do not see by default. Contact forces are 114 to 150 numbers; learners that act are better
@@ -269,6 +270,8 @@ class ProximalPolicy:
         exclude_blocks: names of blocks of the observation that networks do not see, where a task has them.
         critic_blocks: names of blocks of the privileged observation that the value function sees too; see
             `arc_suite.tasks.privileged`.
+        style: file of a motion (.npz) that the policy is to resemble, see `motion_style`; "" for none.
+        style_share: share of the style in the reward.
     """
 
     start: str = ""
@@ -294,9 +297,11 @@ class ProximalPolicy:
     hidden: int = 256
     exclude_blocks: tuple[str, ...] = BLOCKS_LEFT_OUT
     critic_blocks: tuple[str, ...] = ()
+    style: str = ""
+    style_share: float = 0.5
 
     def __post_init__(self):
-        """Raise ValueError for a value out of its range."""
+        """Put the motion of a file in place of its path. Raise ValueError for a value out of its range."""
         ranges = {
             "value_warm_up": (0,),
             "gae_lambda": (0.0, 1.0),
@@ -309,6 +314,7 @@ class ProximalPolicy:
         }
         _check_numbers(self, ranges)
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
+        object.__setattr__(self, "style", motion_text.embed(self.style))  # a run holds its motion, as settings do
         registry.find_entry("network", self.network, NETWORKS)
         transitions = self.num_envs * self.horizon
         if self.symmetry_augmentation and self.network == "perceptron":

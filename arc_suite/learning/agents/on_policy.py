@@ -18,7 +18,7 @@ import numpy as np
 
 from arc_suite import policies
 from arc_suite.bodies import universal
-from arc_suite.learning.agents import architectures, collecting, critic_blocks, learner, networks
+from arc_suite.learning.agents import architectures, collecting, critic_blocks, learner, motion_style, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
@@ -98,6 +98,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     architecture = collector.architecture
     symmetry = mirror_maps(hp, task, architecture)
     state, moments, normalize = begin(hp, context, task, architecture)
+    style = collector.style
+    style_state = None if style is None else style.begin(generator(context.seed, "discriminator", 0))
     iterations = 0
 
     saved = context.checkpoint
@@ -107,6 +109,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
             normalize = Normalizer(*map(np.asarray, networks.restore_tree("normalizer", tuple(normalize), saved)))
             iterations = int(saved["iterations"])
+            if style_state is not None:
+                style_state = networks.restore_tree("style", style_state, saved)
             collector.restore(saved)
 
     while True:
@@ -115,6 +119,11 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
         # Act for the horizon.
         rollout = collector.roll_out(state.policy, normalize, schedules.std, iterations, step)
+        metrics = {"reward": float(rollout["rewards"].mean())}
+        if style is not None:
+            poses = rollout.pop("poses")
+            rollout["rewards"], metrics["style"] = style.add_reward(style_state, rollout["rewards"], poses)
+            style_state = style.learn(style_state, poses, generator(context.seed, "pairs", iterations))
 
         # Learn from it, in epochs of minibatches.
         batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
@@ -127,8 +136,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             moments = update_moments(architecture, symmetry, moments, rollout["observations"])
             normalize = architecture.normalize(moments)
 
-        metrics = {
-            "reward": float(rollout["rewards"].mean()),
+        metrics |= {
             "falls": float(rollout["terminated"].sum()),
             "std": float(schedules.std),
             "kl": float(kl),
@@ -137,6 +145,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         }
         graph = architectures.policy_graph(architecture, normalize, state.policy)
         arrays = jax.tree.map(np.asarray, LearnerState(state, moments, normalize).arrays())
+        arrays |= motion_style.arrays(style_state)
         checkpoint = {**arrays, "iterations": np.array(iterations), **collector.arrays()}
         yield Slice(iterations * hp.num_envs * hp.horizon, metrics, graph, checkpoint)
 
@@ -172,8 +181,12 @@ def check(hp: ProximalPolicy, context: RunContext) -> None:
     """Raise ValueError for hyperparameters that do not fit each other, or several bodies."""
     if hp.value_warm_up and not hp.start:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
+    if hp.style and hp.simulation != "mujoco":
+        raise ValueError(f"simulation: expected mujoco with a style, got {hp.simulation}")
     if not context.setup.several:
         return
+    if hp.style:
+        raise ValueError("style: expected none with several bodies, as a motion is of one")
     if hp.network != "legs":
         raise ValueError(f"network: expected legs with several bodies, got {hp.network}")
     if hp.critic_blocks:
