@@ -36,11 +36,11 @@ _NOISE_SHARE = 0.3  # of the noise of a start in walk: the body starts in the mi
 _MAX_MOTIONS = 64
 
 # Widths of kernels: errors at which a bonus is 0.4. Those of joints and feet are in spreads of the motion.
-_POSE_WIDTH = 1.0
-_SPEED_WIDTH = 2.0
-_FEET_WIDTH = 1.0
-_PLACE_WIDTH = 0.15  # standing heights
-_ATTITUDE_WIDTH = 0.2  # rad
+_POSE_WIDTH = 0.5
+_SPEED_WIDTH = 1.5
+_FEET_WIDTH = 0.5
+_PLACE_WIDTH = 0.08  # standing heights
+_ATTITUDE_WIDTH = 0.1  # rad
 
 # An episode ends where the body is further from the motion than this.
 _MAX_DISTANCE = 0.5  # standing heights, of the torso
