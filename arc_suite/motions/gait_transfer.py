@@ -13,7 +13,7 @@ from arc_suite.models.stride import fitted_gait
 from arc_suite.motions import motion as values
 from arc_suite.motions.ground_poses import compose, ground_poses, integrate_twist, relative_pose, twist_to
 from arc_suite.motions.motion import Motion
-from arc_suite.motions.paths import Paths, match_feet, scale_heights, shrink_turns
+from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 
@@ -55,13 +55,13 @@ def find_gait(body: Body) -> gaits.Gait:
     return fitted_gait(body)
 
 
-def transfer(motion: Motion, body: Body, size: float) -> tuple[Paths, list[str]]:
+def transfer(motion: Motion, body: Body, size: Size) -> tuple[Paths, list[str]]:
     """Return the paths of a body's torso and feet, and a line for each thing that was changed.
 
     Args:
         motion: a loop of steps.
         body: the body that is to move.
-        size: of steps, relative to those of the motion.
+        size: of steps and of the torso's movement.
     """
     cycles = count_cycles(motion)
     gait = find_gait(body)
@@ -84,8 +84,8 @@ def transfer(motion: Motion, body: Body, size: float) -> tuple[Paths, list[str]]
     frames = max(motion.frames, round(seconds * motion.frame_rate) + 1)
     shares = np.linspace(0.0, 1.0, frames)
     source_root = _find_root(motion)
-    root = integrate_twist(source_root.twist * time_ratio * size, shares)
-    offsets = size * (_soles_on_root(motion, source_root) - motion.rest_soles)  # (frames, feet, 3)
+    root = integrate_twist(source_root.twist * time_ratio * size.all * (1.0, size.side, 1.0), shares)
+    offsets = size.ahead_left_up * (_soles_on_root(motion, source_root) - motion.rest_soles)  # (frames, feet, 3)
 
     soles = np.empty((frames, len(partners), 3))
     planted = np.empty((frames, len(partners)), bool)
@@ -244,16 +244,18 @@ def _to_frame(points: np.ndarray, frame: np.ndarray) -> np.ndarray:
 
 
 def _move_torso(
-    motion: Motion, source_root: _Root, root: np.ndarray, shares: np.ndarray, rest_height: float, size: float
+    motion: Motion, source_root: _Root, root: np.ndarray, shares: np.ndarray, rest_height: float, size: Size
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the positions (frames, 3) and quaternions (frames, 4) of a torso that moves on another root as before."""
     ground = rotations.to_heading_frame(
         motion.positions[:, :2] / motion.standing_height - source_root.path[:, :2], source_root.path[:, 2]
     )
     heights = scale_heights(motion.positions[:, 2:] / motion.standing_height, motion.rest_height, rest_height)
-    heights = rest_height + size * (heights - rest_height)
-    local_positions = _sample(np.concatenate([size * ground, heights], axis=-1), shares)
-    local_quaternions = shrink_turns(rotations.turn_about_z(motion.quaternions, -source_root.path[:, 2]), size)
+    heights = rest_height + size.all * (heights - rest_height)
+    local_positions = _sample(np.concatenate([size.ahead_left_up[:2] * ground, heights], axis=-1), shares)
+    local_quaternions = shrink_turns(
+        rotations.turn_about_z(motion.quaternions, -source_root.path[:, 2]), size.all * size.side
+    )
     quaternions = _sample(local_quaternions, shares)
     quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
     return _place(root, local_positions), rotations.turn_about_z(quaternions, root[:, 2])

@@ -5,6 +5,18 @@ from typing import NamedTuple
 import numpy as np
 
 
+class Size(NamedTuple):
+    """Size of paths, relative to those of another body: of all of them, and to the sides in addition."""
+
+    all: float = 1.0
+    side: float = 1.0
+
+    @property
+    def ahead_left_up(self) -> np.ndarray:
+        """Factors (3,) on displacements ahead, to the left and up."""
+        return self.all * np.array((1.0, self.side, 1.0))
+
+
 class Paths(NamedTuple):
     """What a body is to do, without its joints; lengths in standing heights, in the world.
 

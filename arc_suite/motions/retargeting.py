@@ -17,7 +17,7 @@ from arc_suite.models.standing import measure_standing, stability_margin
 from arc_suite.motions import gait_transfer
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
-from arc_suite.motions.paths import Paths, match_feet, scale_heights, shrink_turns
+from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns
 from arc_suite.robots.spec import Body
 
 MAX_MISS = 0.05  # standing heights, of a foot from its path
@@ -27,9 +27,13 @@ _MIN_MARGIN = 0.05  # standing heights, of the center of mass from the edge of t
 _SHIFT_TIME = 1.5  # sqrt(h / g), in which the torso shifts before a foot lifts
 _BISECTIONS = 12
 
-# Changes that are tried in this order until legs reach: heights of the torso, and sizes of paths.
-_LOWER_TORSOS = (0.0, 0.05, 0.1, 0.2, 0.3)  # standing heights
-_SIZES = (1.0, 0.85, 0.7, 0.55, 0.4)
+# Changes that are tried in this order until legs reach: of the torso's height, and of the size of paths.
+_RISES = (0.0, -0.05, 0.05, -0.1, 0.1, -0.2, -0.3)  # standing heights, of the torso
+_SIZES = (
+    *(Size(share) for share in (1.0, 0.85, 0.7)),
+    *(Size(share, side=0.0) for share in (1.0, 0.85, 0.7, 0.55, 0.4)),  # for legs whose hinges are parallel
+    *(Size(share) for share in (0.55, 0.4)),
+)
 
 # Inverse kinematics.
 _FOOT_WEIGHTS = np.diag((1.0, 1.0, 2.0))
@@ -84,7 +88,7 @@ def time_scale(motion: Motion, body: Body) -> float:
 # Gestures.
 
 
-def _transfer_gesture(motion: Motion, body: Body, size: float) -> tuple[Paths, list[str]]:
+def _transfer_gesture(motion: Motion, body: Body, size: Size) -> tuple[Paths, list[str]]:
     """Return the paths of a body's torso and feet in a motion without a gait; see `gait_transfer.transfer`."""
     notes = []
     height = body.torso.standing_height
@@ -94,7 +98,7 @@ def _transfer_gesture(motion: Motion, body: Body, size: float) -> tuple[Paths, l
     travel = np.linalg.norm(motion.displacement[:2]) / motion.standing_height
     flies = not motion.planted.any(axis=-1).all()
     alone = [index for index, partner in enumerate(partners) if partner is None]
-    offsets = size * (motion.soles - motion.rest_soles)
+    offsets = size.ahead_left_up * (motion.soles - motion.rest_soles)
     if travel > _MIN_TRAVEL or flies:  # feet cannot stay where they are
         nearest = np.linalg.norm(motion.rest_soles[None] - rest_soles[:, None], axis=-1).argmin(axis=-1)
         partners = [nearest[index] if partner is None else partner for index, partner in enumerate(partners)]
@@ -115,12 +119,12 @@ def _transfer_gesture(motion: Motion, body: Body, size: float) -> tuple[Paths, l
             soles[:, index] += offsets[:, partner]
             planted[:, index] = motion.planted[:, partner]
     soles[..., 2] = np.where(planted, 0.0, soles[..., 2])
-    positions = size * motion.positions / motion.standing_height
+    positions = size.ahead_left_up * motion.positions / motion.standing_height
     heights = motion.positions[:, 2] / motion.standing_height
     rest_height = rest_height / height
-    positions[:, 2] = rest_height + size * (scale_heights(heights, motion.rest_height, rest_height) - rest_height)
+    positions[:, 2] = rest_height + size.all * (scale_heights(heights, motion.rest_height, rest_height) - rest_height)
     seconds = motion.seconds * time_scale(motion, body)
-    paths = Paths(seconds, positions, shrink_turns(motion.quaternions, size), soles, planted)
+    paths = Paths(seconds, positions, shrink_turns(motion.quaternions, size.all * size.side), soles, planted)
     return _carry_torso(body, paths, notes), notes
 
 
@@ -182,7 +186,7 @@ def _spread(shifts: np.ndarray, paths: Paths, height: float) -> np.ndarray:
 
 
 def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _Fit, list[str]]:
-    """Return paths that legs reach, joint angles, and notes; the torso is lower and steps are smaller if needed.
+    """Return paths that legs reach, joint angles, and notes; the torso's height and the size of steps change if needed.
 
     Args:
         body: the body that is to move.
@@ -197,17 +201,20 @@ def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _F
     for size in _SIZES:
         paths, notes = transfer(motion, body, size)
         few_frames = np.unique(np.linspace(0, len(paths.positions) - 1, _SEARCH_FRAMES).astype(int))
-        for lower in _LOWER_TORSOS:
-            lower_paths = paths._replace(positions=paths.positions - (0.0, 0.0, lower))
-            fit = _solve(body, lower_paths.select(few_frames), follows=False)
+        for rise in _RISES:
+            shifted_paths = paths._replace(positions=paths.positions + (0.0, 0.0, rise))
+            fit = _solve(body, shifted_paths.select(few_frames), follows=False)
             if fit.misses.max() <= MAX_MISS:
-                fit = _solve(body, lower_paths, motion.loops)
+                fit = _solve(body, shifted_paths, motion.loops)
             if fit.misses.max() <= MAX_MISS:
-                if lower:
-                    notes.append(f"the torso is lower by {lower:g} standing heights, so that legs reach")
-                if size < 1.0:
-                    notes.append(f"steps and gestures are {size:g} of their size, so that legs reach")
-                return lower_paths, fit, notes
+                if rise:
+                    direction = "higher" if rise > 0.0 else "lower"
+                    notes.append(f"the torso is {direction} by {abs(rise):g} standing heights, so that legs reach")
+                if size.all < 1.0:
+                    notes.append(f"steps and gestures are {size.all:g} of their size, so that legs reach")
+                if size.side < 1.0:
+                    notes.append("legs do not move sideways, and the torso does not tilt, so that legs reach")
+                return shifted_paths, fit, notes
             if fit.misses.max() < least_miss:
                 least_miss = fit.misses.max()
                 worst_leg = body.legs[int(fit.misses.max(axis=0).argmax())].name

@@ -73,9 +73,20 @@ def test_middle_legs_are_left_out_of_four_legs():
 
 
 @pytest.mark.slow
+def test_legs_that_do_not_reach_to_the_sides():
+    """The hinges of each leg of Leaper but the first are parallel."""
+    steps = drawn_motions.step_loop(QUEEN)
+    sideways = steps._replace(soles=steps.soles + (0.0, 1.0, 0.0) * steps.soles[..., 2:])
+    motion, notes = motions.retarget(sideways, registry.body_of("leaper"))
+    assert 0.4 * froude(steps) < froude(motion) <= froude(steps) * 1.001
+    assert float(notes[-1].split()[-3]) <= MAX_MISS
+    assert any(note.endswith(", so that legs reach") for note in notes)
+
+
+@pytest.mark.slow
 def test_motion_that_legs_cannot_follow_is_one_line():
     raised = drawn_motions.raise_leg(QUEEN, 0)
-    far = raised._replace(soles=raised.soles + (0.0, 3.0, 0.0) * (np.arange(6) == 0)[:, None])
+    far = raised._replace(soles=raised.soles + (3.0, 0.0, 0.0) * (np.arange(6) == 0)[:, None])
     with pytest.raises(ValueError, match="motion 'raise' of queen: spider cannot follow it, l1 misses its path by"):
         motions.retarget(far, SPIDER)
 
