@@ -19,6 +19,8 @@ from arc_suite.robots.spec import Body
 
 _MIN_DUTY_FACTOR = 0.05
 _MAX_DUTY_FACTOR = 0.95
+_MIN_HEIGHT = 1e-6  # standing heights, of a swing, in divisions
+_MAX_STRETCH = 1.5  # of a swing's height, which ends on the ground
 
 
 class _Steps(NamedTuple):
@@ -222,17 +224,16 @@ def _hold_stances(soles: np.ndarray, planted: np.ndarray, root: np.ndarray) -> n
     standing = []
     corrections = []
     for start, end in edges.tolist():
-        place = path[start:end, :2].mean(axis=0)
+        place = np.append(path[start:end, :2].mean(axis=0), 0.0)
         standing += list(range(start, end))
-        corrections += list(place - path[start:end, :2])
+        corrections += list(place - path[start:end])
     if not standing:
         return soles
     indices = np.arange(len(path))
     correction = np.stack([np.interp(indices, standing, component) for component in np.array(corrections).T], axis=-1)
-    heights = path[:, 2] - path[stands, 2].mean()
-    heights = np.where(stands, 0.0, heights.clip(0.0))
-    path = np.concatenate([path[:, :2] + correction, heights[:, None]], axis=-1)
-    middle = path[frames : 2 * frames]
+    middle = (path + correction)[frames : 2 * frames]
+    swing_height = soles[:, 2].max() - soles[planted, 2].mean()
+    middle[:, 2] *= (swing_height / max(middle[:, 2].max(), _MIN_HEIGHT)).clip(1.0, _MAX_STRETCH)
     last = _place(root[-1], _to_frame(middle[:1], root[0]))
     return np.concatenate([middle, last])
 

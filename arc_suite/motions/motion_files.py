@@ -17,7 +17,7 @@ _MAX_NAMES = 1024  # joints or legs
 _MAX_NAME = 200  # characters
 
 TEXTS = ("name", "body")
-NUMBERS = ("standing_height", "frame_rate", "rest_height")
+SCALARS = ("standing_height", "frame_rate", "rest_height")
 NAMES = ("joint_names", "leg_names")
 _BOOLEANS = ("planted",)
 
@@ -76,7 +76,7 @@ def _read(arrays: dict[str, np.ndarray]) -> Motion:
             fields[name] = read_names(name, array, 0)[0]
         elif name in NAMES:
             fields[name] = read_names(name, array, 1)
-        elif name in NUMBERS:
+        elif name in SCALARS:
             fields[name] = checks.number(name, array.item() if array.shape == () else None)
         elif name == "loops":
             fields[name] = checks.boolean(name, array.item() if array.shape == () else None)

@@ -13,7 +13,7 @@ import numpy as np
 from arc_suite import checks, parsers
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
-from arc_suite.motions.motion_files import NAMES, NUMBERS, TEXTS, load, read_names
+from arc_suite.motions.motion_files import NAMES, SCALARS, TEXTS, load, read_names
 
 MAX_TEXT = 1 << 23  # characters
 EXTENSION = ".npz"
@@ -127,7 +127,7 @@ def _read(fields: dict[str, Any]) -> Motion:
     motion = Motion(
         **texts,
         **names,
-        **{name: checks.number(name, fields[name]) for name in NUMBERS},
+        **{name: checks.number(name, fields[name]) for name in SCALARS},
         loops=checks.boolean("loops", fields["loops"]),
         **(arrays | {"planted": arrays["planted"] > 0.5}),
     )
