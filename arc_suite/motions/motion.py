@@ -14,6 +14,7 @@ MAX_FRAMES = 1 << 16  # 18 minutes at 60 Hz
 MIN_RATE = 1.0  # Hz
 MAX_RATE = 1000.0  # Hz
 
+MAX_NUMBER = 1e5  # m, rad or standing heights
 MAX_PLANTED_HEIGHT = 0.03  # standing heights: a sole that is lower is planted
 MAX_SEAM = 0.05  # rad, or standing heights, between the last frame of a loop and its first
 _MAX_HEIGHT_ERROR = 1e-6  # of a standing height, relative
@@ -160,6 +161,8 @@ def check(motion: Motion) -> Motion:
             raise ValueError(f"{field}: expected numbers of shape {shape}, got {values.shape}")
         if not np.isfinite(values).all():
             raise ValueError(f"{field}: expected finite numbers in frame {_first_bad_frame(values)}")
+        if abs(values).max(initial=0.0) > MAX_NUMBER:
+            raise ValueError(f"{field}: expected numbers up to {MAX_NUMBER:g}, got {abs(values).max():.3g}")
     lengths = np.linalg.norm(motion.quaternions, axis=-1)
     if abs(lengths - 1.0).max() > 1e-6:
         raise ValueError("quaternions: expected unit quaternions")

@@ -180,6 +180,7 @@ HOSTILE = {
         "angles: expected finite numbers in frame 7",
     ),
     "infinity": (change(positions=np.full((41, 3), np.inf)), "positions: expected finite numbers in frame 0"),
+    "a far place": (change(positions=np.full((41, 3), 1e300)), "positions: expected numbers up to 100000, got 1e.300"),
     "other joints": (change(joint_names=np.array(["a", "b"])), r"angles: expected numbers of shape \(41, 2\)"),
     "names twice": (change(leg_names=np.array(["a"] * 6)), "leg_names: expected each name once"),
     "names of control characters": (change(body=np.array("a\x1b[2J")), "body: expected printable names"),
