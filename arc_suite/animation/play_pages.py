@@ -21,6 +21,7 @@ from arc_suite.arenas.mapped import sample_surface
 from arc_suite.bodies import universal
 from arc_suite.bodies.universal import Universal
 from arc_suite.cpg import Demonstrator, leaps
+from arc_suite.cpg.limping import Limping
 from arc_suite.cpg.presets import DEFAULTS
 from arc_suite.cpg.selection import law_class, preset_of, presets_of
 from arc_suite.cpg.stepping import Stepping
@@ -39,6 +40,7 @@ GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page
 _DEMONSTRATOR_TASK = "directed"
 _NETWORK_TASK = "steer"
 _DEFAULT_PRESET = "steered"
+_PAGE_LAWS = (Stepping, Limping)  # one law where the pose is by command, see web/law.js
 _OBSERVABLE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # by scripts of a page
 
 
@@ -73,7 +75,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
         body: any.
         policy: cpg, for a demonstrator that follows the command; or the name of a trained policy, as for
             `policies.policy`.
-        preset: preset of the demonstrator: steered, which None stands for, surefooted, reactive or balanced.
+        preset: preset of the demonstrator, of a law in `_PAGE_LAWS`; None stands for steered.
         arena: a further ground, on which the page begins; see `registry.arena_maker`.
 
     Raises:
@@ -202,10 +204,10 @@ def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
 
 def _describe_law(task: Task, preset: str) -> dict[str, Any]:
     """Return the constants of a demonstrator's law; a ValueError if a page cannot run it."""
-    if law_class(preset_of(task.scene.body, preset)) is not Stepping:
-        raise ValueError(
-            f"preset {preset!r}: a page runs steered, surefooted, reactive or balanced, which follow a command by steps"
-        )
+    presets = presets_of(task.scene.body)
+    if law_class(preset_of(task.scene.body, preset)) not in _PAGE_LAWS:
+        names = [name for name, parameters in presets.items() if law_class(parameters) in _PAGE_LAWS]
+        raise ValueError(f"preset {preset!r}: a page runs {', '.join(names)}, which follow a command by steps")
     stepping = Demonstrator(task, preset).law
     return {"kind": "law", "constants": stepping.constants() | {"leaps": _describe_leaps(stepping)}}
 

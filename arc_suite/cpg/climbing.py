@@ -29,7 +29,6 @@ _MAX_STEP = 0.5  # standing heights, between the ground at a foot and that under
 _TRENCH_DEPTH = 0.5  # standing heights below most of the ground under the torso; feet do not reach further down
 _MAX_LEVELING = 0.4  # standing heights, of a foot in swing
 _FULL_ROUGHNESS = 0.06  # standing heights, of the ground's deviation from a plane, at which corrections have full size
-_MAX_TILT_SUM = 0.4  # rad cycles
 _MIN_DIRECTION = 1e-9  # m/s, of a foot that moves
 
 
@@ -129,10 +128,10 @@ class Climbing(Stepping):
         motion = self._limit_motion(request.motion, observation["command"][:, 3:], roughness)
         velocity, foothold_shift = self.balance(motion, vertical, observation)
         tilt = vertical[:, :2] - self.climbing.slope * plane[:, 1:]
-        is_grown = request.size >= 1.0
-        tilt_sum = state.tilt_sum + self.cycles_per_step * tilt * is_grown
-        tilt_sum = tilt_sum.clip(-_MAX_TILT_SUM, _MAX_TILT_SUM)
-        foothold_shift = foothold_shift - self._tilt_shift(roughness * tilt_sum, observation["velocities"][:, 3:5])
+        tilt_sum = self.add_tilt(state.tilt_sum, tilt, request.size)
+        foothold_shift = foothold_shift + self.tilt_shift(
+            self.climbing.tilt_sum * (roughness * tilt_sum), self.climbing.tilt_rate, observation["velocities"][:, 3:5]
+        )
         soles = self.next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
         _, swing_progress = foot_paths.find_path_position(leg_phases, duty_factor)
         correction_size = roughness * request.size
@@ -164,19 +163,6 @@ class Climbing(Stepping):
         slowest = measured.clip(max=0.0) - self.climbing.reserve
         limited_motion = xp.minimum(xp.maximum(motion, slowest), fastest)
         return motion + roughness * (limited_motion - motion)
-
-    def _tilt_shift(self, tilt_sum, turning):
-        """Return by how much the torso's tilt moves its weight, as footholds count it, (environments, 2) m.
-
-        Args:
-            tilt_sum: (environments, 2) see `ClimbingState`.
-            turning: (environments, 2) rates of roll and pitch, rad/s.
-        """
-        xp = turning.__array_namespace__()
-        tilt_rate = xp.stack([-turning[:, 1], turning[:, 0]], axis=-1)  # rad/s, of the vertical in the torso's frame
-        parameters = self.climbing
-        angle = parameters.tilt_sum * tilt_sum + parameters.tilt_rate * self.pendulum_time * tilt_rate
-        return self.ride_height * angle
 
     def step_on_ground(self, soles, swing_progress, velocity, correction_size, heights, plane, vertical):
         """Return positions (environments, legs, 3) of soles over uneven ground, m.

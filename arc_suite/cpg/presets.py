@@ -6,6 +6,7 @@ from pathlib import Path
 from arc_suite.cpg.climbing import ClimbingParameters
 from arc_suite.cpg.leaping import LeapingParameters
 from arc_suite.cpg.leaps import Leap
+from arc_suite.cpg.limping import LimpingParameters
 from arc_suite.cpg.planner import PlanningParameters
 from arc_suite.cpg.prescribed import Bend, Preset
 from arc_suite.cpg.sighted import SightedParameters
@@ -72,6 +73,7 @@ DEFAULTS_OF_FOUR_LEGS = {
 
 # Presets of imported bodies. Their servos need little feedback on the motion: it comes late, and tips them.
 _STEERED = SteppingParameters(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.1, most=1.4, lean=0.0, capture=0.2)
+_BRACED = _STEERED._replace(wider=0.5, lower=0.25)
 DEFAULTS_OF_SERVOS = {
     "slow": 0.18,
     "medium": 0.24,
@@ -80,7 +82,7 @@ DEFAULTS_OF_SERVOS = {
     "steered": _STEERED,
     "surefooted": _STEERED,  # a wide stance costs some of the way over uneven ground
     "climbing": ClimbingParameters(_STEERED, slope=0.0, preview=0.25),
-    "braced": _STEERED._replace(wider=0.5, lower=0.25),
+    "braced": _BRACED,
     "balanced": _STEERED,  # the former name of surefooted
     "reactive": _STEERED._replace(integral=0.0),
     "sighted": _SIGHTED,
@@ -88,6 +90,8 @@ DEFAULTS_OF_SERVOS = {
     "planned": PlanningParameters(_STEERED),
     "tracked": TrackingParameters(),
 }
+# With a failed leg, generated bodies and those with more legs earn more by `braced`.
+DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS = {**DEFAULTS_OF_SERVOS, "limping": LimpingParameters(_BRACED)}
 
 
 def _paper_presets(common: dict, slow: tuple, medium: tuple, fast: tuple) -> dict:

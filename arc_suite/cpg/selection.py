@@ -7,9 +7,16 @@ from typing import Any
 from arc_suite import checks, registry, robots
 from arc_suite.cpg.climbing import Climbing, ClimbingParameters
 from arc_suite.cpg.leaping import Leaping, LeapingParameters
+from arc_suite.cpg.limping import Limping, LimpingParameters
 from arc_suite.cpg.planner import Planned, PlanningParameters
 from arc_suite.cpg.prescribed import PrescribedLaw, Preset
-from arc_suite.cpg.presets import DEFAULTS, DEFAULTS_OF_FOUR_LEGS, DEFAULTS_OF_SERVOS, PRESETS
+from arc_suite.cpg.presets import (
+    DEFAULTS,
+    DEFAULTS_OF_FOUR_LEGS,
+    DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS,
+    DEFAULTS_OF_SERVOS,
+    PRESETS,
+)
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.cpg.straight import Straight, StraightParameters
@@ -27,6 +34,7 @@ LAWS: dict[type, Any] = {
     ClimbingParameters: Climbing,
     SightedParameters: Sighted,
     LeapingParameters: Leaping,
+    LimpingParameters: Limping,
     PlanningParameters: Planned,
     TrackingParameters: Tracked,
 }
@@ -37,6 +45,7 @@ _MEMORYLESS = {
     "straight": "medium",
     "steered": "reactive",
     "braced": "reactive",
+    "limping": "reactive",
     "climbing": "surefooted",
 }
 _COMMAND_BLOCKS = ("command", "pose", "gait", "goal")  # blocks of the observation that show what a task commands
@@ -126,14 +135,15 @@ def _registered_presets() -> dict[str, Any]:
 
 def _default_presets(body: Body) -> Mapping[str, Any]:
     """Return the presets that suit any body of its kind by name."""
+    has_four_legs = len(body.legs) <= 4
     if body.source:
-        return DEFAULTS_OF_SERVOS
-    return DEFAULTS_OF_FOUR_LEGS if len(body.legs) <= 4 else DEFAULTS
+        return DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS if has_four_legs else DEFAULTS_OF_SERVOS
+    return DEFAULTS_OF_FOUR_LEGS if has_four_legs else DEFAULTS
 
 
 def preset_names() -> tuple[str, ...]:
     """Return the names of the presets of all robots and laws, including those of other packages."""
-    tables = (*PRESETS.values(), DEFAULTS, _registered_presets())
+    tables = (*PRESETS.values(), DEFAULTS, DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS, _registered_presets())
     return tuple(dict.fromkeys(name for presets in tables for name in presets))
 
 

@@ -32,6 +32,7 @@ _MAX_POSE_ERROR = 0.05  # standing heights or rad; larger errors count as this o
 _MEASURED_NUMBERS = np.array((0, 3, 4))  # indices of height, roll and pitch among the six numbers of a pose
 _SLOWING_TILT = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops
 _MIN_PATH_LENGTH = 1e-9  # m, of a foot that moves
+_MAX_TILT_SUM = 0.4  # rad cycles
 _NO_BOUND = 1e9  # m, in place of infinity, which JSON does not have
 _TAKE_OFF_SHARE = 0.6  # share of the shift for balance that is left when a foot takes off
 
@@ -280,6 +281,29 @@ class Stepping(CommandLaw):
         lift = self.foot_lift * xp.sin(np.pi * swing_progress)
         heights = self.rest_soles[:, 2] + gait_size * lift
         return xp.concatenate([ground, heights[..., None]], axis=-1)
+
+    def add_tilt(self, tilt_sum, tilt, gait_size):
+        """Return the next sum (environments, 2) of a tilt, rad cycles; while the gait grows nothing is added.
+
+        Args:
+            tilt_sum: (environments, 2) before the control step, rad cycles.
+            tilt: (environments, 2) of the vertical in the torso's frame, forward and left, rad.
+            gait_size: (environments, 1) from 0 to 1.
+        """
+        is_grown = gait_size >= 1.0
+        return (tilt_sum + self.cycles_per_step * tilt * is_grown).clip(-_MAX_TILT_SUM, _MAX_TILT_SUM)
+
+    def tilt_shift(self, tilt, rate_share: float, turning):
+        """Return the shift (environments, 2) of feet under the weight of a torso that tilts, m.
+
+        Args:
+            tilt: (environments, 2) of the vertical in the torso's frame, forward and left, rad.
+            rate_share: share of the distance by which the rate of tilt moves the weight within `pendulum_time`.
+            turning: (environments, 2) rates of roll and pitch, rad/s.
+        """
+        xp = turning.__array_namespace__()
+        tilt_rate = xp.stack([-turning[:, 1], turning[:, 0]], axis=-1)  # rad/s, of the vertical in the torso's frame
+        return -self.ride_height * (tilt + rate_share * self.pendulum_time * tilt_rate)
 
     def constants(self) -> dict:
         """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""

@@ -37,7 +37,7 @@ class Limp(CommandTask):
     command = Schedule()
     modifiers = {"actuator_failure": True}
     from_body = _FROM_BODY
-    demonstrators = ("braced",)
+    demonstrators = ("limping", "braced")
 
 
 class Directed(CommandTask):

@@ -110,6 +110,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
         ("tick", "steered", 64),
         ("leaper", "reactive", 40),
         ("random_4", "surefooted", 64),
+        ("quadruped_15_kg", "braced", 64),
         ("quadruped_15_kg", "steered", 100),
         pytest.param("hexapod_2kg", "steered", 80, marks=pytest.mark.release),
         ("with_arm", "steered", 100),
@@ -324,7 +325,7 @@ def test_a_body_that_cannot_walk_has_no_page():
         (("-o", "a.html", "--policy=zero"), "policy zero: a page runs cpg, ppo, universal, or one trained network"),
         (
             ("-o", "a.html", "--preset=sighted"),
-            "preset 'sighted': a page runs steered, surefooted, reactive or balanced, which follow a command by steps",
+            "preset 'sighted': a page runs steered, surefooted, braced, reactive, which follow a command by steps",
         ),
         (("-o", "a.html", "--policy=none/there.npz"), "cannot read none/there.npz: no such file"),
     ],

@@ -1,6 +1,7 @@
 """Laws as pure functions: held at stops, the same under JAX, fitted to a task however it is given."""
 
 import gymnasium
+import imports
 import numpy as np
 import pytest
 from gaitless import Stay
@@ -27,6 +28,7 @@ PRESETS = [
     (generator.generate(4, 3), "stairs", "climbing"),
     ("leaper", "roam", "balanced"),
     ("queen", "leap", "leaping"),
+    (imports.quadruped(), "limp", "limping"),
 ]
 
 

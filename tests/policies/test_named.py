@@ -16,7 +16,7 @@ from arc_suite.robots import ROBOTS
 
 ALL = (
     "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, "
-    "planned, tracked, in_step, balanced"
+    "planned, tracked, in_step, balanced, limping"
 )
 GENERAL = (
     "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, tracked"
