@@ -20,6 +20,7 @@ FROM_Y_UP = np.array(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 _FROM_Z_UP = np.array(((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
 _MIN_UPRIGHT = 0.7  # cosine of the torso's tilt in the bound pose
 
+CURE = "; --of names the body of the file"  # ends errors of files that may be of another body
 _MAX_LENGTH_ERROR = 0.02  # standing heights, of a bone that belongs to the body
 _MAX_SCALE_ERROR = 0.01  # of a file whose unit is a meter
 _MAX_BIND_MISS = 0.02  # standing heights, of a bone in the bound pose
@@ -197,7 +198,7 @@ def _find_bones(body: Body, bones: tuple[str, ...]) -> list[int]:
     for name in body.part_names:
         if name not in bones:
             hint = checks.hint(name, bones)
-            raise ValueError(f"bones: expected those of {body.name}, and there is no {name}{hint}")
+            raise ValueError(f"bones: expected those of {body.name}, and there is no {name}{hint}{CURE}")
         indices.append(bones.index(name))
     return indices
 
@@ -219,7 +220,7 @@ def _find_scale(body: Body, chain: _Chain, positions: np.ndarray) -> float:
         worst = int(errors.argmax())
         raise ValueError(
             f"bones: expected {body.part_names[worst]} of {body.name} at {expected[worst]:.4g} m from the bone above "
-            f"it, got {lengths[worst] / scale:.4g} m"
+            f"it, got {lengths[worst] / scale:.4g} m{CURE}"
         )
     return float(scale)
 

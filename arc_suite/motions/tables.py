@@ -12,7 +12,7 @@ from arc_suite import checks, files, parsers, rotations
 from arc_suite.models import source
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import MAX_FRAMES, Motion
-from arc_suite.motions.skeletons import close_loop
+from arc_suite.motions.skeletons import CURE, close_loop
 from arc_suite.robots.spec import Body
 
 EXTENSION = ".csv"
@@ -102,7 +102,7 @@ def _make(
     for name in expected_names:
         if name not in columns:
             raise ValueError(
-                f"columns: expected those of {body.name}, and there is no {name}{checks.hint(name, columns)}"
+                f"columns: expected those of {body.name}, and there is no {name}{checks.hint(name, columns)}{CURE}"
             )
     for name in columns:
         if name not in expected_names:

@@ -148,7 +148,10 @@ HOSTILE = {
     "keys behind the end": (lambda e: accessor_of(e, lambda a: a.update(byteOffset=10**6)), "byteOffset|claims"),
     "a view of another file": (lambda e: e.json["bufferViews"][-1].update(buffer=1), "the file's own buffer"),
     "words for numbers": (lambda e: accessor_of(e, lambda a: a.update(count="x")), "count of accessor"),
-    "a bone without its name": (rename, "bones: expected those of tick, and there is no torso; did you mean 'torzo'"),
+    "a bone without its name": (
+        rename,
+        "bones: expected those of tick, and there is no torso; did you mean 'torzo'.*; --of names",
+    ),
     "a longer bone": (stretch, "bones: expected .* of tick at .* m from the bone above it, got"),
     "nodes in a ring": (below_itself, "below itself"),
     "no animation": (lambda e: e.json.pop("animations"), "expected an animation, and there is none"),
