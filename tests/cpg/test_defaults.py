@@ -53,5 +53,5 @@ def test_all_presets_that_obey_a_command_step():
     """One law follows the command of any body, imported ones included."""
     for name in ("queen", "leaper", "varied:7"):
         presets = presets_of(arc_suite.registry.body_of(name))
-        laws = {law_class(presets[preset]).__name__ for preset in ("steered", "surefooted", "reactive")}
+        laws = {law_class(presets[preset]).__name__ for preset in ("steered", "surefooted", "braced", "reactive")}
         assert laws == {"Stepping"}
