@@ -104,7 +104,7 @@ def _check(settings: DatasetSettings, episodes: int) -> None:
     checks.integer("steps", settings.steps, 1)
     last = seed_ranges.COLLECTING[-1] - (episodes - 1)
     checks.integer(f"seed of the first of {episodes} episodes", settings.seed, seed_ranges.COLLECTING.start, last)
-    _policy(settings, num_envs=1)  # raises an error if there is no such policy
+    _policy(settings, num_envs=1, task=settings.setup.definition)  # raises an error if there is no such policy
 
 
 def _policy(settings: DatasetSettings, num_envs: int, task: Task | None = None) -> policies.Policy:

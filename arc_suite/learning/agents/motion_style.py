@@ -29,7 +29,8 @@ _GRADIENT_PENALTY = 5.0  # on the square of the discriminator's gradient at pose
 _WEIGHT_DECAY = 1e-4
 _UPDATES = 6  # of the discriminator in an iteration
 _PAIRS = 256  # of poses of each kind in an update
-_MIN_SPREAD = 0.02  # of a number of a pose, to which it is scaled
+_MIN_SPREAD = 0.1  # of a number of a pose, to which it is scaled: what rests in the motion may move a little
+_SUBSTEPS = 8  # of a control step, from which pairs of poses of the motion are taken
 
 
 class StyleState(NamedTuple):
@@ -81,11 +82,12 @@ class MotionStyle(NamedTuple):
         body_motion = motion_text.read(motion)
         check_body(body_motion, body)
         height = body.torso.standing_height
-        tables = MotionTables.of(body, [body_motion], task.scene.control_timestep, math.sqrt(GRAVITY / height))
+        timestep = task.scene.control_timestep / _SUBSTEPS
+        tables = MotionTables.of(body, [body_motion], timestep, math.sqrt(GRAVITY / height))
         poses = _describe(tables.heights, tables.quaternions, tables.angles, height)
-        rows = int(tables.counts[0])
         starts = [0, tables.mirror_offset] if both_sides and tables.mirror_offset else [0]
-        pairs = np.concatenate([pair_poses(poses[i : i + rows], poses[i + 1 : i + 1 + rows]) for i in starts])
+        cycles = [poses[start : start + tables.counts[0]] for start in starts]
+        pairs = np.concatenate([pair_poses(cycle, np.roll(cycle, -_SUBSTEPS, axis=0)) for cycle in cycles])
         mean = pairs.mean(axis=0)
         scale = pairs.std(axis=0).clip(_MIN_SPREAD)
         scaled_pairs = ((pairs - mean) / scale).astype(np.float32)
