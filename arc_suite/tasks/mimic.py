@@ -122,11 +122,11 @@ class Mimic(Task):
     demonstrators = ("tracked",)
     file_settings = {"motion": FileSetting(motion_text.embed, motion_text.names_file, motion_text.label)}
     weights: ClassVar[Mapping[str, float]] = {
-        "pose": 1.5,
-        "joint_speed": 0.5,
+        "pose": 1.25,
+        "joint_speed": 0.25,
         "feet": 0.5,
-        "place": 0.75,
-        "attitude": 0.75,
+        "place": 1.5,
+        "attitude": 0.5,
         "control": -0.01,
         "smoothness": -0.02,
     }

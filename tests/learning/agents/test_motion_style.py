@@ -80,7 +80,7 @@ def test_a_run_holds_its_motion(motion):
 def test_other_learners_and_motions_of_others_are_refused(motion, tmp_path):
     with refused("unknown hyperparameter 'style'", begins=True):
         Configuration.of(Setup.of("tick", "steer"), "sac", {"style": motion}, steps=320)
-    with refused("motion 'walk' is of 'tick': expected joints ", begins=True):
+    with refused("motion 'walk' is of 'tick': expected 12 joints, got 18", begins=True):
         styled(motion, tmp_path, setup=Setup.of("leaper", "steer")).advance()
     with refused("style: expected none with several bodies, as a motion is of one"):
         hp = {"style": motion, "network": "legs"}
