@@ -26,7 +26,8 @@ class Demonstrator:
     Gait, control step, body and velocity units are those of the task. The presets `slow`, `medium`, `fast`, `tuned`
     and `refined` walk straight ahead by their own clock. They read the angles and velocities of joints and the torso's
     orientation alone. The other presets follow the velocity command that a task shows them, by the clock of its gait;
-    `planned` computes the command itself; `tracked` follows the motion of the task mimic.
+    `planned` computes the command itself; `tracked` follows the motion of the task mimic, `rising` the
+    standing pose.
 
     Its actions are what the task takes. Laws of bodies with motors return torques. In a task of positions it returns
     the positions at which the motors apply these torques: exactly if the observation is exact, and if the positions

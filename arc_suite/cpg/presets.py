@@ -9,6 +9,7 @@ from arc_suite.cpg.leaps import Leap
 from arc_suite.cpg.limping import LimpingParameters
 from arc_suite.cpg.planner import PlanningParameters
 from arc_suite.cpg.prescribed import Bend, Preset
+from arc_suite.cpg.rising import RisingParameters
 from arc_suite.cpg.sighted import SightedParameters
 from arc_suite.cpg.stepping import SteppingParameters
 from arc_suite.cpg.straight import StraightParameters
@@ -48,6 +49,7 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
         "leaping": leaping._replace(walk=sighted),
         "planned": planned,
         "tracked": TrackingParameters(),
+        "rising": RisingParameters(),
     }
 
 
@@ -89,6 +91,7 @@ DEFAULTS_OF_SERVOS = {
     "leaping": _LEAPING._replace(walk=_SIGHTED),
     "planned": PlanningParameters(_STEERED),
     "tracked": TrackingParameters(),
+    "rising": RisingParameters(),
 }
 # With a failed leg, generated bodies and those with more legs earn more by `braced`.
 DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS = {**DEFAULTS_OF_SERVOS, "limping": LimpingParameters(_BRACED)}

@@ -17,6 +17,7 @@ from arc_suite.cpg.presets import (
     DEFAULTS_OF_SERVOS,
     PRESETS,
 )
+from arc_suite.cpg.rising import Rising, RisingParameters
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.cpg.straight import Straight, StraightParameters
@@ -37,6 +38,7 @@ LAWS: dict[type, Any] = {
     LimpingParameters: Limping,
     PlanningParameters: Planned,
     TrackingParameters: Tracked,
+    RisingParameters: Rising,
 }
 
 _STRAIGHT_PRESETS = ("refined", "tuned", "straight", "medium")  # presets that walk straight ahead, the best first

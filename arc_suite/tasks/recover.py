@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite import checks, rotations
-from arc_suite.models.standing import GRAVITY
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import falls
@@ -25,7 +25,7 @@ from arc_suite.tasks.parts import Vector
 from arc_suite.tasks.readings import Readings
 
 LEAST_UPRIGHT = math.cos(math.radians(20.0))  # cosine of the torso's tilt, of a body that is up
-LEAST_HEIGHT = 0.8  # of the torso of a body that is up, h
+LEAST_HEIGHT = 0.8  # of the torso of a body that is up, shares of the height at which it stands
 HOLD_TIME = 0.5  # s, without a break, after which a body has got up
 
 # Seeds of the drops from which episodes start: policies are judged by falls that they did not learn from.
@@ -77,6 +77,7 @@ class Recover(Task):
 
     name = "recover"
     own_arena = True
+    demonstrators = ("rising",)
     training = {"fall_seed": _LEARNING_SEED, "time_limit": 10.0}
     # Attributes that follow from the body; see `Task.from_body`.
     from_body = ("clearances", "height", "_force_unit", "_hold_steps")
@@ -123,8 +124,9 @@ class Recover(Task):
 
     @functools.cached_property
     def height(self) -> float:
-        """The standing height h, m."""
-        return self.scene.body.torso.standing_height
+        """The height at which the torso stands, m: h, or less if the soles hang less far below it (Leaper: 0.75 h)."""
+        pose = measure_standing(self.scene.body)
+        return min(pose.height, -float(pose.soles[:, 2].min()))
 
     @functools.cached_property
     def _force_unit(self) -> np.ndarray:

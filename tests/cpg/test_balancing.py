@@ -47,7 +47,8 @@ def test_its_former_name_is_a_preset_of_leaper_alone():
     for body in (ROBOTS["queen"], ROBOTS["bastion"], ROBOTS["tick"], generator.random_body(4)):
         assert "balanced" not in presets_of(body)
     with pytest.raises(
-        ValueError, match="^unknown preset 'balanced'; did you mean 'braced'.*sighted, leaping, planned, tracked.$"
+        ValueError,
+        match="^unknown preset 'balanced'; did you mean 'braced'.*sighted, leaping, planned, tracked, rising.$",
     ):
         Demonstrator("queen", "balanced")
 

@@ -16,10 +16,11 @@ from arc_suite.robots import ROBOTS
 
 ALL = (
     "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, "
-    "planned, tracked, in_step, balanced, limping"
+    "planned, tracked, rising, in_step, balanced, limping"
 )
 GENERAL = (
-    "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, tracked"
+    "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, "
+    "tracked, rising"
 )
 
 JOINTS = "expected a body named 'queen' to have the 18 joints of queen"

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import rotations
 from arc_suite.bodies import generator
+from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import provenance
 from arc_suite.robots import ROBOTS
@@ -133,3 +134,22 @@ def test_errors_name_the_valid_settings():
         load("tick", "recover", arena="bumps")
     with refused("unknown setting of recover 'fallseed'; did you mean 'fall_seed'?", begins=True):
         load("tick", "recover", fallseed=1)
+
+
+def test_rising_gets_up_from_the_belly_and_not_from_the_back():
+    environment = load("tick", "recover")
+    policy = Demonstrator(environment)
+    for upright, gets_up in ((True, 1.0), (False, 0.0)):
+        timestep = environment.reset()
+        with environment.physics.reset_context():
+            environment.physics.data.qpos[2] = 0.1 if upright else 0.2
+            environment.physics.data.qpos[3:7] = (1.0, 0.0, 0.0, 0.0) if upright else (0.0, 1.0, 0.0, 0.0)
+        for _ in range(60):
+            timestep = environment.step(policy(timestep))
+        assert environment.task.progress["up"] == gets_up
+
+
+def test_the_torso_of_leaper_stands_lower_than_its_standing_height():
+    tasks = {robot: Setup.of(robot, "recover").definition for robot in ("leaper", "queen")}
+    assert_allclose(tasks["leaper"].unwrapped.height, 0.75 * 0.5, rtol=0.03)
+    assert tasks["queen"].unwrapped.height == 0.75
