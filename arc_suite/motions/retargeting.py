@@ -21,6 +21,7 @@ from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shri
 from arc_suite.robots.spec import Body
 
 MAX_MISS = 0.05  # standing heights, of a foot from its path
+MAX_SLIDE = 0.15  # the same of a leg with fewer than three joints, which cannot bring its foot to every place
 
 _MIN_TRAVEL = 0.3  # standing heights over the ground, over which a foot cannot stay planted
 _MIN_MARGIN = 0.05  # standing heights, of the center of mass from the edge of the feet that carry
@@ -37,6 +38,7 @@ _SIZES = (
 
 # Inverse kinematics.
 _FOOT_WEIGHTS = np.diag((1.0, 1.0, 2.0))
+_SLIDING_FOOT_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of legs with fewer than three joints: they slide rather than sink
 _DAMPING = 0.02  # standing heights
 _ITERATIONS = 40
 _SEARCH_FRAMES = 24  # of a motion, for which changes are tried first
@@ -62,7 +64,7 @@ def retarget(motion: Motion, body: Body) -> tuple[Motion, list[str]]:
         body: the body that is to move.
 
     Raises:
-        ValueError: legs do not reach the paths of their feet within `MAX_MISS`.
+        ValueError: legs do not reach the paths of their feet within `MAX_MISS`, or `MAX_SLIDE`.
     """
     transfer = gait_transfer.transfer if gait_transfer.count_cycles(motion) else _transfer_gesture
     paths, fit, notes = _fit_legs(body, motion, transfer)
@@ -196,17 +198,18 @@ def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _F
     Raises:
         ValueError: legs do not reach the paths.
     """
-    least_miss = math.inf
-    worst_leg = ""
+    least_excess = math.inf
+    worst_miss = ""
+    max_misses = np.where(_has_few_joints(body), MAX_SLIDE, MAX_MISS)
     for size in _SIZES:
         paths, notes = transfer(motion, body, size)
         few_frames = np.unique(np.linspace(0, len(paths.positions) - 1, _SEARCH_FRAMES).astype(int))
         for rise in _RISES:
             shifted_paths = paths._replace(positions=paths.positions + (0.0, 0.0, rise))
             fit = _solve(body, shifted_paths.select(few_frames), follows=False)
-            if fit.misses.max() <= MAX_MISS:
+            if (fit.misses <= max_misses).all():
                 fit = _solve(body, shifted_paths, motion.loops)
-            if fit.misses.max() <= MAX_MISS:
+            if (fit.misses <= max_misses).all():
                 if rise:
                     direction = "higher" if rise > 0.0 else "lower"
                     notes.append(f"the torso is {direction} by {abs(rise):g} standing heights, so that legs reach")
@@ -215,13 +218,17 @@ def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _F
                 if size.side < 1.0:
                     notes.append("legs do not move sideways, and the torso does not tilt, so that legs reach")
                 return shifted_paths, fit, notes
-            if fit.misses.max() < least_miss:
-                least_miss = fit.misses.max()
-                worst_leg = body.legs[int(fit.misses.max(axis=0).argmax())].name
-    raise ValueError(
-        f"motion {motion.name!r} of {motion.body}: {body.name} cannot follow it, {worst_leg} misses its path by "
-        f"{least_miss:.2f} standing heights"
-    )
+            excesses = (fit.misses - max_misses).max(axis=0)
+            if excesses.max() < least_excess:
+                least_excess = excesses.max()
+                leg = int(excesses.argmax())
+                worst_miss = f"{body.legs[leg].name} misses its path by {fit.misses[:, leg].max():.2f} standing heights"
+    raise ValueError(f"motion {motion.name!r} of {motion.body}: {body.name} cannot follow it, {worst_miss}")
+
+
+def _has_few_joints(body: Body) -> np.ndarray:
+    """Return for each leg (legs,) whether it has fewer than three joints."""
+    return np.array([len(leg.joints) for leg in body.legs]) < 3
 
 
 def _solve(body: Body, paths: Paths, loops: bool = False, follows: bool = True) -> _Fit:
@@ -240,7 +247,8 @@ def _solve(body: Body, paths: Paths, loops: bool = False, follows: bool = True) 
     goals = (rotations.matrix(paths.quaternions).swapaxes(-1, -2)[:, None] @ goals[..., None])[..., 0]
     rest_angles = find_rest_pose(body).joint_angles
     damping = _DAMPING * height
-    weights = np.broadcast_to(_FOOT_WEIGHTS, (*goals.shape[:2], 3, 3))
+    leg_weights = np.where(_has_few_joints(body)[:, None, None], _SLIDING_FOOT_WEIGHTS, _FOOT_WEIGHTS)
+    weights = np.broadcast_to(leg_weights, (*goals.shape[:2], 3, 3))
     if not follows:
         start = np.broadcast_to(rest_angles, (len(goals), *rest_angles.shape))
         angles = centers.solve_joint_angles(start, goals, weights, damping, _ITERATIONS)

@@ -83,6 +83,15 @@ def test_legs_that_do_not_reach_to_the_sides():
     assert any(note.endswith(", so that legs reach") for note in notes)
 
 
+def test_legs_of_two_joints_slide():
+    """They keep the height of their feet, and miss their places."""
+    body = registry.body_of("varied:9")
+    assert len(body.legs[0].joints) == 2
+    motion, notes = motions.retarget(drawn_motions.step_loop(QUEEN), body)
+    assert MAX_MISS < float(notes[-1].split()[-3]) <= 0.15
+    assert abs(motion.soles[motion.planted][:, 2]).max() < MAX_MISS
+
+
 @pytest.mark.slow
 def test_motion_that_legs_cannot_follow_is_one_line():
     raised = drawn_motions.raise_leg(QUEEN, 0)
