@@ -39,29 +39,31 @@ def cycle_angles(
     rest_pose: RestPose,
     offsets: np.ndarray,
     duty_factor: float,
-    half_path: float,
+    half_path: float | np.ndarray,
     foot_clearance: float,
     damping: float,
 ) -> np.ndarray:
-    """Return joint angles (steps, joints), rad, in a cycle of steps straight ahead.
+    """Return joint angles (steps, joints), rad, in a cycle of steps.
 
     Args:
         rest_pose: pose of the torso over the feet.
         offsets: (legs,) phases of the legs, cycles.
         duty_factor: share of a cycle that a foot stands.
-        half_path: how far ahead of its position at rest a foot touches down, m.
+        half_path: how far ahead of its position at rest a foot touches down, m; or (legs, 2), how far ahead and to the
+            left of it.
         foot_clearance: height of a foot in mid-swing, m.
         damping: of inverse kinematics, m.
     """
     legs = rest_pose.legs
     joint_angles = rest_pose.joint_angles
-    weights = path_weights(np.tile((half_path, 0.0), (len(offsets), 1)), SLIP_WEIGHT)
+    half_paths = half_path if np.ndim(half_path) else np.tile((half_path, 0.0), (len(offsets), 1))
+    weights = path_weights(half_paths, SLIP_WEIGHT)
     angles_of_steps = []
     for step in range(2 * _STEPS_PER_CYCLE):
         leg_phases = (step / _STEPS_PER_CYCLE + offsets) % 1.0
         path_position, swing_progress = find_path_position(leg_phases, duty_factor)
         heights = foot_clearance * np.sin(math.pi * swing_progress)
-        displacements = np.stack([half_path * path_position, np.zeros(len(offsets)), heights], axis=-1)
+        displacements = np.concatenate([half_paths * path_position[:, None], heights[:, None]], axis=-1)
         goals = rest_pose.sole_positions + displacements
         joint_angles = legs.solve_joint_angles(joint_angles, goals, weights, damping, IK_ITERATIONS)
         angles_of_steps.append(legs.by_joint(joint_angles))

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from arc_suite.models import foot_paths
+from arc_suite.models.kinematics import point_velocities
 from arc_suite.models.posture import find_rest_pose
 from arc_suite.models.standing import compile_body
 from arc_suite.models.stride import fitted_gait, half_stroke, strokes
@@ -21,6 +22,8 @@ _MAX_DEPTH = 0.01  # standing heights, of an overlap that does not count
 # Demonstrators lengthen strides to keep their course, and as they start. They stretch strides by this factor at least,
 # and further where legs have room; see `find_largest_stretch`.
 _MIN_STRETCH = 1.25
+# Demonstrators also step aside and turn, to follow commands and to keep their course: forward, left and turning.
+_MOTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
 # To spare, and between stretches that are tried: legs come late, and balance shifts their feet.
 _STRETCH_STEP = 0.125
 
@@ -123,20 +126,29 @@ def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
         angles = [share * sweep for share, (sweep, _) in zip(sweep_shares, strokes_of_legs, strict=True)]
         yield "a stride", np.concatenate(angles)
     # Demonstrators that follow a command step along paths in space, where legs sweep otherwise.
-    for angles in _step_angles(body):
-        yield "a stride", angles
+    for motion in _MOTIONS:
+        for angles in _step_angles(body, motion):
+            yield "a stride", angles
 
 
-@functools.lru_cache(maxsize=16)
-def _step_angles(body: Body) -> np.ndarray:
-    """Return the joint angles (n, joints), rad, of steps along paths in a cycle of the fitted gait."""
+@functools.lru_cache(maxsize=64)
+def _step_angles(body: Body, motion: tuple[float, float, float]) -> np.ndarray:
+    """Return the joint angles (n, joints), rad, of steps along paths in a cycle of the fitted gait.
+
+    Args:
+        body: the spec.
+        motion: direction forward, left and turning. The foot that steps furthest steps as far in all of them.
+    """
     gait = fitted_gait(body)
     standing_height = body.torso.standing_height
+    rest_pose = find_rest_pose(body)
+    (directions,) = point_velocities(np.array([motion]), rest_pose.sole_positions[None])
+    longest = np.hypot(*directions.T).max()
     return foot_paths.cycle_angles(
-        find_rest_pose(body),
+        rest_pose,
         np.array(gait.offsets),
         gait.duty_factor,
-        half_path=_MIN_STRETCH * half_stroke(body, gait),
+        half_path=_MIN_STRETCH * half_stroke(body, gait) / longest * directions,
         foot_clearance=foot_paths.FOOT_CLEARANCE * standing_height,
         damping=foot_paths.IK_DAMPING * standing_height,
     )

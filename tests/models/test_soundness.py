@@ -216,8 +216,8 @@ def test_feet_near_the_middle_are_enough():
     ("body", "text", "cured"),
     [
         (
-            square((0.1, -0.1), out=0.05, deep=0.2, range_deg=(0.0, 45.0)),
-            "chassis and l2_lower overlap by 0.0835 m in a stride: legs mounted 2 times as far out fit",
+            square((0.1, -0.1), out=0.14, deep=0.2, range_deg=(0.0, 45.0)),
+            "chassis and r1_lower overlap by 0.0339 m in a stride: legs mounted 2 times as far out fit",
             True,
         ),
         (
@@ -264,6 +264,16 @@ def test_neighbors_overlap_at_different_ends_of_their_strides():
     assert {each.pose for each in overlaps(body)} == {"a stride"}
     assert ("l1_upper", "l2_lower") in {each.names for each in overlaps(body)}
     assert not any(overlaps(ROBOTS["bastion"]))
+
+
+def test_neighbors_overlap_as_the_body_steps_aside():
+    """This body's legs pass each other in strides ahead; while it was steered aside, they overlapped by 0.047 h."""
+    body = generator.random_body(15143)
+    body_overlaps = list(overlaps(body))
+    assert {overlap.pose for overlap in body_overlaps} == {"a stride"}
+    assert ("r1_lower", "r2_foot") in {overlap.names for overlap in body_overlaps}
+    assert max(overlap.depth for overlap in body_overlaps) > 0.047 * body.torso.standing_height
+    assert not any(overlaps(sound_body(15143)))
 
 
 def test_overlaps_scale_with_the_body():
