@@ -235,7 +235,9 @@ class Configuration:
         if "arena" in settings:
             words.append(f"--arena={settings.pop('arena')}")
         words += _flags("set", settings)
-        words += _flags("train_set", self.training)
+        of_task = self.setup.kind.training
+        changed_training = {name: value for name, value in self.training.items() if of_task.get(name) != value}
+        words += _flags("train_set", changed_training)
         words += _flags("hp", changes)
         return shlex.join(words)
 
