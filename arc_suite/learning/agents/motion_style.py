@@ -27,7 +27,7 @@ _HIDDEN = (128, 64)  # units of the discriminator's layers
 _RATE = 1e-4  # learning rate
 _GRADIENT_PENALTY = 5.0  # on the square of the discriminator's gradient at poses of the motion
 _WEIGHT_DECAY = 1e-4
-_UPDATES = 6  # of the discriminator in an iteration
+_UPDATES = 3  # of the discriminator in an iteration
 _PAIRS = 256  # of poses of each kind in an update
 _MIN_SPREAD = 0.1  # of a number of a pose, to which it is scaled: what rests in the motion may move a little
 _SUBSTEPS = 8  # of a control step, from which pairs of poses of the motion are taken
@@ -105,7 +105,7 @@ class MotionStyle(NamedTuple):
         return StyleState(layers, optax.adam(_RATE).init(layers))
 
     def add_reward(self, state: StyleState, rewards: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return rewards (...) with the share of the style, and the mean of the style, from 0 to 1.
+        """Return rewards (...) with the share of the style, and the mean of the style, about 0 to 1.
 
         Args:
             state: the discriminator.
@@ -113,7 +113,7 @@ class MotionStyle(NamedTuple):
             pairs: (..., 2 * numbers) poses before and after each step.
         """
         scores = np.asarray(_score(state.layers, self._scale(pairs)))
-        styles = np.maximum(0.0, 1.0 - 0.25 * (scores - 1.0) ** 2)
+        styles = (0.5 * (scores + 1.0)).clip(-1.0, 1.0)  # a clear difference must not hide which way is nearer
         style_rewards = self.highest_reward * styles
         return (1.0 - self.share) * rewards + self.share * style_rewards, float(styles.mean())
 
