@@ -7,7 +7,7 @@ from arc_suite.arenas import ARENAS, terrain
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies.text_tables import table
 from arc_suite.robots import ROBOTS, gaits
-from arc_suite.tasks import modifiers, parameters, walk
+from arc_suite.tasks import mimic, modifiers, parameters, recover, walk
 from arc_suite.tasks.command import Schedule
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.gait_and_pose import GaitAndPose
@@ -23,6 +23,7 @@ _MEANINGS_WITHOUT_FIELD = {
     "gait": f"a gait by name, in place of duty_factor and phase_offsets: {', '.join(gaits.NAMES)}",
     "base_noise": f"one number for {', '.join(parameters.SHARED_NOISE['base_noise'])}",
     "joint_noise": f"one number for {', '.join(parameters.SHARED_NOISE['joint_noise'])}",
+    "motion": "motions to follow: walk, the path of a file .npz, or a list",
     "cost_limit": "bound of the weighted sum of the costs of a step",
     "time_limit": f"of an episode, s; {STEPS} control steps without it",
     "arena": f"another ground: {', '.join(ARENAS)}, or a file .png, .obj, .stl or .xml",
@@ -34,7 +35,17 @@ _MEANINGS_WITHOUT_FIELD = {
 def _collect_meanings() -> dict[str, str]:
     """Return the meanings of all settings by name, from the docstrings of the classes that have them as fields."""
     meanings = {}
-    for settings_class in (Parameters, Noise, walk.WalkSettings, Schedule, GaitAndPose, Level, Lanes):
+    for settings_class in (
+        Parameters,
+        Noise,
+        walk.WalkSettings,
+        mimic.MimicSettings,
+        recover.RecoverSettings,
+        Schedule,
+        GaitAndPose,
+        Level,
+        Lanes,
+    ):
         meanings |= markdown.attribute_meanings(settings_class)
     for modifier in SUITE_MODIFIERS:
         modifier_meanings = markdown.attribute_meanings(modifier)
@@ -97,10 +108,13 @@ def bounds(name: str) -> str:
 def _defaults(task: Task) -> dict[str, Any]:
     """Return the default values of a task's settings by name."""
     settings = task.settings
-    defaults = {**settings.parameters._asdict(), **settings.noise._asdict(), **settings._asdict()}
+    defaults = dict(settings._asdict())
+    for numbers in (defaults.get("parameters"), defaults.get("noise")):
+        if numbers:
+            defaults |= numbers._asdict()
     for part_name in ("ground", "command", "gait_and_pose"):
         part = settings._asdict().get(part_name)
         if part:
             defaults |= vars(part)
-    defaults["weights"] = "see Reward"
+    defaults |= {"weights": "see Reward", "motion": "walk"}
     return defaults

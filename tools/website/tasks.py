@@ -41,6 +41,30 @@ _COMMAND_TERMS = {
     "goal": "1 in the step that reaches a goal",
     "transport": "work of the motors by weight, over the displacement at v*",
 }
+_MIMIC_TERMS = {
+    "pose": "1 where joint angles are those of the motion",
+    "joint_speed": "1 where joints move as fast as those of the motion",
+    "feet": "1 where feet are in the places of the motion's, seen from the torso",
+    "place": "1 where the torso is at the place and height of the motion's",
+    "attitude": "1 where the torso has the orientation of the motion's",
+}
+_RECOVER_TERMS = {
+    "upright": "share of the way from upside down to upright",
+    "height": "height of the torso by h, at most 1, times the same share",
+    "up": "1 while the torso is high and upright",
+    "pose": "of a body that is up: 1 in the standing pose",
+    "rest": "of a body that is up: 1 where nothing moves",
+    "control": "mean squared torque, as shares of the largest",
+    "smoothness": "mean squared change of the torques",
+}
+# Of tasks without a command, by name.
+_TERMS = {"walk": _WALK_TERMS | _COSTS, "mimic": _COSTS | _MIMIC_TERMS, "recover": _RECOVER_TERMS}
+_ENDS = {
+    "mimic": "The discount is 0 where the torso is further than half a standing height, or about 60 degrees, from the "
+    "motion, and 1 at the time limit.",
+    "recover": "The discount is 1 at the time limit. Nothing ends an episode before.",
+}
+_GUIDES = {"mimic": "motions", "recover": "motions"}  # pages in docs/ that explain tasks without a page of their own
 # Definitions of metrics by name.
 METRICS = {
     "speed": "mean velocity along world x, m/s",
@@ -53,6 +77,10 @@ METRICS = {
     "sank": "1 if a foot got stuck under the ground, a contact artifact",
     "gait_compliance": "share of foot samples that agree with the prescribed contact schedule",
     "cost_of_transport": "positive work of the motors by weight and path",
+    "joint_error": "root of the mean square error of joint angles, rad",
+    "torso_error": "root of the mean square distance of the torso from that of the motion, standing heights",
+    "up": "1 if the body got up",
+    "time_to_get_up": "s, or the time so far",
     "collisions": "ways from goal to goal on which a pillar was touched",
 }
 
@@ -60,7 +88,7 @@ METRICS = {
 def terms(task_class: type[Task]) -> dict[str, str]:
     """Return definitions of the reward's terms of a task, by name."""
     if not issubclass(task_class, CommandTask):
-        return _WALK_TERMS | _COSTS
+        return _TERMS[task_class.name]
     velocity_costs = {
         name: f"{_COSTS[name]}, in units of h and g" for name in ("angular_velocity", "vertical_velocity")
     }
@@ -80,7 +108,8 @@ def page(name: str, written: str = "") -> str:
 
 def _introduction(name: str) -> str:
     """Return the beginning of the page of a task that has no page in docs/."""
-    sentences = f"{markdown.summary(TASKS[name])} [Ground](ground.md) explains it."
+    guide = _GUIDES.get(name, "ground")
+    sentences = f"{markdown.summary(TASKS[name])} [{guide.capitalize()}]({guide}.md) explains it."
     return f"# {name.capitalize()}\n\n![{name}](films/{name}.webp)\n\n{sentences}"
 
 
@@ -179,6 +208,8 @@ def _reward(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
 def _end(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
     """Return the table, or a sentence, about the discounts at the end of an episode."""
     if not issubclass(task_class, CommandTask):
+        if task_class.name in _ENDS:
+            return _ENDS[task_class.name]
         heights = _text_by_robot(tasks, lambda task: f"{markdown.format_value(task.settings.healthy_range)} m")
         return f"The discount is 0 where the torso leaves its healthy heights ({heights}), and 1 at the time limit."
     health = task_class.health
