@@ -41,10 +41,12 @@ PRESETS = {
     "navigate": ("zero", "steered", "planned"),
     **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "climbing", "sighted")),
     "leap": ("zero", "sighted", "leaping"),
+    "mimic": ("zero", "tracked"),
+    "recover": ("zero", "rising"),
 }
 # Presets that straight walks are compared with, for anchors alone: docs/results.md has them by `arc-suite evaluate`.
 WALK = ("zero", "medium", "tuned", "refined")
-METRICS = ("distance", "goals", "tracking")  # the first that a task has
+METRICS = ("distance", "goals", "tracking", "joint_error", "up")  # the first that a task has
 
 FLAGS = flags.FLAGS
 flags.DEFINE_list("tasks", None, "Which tasks. [default: all]")

@@ -14,7 +14,7 @@ from arc_suite.policies.protocol import alone
 from arc_suite.tasks import TASKS
 
 
-@pytest.mark.parametrize("task", [task for task in TASKS if task != "recover"])  # which has no demonstrator
+@pytest.mark.parametrize("task", TASKS)
 def test_the_default_is_the_preset_that_suits_the_task(task):
     environment = arc_suite.load("queen", task, {"random": 0})
     definition = environment.task.definition

@@ -17,7 +17,7 @@ BLOCK_CONTENTS = {
     "goal": "direction of the goal as cosine and sine, and its distance, at most 1",
     "scan": "height of the ground at 25 x 7 points around the torso, clipped to [-1, 1]; 0 is level ground",
     "ranges": "distance of the nearest pillar along 24 rays, at most 1",
-    "motion": "sine and cosine of the share of the motion's cycle; 1 for the motion, -1 for its mirror image; which motion",
+    "motion": "sine and cosine of the phase in the motion; 1, or -1 for its mirror image; which motion",
     "next_poses": "in one and two control steps: place and quaternion of the motion's torso, joint angles",
     "vertical": "the world's up axis in the torso's frame",
 }
