@@ -25,11 +25,11 @@ from arc_suite.models.outline import outline
 from arc_suite.simulation import films
 
 ROOT = Path(__file__).parents[1]
-MAX_TOTAL_BYTES = 6_400_000  # of all pictures and films
+MAX_TOTAL_BYTES = 6_600_000  # of all pictures and films
 
 
 class View(NamedTuple):
-    """Some steps of an episode under the best demonstrator, and a camera on it.
+    """Some steps of an episode, and a camera on it.
 
     Attributes:
         robot: its name.
@@ -44,6 +44,7 @@ class View(NamedTuple):
         distance: distance of the camera, in distances of the farthest foot from the torso.
         drives: whether the camera goes along in a straight line; else it stands.
         settings: settings of the task.
+        policy: name of the policy.
     """
 
     robot: str
@@ -57,6 +58,7 @@ class View(NamedTuple):
     distance: float = 4.4
     drives: bool = True
     settings: Mapping[str, float] = {}
+    policy: str = "cpg"
 
 
 _CLOSE = {"distance": 3.7, "azimuth": -42.0}
@@ -88,6 +90,8 @@ TASK_VIEWS = {
     "leap": View("queen", "leap", start=288, moment=32, **{**_SIDE, "elevation": 20.0}),
     "roam": View("queen", "roam", 0, 40, 31, elevation=20.0, distance=6.0, drives=False),
     "navigate": View("bastion", "navigate", 0, 40, 62, azimuth=155.0, elevation=38.0, distance=9.0),
+    "mimic": View("tick", "mimic", azimuth=-20.0, elevation=18.0, distance=6.0),
+    "recover": View("tick", "recover", 3, 0, 12, elevation=18.0, distance=5.0, drives=False, policy="ppo"),
 }
 _CLIP_FPS = 30.0
 _CUT_ABOVE = 0.82  # share of the rows cut from a square picture that are cut above, where it is empty
@@ -98,7 +102,8 @@ _FILM_STEPS = 67  # control steps of a view; the camera is fitted to the torso's
 def play(view: View, environment, steps: int) -> Iterator[int]:
     """Play a view, and yield the number of each of its control steps."""
     definition = environment.task.definition
-    policy = policies.policy("cpg", view.robot, suited_preset(definition), task=definition)
+    preset = suited_preset(definition) if view.policy == "cpg" else None
+    policy = policies.policy(view.policy, view.robot, preset, task=definition)
     for step, timestep in enumerate(evaluation.rollout(environment, policy, view.seed, view.start + steps)):
         if timestep.first() and view.command is not None:
             environment.command("command", view.command)
@@ -216,8 +221,8 @@ MEDIA = (
     Media(
         "docs/tasks.png",
         TASK_VIEWS,
-        columns=4,
-        size=(360, 216),
+        columns=6,
+        size=(300, 180),
         steps=0,
         captions=True,
         large=True,

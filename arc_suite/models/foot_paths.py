@@ -43,14 +43,14 @@ def cycle_angles(
     foot_clearance: float,
     damping: float,
 ) -> np.ndarray:
-    """Return joint angles (steps, joints), rad, in a cycle of steps.
+    """Return joint angles (steps, ..., joints), rad, in a cycle of steps.
 
     Args:
         rest_pose: pose of the torso over the feet.
         offsets: (legs,) phases of the legs, cycles.
         duty_factor: share of a cycle that a foot stands.
-        half_path: how far ahead of its position at rest a foot touches down, m; or (legs, 2), how far ahead and to the
-            left of it.
+        half_path: how far ahead of its position at rest a foot touches down, m; or (..., legs, 2), how far ahead and to
+            the left of it.
         foot_clearance: height of a foot in mid-swing, m.
         damping: of inverse kinematics, m.
     """
@@ -63,7 +63,8 @@ def cycle_angles(
         leg_phases = (step / _STEPS_PER_CYCLE + offsets) % 1.0
         path_position, swing_progress = find_path_position(leg_phases, duty_factor)
         heights = foot_clearance * np.sin(math.pi * swing_progress)
-        displacements = np.concatenate([half_paths * path_position[:, None], heights[:, None]], axis=-1)
+        ground = half_paths * path_position[:, None]
+        displacements = np.concatenate([ground, np.broadcast_to(heights[:, None], (*ground.shape[:-1], 1))], axis=-1)
         goals = rest_pose.sole_positions + displacements
         joint_angles = legs.solve_joint_angles(joint_angles, goals, weights, damping, IK_ITERATIONS)
         angles_of_steps.append(legs.by_joint(joint_angles))

@@ -126,32 +126,30 @@ def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
         angles = [share * sweep for share, (sweep, _) in zip(sweep_shares, strokes_of_legs, strict=True)]
         yield "a stride", np.concatenate(angles)
     # Demonstrators that follow a command step along paths in space, where legs sweep otherwise.
-    for motion in _MOTIONS:
-        for angles in _step_angles(body, motion):
-            yield "a stride", angles
+    for angles in _step_angles(body):
+        yield "a stride", angles
 
 
-@functools.lru_cache(maxsize=64)
-def _step_angles(body: Body, motion: tuple[float, float, float]) -> np.ndarray:
-    """Return the joint angles (n, joints), rad, of steps along paths in a cycle of the fitted gait.
+@functools.lru_cache(maxsize=16)
+def _step_angles(body: Body) -> np.ndarray:
+    """Return the joint angles (n, joints), rad, of steps along paths in a cycle of the fitted gait, in all `_MOTIONS`.
 
-    Args:
-        body: the spec.
-        motion: direction forward, left and turning. The foot that steps furthest steps as far in all of them.
+    The foot that steps furthest steps as far in all of them.
     """
     gait = fitted_gait(body)
     standing_height = body.torso.standing_height
     rest_pose = find_rest_pose(body)
-    (directions,) = point_velocities(np.array([motion]), rest_pose.sole_positions[None])
-    longest = np.hypot(*directions.T).max()
-    return foot_paths.cycle_angles(
+    directions = point_velocities(np.array(_MOTIONS), rest_pose.sole_positions[None])  # (motions, legs, 2)
+    longest = np.hypot(directions[..., 0], directions[..., 1]).max(axis=-1)
+    angles = foot_paths.cycle_angles(
         rest_pose,
         np.array(gait.offsets),
         gait.duty_factor,
-        half_path=_MIN_STRETCH * half_stroke(body, gait) / longest * directions,
+        half_path=_MIN_STRETCH * half_stroke(body, gait) / longest[:, None, None] * directions,
         foot_clearance=foot_paths.FOOT_CLEARANCE * standing_height,
         damping=foot_paths.IK_DAMPING * standing_height,
     )
+    return angles.reshape(-1, angles.shape[-1])
 
 
 def _separate_pairs(body: Body) -> np.ndarray:

@@ -93,23 +93,25 @@ def transfer(motion: Motion, body: Body, size: Size) -> tuple[Paths, list[str]]:
     planted = np.empty((frames, len(partners)), bool)
     begin = _find_begin(steps, partners, gait, cycles, is_regular)
     for leg, foot in enumerate(partners):
-        source_shares = shares
-        planted[:, leg] = motion.planted[_nearest_frames(shares, motion.frames), foot]
-        if is_regular[foot]:
-            starts = (np.arange(cycles) - gait.offsets[leg]) / cycles + begin
-            step_duration = gait.duty_factor / cycles
-            source_shares = _warp(shares, starts, step_duration, steps[foot])
-            since_start = (shares - begin + gait.offsets[leg] / cycles) % (1.0 / cycles)
-            planted[:, leg] = since_start < step_duration
-        offset = _sample(offsets[:, foot], source_shares)
-        soles[:, leg] = _place(root, rest_soles[leg] + offset)
-        if is_regular[foot]:
-            soles[:, leg] = _hold_stances(soles[:, leg], planted[:, leg], root)
-    irregular_feet = [body.legs[leg].name for leg, foot in enumerate(partners) if not is_regular[foot]]
-    if irregular_feet:
-        notes.append(f"without steps of their own in each cycle: {', '.join(irregular_feet)}")
+        if not is_regular[foot]:
+            planted[:, leg] = motion.planted[_nearest_frames(shares, motion.frames), foot]
+            soles[:, leg] = _place(root, rest_soles[leg] + _sample(offsets[:, foot], shares))
+            continue
+        first_start = begin - gait.offsets[leg] / cycles
+        step_duration = gait.duty_factor / cycles
+        planted[:, leg] = (shares - first_start) % (1.0 / cycles) < step_duration
+        source_shares = _warp(shares, np.arange(cycles) / cycles + first_start, step_duration, steps[foot])
+        soles[:, leg] = _place(root, rest_soles[leg] + _sample(offsets[:, foot], source_shares))
+        soles[:, leg] = _hold_stances(soles[:, leg], planted[:, leg], root)
+    notes += _note_irregular_feet(body, partners, is_regular)
     positions, quaternions = _move_torso(motion, source_root, root, shares, rest_height / height, size)
     return Paths(seconds, positions, quaternions, soles, planted), notes
+
+
+def _note_irregular_feet(body: Body, partners: list[int], is_regular: np.ndarray) -> list[str]:
+    """Return a line that names the legs whose partners do not step once in each cycle; none without such legs."""
+    names = [body.legs[leg].name for leg, foot in enumerate(partners) if not is_regular[foot]]
+    return [f"without steps of their own in each cycle: {', '.join(names)}"] if names else []
 
 
 def _find_partners(motion: Motion, rest_soles: np.ndarray) -> list[int]:

@@ -152,6 +152,12 @@ class Modified(Wrapper):
     def _indices_to_remember(self) -> list[int]:
         return self._indices_with("remember")
 
+    @functools.cached_property
+    def _has_center(self) -> bool:
+        """Whether actions are positions about a center that the task gives."""
+        gives_center = type(self.task.unwrapped).position_center is not Task.position_center
+        return gives_center and self.actions == "position"
+
     @property
     def actions(self) -> str:
         """What an action is: the "torque" of each motor, or the "position" of each joint."""
@@ -203,9 +209,8 @@ class Modified(Wrapper):
         """
         elapsed = memory.changes.elapsed
         states = list(memory.changes.states)
-        center = self.task.position_center(memory.task)
-        if center is not None and self.actions == "position":
-            action = self.modifier(Control).add_center(center, action)
+        if self._has_center:
+            action = self.modifier(Control).add_center(self.task.position_center(memory.task), action)
         for index in self._indices_to_act:
             states[index], action = self.changes[index].act(states[index], action, elapsed)
         task_memory, inputs = self.task.before(memory.task, action)

@@ -46,7 +46,8 @@ def test_every_row_is_drawn_and_within_its_limit():
     assert {path.stem for path in (ROOT / "docs" / "films").iterdir()} == {*ROBOTS, *TASKS, "robots"}
     for path, media in ROWS.items():
         with Image.open(path) as picture:
-            rows = -(-len(media.views) // media.columns)
+            cells = len(media.views) + 3 * media.large  # the large view takes four
+            rows = -(-cells // media.columns)
             assert picture.size == (media.columns * media.size[0], rows * media.size[1])
             assert getattr(picture, "n_frames", 1) == max(1, media.steps)
 
@@ -65,10 +66,10 @@ def steps_of(name):
 @pytest.mark.parametrize("name", [name for name in TASKS if name not in ("walk", "limp")])
 def test_a_film_of_a_task_shows_what_the_task_is_about(name):
     run = steps_of(name)
-    assert len(run) == 67 and not run[-1][2]["fell"]
+    assert len(run) == 67 and not run[-1][2].get("fell")
     reds = [any(mark.color[1] < 0.2 for mark in marks) for marks, *_ in run]
     moment = make_media.TASK_VIEWS[name].moment
-    assert all(len(marks) >= 2 for marks, *_ in run) or name == "navigate"
+    assert all(len(marks) >= 2 for marks, *_ in run) or name in ("navigate", "recover")
     assert (any(reds), reds[moment]) == 2 * (name in ("shoved", "roam"),)
     if name == "navigate":
         assert run[-1][2]["goals"] > run[0][2]["goals"]

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arc_suite.learning.agents import architectures, critic_blocks, learner
+from arc_suite.learning.agents import architectures, critic_blocks, learner, motion_style, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, Diverged, RunContext, generator
-from arc_suite.learning.agents.motion_style import MotionStyle, pair_poses
+from arc_suite.learning.agents.motion_style import MotionStyle, StyleState, pair_poses
 from arc_suite.learning.agents.normalizer import Normalizer
 
 # Names of the arrays of a rollout.
@@ -26,6 +26,7 @@ class EnvironmentRollouts:
         architecture: architecture of the networks.
         observation: (num_envs, ...) before the next step, as networks view it.
         style: the motion whose style the policy learns; None for none.
+        style_state: what it has learned; None for none.
     """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
@@ -40,9 +41,11 @@ class EnvironmentRollouts:
         self.architecture = architectures.of_environment(
             self.environment, hp.network, hp.critic_blocks, hp.symmetry_augmentation
         )
-        self.style = None
+        self.style: MotionStyle | None = None
+        self.style_state: StyleState | None = None
         if hp.style:
             self.style = MotionStyle.of(self.task, hp.style, hp.style_share, both_sides=hp.symmetry_augmentation)
+            self.style_state = self.style.begin(generator(context.seed, "discriminator", 0))
         observation, info = self.environment.reset()
         self._poses = self._read_poses(observation)
         self.observation = self._view(observation, info)
@@ -104,12 +107,31 @@ class EnvironmentRollouts:
             self.observation = view
         return {name: np.stack(arrays) for name, arrays in rollout.items()}
 
+    def reward_style(self, rollout: dict[str, np.ndarray], iteration: int) -> dict[str, float]:
+        """Add the share of the style to the rewards of a rollout, learn from its poses, and return metrics.
+
+        Args:
+            rollout: as `roll_out` returns it; `poses` are taken out.
+            iteration: number of the horizon, which seeds the draws.
+
+        Returns:
+            `reward`, the mean reward of the task, and with a style also `style`, its mean.
+        """
+        metrics = {"reward": float(rollout["rewards"].mean())}
+        if self.style is not None and self.style_state is not None:
+            poses = rollout.pop("poses")
+            rollout["rewards"], metrics["style"] = self.style.add_reward(self.style_state, rollout["rewards"], poses)
+            random = generator(self._seed, "pairs", iteration)
+            self.style_state = self.style.learn(self.style_state, poses, random)
+        return metrics
+
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return the state of the environments as part of a checkpoint."""
+        """Return the state of the environments and of the style as part of a checkpoint."""
         arrays = learner.environment_arrays(self.environment)
         arrays[f"{ENVIRONMENT_PREFIX}seen"] = self.observation
         if self.style is not None:
             arrays[f"{ENVIRONMENT_PREFIX}poses"] = self._poses
+            arrays |= motion_style.arrays(self.style_state)
         return arrays
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -118,6 +140,7 @@ class EnvironmentRollouts:
         self.observation = arrays[f"{ENVIRONMENT_PREFIX}seen"]
         if self.style is not None:
             self._poses = arrays[f"{ENVIRONMENT_PREFIX}poses"]
+            self.style_state = networks.restore_tree("style", self.style_state, arrays)
 
     def _read_poses(self, observation: np.ndarray) -> np.ndarray:
         """Return the poses (..., numbers) of observations (..., size) as a style sees them; (0,) without a style."""

@@ -7,7 +7,6 @@ task decides where the body goes. The discriminator is part of a checkpoint and 
 
 import functools
 import math
-from collections.abc import Mapping
 from typing import NamedTuple, Self
 
 import jax
@@ -169,6 +168,6 @@ def _learn(state: StyleState, motion_pairs, policy_pairs) -> StyleState:
     return state
 
 
-def arrays(state: StyleState | None) -> Mapping[str, np.ndarray]:
-    """Return the arrays of a checkpoint by name; none without a style."""
-    return {} if state is None else jax.tree.map(np.asarray, networks.name_leaves({"style": state}))
+def arrays(state: StyleState | None) -> dict[str, np.ndarray]:
+    """Return the arrays of a checkpoint by name."""
+    return jax.tree.map(np.asarray, networks.name_leaves({"style": state}))

@@ -18,7 +18,7 @@ import numpy as np
 
 from arc_suite import policies
 from arc_suite.bodies import universal
-from arc_suite.learning.agents import architectures, collecting, critic_blocks, learner, motion_style, networks
+from arc_suite.learning.agents import architectures, collecting, critic_blocks, learner, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
@@ -98,8 +98,6 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     architecture = collector.architecture
     symmetry = mirror_maps(hp, task, architecture)
     state, moments, normalize = begin(hp, context, task, architecture)
-    style = collector.style
-    style_state = None if style is None else style.begin(generator(context.seed, "discriminator", 0))
     iterations = 0
 
     saved = context.checkpoint
@@ -109,8 +107,6 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
             normalize = Normalizer(*map(np.asarray, networks.restore_tree("normalizer", tuple(normalize), saved)))
             iterations = int(saved["iterations"])
-            if style_state is not None:
-                style_state = networks.restore_tree("style", style_state, saved)
             collector.restore(saved)
 
     while True:
@@ -119,11 +115,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
         # Act for the horizon.
         rollout = collector.roll_out(state.policy, normalize, schedules.std, iterations, step)
-        metrics = {"reward": float(rollout["rewards"].mean())}
-        if style is not None:
-            poses = rollout.pop("poses")
-            rollout["rewards"], metrics["style"] = style.add_reward(style_state, rollout["rewards"], poses)
-            style_state = style.learn(style_state, poses, generator(context.seed, "pairs", iterations))
+        metrics = collector.reward_style(rollout, iterations)
 
         # Learn from it, in epochs of minibatches.
         batch = batch_of(hp, architecture, rollout, state.values, normalize, symmetry)
@@ -145,7 +137,6 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         }
         graph = architectures.policy_graph(architecture, normalize, state.policy)
         arrays = jax.tree.map(np.asarray, LearnerState(state, moments, normalize).arrays())
-        arrays |= motion_style.arrays(style_state)
         checkpoint = {**arrays, "iterations": np.array(iterations), **collector.arrays()}
         yield Slice(iterations * hp.num_envs * hp.horizon, metrics, graph, checkpoint)
 
