@@ -47,7 +47,7 @@ _MAX_DISTANCE = 0.5  # standing heights, of the torso
 _MAX_ATTITUDE = 1.0  # rad, about
 
 
-_GHOST_DISTANCE = 2.5  # of the motion's pose in pictures from the motion, mean distances of the feet
+_GHOST_DISTANCE = 2.2  # of the motion's pose in pictures from the motion, mean distances of the feet
 
 
 class MimicSettings(NamedTuple):
@@ -122,11 +122,11 @@ class Mimic(Task):
     demonstrators = ("tracked",)
     file_settings = {"motion": FileSetting(motion_text.embed, motion_text.names_file, motion_text.label)}
     weights: ClassVar[Mapping[str, float]] = {
-        "pose": 1.25,
+        "pose": 1.5,
         "joint_speed": 0.25,
         "feet": 0.5,
-        "place": 1.5,
-        "attitude": 0.5,
+        "place": 1.0,
+        "attitude": 0.75,
         "control": -0.01,
         "smoothness": -0.02,
     }
