@@ -64,12 +64,15 @@ MUTANTS = {
     "user's choice of OpenGL overwritten": '«"MUJOCO_GL" not in os.environ and →»',
     # Tasks.
     "dropped clip of the contact forces": "forces.reshape(forces.shape[:-2] + (-1,))«.clip(-1.0, 1.0)→»,",
-    "sign of a weight": '        "smoothness": «-→»0.02',
+    "sign of a weight": '        "vertical_velocity": «-→»0.02',
     "yaw rate penalized in place of pitch rate": "pitch_rate = component(velocities, «4→5»)",
     "stance and swing exchanged": "+ offsets) % TWO_PI «<→>» TWO_PI",
     "gait clock advances too late": "phases[tick - 1] + «→0.5 * »advance",
     "a long episode's clock jumps": "ends[«np.argmin(distances_from_zero)→-1»]",
-    "previous action forgotten": "previous_action=«memory.→»action",
+    "previous action forgotten": (
+        'the action itself as what to write."""\n'
+        "        return memory._replace(action=action, previous_action=«memory.→»action)"
+    ),
     "quaternion not normalized": "«qpos[3:7] /= np.linalg.norm(qpos[3:7])→pass»",
     "reset noise to one side": "random.uniform(«-→0.0 * »widths, widths)",
     "speed of the state in place of the frame's": "x = component(readings.«frame→torso»_position, 0) + 0.0  # a copy\n",

@@ -269,7 +269,7 @@ class Mimic(Task):
         return damping / stiffness / self.scene.control_timestep
 
     def before(self, memory: MimicMemory, action) -> tuple[MimicMemory, Inputs]:
-        """Return the memory with the action, and the action itself as what to write."""
+        """Return the memory with the action, and the action as the input."""
         return memory._replace(action=action, previous_action=memory.action), Inputs(action)
 
     def after(self, memory: MimicMemory, readings: Readings) -> MimicMemory:

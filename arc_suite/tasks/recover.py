@@ -191,7 +191,7 @@ class Recover(Task):
         return memory
 
     def before(self, memory: RecoverMemory, action) -> tuple[RecoverMemory, Inputs]:
-        """Return the memory with the action, and the action itself as what to write."""
+        """Return the memory with the action, and the action as the input."""
         return memory._replace(action=action, previous_action=memory.action), Inputs(action)
 
     def after(self, memory: RecoverMemory, readings: Readings) -> RecoverMemory:
