@@ -84,6 +84,8 @@ class Demonstrator:
         if preset is not None:
             _warn_of_ignored_commands(body_task, name, ignored_commands(body_task, self.law))
         self._task = body_task
+        # The center of positions may follow from any block.
+        self._reads = self.law.reads if _stands_at_center(body_task) else tuple(body_task.blocks)
         self._body = body
         self._starts_lying = body_task.lies
         self._state: Any = None  # of the law; None before the first action
@@ -111,7 +113,7 @@ class Demonstrator:
         Raises:
             ValueError: an observation without named blocks, of another body, or without a block of the law.
         """
-        blocks = read_blocks(observation, self.law.reads, len(self._body.joint_names), len(self._body.part_names))
+        blocks = read_blocks(observation, self._reads, len(self._body.joint_names), len(self._body.part_names))
         is_one_environment = blocks["posture"].ndim == 1
         if is_one_environment:
             blocks = {name: block[None] for name, block in blocks.items()}
@@ -158,6 +160,11 @@ class Demonstrator:
             start = "the torso starts below half or above twice that"
             text = f"{self._body.name} stands {standing_height:g} m high, and {start}"
             warnings.warn(f"{text}: is this the demonstrator of another robot?", stacklevel=3)
+
+
+def _stands_at_center(task: Task) -> bool:
+    """Return whether the actions of a task are relative to the standing pose alone."""
+    return type(task.unwrapped).observed_position_center is Task.observed_position_center
 
 
 def _as_actions(task: Task, outputs: np.ndarray, blocks: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -12,7 +12,13 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
 
 SEEDS = range(500, 508)  # no demonstrator was tuned on these episodes
-METRICS = ("goals", "tracking", "speed")  # names of metrics, of which a task shows the first that it has
+METRICS = (
+    "goals",
+    "tracking",
+    "speed",
+    "joint_error",
+    "up",
+)  # names of metrics, of which a task shows the first that it has
 MAX_SHORTFALL = 0.05  # of a default preset, as a share of what the best preset gains over standing still
 
 

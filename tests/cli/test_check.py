@@ -191,5 +191,7 @@ def test_every_task_is_walked_by_the_preset_that_suits_it():
     lines = done.stdout.splitlines()
     assert lines[0] == "spider: spider stands and can take steps"
     for line, task in zip(lines[1:], TASKS, strict=True):
-        assert re.fullmatch(rf"spider: {task} by \w+: (speed|tracking|goals) \d\.\d\d, [0-4] of 4 upright", line), line
+        assert re.fullmatch(
+            rf"spider: {task} by \w+: (speed|tracking|goals|joint_error|up) \d\.\d\d, [0-4] of 4 upright", line
+        ), line
     assert "spider: shoved by braced: tracking" in lines[10]

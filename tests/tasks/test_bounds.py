@@ -25,13 +25,14 @@ BOUNDS = {
     "cost_limit": (1e-9, LARGEST),
     "velocity_band": (1e-9, LARGEST),
     "healthy_range": ((-LARGEST, LARGEST), (LARGEST - 1.0, LARGEST)),
-    "weights": ({"healthy": -LARGEST}, {"control": LARGEST}),
+    "weights": ({"smoothness": -LARGEST}, {"control": LARGEST}),
     "time_limit": (1e-9, LARGEST),
     "actuator_failure": (0, 5),
     "poses": (0.0, 1.0),
+    "fall_seed": (0, 2**32 - 1),
     "commands": ({"forward": -MAX_COMMAND}, {"left": MAX_COMMAND, "turning": (-MAX_COMMAND, MAX_COMMAND)}),
 }
-NOT_NUMBERS = ("gait", "gaits", "start", "curriculum", "scan")
+NOT_NUMBERS = ("gait", "gaits", "start", "curriculum", "scan", "motion", "both_sides")
 LEVEL = ("steer", "directed", "shoved", "limp")
 FEW = ("walk", "steer", "rough", "navigate")
 
