@@ -27,6 +27,7 @@ CONFIGURATION_FIELDS = ("robot", "task", "task_kwargs", *_LEARNING_FIELDS)
 # Further fields in the record of a run, which follow from its configuration, the data and the installed packages.
 # `learner` is in records of earlier versions.
 PRIOR_SHA256 = "prior_sha256"
+STYLE_FIELDS = ("style", "style_share")  # hyperparameters of `motion_style`
 TRAINING_SEEDS = "training_seeds"
 DATA_FIELDS = (PRIOR_SHA256, TRAINING_SEEDS)
 PROVENANCE_FIELDS = (
@@ -242,9 +243,12 @@ class Configuration:
         return shlex.join(words)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the configuration as files hold it, plain values by field."""
+        """Return the configuration as files hold it, plain values by field; without a style, no fields of it."""
         learning_fields = {name: getattr(self, name) for name in _LEARNING_FIELDS}
-        learning_fields["hyperparameters"] = dataclasses.asdict(self.hyperparameters)
+        hyperparameters = dataclasses.asdict(self.hyperparameters)
+        if not hyperparameters.get("style"):  # as runs of earlier versions, which go on
+            hyperparameters = {name: value for name, value in hyperparameters.items() if name not in STYLE_FIELDS}
+        learning_fields["hyperparameters"] = hyperparameters
         return self.setup.to_dict() | learning_fields
 
     @classmethod
