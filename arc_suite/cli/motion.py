@@ -18,7 +18,7 @@ from absl import flags
 
 from arc_suite import checks, files, motions, registry
 from arc_suite.cli.flags import check_flags_suit_file, define_body, only_body, refuse_flags
-from arc_suite.motions import reading
+from arc_suite.motions import motion_files, reading
 
 FLAGS = flags.FLAGS
 define_body()
@@ -38,7 +38,7 @@ def main(file: str | None = None) -> None:
     extension = checks.extension(file, reading.EXTENSIONS)
     check_flags_suit_file(extension, reading.OPTIONS)
     if FLAGS.output is not None:
-        checks.extension(FLAGS.output, [reading.MOTION_EXTENSION])
+        checks.extension(FLAGS.output, [motion_files.EXTENSION])
     if reading.holds_motion(file):
         refuse_flags(("loop", "fps"), f"goes with a table, and {file} is a motion")
         refuse_flags(("of",), f"goes with files of other tools, and {file} names its body")

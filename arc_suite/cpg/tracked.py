@@ -14,7 +14,7 @@ from arc_suite.models.sizing import size_body
 from arc_suite.models.standing import measure_standing, mechanics_of_poses
 from arc_suite.motions.motion import MAX_PLANTED_HEIGHT
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.motion_tables import POSES_AHEAD, MotionTables
+from arc_suite.tasks.motion_tables import MotionTables, split_next_angles
 
 
 class TrackingParameters(NamedTuple):
@@ -49,7 +49,6 @@ class Tracked:
         )
         self._tables = tables
         self._control_timestep = task.scene.control_timestep
-        self._block_size = task.blocks["next_poses"].size // POSES_AHEAD
         torques = np.array([joint.torque for joint in body.joints])
         radii = np.array([leg.foot.radius for leg in body.legs])
         is_planted = tables.feet[..., 2] - radii < MAX_PLANTED_HEIGHT * body.torso.standing_height
@@ -63,10 +62,7 @@ class Tracked:
     def __call__(self, state: Clock, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints); see `law`."""
         _, angles, velocities = proprioception(observation)
-        next_poses = observation["next_poses"]
-        joints = angles.shape[-1]
-        first = next_poses[:, self._block_size - joints : self._block_size]
-        second = next_poses[:, -joints:]
+        first, second = split_next_angles(observation["next_poses"], angles.shape[-1])
         speeds = (second - first) / self._control_timestep
         xp = angles.__array_namespace__()
         loads = xp.asarray(self._loads)[self._row(observation["motion"])]

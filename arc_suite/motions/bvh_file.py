@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import checks, files, parsers, rotations
 from arc_suite.motions.motion import MAX_FRAMES, MAX_RATE, MIN_RATE
-from arc_suite.motions.skeletons import FROM_Y_UP, Skeleton
+from arc_suite.motions.skeletons import FROM_Y_UP, LOOP_SUFFIX, Skeleton
 
 EXTENSION = ".bvh"
 
@@ -20,7 +20,6 @@ _MAX_BYTES = 1 << 25
 _MAX_JOINTS = 1024
 _MAX_DEPTH = 256
 _AXES = {"X": 0, "Y": 1, "Z": 2}
-_LOOP_SUFFIX = "_loop"
 
 
 class _Joint(NamedTuple):
@@ -60,9 +59,9 @@ def read(path: str | os.PathLike) -> Skeleton:
         above = bind_positions[joint.parent] if joint.parent >= 0 else 0.0
         bind_positions[index] = above + joint.offset
     return Skeleton(
-        name=stem.removesuffix(_LOOP_SUFFIX) or stem,
+        name=stem.removesuffix(LOOP_SUFFIX) or stem,
         frame_rate=rate,
-        loops=stem.endswith(_LOOP_SUFFIX),
+        loops=stem.endswith(LOOP_SUFFIX),
         bones=tuple([joint.name for joint in joints]),
         bind_positions=bind_positions @ FROM_Y_UP.T,
         positions=positions @ FROM_Y_UP.T,

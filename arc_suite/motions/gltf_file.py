@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, files, parsers
+from arc_suite import checks, files, parsers, rotations
 from arc_suite.motions.motion import MAX_FRAMES
-from arc_suite.motions.skeletons import FROM_Y_UP, Skeleton
+from arc_suite.motions.skeletons import FROM_Y_UP, LOOP_SUFFIX, Skeleton
 
 EXTENSION = ".glb"
 FRAME_RATE = 60.0  # Hz, at which animations are sampled
@@ -23,7 +23,6 @@ _MAX_DEPTH = 256  # of nodes below each other
 _MAX_ANIMATIONS = 1024
 _MAX_VALUES = 1 << 26  # numbers of sampled poses: frames times nodes times 16
 _TIME_TOLERANCE = 1e-5  # s
-_LOOP_SUFFIX = "_loop"
 _IN_PLACE_SUFFIX = "_in_place"
 
 _MAGIC = b"glTF"
@@ -153,7 +152,7 @@ def _choose_animation(animations: list[dict], clip: str | None) -> dict:
             raise ValueError(f"--clip: expected one of {', '.join(by_name)[:500]}")
         (animation,) = by_name.values()
         return animation
-    name = clip if clip in by_name else f"{clip}{_LOOP_SUFFIX}"
+    name = clip if clip in by_name else f"{clip}{LOOP_SUFFIX}"
     return by_name[name] if name in by_name else by_name[checks.name(clip, by_name, "clip")]
 
 
@@ -266,13 +265,7 @@ def _rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
     lengths = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     if not (lengths > 1e-6).all():
         raise ValueError("rotation: expected quaternions above 0")
-    x, y, z, w = (quaternions / lengths).T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return rotations.matrix(np.roll(quaternions / lengths, 1, axis=-1))
 
 
 def _world_poses(poses: np.ndarray, parents: list[int | None]) -> np.ndarray:
@@ -350,7 +343,7 @@ def _make_skeleton(
 ) -> Skeleton:
     """Return the skeleton of world transforms (frames, joints, 4, 4), in the axes of the suite."""
     extras = animation.get("extras")
-    loops = name.endswith(_LOOP_SUFFIX)
+    loops = name.endswith(LOOP_SUFFIX)
     if isinstance(extras, dict) and isinstance(extras.get("loops"), bool):
         loops = extras["loops"]
     turns = poses[..., :3, :3] @ np.linalg.inv(bind_poses[:, :3, :3])
@@ -358,7 +351,7 @@ def _make_skeleton(
     if not (np.isfinite(scales) & (scales > 1e-9)).all():
         raise ValueError("expected poses without mirrors and scales of 0")
     return Skeleton(
-        name=name.removesuffix(_LOOP_SUFFIX).removesuffix(_IN_PLACE_SUFFIX) or name,
+        name=name.removesuffix(LOOP_SUFFIX).removesuffix(_IN_PLACE_SUFFIX) or name,
         frame_rate=(len(poses) - 1) / seconds if seconds > 0.0 else FRAME_RATE,
         loops=loops,
         bones=tuple([str(nodes[joint].get("name", "")) for joint in joints]),

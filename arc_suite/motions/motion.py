@@ -147,15 +147,7 @@ def check(motion: Motion) -> Motion:
     frames = motion.frames
     joints = len(motion.joint_names)
     legs = len(motion.leg_names)
-    shapes = {
-        "positions": (frames, 3),
-        "quaternions": (frames, 4),
-        "angles": (frames, joints),
-        "planted": (frames, legs),
-        "soles": (frames, legs, 3),
-        "rest_soles": (legs, 3),
-    }
-    for field, shape in shapes.items():
+    for field, shape in array_shapes(frames, joints, legs).items():
         values = getattr(motion, field)
         if values.shape != shape:
             raise ValueError(f"{field}: expected numbers of shape {shape}, got {values.shape}")
@@ -174,6 +166,18 @@ def check(motion: Motion) -> Motion:
 def fits(motion: Motion, body: Body) -> bool:
     """Return whether a motion was drawn for a body: the same joints and legs, and the same standing height."""
     return _describe_misfit(motion, body) is None
+
+
+def array_shapes(frames: int, joints: int, legs: int) -> dict[str, tuple[int, ...]]:
+    """Return the shape of every array of a motion by name, given its numbers of frames, joints and legs."""
+    return {
+        "positions": (frames, 3),
+        "quaternions": (frames, 4),
+        "angles": (frames, joints),
+        "planted": (frames, legs),
+        "soles": (frames, legs, 3),
+        "rest_soles": (legs, 3),
+    }
 
 
 def check_body(motion: Motion, body: Body) -> None:

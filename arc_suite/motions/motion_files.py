@@ -10,6 +10,7 @@ from arc_suite import archives, checks, files, parsers
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
 
+EXTENSION = ".npz"
 FORMAT = "arc_suite motion 1"  # another number for every change of what a file holds
 
 MAX_BYTES = 1 << 28  # bytes of all arrays
@@ -29,7 +30,7 @@ def save(motion: Motion, path: str | os.PathLike) -> None:
         ValueError: the file's extension is not `.npz`.
         OSError: the file cannot be written.
     """
-    checks.extension(path, (".npz",))
+    checks.extension(path, (EXTENSION,))
     with files.writing(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, format=FORMAT, **_arrays(motion))
 

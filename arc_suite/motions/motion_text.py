@@ -13,10 +13,9 @@ import numpy as np
 from arc_suite import checks, parsers
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
-from arc_suite.motions.motion_files import NAMES, SCALARS, TEXTS, load, read_names
+from arc_suite.motions.motion_files import EXTENSION, NAMES, SCALARS, TEXTS, load, read_names
 
 MAX_TEXT = 1 << 23  # characters
-EXTENSION = ".npz"
 
 _MAX_COLUMNS = 1 << 12  # numbers of a frame
 
@@ -33,7 +32,8 @@ def to_text(motion: Motion) -> str:
         ValueError: more frames than a text may have.
     """
     fields = motion._asdict()
-    arrays = [fields.pop(name) for name in _shapes(motion.frames, motion.joint_names, motion.leg_names)]
+    shapes = values.array_shapes(motion.frames, len(motion.joint_names), len(motion.leg_names))
+    arrays = [fields.pop(name) for name in shapes]
     numbers = np.concatenate([array.astype("<f8").ravel() for array in arrays])
     compressed = zlib.compress(numbers.tobytes(), 9)
     fields |= {"frames": motion.frames, "numbers": base64.b64encode(compressed).decode()}
@@ -95,26 +95,12 @@ def _map_words(function: Callable[[Any], Any], words: Any) -> Any:
     return [function(word) for word in words] if isinstance(words, list | tuple) else function(words)
 
 
-def _shapes(frames: int, joint_names: tuple[str, ...], leg_names: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
-    """Return the shape of every array of a motion by name."""
-    joints = len(joint_names)
-    legs = len(leg_names)
-    return {
-        "positions": (frames, 3),
-        "quaternions": (frames, 4),
-        "angles": (frames, joints),
-        "planted": (frames, legs),
-        "soles": (frames, legs, 3),
-        "rest_soles": (legs, 3),
-    }
-
-
 def _read(fields: dict[str, Any]) -> Motion:
     """Return the motion of fields by name; damaged ones raise anything."""
     names = {name: read_names(name, np.array(fields[name], str), 1) for name in NAMES}
     texts = {name: read_names(name, np.array(fields[name], str), 0)[0] for name in TEXTS}
     frames = checks.integer("frames", fields["frames"], 2, values.MAX_FRAMES)
-    shapes = _shapes(frames, **names)
+    shapes = values.array_shapes(frames, len(names["joint_names"]), len(names["leg_names"]))
     sizes = [math.prod(shape) for shape in shapes.values()]
     if sum(sizes) > frames * _MAX_COLUMNS:
         raise ValueError(f"expected at most {_MAX_COLUMNS} numbers in a frame")

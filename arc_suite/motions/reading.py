@@ -13,12 +13,11 @@ from arc_suite.motions.motion import Motion
 from arc_suite.motions.skeletons import fit_skeleton
 from arc_suite.robots.spec import Body
 
-MOTION_EXTENSION = ".npz"
-EXTENSIONS = (MOTION_EXTENSION, gltf_file.EXTENSION, bvh_file.EXTENSION, tables.EXTENSION)
+EXTENSIONS = (motion_files.EXTENSION, gltf_file.EXTENSION, bvh_file.EXTENSION, tables.EXTENSION)
 OPTIONS = {  # extensions of the files that take an option
     "clip": (gltf_file.EXTENSION,),
-    "loop": (gltf_file.EXTENSION, bvh_file.EXTENSION, tables.EXTENSION, MOTION_EXTENSION),
-    "fps": (tables.EXTENSION, MOTION_EXTENSION),
+    "loop": (gltf_file.EXTENSION, bvh_file.EXTENSION, tables.EXTENSION, motion_files.EXTENSION),
+    "fps": (tables.EXTENSION, motion_files.EXTENSION),
 }
 
 _MIN_EXCESS = np.radians(1.0)  # rad, beyond the range of a joint
@@ -43,7 +42,7 @@ NO_OPTIONS = Options()
 
 def holds_motion(path: str | os.PathLike) -> bool:
     """Return whether a file is one of `save`, which names its body and takes no options."""
-    if Path(path).suffix.lower() != MOTION_EXTENSION:
+    if Path(path).suffix.lower() != motion_files.EXTENSION:
         return False
     files.read_bytes(path, 0)
     with parsers.guard(f"{path}: no motion, or a damaged one"):
@@ -94,7 +93,7 @@ def _read_arrays(path: str | os.PathLike, body: Body, options: Options) -> tuple
 
 
 _READERS: dict[str, Callable[[str | os.PathLike, Body, Options], tuple[Motion, list[str]]]] = {
-    MOTION_EXTENSION: _read_arrays,
+    motion_files.EXTENSION: _read_arrays,
     gltf_file.EXTENSION: _read_skeleton,
     bvh_file.EXTENSION: _read_skeleton,
     tables.EXTENSION: _read_csv,

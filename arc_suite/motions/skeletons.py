@@ -16,6 +16,7 @@ from arc_suite.robots.spec import Body
 
 # From axes with y up and z ahead, as of glTF, to those of the suite, x ahead and z up.
 FROM_Y_UP = np.array(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+LOOP_SUFFIX = "_loop"  # of the names of animations that repeat
 # From what these make of axes with z up and -y ahead, as of Blender.
 _FROM_Z_UP = np.array(((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
 _MIN_UPRIGHT = 0.7  # cosine of the torso's tilt in the bound pose

@@ -28,7 +28,7 @@ from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import FileSetting, Inputs, Start, Task
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.ghost import draw_pose
-from arc_suite.tasks.motion_tables import POSES_AHEAD, MotionTables
+from arc_suite.tasks.motion_tables import POSES_AHEAD, MotionTables, split_next_angles
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings
 
@@ -252,10 +252,7 @@ class Mimic(Task):
 
     def observed_position_center(self, blocks: Mapping[str, np.ndarray]):
         """Return the same angles (..., joints) from the block `next_poses`, rad."""
-        next_poses = blocks["next_poses"]
-        joints = len(self.scene.body.joint_names)
-        size = next_poses.shape[-1] // POSES_AHEAD
-        return self._lead(next_poses[..., size - joints : size], next_poses[..., -joints:])
+        return self._lead(*split_next_angles(blocks["next_poses"], len(self.scene.body.joint_names)))
 
     def _lead(self, angles, later_angles):
         """Return angles (..., joints) that are ahead of a pose, as position control damps the speed of joints."""

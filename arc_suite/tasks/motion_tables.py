@@ -115,6 +115,12 @@ def _return_to_start(motion: Motion) -> Motion:
     return longer._replace(loops=True, positions=positions, quaternions=quaternions, angles=angles)
 
 
+def split_next_angles(next_poses, joints: int) -> tuple:
+    """Return the angles (..., joints) of both poses in the block `next_poses` (..., size): its poses end with them."""
+    size = next_poses.shape[-1] // POSES_AHEAD
+    return next_poses[..., size - joints : size], next_poses[..., -joints:]
+
+
 class _Table(NamedTuple):
     """The columns of one motion, as in `MotionTables`."""
 

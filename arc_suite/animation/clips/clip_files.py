@@ -19,14 +19,14 @@ from arc_suite.animation.clips.metadata import ROOT_MOTIONS, sidecar
 from arc_suite.animation.clips.motion_of_clip import clip_of_motion, motion_of_clip
 from arc_suite.envs.setup import Setup
 from arc_suite.models.visuals.scene import MAX_HEIGHT
+from arc_suite.motions import motion_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
 
 GLB_EXTENSION = ".glb"
 FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
 SHEET_EXTENSION = ".png"
-MOTION_EXTENSION = ".npz"
-EXTENSIONS = (GLB_EXTENSION, MOTION_EXTENSION, *FILM_EXTENSIONS, SHEET_EXTENSION)
+EXTENSIONS = (GLB_EXTENSION, motion_files.EXTENSION, *FILM_EXTENSIONS, SHEET_EXTENSION)
 
 # The extensions of files that take an option.
 OPTION_EXTENSIONS = {
@@ -101,7 +101,7 @@ def animate(
         _check_names(made_clips)
         if extension == GLB_EXTENSION:
             metrics |= _write_glb(temporary, setup.body, made_clips, **options)
-        elif extension == MOTION_EXTENSION:
+        elif extension == motion_files.EXTENSION:
             motions.save(motion_of_clip(setup.body, made_clips[0]), temporary)
         elif extension == SHEET_EXTENSION:
             _write_sheet(temporary, setup.body, made_clips[0], **options)
@@ -111,7 +111,7 @@ def animate(
 
 
 def _is_motion(name: str) -> bool:
-    return name.lower().endswith(MOTION_EXTENSION)
+    return name.lower().endswith(motion_files.EXTENSION)
 
 
 def _check_names(clips: Sequence[Clip]) -> None:
