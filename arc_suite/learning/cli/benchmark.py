@@ -81,7 +81,7 @@ def run_division(division: str, places: list[str]) -> int:
     runs = [run for run in study.runs if _is_selected(run, places)]
     with resumable(folder):
         status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
-    publication.publish(study.runs, folder, published)
+    publication.publish(study.runs, folder, published, progress)
     run_results = results.read_results(study.runs, published)
     if run_results:
         print(report.write(name, study, published))

@@ -92,7 +92,7 @@ def make_or_report(
     folder = Path(FLAGS.runs or Path("runs", tables.folder_name(name)))
     results = Path(FLAGS.results or Path("studies", tables.folder_name(name)))
     if FLAGS.report:
-        publication.publish(study.runs, folder, results)
+        publication.publish(study.runs, folder, results, progress)
         print(write_report(name, study, results))
         return 0
     if FLAGS.jobs is not None and FLAGS.submit is not None:
@@ -107,7 +107,7 @@ def make_or_report(
             status = runner.make_on_device(runs, folder, FLAGS.minutes, progress)
         else:
             status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
-    publication.publish(study.runs, folder, results)
+    publication.publish(study.runs, folder, results, progress)
     return status
 
 

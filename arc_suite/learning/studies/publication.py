@@ -3,11 +3,12 @@
 import contextlib
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gymnasium.vector import AutoresetMode
+from tqdm import tqdm
 
 from arc_suite import evaluation, files, policies, style
 from arc_suite.cpg.selection import presets_of
@@ -34,15 +35,16 @@ _EPISODE_COLUMNS = ("run", "step", "seed", "return", "length")  # first columns 
 _STYLE_COLUMNS = tuple(STYLE + name for name in METRICS)
 
 
-def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
+def publish(runs: Sequence[Run], folder: Path, published: Path, progress: Callable = tqdm) -> None:
     """Write the tables of all evaluated runs of a study, and the returns of standing still and of demonstrators.
 
-    Rows of runs that have no folder stay.
+    Rows of runs that have no folder stay. Demonstrators play in the places of evaluated runs alone.
 
     Args:
         runs: runs of the study.
         folder: folder of the study, with a folder for each run.
         published: folder of the tables.
+        progress: makes a progress bar as `tqdm` does.
 
     Raises:
         ValueError: a damaged table.
@@ -50,7 +52,7 @@ def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
     """
     run_rows = {row["run"]: row for row in csv_files.read(published / results.RUNS, RUN_COLUMNS)}
     episodes = results.read_episodes(published)
-    for run in runs:
+    for run in progress(runs, desc=f"{published}: style and returns", unit="run", leave=False):
         output = folder / run.name
         rows = _complete_evaluations(output)
         if rows:
@@ -69,7 +71,8 @@ def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
     all_rows = [row for name in names for row in episodes[name]]
     csv_files.write(published / results.EVALUATIONS, columns, all_rows)
     csv_files.write(published / results.RUNS, RUN_COLUMNS, [run_rows[name] for name in names])
-    _publish_demonstrators(runs, published)
+    evaluated_runs = [run for run in runs if run.name in episodes]
+    _publish_demonstrators(evaluated_runs, published, progress)
 
 
 def _complete_evaluations(folder: Path) -> list[dict[str, str]]:
@@ -180,14 +183,17 @@ def _play_final_episodes(run: Run, folder: Path, step: str) -> None:
     csv_files.write(folder / "final.csv", list(rows[0]), rows)
 
 
-def _publish_demonstrators(runs: Sequence[Run], published: Path) -> None:
-    """Add the returns of standing still and of demonstrators in the places that the table lacks."""
+def _publish_demonstrators(runs: Sequence[Run], published: Path, progress: Callable = tqdm) -> None:
+    """Add the returns of standing still and of demonstrators in the places of runs that the table lacks."""
     published_returns = results.read_demonstrators(published)
-    setups = {run.place: run.configuration.validation for run in runs}
-    new_returns = {place: _anchor_returns(setup) for place, setup in setups.items() if place not in published_returns}
-    if new_returns:
-        with files.writing(published / results.DEMONSTRATORS) as temporary:
-            anchors.write(temporary, published_returns | new_returns)
+    setups = {run.place: run.configuration.validation for run in runs if run.place not in published_returns}
+    if not setups:
+        return
+    new_returns = {}
+    for place, setup in progress(setups.items(), desc=f"{published}: demonstrators", unit="place", leave=False):
+        new_returns[place] = _anchor_returns(setup)
+    with files.writing(published / results.DEMONSTRATORS) as temporary:
+        anchors.write(temporary, published_returns | new_returns)
 
 
 def _anchor_returns(setup: Setup) -> anchors.Returns:

@@ -71,6 +71,25 @@ def test_unfinished_evaluations_do_not_count(tmp_path):
     assert len(rows) == 20 and rows[9:11] == [("1000", "9", "1.0"), ("2000", "0", "3.0")]
 
 
+def test_demonstrators_play_where_runs_were_evaluated_alone(tmp_path, monkeypatch):
+    """A part of a study, and a shard of it, do not wait for the demonstrators of the other places."""
+    monkeypatch.setattr(publication, "_anchor_returns", lambda setup: {"zero": np.full(1, len(setup.name))})
+    runs = [run(robot, "sac", 1_000_000) for robot in ("tick", "queen", "bastion")]
+    bars = []
+
+    def progress(values, desc, unit, leave):
+        bars.append((len(values), unit))
+        return values
+
+    publish(tmp_path, runs[1], constant(100.0, 200.0))
+    publication.publish(runs, tmp_path / "none", tmp_path, progress)
+    assert set(results.read_demonstrators(tmp_path)) == {"queen, walk"}
+    publish(tmp_path, runs[0], constant(100.0, 200.0))
+    publication.publish(runs, tmp_path / "none", tmp_path, progress)
+    assert set(results.read_demonstrators(tmp_path)) == {"queen, walk", "tick, walk"}
+    assert bars == [(3, "run"), (1, "place")] * 2
+
+
 def test_damaged_tables_are_one_line(tmp_path):
     each = run("tick", "sac", 1_000_000)
     publish(tmp_path, each, constant(100.0))
