@@ -1,5 +1,6 @@
 """Archives that others may have written, of arrays (.npz) or with a member of text: read as data, within limits."""
 
+import hashlib
 import math
 import os
 import zipfile
@@ -10,6 +11,7 @@ import numpy as np
 from arc_suite import checks, files, parsers
 
 _MAX_MEMBERS = 1 << 17
+_CHUNK = 1 << 20  # bytes
 _MAX_NAME = 80  # characters of a member's name in an error
 _VALID_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those that NumPy writes
 _HEADER_READERS = {
@@ -57,6 +59,29 @@ def read_member(path: str | os.PathLike, member: str, max_bytes: int) -> str:
         if entry.file_size > max_bytes:
             raise ValueError(f"expected at most {max_bytes} bytes, got {entry.file_size}")
         return archive.read(entry).decode("utf-8")
+
+
+def digest(path: str | os.PathLike, max_bytes: int) -> str:
+    """Return the sha256 of the members of an archive: their names in order, sizes and bytes.
+
+    Times and the compression of members do not count.
+
+    Args:
+        path: path of the file.
+        max_bytes: the largest valid size of all members together, uncompressed.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: the file is too large or damaged.
+    """
+    content_hash = hashlib.sha256()
+    with files.plain(path).open("rb") as file, _open(file, max_bytes) as archive:
+        for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
+            content_hash.update(f"{entry.filename}\0{entry.file_size}\0".encode())
+            with parsers.guard(checks.quote(entry.filename)[:_MAX_NAME]), archive.open(entry) as member:
+                while chunk := member.read(_CHUNK):
+                    content_hash.update(chunk)
+    return content_hash.hexdigest()
 
 
 def _open(file: IO[bytes], max_bytes: float = math.inf) -> zipfile.ZipFile:

@@ -218,24 +218,25 @@ def function_file(name: str) -> Path | None:
 
 
 def digest(name: str) -> str:
-    """Return the sha256 of the files of a policy.
+    """Return the sha256 of the content of a policy; times and compression of files do not count.
 
-    They are those of a run, all checkpoints, a zip and its statistics, or the file of a function. Files that this one
-    imports or reads do not count.
+    It is that of a network, see `network.digest`, of those of all checkpoints, of the members of a zip with its
+    statistics, or of the file of a function. Files that a function imports or reads do not count; see `frozen`.
 
     Raises:
-        ValueError: a damaged file of another library, or one without a file that belongs to it.
+        ValueError: a damaged file, or one of another library without a file that belongs to it.
         OSError: a file cannot be read.
     """
     policy_file = other_libraries.find(name)
-    code = function_file(name)
     if policy_file is not None:
-        paths = policy_file.policy_files()
-    elif code is not None:
-        paths = [code]
-    else:
-        paths = _policy_files(Path(name))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
+        return policy_file.digest()
+    code = function_file(name)
+    if code is not None:
+        return hashlib.sha256(code.read_bytes()).hexdigest()
+    digests = [network.digest(network.load(path)) for path in _policy_files(Path(name))]
+    if len(digests) == 1:
+        return digests[0]
+    return hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
 def setup_of(name) -> Setup | None:

@@ -10,6 +10,7 @@ A policy file is an archive of the graph's arrays with one JSON text:
 It holds no pickle and no code, so that reading a file runs nothing.
 """
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -108,6 +109,20 @@ def save(path: str | os.PathLike, network: Network) -> None:
     record["training_seeds"] = seed_ranges.to_json(network.training_seeds)
     with files.writing(path) as temporary:
         np.savez(temporary, policy=np.array(json.dumps(record)), **network.graph.arrays)  # type: ignore[arg-type]
+
+
+def digest(network: Network) -> str:
+    """Return the sha256 of what a policy computes: its blocks, operators, and arrays with names, shapes and bytes.
+
+    The bytes of a file differ with its compression and its times, and with the type in which it stores numbers.
+    """
+    nodes = [[node.operator, *node.inputs] for node in network.graph.nodes]
+    arrays = {name: np.ascontiguousarray(array) for name, array in sorted(network.graph.arrays.items())}
+    shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
+    content_hash = hashlib.sha256(json.dumps([list(network.blocks.items()), nodes, shapes]).encode())
+    for array in arrays.values():
+        content_hash.update(array)
+    return content_hash.hexdigest()
 
 
 def load(path: str | os.PathLike) -> Network:

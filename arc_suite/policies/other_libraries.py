@@ -4,7 +4,6 @@ A name is that of a file, or `FILE+FURTHER` with a further file that belongs to 
 """
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol, cast
 
@@ -48,8 +47,8 @@ class Reader(Protocol):
         """Return the setup that a file was trained in; None for one that does not hold it."""
         ...
 
-    def policy_files(self, path: Path, further: Path | None) -> Sequence[Path]:
-        """Return the files that a policy consists of."""
+    def digest(self, path: Path, further: Path | None) -> str:
+        """Return the sha256 of the content of a policy, without times of its files."""
         ...
 
     def load(self, path: Path, further: Path | None) -> Loaded:
@@ -79,9 +78,9 @@ class PolicyFile(NamedTuple):
         """Return the setup that it was trained in; see `Reader.setup`."""
         return self.reader.setup(self.path)
 
-    def policy_files(self) -> Sequence[Path]:
-        """Return the files that its policy consists of."""
-        return self.reader.policy_files(self.path, self.further)
+    def digest(self) -> str:
+        """Return the sha256 of its content; see `Reader.digest`."""
+        return self.reader.digest(self.path, self.further)
 
     def load(self) -> Loaded:
         """Return its policy."""

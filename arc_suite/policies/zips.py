@@ -4,6 +4,7 @@ A name is `ppo.zip`, or `ppo.zip+stats.pkl` with a file of statistics. A zip of 
 `arc_suite.envs.sb3.VecEnv` also holds the setup of the training. The functions are those of `other_libraries.Reader`.
 """
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -14,6 +15,7 @@ from arc_suite.envs.setup import ATTRIBUTE, Setup
 from arc_suite.policies.other_libraries import Loaded
 
 EXTENSION = ".zip"
+_MAX_BYTES = 1 << 32  # of all members; replay buffers are saved apart
 NO_SETUP = "does not hold the robot and task that it was trained for; train in arc_suite.envs.sb3.VecEnv"
 
 
@@ -47,14 +49,20 @@ def setup(path: Path) -> Setup | None:
         raise ValueError(f"policy {path}: {error}") from None
 
 
-def policy_files(path: Path, further: Path | None) -> list[Path]:
-    """Return a zip and the file of its statistics, if there is one.
+def digest(path: Path, further: Path | None) -> str:
+    """Return the sha256 of the members of a zip, and of the file of its statistics if there is one.
 
     Raises:
-        ValueError, OSError: as `statistics`.
+        ValueError, OSError: as `statistics`, or a file that is too large.
     """
     statistics_path = statistics(path, further)
-    return [path] if statistics_path is None else [path, statistics_path]
+    with parsers.guard(f"policy {path}: damaged"):
+        members_hash = archives.digest(path, _MAX_BYTES)
+    if statistics_path is None:
+        return members_hash
+    with statistics_path.open("rb") as file:
+        statistics_hash = hashlib.file_digest(file, "sha256").hexdigest()
+    return hashlib.sha256(f"{members_hash}\0{statistics_hash}".encode()).hexdigest()
 
 
 def load(path: Path, further: Path | None) -> Loaded:

@@ -42,6 +42,27 @@ def rewritten(saved, name, change):
     return saved / "policy.npz"
 
 
+def test_the_hash_is_that_of_what_a_policy_computes(saved):
+    """Compression, times and the type of stored numbers do not count; a bit of a weight does."""
+    path = saved / "policy.npz"
+    before = policies.digest(str(path))
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    np.savez_compressed(path, **dict(reversed(arrays.items())))
+    assert policies.digest(str(path)) == before == network.digest(made())
+    name = next(name for name, array in arrays.items() if array.dtype == np.float32)
+    half = arrays[name].astype(np.float16)
+    digests = set()
+    for numbers in (half, half.astype(np.float32)):
+        np.savez(path, **arrays | {name: numbers})
+        digests.add(policies.digest(str(path)))
+    assert len(digests) == 1 and before not in digests
+    other = arrays[name].copy()
+    other.flat[0] = np.nextafter(other.flat[0], np.inf)
+    np.savez(path, **arrays | {name: other})
+    assert policies.digest(str(path)) not in {before, *digests}
+
+
 def test_what_operators_compute():
     """Every operator, against the same in float64; truth values are 1 and 0."""
     numbers = drawn(1)

@@ -1,6 +1,5 @@
 """What a zip of stable-baselines3 tells without its pickles: its setup, and which statistics belong to it."""
 
-import hashlib
 import importlib.util
 import json
 import sys
@@ -39,7 +38,7 @@ def test_a_library_is_read_by_the_module_of_its_extension(tmp_path, monkeypatch)
     reader = types.ModuleType("reader_of_text")
     reader.NO_SETUP = "says nothing of its robot"
     reader.setup = lambda path: setup if path.read_text() == "tick" else None
-    reader.policy_files = lambda path, further: [path]
+    reader.digest = lambda path, further: path.read_text()
     reader.load = lambda path, further: loaded
     monkeypatch.setitem(sys.modules, reader.__name__, reader)
     monkeypatch.setitem(other_libraries.READERS, ".text", reader.__name__)
@@ -47,7 +46,7 @@ def test_a_library_is_read_by_the_module_of_its_extension(tmp_path, monkeypatch)
     path.write_text("tick")
     assert policies.is_file(str(path)) and policies.setup_of(str(path)) == setup
     assert policies.policy(path, "tick") is loaded
-    assert policies.digest(str(path)) == hashlib.sha256(b"tick").hexdigest()
+    assert policies.digest(str(path)) == "tick"
     assert policies.training_seeds(path) is None
     with refused(f"policy {path}: made for tick, and not for queen"):
         policies.policy(path, "queen")
@@ -87,6 +86,24 @@ def test_statistics_lie_next_to_the_zip(tmp_path, name):
     before = policies.digest(str(path))
     (tmp_path / name).write_text("others")
     assert policies.digest(str(path)) != before
+
+
+def test_the_hash_of_a_zip_is_that_of_its_members(tmp_path):
+    """Times, compression and order of members do not count; names and bytes do."""
+    path = write(tmp_path / "sac.zip", **ON_POLICY)
+    before = policies.digest(str(path))
+    content = {"pytorch_version": b"2", "data": zipfile.ZipFile(path).read("data")}
+
+    def digest(compression, members):
+        with zipfile.ZipFile(path, "w", compression) as archive:
+            for name, member in members.items():
+                archive.writestr(zipfile.ZipInfo(name, (2001, 1, 1, 0, 0, 0)), member, compression)
+        return policies.digest(str(path))
+
+    assert digest(zipfile.ZIP_DEFLATED, {"data": content["data"]}) == before
+    both = digest(zipfile.ZIP_STORED, content)
+    assert both == digest(zipfile.ZIP_DEFLATED, dict(reversed(content.items()))) != before
+    assert digest(zipfile.ZIP_STORED, content | {"pytorch_version": b"3"}) != both
 
 
 def test_only_a_zip_that_was_trained_with_statistics_takes_them(tmp_path):

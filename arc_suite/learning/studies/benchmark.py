@@ -3,15 +3,17 @@
 studies/scores.csv holds a row for each run, by `write`. The table of all learners is made from this file alone.
 """
 
+import contextlib
 import difflib
 import itertools
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from arc_suite import checks, evaluation, files, policies, style
 from arc_suite.envs.setup import Setup
@@ -20,7 +22,8 @@ from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING
 from arc_suite.learning.studies.results import RunResult
 from arc_suite.learning.studies.text_tables import table
-from arc_suite.policies import named, network, other_libraries
+from arc_suite.policies import Policy, frozen, named, network, other_libraries, separate
+from arc_suite.policies.frozen import Frozen
 
 SCORES = "scores.csv"
 CLIP = (-0.5, 1.2)  # bounds of the score of a run
@@ -123,8 +126,12 @@ def score_policies(folder: Path, progress: Callable) -> list[RunScore]:
         ValueError: no policy in the folder, another name, two policies of a place and seed, or one that does not fit.
         OSError: a file cannot be read.
     """
-    bar = progress(_find_policies(folder).items(), desc=str(folder), unit="policy", leave=False)
-    return [_score_policy(path, Setup.of(robot, task), seed) for (robot, task, seed), path in bar]
+    paths_by_run = _find_policies(folder)
+    with contextlib.ExitStack() as stack:
+        has_module = any(path.suffix == named.PYTHON_EXTENSION for path in paths_by_run.values())
+        frozen_folder = stack.enter_context(frozen.freeze(folder)) if has_module else None
+        bar = progress(paths_by_run.items(), desc=str(folder), unit="policy", leave=False)
+        return [_score_policy(path, Setup.of(*place), seed, frozen_folder) for (*place, seed), path in bar]
 
 
 def _find_policies(folder: Path) -> dict[tuple[str, str, int], Path]:
@@ -151,23 +158,48 @@ def _is_policy(path: Path) -> bool:
     return not is_skipped and (path.suffix in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path)))
 
 
-def _score_policy(path: Path, setup: Setup, seed: int) -> RunScore:
-    """Play the protocol's episodes by a policy, and return its score; the seed is that of its training."""
-    environment = setup.load()
-    name = f"{path}:{MAKE}" if path.suffix == named.PYTHON_EXTENSION else path
-    training_seeds = provenance.training_seeds(str(name), range(evaluation.EPISODES))
+def _score_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | None) -> RunScore:
+    """Play the protocol's episodes by a policy, and return its score.
+
+    Args:
+        path: path of the policy.
+        setup: setup of its place.
+        seed: seed of its training.
+        frozen_folder: copy of its folder, which a module needs.
+    """
+    name = f"{path}:{MAKE}" if path.suffix == named.PYTHON_EXTENSION else str(path)
+    training_seeds = provenance.training_seeds(name, range(evaluation.EPISODES))
     notes = provenance.UNKNOWN if training_seeds is None else ""
-    policy = policies.policy(name, setup.body, task=environment.task.definition)
 
     # The first episodes are recorded, as their style is measured.
-    tracks = [style.record(environment, policy, episode_seed) for episode_seed in range(evaluation.CURVE_EPISODES)]
-    further_seeds = range(evaluation.CURVE_EPISODES, evaluation.EPISODES)
-    further_episodes = evaluation.episodes(environment, policy, further_seeds)
-    returns = [track.rewards.sum() for track in tracks] + [episode.total for episode in further_episodes]
+    seeds = range(evaluation.EPISODES)
+    with contextlib.closing(setup.load()) as environment, _acting(path, setup, 1, frozen_folder) as policy:
+        tracks = [style.record(environment, policy, episode) for episode in seeds[: evaluation.CURVE_EPISODES]]
+    returns = [track.rewards.sum() for track in tracks]
+    further_seeds = seeds[evaluation.CURVE_EPISODES :]
+    if further_seeds:
+        environments = setup.make_vec(len(further_seeds), autoreset_mode=AutoresetMode.DISABLED)
+        acting = _acting(path, setup, len(further_seeds), frozen_folder)
+        with contextlib.closing(environments), acting as policy:
+            episodes = evaluation.episodes_in_batch(environments, policy, further_seeds)
+        returns += [episode.total for episode in episodes]
 
     episode_metrics = [style.measure(track) for track in tracks]
     metrics = {metric: np.array([values[metric].value for values in episode_metrics]) for metric in STYLE}
     return _run_score(setup, seed, float(np.mean(returns)), np.nan, metrics, notes)
+
+
+@contextlib.contextmanager
+def _acting(path: Path, setup: Setup, num_envs: int, frozen_folder: Frozen | None) -> Iterator[Policy]:
+    """Make the policy of a file; a module acts in a process of its own, from the copy of its folder."""
+    if path.suffix != named.PYTHON_EXTENSION:
+        yield policies.policy(path, setup.body, num_envs=num_envs, task=setup.definition)
+        return
+    module = frozen_folder.path / path.name
+    sizes = setup.definition.sizes
+    policy = separate.Separate(module, MAKE, setup.body.name, num_envs, sizes, f"policy {path}")
+    with contextlib.closing(policy):
+        yield policy
 
 
 def check_name(name: str) -> None:
