@@ -1,6 +1,7 @@
 """Writes the tables of committed studies into docs/benchmark.md, docs/any_body.md and docs/study.md.
 
-A table stands between the lines <!-- table --> and <!-- end --> of its page.
+A table stands between the lines <!-- table --> and <!-- end --> of its page. docs/benchmark.md has another one, which
+says how often intervals hold the expected score: it is simulated.
 
 Example:
   python tools/page_tables.py
@@ -13,7 +14,7 @@ from studies.pages import table_writer
 
 from arc_suite.cli import program
 from arc_suite.learning.studies import benchmark, results
-from studies import bodies, catalog, claims
+from studies import bodies, catalog, claims, coverage
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -25,10 +26,10 @@ COMPARED_STUDIES = ("exact-tick", "short")
 
 def main() -> None:
     """Write the tables."""
-    for name, make_table in TABLES.items():
-        page = DOCS / f"{name}.md"
-        table_writer(page)(make_table())
-        print(f"wrote {page.relative_to(ROOT)}")
+    for (page_name, table_name), make_table in TABLES.items():
+        page = DOCS / f"{page_name}.md"
+        table_writer(page, table_name)(make_table())
+        print(f"wrote {page.relative_to(ROOT)}: {table_name}")
 
 
 def returns_next_to_the_papers() -> str:
@@ -37,11 +38,12 @@ def returns_next_to_the_papers() -> str:
     return claims.next_to_the_papers(results_of_studies, STEPS)
 
 
-# By name of a page: a function that makes its table.
-TABLES: dict[str, Callable[[], str]] = {
-    "benchmark": lambda: benchmark.text(STUDIES),
-    "any_body": lambda: bodies.text(STUDIES / "bodies.csv"),
-    "study": returns_next_to_the_papers,
+# By names of a page and of its table: a function that makes the table.
+TABLES: dict[tuple[str, str], Callable[[], str]] = {
+    ("benchmark", "coverage"): coverage.text,
+    ("benchmark", "table"): lambda: benchmark.text(STUDIES),
+    ("any_body", "table"): lambda: bodies.text(STUDIES / "bodies.csv"),
+    ("study", "table"): returns_next_to_the_papers,
 }
 
 

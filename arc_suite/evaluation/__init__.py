@@ -14,6 +14,7 @@ from arc_suite.evaluation.protocol import (
 )
 from arc_suite.evaluation.reports import Report, evaluate
 from arc_suite.evaluation.statistics import (
+    MIN_RUNS,
     Curve,
     Summary,
     curve,
@@ -28,6 +29,7 @@ from arc_suite.evaluation.statistics import (
 __all__ = [
     "CURVE_EPISODES",
     "EPISODES",
+    "MIN_RUNS",
     "Curve",
     "EpisodeResult",
     "Report",

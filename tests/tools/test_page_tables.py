@@ -7,10 +7,10 @@ from refusals import refused
 from studies import pages
 
 
-@pytest.mark.parametrize("name", page_tables.TABLES)
-def test_a_page_holds_its_table(name):
-    table = page_tables.TABLES[name]()
-    assert f"<!-- table -->\n\n{table}\n\n<!-- end -->" in (page_tables.DOCS / f"{name}.md").read_text()
+@pytest.mark.parametrize(("page", "name"), page_tables.TABLES)
+def test_a_page_holds_its_table(page, name):
+    table = page_tables.TABLES[page, name]()
+    assert f"<!-- {name} -->\n\n{table}\n\n<!-- end -->" in (page_tables.DOCS / f"{page}.md").read_text()
 
 
 def test_our_returns_stand_next_to_the_papers():
@@ -21,9 +21,11 @@ def test_our_returns_stand_next_to_the_papers():
 
 def test_a_table_replaces_what_stands_between_the_lines(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("# Mine\n\n<!-- table -->\nrows\n<!-- end -->\n")
+    page.write_text("# Mine\n\n<!-- table -->\nrows\n<!-- end -->\n\n<!-- more -->\n<!-- end -->\n")
     pages.table_writer(page)("| a |")
-    assert page.read_text() == "# Mine\n\n<!-- table -->\n\n| a |\n\n<!-- end -->\n"
+    pages.table_writer(page, "more")("| b |")
+    tables = "<!-- table -->\n\n| a |\n\n<!-- end -->\n\n<!-- more -->\n\n| b |\n\n<!-- end -->\n"
+    assert page.read_text() == f"# Mine\n\n{tables}"
 
 
 def test_pages_without_the_lines_are_refused(tmp_path):

@@ -25,16 +25,17 @@ STYLE_METRICS = {  # by the heading of their column
     "torso pitch, rad": "torso_pitch",
 }
 HEADS = (
-    *("robot, task", "algorithm", "phases, updates", "prior data, episodes", "seeds", "return", "score", "IQM [95 %]"),
-    *("metric", *STYLE_METRICS, "steps", "CPU min", "notes", "study", "command of seed 0", "configuration"),
+    *("robot, task", "algorithm", "phases, updates", "prior data, episodes"),
+    *("seeds", "return", "95 %", "of each seed", "score", "metric"),
+    *(*STYLE_METRICS, "steps", "CPU min", "notes", "study", "command of seed 0", "configuration"),
 )
 _TEXT = (
     "All committed studies, written by `python tools/study.py NAME --report`. "
-    "Return: mean over 100 episodes of the latest policy, unless noted. Score: (return - standing still) / (best "
-    "demonstrator - standing still). IQM: interquartile mean with 95 % bootstrap interval over seeds; a single seed "
-    "has none. Then the task's own metric, speed in m/s; headings are relative to the x axis, which is not the "
-    "direction of a command. Runs of one configuration that several studies have are in one row. Phases: the most "
-    "updates of the critics alone; 75,000 are published."
+    "Return: mean over 100 episodes of the latest policy, unless noted; over three seeds or more with a 95 % interval "
+    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still). Then the task's own "
+    "metric, speed in m/s; headings are relative to the x axis, which is not the direction of a command. Runs of one "
+    "configuration that several studies have are in one row. Phases: the most updates of the critics alone; 75,000 "
+    "are published."
 )
 
 
@@ -75,7 +76,7 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
     rows = []
     for _, _, seeds in report.by_kind(groups):
         run = seeds[0].run
-        scores = results.final_returns(seeds)
+        returns = results.final_returns(seeds)
         phase_updates = getattr(run.configuration.hyperparameters, "phase_updates", 0)
         metric = next(iter(seeds[0].progress))
         cells = {
@@ -84,9 +85,10 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
             "phases, updates": f"{phase_updates:,}" if phase_updates else "-",
             "prior data, episodes": f"{run.prior.preset}, {run.prior.episodes:,}" if run.prior else "-",
             "seeds": str(len(seeds)),
-            "return": f"{scores.mean():.1f}",
-            "score": report.score_text(scores, run.place, demonstrators),
-            "IQM [95 %]": report.iqm_text(scores),
+            "return": f"{returns.mean():.1f}",
+            "95 %": report.interval_text(returns),
+            "of each seed": report.list_text(returns),
+            "score": report.score_text(returns, run.place, demonstrators),
             "metric": f"{metric} {np.mean([np.mean(result.progress[metric]) for result in seeds]):.3f}",
             **{head: report.style_text(name, seeds) for head, name in STYLE_METRICS.items()},
             "steps": f"{min(result.steps[-1] for result in seeds):,} of {run.configuration.steps:,}",

@@ -1,4 +1,4 @@
-"""Pages of docs that hold a table between the lines <!-- table --> and <!-- end -->."""
+"""Pages of docs that hold tables, such as between the lines <!-- table --> and <!-- end -->."""
 
 import re
 from collections.abc import Callable
@@ -6,11 +6,13 @@ from pathlib import Path
 
 from arc_suite import files
 
-_MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
+def table_writer(path: Path, name: str = "table") -> Callable[[str], None]:
+    """Return a function that writes a table into a page, between its lines <!-- NAME --> and <!-- end -->.
 
-def table_writer(path: Path) -> Callable[[str], None]:
-    """Return a function that writes a table into a page, between its lines <!-- table --> and <!-- end -->.
+    Args:
+        path: path of the page.
+        name: name of the table in its first line.
 
     Raises:
         ValueError: the page has no such lines.
@@ -18,10 +20,11 @@ def table_writer(path: Path) -> Callable[[str], None]:
     """
     with files.reading(path):
         page = path.read_text(encoding="utf-8")
-    if not _MARKS.search(page):
-        raise ValueError(f"{path}: expected the lines <!-- table --> and <!-- end -->, got none")
+    place = re.compile(rf"(?<=<!-- {re.escape(name)} -->\n).*?(?=<!-- end -->)", re.DOTALL)
+    if not place.search(page):
+        raise ValueError(f"{path}: expected the lines <!-- {name} --> and <!-- end -->, got none")
 
     def write(table: str) -> None:
-        files.write(path, _MARKS.sub(lambda match: f"\n{table}\n\n", page))
+        files.write(path, place.sub(lambda match: f"\n{table}\n\n", page, count=1))
 
     return write

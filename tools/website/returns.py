@@ -16,7 +16,10 @@ from arc_suite.tasks import TASKS
 from studies import leaderboard
 
 ROOT = Path(__file__).parents[2]
-_LEARNER_HEADS = ("robot, task", "algorithm", "seeds", "return", "score", "IQM [95 %]", "metric", "steps", "study")
+_LEARNER_HEADS = (
+    *("robot, task", "algorithm", "seeds", "return", "95 %", "of each seed"),
+    *("score", "metric", "steps", "study"),
+)
 
 
 def demonstrators(robots=tuple(ROBOTS), tasks=tuple(TASKS)) -> str:

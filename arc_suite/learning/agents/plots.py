@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from arc_suite.evaluation import curve
+from arc_suite.evaluation import MIN_RUNS, curve
 
 # Color and marker of an algorithm in all pictures. The paper's six algorithms and PPO have Okabe and Ito's colors, the
 # others have Tol's muted colors. Both palettes are made for color-blind eyes; markers separate similar colors.
@@ -110,7 +110,7 @@ def plot_study(
 ) -> Figure:
     """Draw the learning curves of a study, with a panel for each place: a robot and a task.
 
-    A curve is the interquartile mean over runs, with its 95 % bootstrap interval; of a single run the mean return.
+    A curve is the mean return over runs, with its 95 % interval if there are `MIN_RUNS` runs or more.
 
     Args:
         groups: curves by place and kind of run.
@@ -141,9 +141,9 @@ def plot_study(
 def _draw_curve(axis, kind: str, kind_curve: Curve, style: tuple[str, str], variant: Mapping[str, Any]) -> None:
     """Draw the curve of a kind of run; its style is a color and a marker, and a variant changes the line."""
     color, marker = style
-    robust_means = curve([kind_curve.returns])
-    if len(kind_curve.returns) > 1:
-        axis.fill_between(kind_curve.steps, robust_means.low, robust_means.high, color=color, alpha=0.15, linewidth=0)
+    means = curve([kind_curve.returns])
+    if len(kind_curve.returns) >= MIN_RUNS:
+        axis.fill_between(kind_curve.steps, means.low, means.high, color=color, alpha=0.15, linewidth=0)
     line_style = {
         "color": color,
         "marker": marker,
@@ -151,7 +151,7 @@ def _draw_curve(axis, kind: str, kind_curve: Curve, style: tuple[str, str], vari
         "markevery": _points_per_marker(kind_curve.steps),
         **variant,
     }
-    axis.plot(kind_curve.steps, robust_means.iqm, label=kind, **line_style)
+    axis.plot(kind_curve.steps, means.mean, label=kind, **line_style)
 
 
 def _draw_legend(figure: Figure, axes: np.ndarray, max_columns: int) -> None:

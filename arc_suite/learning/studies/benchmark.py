@@ -296,7 +296,7 @@ def _result_cells(groups: Groups) -> list[str]:
     most_seeds = max(seed_counts)
     seeds = f"{fewest_seeds}" if fewest_seeds == most_seeds else f"{fewest_seeds} to {most_seeds}"
     if len(nonempty_groups) == len(groups):
-        total_cell = _total_text(groups, fewest_seeds)
+        total_cell = _total_text(groups)
     else:
         total_cell = f"{len(nonempty_groups)} of {len(groups)} places"
 
@@ -313,15 +313,24 @@ def _result_cells(groups: Groups) -> list[str]:
         f"{' '.join(lowest_place)} {mean_scores[lowest_place]:z.2f}",
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
         *(f"{_mean_style(name, nonempty_groups):.3f}" for name in STYLE),
-        *(f"{mean_scores[place]:z.2f}" if place in mean_scores else NOT_RUN for place in groups),
+        *(_place_text(scores) for scores in groups.values()),
         _notes_text(groups),
     ]
 
 
-def _total_text(groups: Groups, seeds: int) -> str:
-    """Return the total as text, and its interval if there are two seeds or more."""
+def _total_text(groups: Groups) -> str:
+    """Return the total as text, and its interval if all places have enough seeds."""
     mean, (low, high) = total(groups)
-    return f"{mean:.3f} [{low:.3f}, {high:.3f}]" if seeds > 1 else f"{mean:.3f}"
+    return f"{mean:.3f} [{low:.3f}, {high:.3f}]" if np.isfinite(low) else f"{mean:.3f}"
+
+
+def _place_text(scores: Sequence[RunScore]) -> str:
+    """Return the mean score in a place as text, and the score of each seed if there are several."""
+    if not scores:
+        return NOT_RUN
+    mean = f"{np.mean([score.score for score in scores]):z.2f}"
+    by_seed = sorted(scores, key=lambda score: score.seed)
+    return f"{mean} ({', '.join(f'{score.score:z.2f}' for score in by_seed)})" if len(scores) > 1 else mean
 
 
 def _mean_style(name: str, groups: Groups) -> float:

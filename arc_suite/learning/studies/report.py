@@ -56,14 +56,14 @@ def write(name: str, study: Study, published: Path, further: Sections | None = N
 
 # First paragraphs of the sections.
 _ABOUT_CURVES = (
-    "Interquartile mean over seeds with its 95 % bootstrap interval; of a single seed the mean. Dashed: standing "
-    "still and demonstrators. Dotted: the paper's returns at the last step, from 50,000 on."
+    "Mean over seeds, with its 95 % interval (Student's t) if there are three or more. Dashed: standing still and "
+    "demonstrators. Dotted: the paper's returns at the last step, from 50,000 on."
 )
 _ABOUT_FINALS = (
-    "Mean over 100 seeded episodes of the latest policy, unless noted, and standard deviation over seeds; "
-    "interquartile mean with 95 % bootstrap interval over seeds. A single seed has neither. Score: (return - standing "
-    "still) / (best demonstrator - standing still). The paper's returns are at equal steps, read off its curves "
-    "within about 30. Then come standing still and the demonstrators, with the standard deviation over episodes."
+    "Mean over 100 seeded episodes of the latest policy, unless noted. Over three seeds or more it has a 95 % interval "
+    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still). The paper's returns are "
+    "at equal steps, read off its curves within about 30. Then come standing still and the demonstrators, with the "
+    "standard deviation over episodes."
 )
 _ABOUT_EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
@@ -148,18 +148,15 @@ def _policy_label(name: str) -> str:
     return "standing still" if name == anchors.ZERO else f"demonstrator {name}"
 
 
-def _mean_text(values: np.ndarray) -> str:
-    """Return the mean of values as text, and the standard deviation of two or more."""
-    mean = f"{values.mean():.1f}"
-    return f"{mean} +- {values.std():.1f}" if len(values) > 1 else mean
+def interval_text(values: np.ndarray) -> str:
+    """Return the interval of the mean of returns (seeds,) as text; a dash for too few seeds."""
+    _, (low, high) = evaluation.mean_and_interval([values])
+    return f"[{low:.1f}, {high:.1f}]" if np.isfinite(low) else "-"
 
 
-def iqm_text(values: np.ndarray) -> str:
-    """Return the interquartile mean of returns (seeds,) with its interval as text; a dash for a single seed."""
-    if len(values) == 1:
-        return "-"
-    middle, (low, high) = evaluation.iqm_and_interval([values])
-    return f"{middle:.1f} [{low:.1f}, {high:.1f}]"
+def list_text(values: np.ndarray) -> str:
+    """Return the returns (seeds,) as text."""
+    return ", ".join(f"{value:.1f}" for value in values)
 
 
 def score_text(values: np.ndarray, place: str, demonstrators) -> str:
@@ -197,9 +194,10 @@ def _finals_table(groups: Groups, demonstrators) -> str:
                 kind,
                 f"{steps:,}",
                 str(len(seeds)),
-                _mean_text(final_returns),
+                f"{final_returns.mean():.1f}",
+                interval_text(final_returns),
+                list_text(final_returns),
                 score_text(final_returns, place, demonstrators),
-                iqm_text(final_returns),
                 _paper_return(seeds[0], steps),
                 results.join_notes(seeds),
             )
@@ -212,14 +210,15 @@ def _finals_table(groups: Groups, demonstrators) -> str:
                 _policy_label(name),
                 "-",
                 "-",
-                _mean_text(episode_returns),
-                score_text(episode_returns, place, demonstrators),
+                f"{episode_returns.mean():.1f} +- {episode_returns.std():.1f}",
                 "-",
+                "-",
+                score_text(episode_returns, place, demonstrators),
                 f"{expert_return:.0f}" if is_paper_expert else "-",
                 "".join(results.note_few_episodes(episode_returns)) or "-",
             )
             lines.append(anchor_cells)
-    heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]")
+    heads = ("robot, task", "algorithm", "steps", "seeds", "return", "95 %", "of each seed", "score")
     return table((*heads, "paper, equal steps", "notes"), lines)
 
 

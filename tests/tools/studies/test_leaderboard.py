@@ -31,7 +31,7 @@ def test_the_leaderboard_holds_each_configuration_once(tmp_path, monkeypatch):
     leaderboard.write(tmp_path)
     page = (tmp_path / "README.md").read_text()
     rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| tick")]
-    assert sorted((row[1], row[2], row[4], row[15]) for row in rows) == [
+    assert sorted((row[1], row[2], row[4], row[16]) for row in rows) == [
         ("sac", "-", "2", "[b](b/README.md)"),
         ("speq", "75,000", "1", "[b](b/README.md)"),
         ("speq-short", "7,500", "1", "[b](b/README.md)"),
