@@ -19,7 +19,6 @@ from arc_suite.robots.spec import Body
 POSES_AHEAD = 2  # rows after the end of a cycle, which continue it: a policy sees so many poses ahead
 
 _RETURN_SECONDS = 0.5  # in which a motion that does not loop returns to its first pose
-_SUBFRAMES = 4  # in a control step, by which velocities are measured
 
 # Least spreads: motions in which a joint or a foot rests are not followed more exactly than this.
 _MIN_ANGLE_SPREAD = 0.05  # rad
@@ -134,31 +133,34 @@ class _Table(NamedTuple):
 
 
 def _tabulate(body: Body, loop: Motion, count: int) -> _Table:
-    """Return the table of a loop with a number of rows in a cycle, and with those that continue it."""
-    fine_loop = motions.resample(loop, _SUBFRAMES * count / loop.seconds)
-    fine_velocities = motions.velocities(fine_loop)
-    fine_rows = np.arange(0, _SUBFRAMES * (count + POSES_AHEAD), _SUBFRAMES)
-    frames = motions.repeat(fine_loop, 0, int(fine_rows[-1]) + 1)
-    positions = frames.positions[fine_rows]
-    quaternions = frames.quaternions[fine_rows]
+    """Return the table of a loop with a number of rows in a cycle, and with those that continue it.
+
+    Velocities are differences between rows: motors that get an action a row can follow no faster change.
+    """
+    loop = motions.resample(loop, count / loop.seconds)
+    velocities = motions.velocities(loop)
+    rows = count + POSES_AHEAD
+    frames = motions.repeat(loop, 0, rows)
+    positions = frames.positions
+    quaternions = frames.quaternions
     yaw = np.unwrap(rotations.yaw(quaternions))
-    angles = frames.angles[fine_rows]
+    angles = frames.angles
     legs = Legs.of(body)
     soles = find_soles(legs, positions, quaternions, angles)  # edits of frames may have left `soles` behind
     from_torso = rotations.to_heading_frame((soles - positions[:, None])[..., :2], yaw[:, None])
     center_heights = soles[..., 2:] + legs.radii[:, None]
-    in_cycle = fine_rows % (_SUBFRAMES * count)
-    turns = yaw - yaw[in_cycle // _SUBFRAMES]
-    linear = fine_velocities.linear[in_cycle]
+    in_cycle = np.arange(rows) % count
+    turns = yaw - yaw[in_cycle]
+    linear = velocities.linear[in_cycle]
     ground_velocities = rotations.to_heading_frame(linear[:, :2], -turns)
-    phases = 2.0 * np.pi * np.arange(count + POSES_AHEAD) / count
-    velocities = (ground_velocities, linear[:, 2:], fine_velocities.angular[in_cycle], fine_velocities.joints[in_cycle])
+    phases = 2.0 * np.pi * np.arange(rows) / count
+    columns = (ground_velocities, linear[:, 2:], velocities.angular[in_cycle], velocities.joints[in_cycle])
     return _Table(
         places=np.concatenate([positions[:, :2], yaw[:, None]], axis=-1),
         heights=positions[:, 2],
         quaternions=quaternions,
         angles=angles,
-        velocities=np.concatenate(velocities, axis=-1),
+        velocities=np.concatenate(columns, axis=-1),
         feet=np.concatenate([from_torso, center_heights], axis=-1),
         circle=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
     )

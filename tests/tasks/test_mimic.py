@@ -51,6 +51,17 @@ def test_a_body_starts_in_its_motion_and_moves_as_it_does(motion):
     assert errors.feet < 1e-3  # feet are measured a substep before
 
 
+def test_speeds_are_those_between_control_steps():
+    """A motion that stops within a frame starts no body at a speed that motors cannot stop in a control step."""
+    motion = nod()
+    angles = motion.angles.copy()
+    angles[:, 1] = np.linspace(0.0, 3.0, 31).clip(0.0, 1.5)  # rad: 3 rad/s, then rest
+    environment, _ = opened([motion._replace(angles=angles)])
+    tables = environment.task.definition.unwrapped.tables
+    corner = int(np.argmax(tables.angles[:, 1] > 1.5 - 1e-9))
+    assert tables.velocities[corner, 7] == pytest.approx(1.5, abs=0.05)
+
+
 def test_a_cycle_begins_at_the_place_of_the_body():
     environment, _ = opened()
     count = int(environment.task.definition.unwrapped.tables.counts[0])
