@@ -53,6 +53,19 @@ def test_tasks_with_a_command(task):
     np.testing.assert_allclose(progress["gait_compliance"], expected["gait_compliance"], atol=0.05)
 
 
+@pytest.mark.parametrize(("robot", "task"), [("tick", "mimic"), ("leaper", "recover")])
+def test_motions_and_falls(robot, task):
+    """Under the demonstrators of both tasks."""
+    env, start, step = compiled(robot, task)
+    state, envs, ours, theirs = walked(env, start, step, 50)
+    assert ours.sum(axis=0).mean() == pytest.approx(theirs.sum(axis=0).mean(), rel=0.01)
+    assert not np.asarray(state.done).any()
+    progress, expected = env.task.progress(state.info["memory"]), envs.task.progress
+    assert progress.keys() == expected.keys()
+    for name in progress:  # rad, standing heights, s; whether it is up or fell
+        np.testing.assert_allclose(progress[name].mean(), expected[name].mean(), rtol=0.05, err_msg=name)
+
+
 MODIFIERS = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "friction": (0.5, 1.0), "mass": (0.8, 1.2)}
 MODIFIERS |= {"observation_noise": 1.0, "delay": (0, 3), "actions": "position"}
 
