@@ -1,7 +1,8 @@
 """Writes the tables of committed studies into docs/benchmark.md, docs/any_body.md and docs/study.md.
 
 A table stands between the lines <!-- table --> and <!-- end --> of its page. docs/benchmark.md has another one, which
-says how often intervals hold the expected score: it is simulated.
+says how often intervals hold the expected score: it is simulated. First the scores of the benchmark, in
+studies/scores.csv, are made anew from the tables of its studies.
 
 Example:
   python tools/page_tables.py
@@ -14,6 +15,7 @@ from studies.pages import table_writer
 
 from arc_suite.cli import program
 from arc_suite.learning.studies import benchmark, results
+from arc_suite.learning.studies.divisions import DIVISIONS
 from studies import bodies, catalog, claims, coverage
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -25,11 +27,22 @@ COMPARED_STUDIES = ("exact-tick", "short")
 
 
 def main() -> None:
-    """Write the tables."""
+    """Write the scores and the tables."""
+    write_scores()
     for (page_name, table_name), make_table in TABLES.items():
         page = DOCS / f"{page_name}.md"
         table_writer(page, table_name)(make_table())
         print(f"wrote {page.relative_to(ROOT)}: {table_name}")
+
+
+def write_scores() -> None:
+    """Write the scores of the committed studies of the benchmark; those of policies without a study stay."""
+    for path in sorted(STUDIES.glob(f"*/{results.RUNS}")):
+        name = path.parent.name
+        division, _, learner = name.partition("-")
+        if division in DIVISIONS:
+            run_results = results.read_results(catalog.study(name).runs, path.parent)
+            benchmark.write(STUDIES, division, learner, benchmark.score_results(run_results))
 
 
 def returns_next_to_the_papers() -> str:

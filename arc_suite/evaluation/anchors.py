@@ -62,16 +62,29 @@ class Anchors(NamedTuple):
         return self.zero + score * (self.demonstrator - self.zero)
 
 
-def of_returns(returns_by_policy: Returns) -> Anchors:
-    """Return the anchors of returns by policy, one of which is `zero`."""
+def of_returns(returns_by_policy: Returns, seeds: Sequence[int] = ()) -> Anchors:
+    """Return the anchors of returns by policy, one of which is `zero`.
+
+    Args:
+        returns_by_policy: returns of the episodes from seed 0 on.
+        seeds: seeds of the episodes that are scored, so that anchors are means over the same ones. Empty for means over
+            all episodes, as where some policy has not played these seeds.
+    """
+    fewest_episodes = min(returns.size for returns in returns_by_policy.values())
+    if len(seeds) and min(seeds) >= 0 and max(seeds) < fewest_episodes:
+        returns_by_policy = {name: returns[list(seeds)] for name, returns in returns_by_policy.items()}
     means = {name: float(returns.mean()) for name, returns in returns_by_policy.items()}
     zero = means.pop(ZERO)
     best = max(means, key=means.__getitem__, default=None)
     return Anchors(zero, None if best is None else means[best], best)
 
 
-def anchors(setup: Setup) -> Anchors:
+def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
     """Return the anchors of a robot, a task and settings; those that are not committed are measured.
+
+    Args:
+        setup: robot, task and settings.
+        seeds: seeds of the episodes that are scored, see `of_returns`.
 
     Raises:
         ValueError: a setting of the task that does not fit, or episodes that need not end.
@@ -81,7 +94,7 @@ def anchors(setup: Setup) -> Anchors:
     returns_by_policy = committed_returns(setup)
     if returns_by_policy is None:
         returns_by_policy = measure_returns(setup)
-    return of_returns(returns_by_policy)
+    return of_returns(returns_by_policy, seeds)
 
 
 @functools.lru_cache(maxsize=16)

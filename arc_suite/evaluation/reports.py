@@ -193,7 +193,7 @@ def report(
     anchor_returns = anchors.committed_returns(setup)
     score = None
     if anchor_returns is not None:
-        score = float(anchors.of_returns(anchor_returns).score(returns.mean))
+        score = float(anchors.of_returns(anchor_returns, seeds).score(returns.mean))
     metrics = episodes[0].progress
     return Report(
         setup=setup,

@@ -143,7 +143,7 @@ def test_standing_still_has_score_0(tmp_path):
     report = json.loads(path.read_text())["robots"]["tick"]
     assert abs(float(lines[-1].split()[8])) < 0.02
     setup = Setup.of("tick")
-    scale = anchors.anchors(setup)
+    scale = anchors.anchors(setup, range(2))
     assert report["zero_return"] == pytest.approx(anchors.committed_returns(setup)["zero"][:2].mean())
     assert report["score"] == pytest.approx(scale.score(report["return"]["mean"]))
 

@@ -12,12 +12,12 @@ from arc_suite.learning.agents.configuration import Configuration
 
 def test_the_return_of_a_score():
     run = Configuration.of(Setup.of("tick", "walk"))
-    scale = anchors.anchors(run.setup)
+    scale = anchors.anchors(run.setup, range(10))  # those of the episodes that evaluate
     assert outcomes.return_of_score(run, 0.5) == pytest.approx((scale.zero + scale.demonstrator) / 2.0)
 
 
 def test_a_task_without_a_demonstrator_has_no_scores(monkeypatch):
-    monkeypatch.setattr(anchors, "anchors", lambda setup: anchors.Anchors(1628.0))
+    monkeypatch.setattr(anchors, "anchors", lambda *_: anchors.Anchors(1628.0))
     what = "expected a task with a demonstrator that earns more than standing still"
     with refused(f"score 0.9: {what}, got tick, walk"):
         outcomes.return_of_score(Configuration.of(Setup.of("tick", "walk")), 0.9)

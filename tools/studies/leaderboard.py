@@ -32,10 +32,11 @@ HEADS = (
 _TEXT = (
     "All committed studies, written by `python tools/study.py NAME --report`. "
     "Return: mean over 100 episodes of the latest policy, unless noted; over three seeds or more with a 95 % interval "
-    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still). Then the task's own "
-    "metric, speed in m/s; headings are relative to the x axis, which is not the direction of a command. Runs of one "
-    "configuration that several studies have are in one row. Phases: the most updates of the critics alone; 75,000 "
-    "are published."
+    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same "
+    "episodes. Then the task's own metric, speed in m/s; headings are relative to the x axis, which is not the "
+    "direction of a command. Runs of one configuration that several studies have are in one row. Phases: the most "
+    "updates of the critics alone; 75,000 are published. Earlier model: the body or the ground has changed since the "
+    "run, so that the command gives another return."
 )
 
 
@@ -88,7 +89,7 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
             "return": f"{returns.mean():.1f}",
             "95 %": report.interval_text(returns),
             "of each seed": report.list_text(returns),
-            "score": report.score_text(returns, run.place, demonstrators),
+            "score": report.score_text(seeds, demonstrators),
             "metric": f"{metric} {np.mean([np.mean(result.progress[metric]) for result in seeds]):.3f}",
             **{head: report.style_text(name, seeds) for head, name in STYLE_METRICS.items()},
             "steps": f"{min(result.steps[-1] for result in seeds):,} of {run.configuration.steps:,}",

@@ -53,6 +53,7 @@ class RunScore(NamedTuple):
         gait_compliance: mean over ten episodes.
         heading_error: mean size over ten episodes, rad; NaN for tasks of `TURNING`.
         notes: reasons why the score is not comparable with others; empty without any.
+        model_sha256: hash of the model in which the run learned, or in which a policy was judged; empty if unknown.
     """
 
     robot: str
@@ -64,6 +65,7 @@ class RunScore(NamedTuple):
     gait_compliance: float
     heading_error: float
     notes: str = ""
+    model_sha256: str = ""
 
 
 COLUMNS = ("division", "learner", *RunScore._fields)  # columns of `SCORES`
@@ -77,27 +79,35 @@ def score_results(run_results: Iterable[RunResult]) -> list[RunScore]:
 
 def _score_result(result: RunResult) -> RunScore:
     setup = result.run.configuration.setup
-    curve_scores = anchors.anchors(setup).score(result.returns.mean(axis=1))
+    curve_scores = anchors.anchors(setup, result.curve_seeds).score(result.returns.mean(axis=1))
     reaching = np.flatnonzero(curve_scores >= HALF)
     minutes = result.cpu[reaching[0]] / 60.0 if reaching.size else np.inf
     notes = "; ".join(result.notes)
-    return _run_score(setup, result.run.configuration.seed, result.final, minutes, result.style, notes)
+    score = anchors.anchors(setup, result.seeds).score(result.final)
+    run_score = _run_score(setup, result.run.configuration.seed, result.final, score, minutes, result.style, notes)
+    return run_score._replace(model_sha256=result.model_sha256)
 
 
 def _run_score(
-    setup: Setup, seed: int, mean_return: float, minutes: float, metrics: Mapping[str, np.ndarray], notes: str
+    setup: Setup,
+    seed: int,
+    mean_return: float,
+    score: float,
+    minutes: float,
+    metrics: Mapping[str, np.ndarray],
+    notes: str,
 ) -> RunScore:
-    """Return the score of a run.
+    """Return the score of a run in the model that the code makes now.
 
     Args:
         setup: setup of the run.
         seed: seed of the run.
         mean_return: mean return of the protocol's episodes.
+        score: score of this return.
         minutes: CPU time until the score `HALF`.
         metrics: metrics of style by name, each (episodes,).
         notes: notes on the score.
     """
-    score = anchors.anchors(setup).score(mean_return)
     return RunScore(
         robot=setup.name,
         task=setup.kind.name,
@@ -108,6 +118,7 @@ def _run_score(
         gait_compliance=results.mean_size(metrics["gait_compliance"]),
         heading_error=np.nan if setup.kind.name in TURNING else results.mean_size(metrics["heading_error"]),
         notes=notes,
+        model_sha256=results.hash_model(setup),
     )
 
 
@@ -186,7 +197,8 @@ def _score_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | N
 
     episode_metrics = [style.measure(track) for track in tracks]
     metrics = {metric: np.array([values[metric].value for values in episode_metrics]) for metric in STYLE}
-    return _run_score(setup, seed, float(np.mean(returns)), np.nan, metrics, notes)
+    score = anchors.anchors(setup, range(evaluation.EPISODES)).score(np.mean(returns))
+    return _run_score(setup, seed, float(np.mean(returns)), score, np.nan, metrics, notes)
 
 
 @contextlib.contextmanager
@@ -241,9 +253,9 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     """
     scores_by_learner: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
-        division, learner, robot, task, seed, *cells, notes = row.values()
+        division, learner, robot, task, seed, *cells, notes, model_sha256 = row.values()
         checks.name(division, DIVISIONS, "division")
-        score = RunScore(robot, task, int(seed), *map(float, cells), notes)
+        score = RunScore(robot, task, int(seed), *map(float, cells), notes, model_sha256)
         if np.isinf((score.result, score.score)).any():
             raise ValueError(f"{studies / SCORES}: expected finite returns and scores, got {', '.join(cells)[:100]}")
         scores_by_learner.setdefault((division, learner), []).append(score)
@@ -351,4 +363,6 @@ def _notes_text(groups: Groups) -> str:
     for scores in groups.values():
         for score in scores:
             notes += [note for note in score.notes.split("; ") if note]
+    models = [(Setup.of(*place), score.model_sha256) for place, scores in groups.items() for score in scores]
+    notes += results.note_earlier_models(models)
     return "; ".join(dict.fromkeys(notes)) or "-"

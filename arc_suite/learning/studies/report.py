@@ -61,9 +61,10 @@ _ABOUT_CURVES = (
 )
 _ABOUT_FINALS = (
     "Mean over 100 seeded episodes of the latest policy, unless noted. Over three seeds or more it has a 95 % interval "
-    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still). The paper's returns are "
-    "at equal steps, read off its curves within about 30. Then come standing still and the demonstrators, with the "
-    "standard deviation over episodes."
+    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same episodes. "
+    "Earlier model: the body or the ground has changed since the run. The paper's returns are at equal steps, read off "
+    "its curves within about 30. Then come standing still and the demonstrators, with the standard deviation over "
+    "episodes."
 )
 _ABOUT_EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
@@ -159,17 +160,23 @@ def list_text(values: np.ndarray) -> str:
     return ", ".join(f"{value:.1f}" for value in values)
 
 
-def score_text(values: np.ndarray, place: str, demonstrators) -> str:
-    """Return the score of the mean return as text; a dash without anchors.
+def score_text(seeds: Sequence[RunResult], demonstrators) -> str:
+    """Return the mean score of the latest policies in a place as text; a dash without anchors.
+
+    Anchors are means over the episodes that a policy has played.
 
     Args:
-        values: returns in a place.
-        place: place, see `Run.place`.
+        seeds: results in a place.
         demonstrators: anchors of the study, see `results.read_demonstrators`.
     """
-    if place not in demonstrators:
+    returns_by_policy = demonstrators.get(seeds[0].run.place)
+    if returns_by_policy is None:
         return "-"
-    score = anchors.of_returns(demonstrators[place]).score(values.mean())
+    scores = [anchors.of_returns(returns_by_policy, result.seeds).score(result.final) for result in seeds]
+    return _format_score(np.mean(scores))
+
+
+def _format_score(score: float) -> str:
     return f"{score:z.2f}" if np.isfinite(score) else "-"
 
 
@@ -197,7 +204,7 @@ def _finals_table(groups: Groups, demonstrators) -> str:
                 f"{final_returns.mean():.1f}",
                 interval_text(final_returns),
                 list_text(final_returns),
-                score_text(final_returns, place, demonstrators),
+                score_text(seeds, demonstrators),
                 _paper_return(seeds[0], steps),
                 results.join_notes(seeds),
             )
@@ -213,7 +220,7 @@ def _finals_table(groups: Groups, demonstrators) -> str:
                 f"{episode_returns.mean():.1f} +- {episode_returns.std():.1f}",
                 "-",
                 "-",
-                score_text(episode_returns, place, demonstrators),
+                _format_score(anchors.of_returns(demonstrators[place]).score(episode_returns.mean())),
                 f"{expert_return:.0f}" if is_paper_expert else "-",
                 "".join(results.note_few_episodes(episode_returns)) or "-",
             )
@@ -226,7 +233,9 @@ def _efficiency_table(groups: Groups, demonstrators) -> str:
     """Return the table of steps and CPU time until two returns."""
     lines = []
     for place, kind, seeds in by_kind(groups):
-        half_score = anchors.of_returns(demonstrators[place]).at(0.5) if place in demonstrators else np.inf
+        half_score = np.inf
+        if place in demonstrators:
+            half_score = anchors.of_returns(demonstrators[place], seeds[0].curve_seeds).at(0.5)
         cells = []
         for threshold in (half_score, 3500.0):
             steps, seconds = results.cost_of_return(seeds, threshold)

@@ -1,5 +1,6 @@
 """Results of studies: the published tables of their runs, and statistics over them."""
 
+import functools
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import evaluation, parsers
+from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, provenance
 from arc_suite.evaluation.published import CURVES
 from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, PROVENANCE_FIELDS, TRAINING_SEEDS
@@ -29,6 +31,7 @@ _NOT_METRICS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of
 # Notes on a final return.
 SHARED_SEEDS = "data share seeds with evaluation"
 TEN_EPISODES = "ten episodes"
+EARLIER_MODEL = "earlier model"
 
 
 class RunResult(NamedTuple):
@@ -44,6 +47,8 @@ class RunResult(NamedTuple):
         style: metrics of style of the latest policy by name, each (episodes,).
         phases: (phases,) updates of each stabilization phase; empty if they are not published.
         training_seeds: seeds of the episodes that the run learned from; None if they are unknown.
+        seeds: seeds of the episodes of `finals`; the first ones are those of the curve. Empty if they are unknown.
+        model_sha256: hash of the model in which the run learned; empty if it is unknown.
     """
 
     run: Run
@@ -55,6 +60,13 @@ class RunResult(NamedTuple):
     style: dict[str, np.ndarray]
     phases: np.ndarray
     training_seeds: Ranges | None = ()
+    seeds: Sequence[int] = ()
+    model_sha256: str = ""
+
+    @property
+    def curve_seeds(self) -> Sequence[int]:
+        """Seeds of the episodes of `returns`."""
+        return self.seeds[: evaluation.CURVE_EPISODES]
 
     @property
     def final(self) -> float:
@@ -137,6 +149,8 @@ def _result(run: Run, episodes: Sequence[Mapping[str, str]], run_row: Mapping[st
         style=style,
         phases=np.array(list(updates_by_step.values())),
         training_seeds=from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
+        seeds=[int(row["seed"]) for row in latest],
+        model_sha256=run_row["model_sha256"],
     )
 
 
@@ -176,9 +190,28 @@ def note_few_episodes(returns: np.ndarray) -> tuple[str, ...]:
     return (TEN_EPISODES,) if len(returns) < evaluation.EPISODES else ()
 
 
-def join_notes(seeds: Iterable[RunResult]) -> str:
+def note_earlier_models(models: Iterable[tuple[Setup, str]]) -> tuple[str, ...]:
+    """Return a note if runs learned in another model than the code makes now; none otherwise.
+
+    Args:
+        models: setup of each run, and the hash of its model; empty if it is unknown.
+    """
+    are_earlier = [model not in ("", hash_model(setup)) for setup, model in models]
+    if not any(are_earlier):
+        return ()
+    return (EARLIER_MODEL if all(are_earlier) else f"{EARLIER_MODEL}: {sum(are_earlier)} of {len(are_earlier)} runs",)
+
+
+@functools.cache
+def hash_model(setup: Setup) -> str:
+    """Return the hash of the model of a setup, as the code makes it now; empty for several bodies."""
+    return setup.provenance().get("model_sha256", "")
+
+
+def join_notes(seeds: Sequence[RunResult]) -> str:
     """Return the notes of all results without repetitions; a dash without any."""
     notes = [note for result in seeds for note in result.notes]
+    notes += note_earlier_models((result.run.configuration.setup, result.model_sha256) for result in seeds)
     return "; ".join(dict.fromkeys(notes)) or "-"
 
 

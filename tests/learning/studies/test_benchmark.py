@@ -11,6 +11,7 @@ import pytest
 from refusals import refused
 
 from arc_suite import evaluation
+from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.studies import benchmark, csv_files, results, tables
 from arc_suite.learning.studies.benchmark import RunScore
@@ -84,10 +85,17 @@ def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
     (score,) = benchmark.score_results([result([0.6, 0.4])])
     assert (score.robot, score.task, score.seed) == ("tick", "walk", 0)
     assert score.result == pytest.approx(scale().at(0.4)) and score.score == pytest.approx(0.4)
-    assert score.minutes == 1.0
+    assert score.minutes == 1.0 and score.notes == "ten episodes"
     assert (score.gait_compliance, score.heading_error) == (pytest.approx(0.9), pytest.approx(0.2))
     (slow,) = benchmark.score_results([result([0.1, 0.4], seed=1)])
     assert slow.minutes == np.inf and slow.seed == 1
+
+
+def test_scores_of_ten_episodes_are_those_of_their_seeds():
+    """In the first ten episodes of `steer`, Tick earns more by standing than in all hundred."""
+    unpaired = result([0.0, 0.0], task="steer")._replace(finals=np.full(10, 1547.4))
+    paired = unpaired._replace(seeds=range(10))
+    assert [round(score.score, 3) for score in benchmark.score_results([unpaired, paired])] == [0.154, 0.095]
 
 
 def test_scores_are_clipped_and_unfinished_runs_have_none():
@@ -163,6 +171,21 @@ def test_notes_of_scores_stand_in_the_table_once(tmp_path):
     noted = [each._replace(notes="training data unknown") for each in complete({})[:2]]
     benchmark.write(tmp_path, "top", "theirs", [*noted, *complete({})[2:]])
     assert row(benchmark.text(tmp_path), "theirs")[-1] == "training data unknown"
+
+
+def test_runs_of_an_earlier_model_are_noted(tmp_path):
+    """A run commits the hash of its model, and the table compares it with that of the code."""
+    (now,) = benchmark.score_results([result([0.1, 0.2])._replace(model_sha256=results.hash_model(Setup.of("tick")))])
+    (earlier,) = benchmark.score_results([result([0.1, 0.2], seed=1)._replace(model_sha256="0" * 64)])
+    unknown = score(("tick", "walk"), 2, 0.2)
+    few = "10 of 10 places have fewer than 3 seeds"
+    for scores, note in (
+        ([now, unknown], ""),
+        ([now, earlier], "; earlier model: 1 of 2 runs"),
+        ([earlier], "; earlier model"),
+    ):
+        benchmark.write(tmp_path, "samples", "mine", [each._replace(notes="") for each in scores])
+        assert row(benchmark.text(tmp_path), "mine")[-1] == few + note
 
 
 def test_places_with_more_seeds_weigh_no_more(tmp_path):
@@ -306,4 +329,4 @@ def test_a_track_is_run_and_resumed(tmp_path):
 def test_committed_scores_are_those_of_committed_results(name):
     expected = benchmark.score_results(results.read_results(tables.study(name).runs, COMMITTED / name))
     for one, other in zip(benchmark.read(COMMITTED)[tuple(name.split("-", 1))], expected, strict=True):
-        assert one[:3] == other[:3] and one[3:] == pytest.approx(other[3:], nan_ok=True)
+        assert one[:3] == other[:3] and one[3:8] == pytest.approx(other[3:8], nan_ok=True) and one[8:] == other[8:]
