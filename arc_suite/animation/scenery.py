@@ -21,9 +21,8 @@ _FLOOR_PREFIX = "floor"  # of the names of geoms of the ground and of obstacles
 def describe_scenery(track: Track) -> dict[str, Any]:
     """Return the scenery of an episode; lengths are in m and the world's axes.
 
-    The episode is started again by its seed, which places the obstacles. It is replayed by its actions for the debug
-    markers. They end where the replay differs from the recording, for example with weak motors, as the recorded actions
-    are the applied ones.
+    The episode is started again by its seed, which places the obstacles. It is replayed by the controls that the motors
+    had, for the debug markers. They end where the replay differs from the recording, for example of another version.
 
     Returns:
         A dictionary:
@@ -142,19 +141,29 @@ def _has_marks_or_failures(task) -> bool:
 
 
 def _replay(environment, track: Track) -> _Replay:
-    """Return what an episode shows until it differs from its track, given its environment at the start."""
+    """Return what an episode shows until it differs from its track, given its environment at the start.
+
+    A track has the controls of the motors, and not the actions that they come from.
+    """
     task = environment.task
+    physics = environment.physics
+    joints = len(track.body.joint_names)
+    substeps = task.definition.scene.substeps
     part_names_of_leg = {leg.name: leg.part_names for leg in track.body.legs}
     max_error = _MAX_REPLAY_ERROR * track.body.torso.standing_height
     styles: dict[_Style, int] = {}
     marks = []
     failed = []
-    for action, recorded_position in zip(track.actions, track.positions, strict=True):
-        environment.step(action)
-        torso_position = readings.torso_qpos(environment.physics.data.qpos, task.definition.scene.layout)[:3]
+    for control, recorded_position in zip(track.actions, track.positions, strict=True):
+        # An action passes through delays, positions and weak motors; what was recorded has passed through them.
+        task.before_step(np.zeros(joints), physics)
+        physics.data.ctrl[:joints] = control
+        physics.step(substeps)
+        task.after_step(physics)
+        torso_position = readings.torso_qpos(physics.data.qpos, task.definition.scene.layout)[:3]
         if abs(torso_position - recorded_position).max() > max_error:
             break
-        marks.append(_describe_marks(task.markers(environment.physics), styles))
+        marks.append(_describe_marks(task.markers(physics), styles))
         failed.append([name for leg in task.failed_legs() for name in part_names_of_leg[leg]])
     return _Replay(
         styles=[{"shape": style.shape, "radius": style.radius, "color": style.color} for style in styles],

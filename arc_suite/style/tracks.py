@@ -22,7 +22,7 @@ class Track(NamedTuple):
 
     Attributes:
         setup: body, task and settings.
-        seed: seed of the episode; the actions repeat it, unless motors were weak or actions late.
+        seed: seed of the episode; the actions repeat it where motors take them as they are.
         time_step: s between rows.
         positions: (steps, 3) positions of the torso.
         quaternions: (steps, 4) quaternions of the torso, w first.

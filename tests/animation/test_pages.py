@@ -62,10 +62,11 @@ def test_a_page_holds_the_tracks(bundle, tracks):
     assert pages.page(tracks) == page
 
 
-def scenery_of(task, settings, steps, preset="steered"):
+def scenery_of(task, settings, steps, preset=None):
     """The scenery of an episode, and the environment where it ended."""
     environment = arc_suite.load("tick", task, {"random": 0, **settings})
-    track = record(environment, policy("cpg", "tick", preset), 3, steps)
+    task = environment.task.definition
+    track = record(environment, policy("cpg", "tick", preset, task=task), 3, steps)
     return scenery.describe_scenery(track), environment
 
 
@@ -122,10 +123,41 @@ def test_kicks_and_failed_legs_come_along():
     assert found["failed"][FAILS_FROM] == [leg.full_name(part) for part in (*leg.links, leg.foot)]
 
 
-def test_marks_end_where_actions_do_not_repeat_the_episode():
-    """Actions are recorded as motors of a third of their strength apply them: repeated, they are a ninth."""
-    found, _ = scenery_of("steer", {"motor_strength": 1.0 / 3.0}, 12)
-    assert len(found["marks"]) < 6
+@pytest.mark.parametrize(
+    ("task", "settings"),
+    [
+        ("mimic", {}),  # whose actions are positions about the motion
+        ("steer", {"motor_strength": 1.0 / 3.0}),
+        ("steer", {"delay": 2, "actions": "position"}),
+    ],
+)
+def test_marks_go_on_where_motors_get_something_else_than_the_action(task, settings):
+    found, environment = scenery_of(task, settings, 8)
+    assert len(found["marks"]) == 8
+    wanted = environment.task.markers(environment.physics)
+    assert len(found["marks"][-1]) == len(wanted)
+    for (style, *ends), mark in zip(found["marks"][-1], wanted, strict=True):
+        assert found["styles"][style] == {"shape": mark.shape, "radius": mark.radius, "color": tuple(mark.color)}
+        np.testing.assert_allclose(ends, [*mark.start, *mark.end], atol=1e-12)
+
+
+def test_the_page_of_mimic_shows_the_motion_beside_the_body(bundle):
+    environment = arc_suite.load("tick", "mimic", {"random": 0})
+    task = environment.task.definition
+    track = record(environment, policy("cpg", "tick", task=task), 0, 5)
+    (walk,) = data_of(pages.page({"tick": track}))
+    for marks, position in zip(walk["scenery"]["marks"], track.positions, strict=True):
+        torso, *links = marks
+        assert len(links) == sum(len(leg.links) for leg in task.scene.body.legs)
+        middle = 0.5 * (np.array(torso[1:4]) + torso[4:])
+        assert middle[1] - position[1] > task.scene.body.torso.standing_height
+        assert len({style for style, *_ in marks}) == len(marks)
+
+
+def test_marks_end_where_a_replay_differs():
+    track = record(arc_suite.load("tick", "steer", {"random": 0}), policy("cpg", "tick", "steered"), 3, 8)
+    moved = track._replace(positions=track.positions + np.arange(8)[:, None] // 5)
+    assert len(scenery.describe_scenery(moved)["marks"]) == 5
 
 
 def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_package(tmp_path, monkeypatch):
