@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, registry
+from arc_suite import checks, registry, usage
 from arc_suite.cpg.law import proprioception, read_blocks, restart_where
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset
@@ -111,8 +111,10 @@ class Demonstrator:
             (environments, joints) in [-1, 1], or (joints,).
 
         Raises:
-            ValueError: an observation without named blocks, of another body, or without a block of the law.
+            ValueError: an observation without named blocks, of another body, or without a block of the law; or a
+                run learns that declares no demonstrator as its source.
         """
+        usage.add_source(usage.DEMONSTRATOR)
         blocks = read_blocks(observation, self._reads, len(self._body.joint_names), len(self._body.part_names))
         is_one_environment = blocks["posture"].ndim == 1
         if is_one_environment:

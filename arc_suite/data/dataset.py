@@ -9,7 +9,7 @@ from typing import Any
 
 import h5py
 
-from arc_suite import checks, files, parsers
+from arc_suite import checks, files, parsers, usage
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import DatasetSettings
@@ -30,8 +30,9 @@ def open(dataset_id: str) -> "Dataset":
 
     Raises:
         ValueError: no such dataset, one that is damaged or not of this suite, or one that needs a module
-            which has not been imported.
+            which has not been imported; or a run learns that declares no prior data as its source.
     """
+    usage.add_source(usage.PRIOR_DATA)
     return Dataset(dataset_id, ids.find(dataset_id))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from dm_control.rl import control
 from dm_env import specs
 
-from arc_suite import checks
+from arc_suite import checks, usage
 from arc_suite.envs import snapshots, trees
 from arc_suite.envs.calls import (
     KnownAttributes,
@@ -123,6 +123,8 @@ class Environment(KnownAttributes, control.Environment):
         A fall terminates the episode, in its last possible step, too: its discount is 0.
         """
         timestep = super().step(action)
+        if not timestep.first():
+            usage.count_steps(1)
         # dm_control does not ask the task in the step of the time limit.
         if timestep.last() and timestep.discount and self.task.has_failed(self.physics):
             return timestep._replace(discount=0.0)
@@ -215,7 +217,7 @@ class Environment(KnownAttributes, control.Environment):
             RuntimeError: another thread is at work in the environment.
         """
         if seed is not None:
-            self.task.random = np.random.RandomState(checks.seed(seed))
+            self.task.random = _begin_stream(seed)
         return super().reset()
 
     def command(self, name: str, value) -> None:
@@ -291,7 +293,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             ValueError: an unknown `on_divergence`, or a seed that is not valid.
         """
         if not isinstance(random, np.random.RandomState):
-            random = np.random.RandomState(None if random is None else checks.seed(random))
+            random = _begin_stream(random)
         self.definition = task
         self.opened = task
         self._next_task = task
@@ -570,3 +572,16 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._now.memory = self.definition.begin(self._now.memory, readings)
         self._now.readings = None
         return readings
+
+
+def _begin_stream(seed: int | None) -> np.random.RandomState:
+    """Return the generator of a stream of episodes; of a random one for None.
+
+    Raises:
+        ValueError: a seed that is not valid, or one that the run that learns may not play.
+    """
+    if seed is None:
+        return np.random.RandomState()
+    valid_seed = checks.seed(seed)
+    usage.check_seeds([valid_seed])
+    return np.random.RandomState(valid_seed)

@@ -12,7 +12,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from arc_suite import checks
+from arc_suite import checks, usage
 from arc_suite.envs import snapshots, stacked, trees
 from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import (
@@ -280,6 +280,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         memory_of_inputs, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
         self._write_inputs(inputs, is_stepping)
         has_diverged = self.batch.step(task.scene.substeps, is_stepping)
+        usage.count_steps(int(np.count_nonzero(is_stepping)))
         readings = task.read(self.batch.data)
         memory = trees.where(is_stepping, task.after(memory_of_inputs, readings), earlier_memory)
         self._memory = memory
@@ -687,7 +688,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
     def _begin_streams(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         """Start new streams of random numbers in some environments (num_envs,), except those whose seed is None."""
-        for index in np.flatnonzero(mask).tolist():
+        indices = np.flatnonzero(mask).tolist()
+        usage.check_seeds(seeds[index] for index in indices)
+        for index in indices:
             if seeds[index] is not None:
                 self._randoms[index] = np.random.RandomState(seeds[index])
                 self._stream_seeds[index] = seeds[index]

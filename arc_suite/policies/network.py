@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import archives, checks, files, parsers, registry, seed_ranges
+from arc_suite import archives, checks, files, parsers, registry, seed_ranges, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.policies.graph import Graph, Node, check_graph
 
@@ -129,9 +129,11 @@ def load(path: str | os.PathLike) -> Network:
     """Read a policy file, or that of a run's folder; nothing that it names is imported.
 
     Raises:
-        ValueError: a damaged file, or a robot, task or arena whose module has not been imported.
+        ValueError: a damaged file, or a robot, task or arena whose module has not been imported; or a run learns that
+            declares no policy as its source.
         OSError: it cannot be read.
     """
+    usage.add_source(usage.POLICY)
     path = Path(path)
     if path.is_dir():
         path = path / FILE

@@ -6,10 +6,10 @@ used, as they need JAX. A learner is a function, a training script that reads fr
 
     learn(hp, context) -> Iterator[Slice]
 
-`context` (a `learner.RunContext`) says what is learned and makes environments. Each `learner.Slice` has the
-environment steps so far, metrics for training.csv, the policy, and the arrays of a checkpoint. A slice ends at the
-latest where the next evaluation is due. `context.checkpoint` has the arrays of an earlier slice: learning resumes
-from them bit-exactly.
+`context` (a `learner.RunContext`) says what is learned and makes environments, which count the steps of the run
+(`arc_suite.usage`). Each `learner.Slice` has metrics for training.csv, the policy, and the arrays of a checkpoint. A
+slice ends at the latest where the next evaluation is due. `context.checkpoint` has the arrays of an earlier slice:
+learning resumes from them bit-exactly.
 
 `training.train` does the rest: it evaluates, writes the folder of the run, and resumes. All random numbers come from
 generators seeded by the run's seed, a purpose and a count (`learner.generator`), so checkpoints need no random state.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from arc_suite import checks, registry, versions
+from arc_suite import checks, registry, usage, versions
 from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.hyperparameters import (
@@ -31,10 +31,10 @@ class Algorithm(NamedTuple):
         steps: environment steps of a run, by default.
         terrain_steps: environment steps of a run in any arena except the flat one, by default; None for `steps`.
         extends: whether a run can be extended to more steps, as no schedule depends on them.
-        source: what it learns from in addition to its own steps: "nothing", "prior data", "a demonstrator" or
-            "a policy".
+        source: what it learns from in addition to its own steps, one of `usage.SOURCES`: "nothing", "prior data",
+            "a demonstrator", "a policy" or "unknown". The use of another one ends a run.
         several: whether it can learn with several bodies.
-        acts: whether it steps environments.
+        acts: whether it steps environments; if not, it counts updates, see `RunContext.count_steps`.
     """
 
     learn: Callable[[Any, Any], Iterator[Any]]
@@ -44,7 +44,7 @@ class Algorithm(NamedTuple):
     steps: int = 1_000_000
     terrain_steps: int | None = None
     extends: bool = False
-    source: str = "nothing"
+    source: str = usage.UNKNOWN
     several: bool = False
     acts: bool = True
 
@@ -198,11 +198,11 @@ def stays_on_device(hp) -> bool:
 
 
 # Kinds of algorithms; the further arguments of each are its hyperparameters and its summary.
-_off_policy = functools.partial(Algorithm, _learn, extends=True)
-_with_prior = functools.partial(_off_policy, source="prior data")
-_on_policy = functools.partial(Algorithm, _learn, several=True)
-_finetune = functools.partial(_on_policy, source="a policy")
-_dagger = functools.partial(Algorithm, _learn, source="a demonstrator", several=True)
+_off_policy = functools.partial(Algorithm, _learn, extends=True, source=usage.NOTHING)
+_with_prior = functools.partial(_off_policy, source=usage.PRIOR_DATA)
+_on_policy = functools.partial(Algorithm, _learn, several=True, source=usage.NOTHING)
+_finetune = functools.partial(_on_policy, source=usage.POLICY)
+_dagger = functools.partial(Algorithm, _learn, source=usage.DEMONSTRATOR, several=True)
 
 # First the six algorithms of the ARC-RL paper, as in its published code, then others: docs/agents.md.
 ALGORITHMS = {
@@ -295,7 +295,7 @@ ALGORITHMS = {
         "behavior cloning of a dataset",
         evaluate_every=2500,
         steps=5000,
-        source="prior data",
+        source=usage.PRIOR_DATA,
         acts=False,
     ),
 }

@@ -61,9 +61,10 @@ def learn(hp: BehaviorCloning, context: RunContext) -> Iterator[Slice]:
             )
             errors.append(float(error))
             step += updates
+            context.count_steps(updates)
         checkpoint = {**networks.flatten_tree("state", state), "step": np.array(step)}
         graph = architectures.policy_graph(architecture, normalize, state.layers)
-        yield Slice(step, {"error": float(np.mean(errors))}, graph, checkpoint)
+        yield Slice({"error": float(np.mean(errors))}, graph, checkpoint)
 
 
 def _observation_moments(replay: Replay, size: int) -> Moments:

@@ -127,7 +127,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             **learner.environment_arrays(environment),
             **teacher.snapshot(),
         }
-        yield Slice(step, metrics, architectures.policy_graph(architecture, normalize, state.layers), checkpoint)
+        yield Slice(metrics, architectures.policy_graph(architecture, normalize, state.layers), checkpoint)
 
 
 def _open_environment(context: RunContext, num_envs: int):

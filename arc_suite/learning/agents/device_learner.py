@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
+from arc_suite import usage
 from arc_suite.learning.agents import architectures, learner, networks, on_policy
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
@@ -117,6 +118,7 @@ def learn_in_step(hp: ProximalPolicy, contexts: Sequence[RunContext]) -> Iterato
         while True:
             trainer_state, table = running_chunk.result()
             finished_chunk = chunk
+            usage.count_steps(len(contexts) * (chunk.end - chunk.first) * hp.num_envs * hp.horizon)
             step = chunk.end * hp.num_envs * hp.horizon
             parts = _split_runs(len(contexts), rollouts, trainer_state)
             chunk = next_chunk(hp, first_context, finished_chunk.end)
@@ -128,7 +130,7 @@ def learn_in_step(hp: ProximalPolicy, contexts: Sequence[RunContext]) -> Iterato
                 metrics = _summarize(hp, contexts[index], finished_chunk, columns)
                 graph = architectures.policy_graph(architecture, *jax.tree.map(np.asarray, (normalize, policy)))
                 arrays = {**checkpoint, "iterations": np.array(finished_chunk.end)}
-                slices.append(Slice(step, metrics, graph, arrays))
+                slices.append(Slice(metrics, graph, arrays))
             yield slices
             if step >= first_context.steps:
                 return

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from arc_suite import parsers, seed_ranges
+from arc_suite import parsers, seed_ranges, usage
 from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -83,6 +83,13 @@ class RunContext(NamedTuple):
         defaults = {"num_threads": self.threads, "autoreset_mode": AutoresetMode.SAME_STEP}
         return self.training.make_vec(num_envs, seed=self.first_seed, **(defaults | options))
 
+    def count_steps(self, steps: int) -> None:
+        """Count steps of a simulator that is not the suite's, or updates of an algorithm that does not act.
+
+        Environments of the suite count their steps themselves. The record of the run has both numbers.
+        """
+        usage.count_steps_by_learner(steps)
+
     def next_evaluation(self, step: int) -> int:
         """Return the environment step of the first evaluation after `step`."""
         next_multiple = (step // self.evaluate_every + 1) * self.evaluate_every
@@ -93,16 +100,16 @@ class Slice(NamedTuple):
     """A slice of learning, which takes seconds.
 
     Attributes:
-        step: environment steps so far.
         metrics: a line of training.csv, metrics by name; all lines have the same names. None for no line.
         policy: graph of the deterministic policy, from the flat observation to actions in [-1, 1].
         checkpoint: everything that learning resumes from, arrays by name.
+        is_complete: whether learning from the latest environment step is complete; before, no policy is evaluated.
     """
 
-    step: int
     metrics: Mapping[str, float] | None
     policy: Graph
     checkpoint: dict[str, np.ndarray]
+    is_complete: bool = True
 
 
 @contextlib.contextmanager

@@ -205,8 +205,8 @@ class OffPolicyRun:
             **networks.flatten_tree("moments", self.inputs.moments),
             **environment_arrays,
         }
-        complete_steps = self.steps if self.phase is None else self.steps - self.hp.num_envs
-        return Slice(complete_steps, metrics, self.inputs.policy_graph(sac.deterministic_layers(state)), checkpoint)
+        policy = self.inputs.policy_graph(sac.deterministic_layers(state))
+        return Slice(metrics, policy, checkpoint, is_complete=self.phase is None)
 
     def end_line(self, sums: Mapping[str, Any]) -> dict[str, float]:
         """Return a line of metrics, given the sums since the latest line, and begin the next line."""

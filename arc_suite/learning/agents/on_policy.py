@@ -138,7 +138,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         graph = architectures.policy_graph(architecture, normalize, state.policy)
         arrays = jax.tree.map(np.asarray, LearnerState(state, moments, normalize).arrays())
         checkpoint = {**arrays, "iterations": np.array(iterations), **collector.arrays()}
-        yield Slice(iterations * hp.num_envs * hp.horizon, metrics, graph, checkpoint)
+        yield Slice(metrics, graph, checkpoint)
 
 
 def begin(hp: ProximalPolicy, context: RunContext, task: Task, architecture: Architecture) -> LearnerState:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from arc_suite import checks, evaluation, files, seed_ranges
+from arc_suite import checks, evaluation, files, seed_ranges, usage
 from arc_suite.learning.agents import algorithms, priors, run_folder
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
 from arc_suite.learning.agents.evaluating import Evaluator, Lines, ProcessEvaluator
@@ -21,7 +21,9 @@ from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
 from arc_suite.policies.network import Network
 from arc_suite.simulation.cores import usable_cores
+from arc_suite.usage import Usage
 
+STEP_COUNTS = ("environment_steps", "steps_by_learner")  # fields of `Usage`, and of the progress of a checkpoint
 _SAVE_INTERVAL = 30.0  # s between two checkpoints of a learner that stays on a device
 
 
@@ -59,7 +61,7 @@ def train(
     algorithm = configuration.definition
     stays_on_device = configuration.learns_on_device
     with (
-        _record(configuration, folder, threads, stays_on_device, 1, on_metrics) as recorder,
+        _record(configuration, folder, threads, stays_on_device, [configuration.seed], on_metrics) as recorder,
         contextlib.closing(algorithm.learn(algorithm.hyperparameters, recorder.context)) as slices,
         recorder.show_progress(progress),
     ):
@@ -100,8 +102,9 @@ def train_in_one_program(
     with contextlib.ExitStack() as stack:
         recorders = []
         listeners = listeners or [_ignore_metrics] * len(folders)
+        run_seeds = [configuration.seed for configuration in configurations]
         for configuration, folder, on_metrics in zip(configurations, folders, listeners, strict=True):
-            recording = _record(configuration, folder, usable_cores(), True, len(folders), on_metrics)
+            recording = _record(configuration, folder, usable_cores(), True, run_seeds, on_metrics)
             recorders.append(stack.enter_context(recording))
         contexts = [recorder.context for recorder in recorders]
         all_hyperparameters = [configuration.hyperparameters for configuration in configurations]
@@ -139,6 +142,7 @@ class _Recorder:
     Attributes:
         folder: folder of the run.
         context: what the learner takes.
+        usage: what the run has used so far; its steps are those of the run.
         has_checkpoint: whether the folder has a checkpoint, or will have one by `flush`.
     """
 
@@ -150,7 +154,7 @@ class _Recorder:
         evaluator: Evaluator | ProcessEvaluator,
         training_seeds: seed_ranges.Ranges | None,
         interval: float,
-        runs: int,
+        run_seeds: Sequence[int],
         on_metrics: Callable[[int, Mapping[str, float]], None],
     ):
         """Begin where the folder's checkpoint stands.
@@ -162,7 +166,7 @@ class _Recorder:
             evaluator: evaluates policies.
             training_seeds: seeds of the episodes that policies learn from.
             interval: seconds between two checkpoints; 0 to write each.
-            runs: runs that this process trains, which share its CPU time.
+            run_seeds: seeds of the runs that this process trains, which share its CPU time and environments.
             on_metrics: see `train`.
         """
         self.folder = run_files.path
@@ -172,16 +176,17 @@ class _Recorder:
         self._run_files = run_files
         self._evaluator = evaluator
         self._training_seeds = training_seeds
-        self._runs = runs
+        self._runs = len(run_seeds)
         self._bar = None
         self._on_metrics = on_metrics
         self._writer = _CheckpointWriter(run_files, interval)
         self._progress = {"evaluated": 0, "pending": [], "wall": 0.0, "cpu": 0.0} | run_files.progress
+        self.usage = _usage_so_far(configuration, run_files, run_seeds)
         self._policy_step = self._progress["evaluated"]  # of the latest policy whose evaluation has begun
         self._is_policy_new = False  # whether the latest slice has a policy to evaluate
         # Where the clocks stood when the run began, if it had never stopped.
         self._wall_start = time.monotonic() - self._progress["wall"]
-        self._cpu_start = _cpu_clock() - runs * self._progress["cpu"]
+        self._cpu_start = _cpu_clock() - self._runs * self._progress["cpu"]
         for step in self._progress["pending"]:
             evaluator.begin(step, network.load(_checkpoint_folder(self.folder, step)))
             self._policy_step = step
@@ -206,21 +211,25 @@ class _Recorder:
         """Write the latest checkpoint if it has not been written."""
         self._writer.flush()
 
+    @usage.pause()
     def begin(self, learned_slice: Slice) -> None:
         """Write the line of a slice, and begin the evaluation of its policy if it is due.
 
         Raises:
-            Diverged: a metric or an array of it is not finite.
+            ValueError: an algorithm that does not act, by its definition, has made environment steps.
+            Diverged: a metric or an array of the slice is not finite.
         """
-        step = learned_slice.step
+        step = self.usage.steps
         metrics = learned_slice.metrics
-        _check_finite(learned_slice, self.folder)
+        _check_steps(self.usage, self._configuration)
+        _check_finite(learned_slice, step, self.folder)
         self._bar.update(step - self._bar.n)
         if metrics is not None:
             self._run_files.append("training", {"step": step, **metrics})
             self._on_metrics(step, metrics)
             self._bar.set_postfix_str(_postfix(metrics, self._progress), refresh=False)
-        self._is_policy_new = step >= self.context.next_evaluation(self._policy_step)
+        is_due = step >= self.context.next_evaluation(self._policy_step)
+        self._is_policy_new = learned_slice.is_complete and is_due
         if self._is_policy_new:
             self._policy_step = step
             policy_setup = self._configuration.policy_setup
@@ -228,6 +237,7 @@ class _Recorder:
             network.save(files.folder(_checkpoint_folder(self.folder, step)) / network.FILE, policy)
             self._evaluator.begin(step, policy)
 
+    @usage.pause()
     def complete(self, learned_slice: Slice) -> None:
         """Write the results of evaluations, times, and the checkpoint of a slice.
 
@@ -241,9 +251,11 @@ class _Recorder:
         self._progress["pending"] = list(self._evaluator.pending)
         self._progress["wall"] = time.monotonic() - self._wall_start  # s, of all processes of a run
         self._progress["cpu"] = self.cpu_seconds()  # s, of all processes of a run
+        self._progress |= {name: getattr(self.usage, name) for name in STEP_COUNTS}
+        self._progress["sources"] = sorted(self.usage.sources)
         if learned_slice.metrics is not None or self._is_policy_new:
             seconds = {f"{name}_seconds": round(self._progress[name], 3) for name in ("wall", "cpu")}
-            self._run_files.append("times", {"step": learned_slice.step, **seconds})
+            self._run_files.append("times", {"step": self.usage.steps, **seconds})
         self._writer.write(learned_slice.checkpoint, self._progress, at_once=is_last)
         self.has_checkpoint = True
 
@@ -254,15 +266,15 @@ def _record(
     folder: Path,
     threads: int,
     stays_on_device: bool,
-    runs: int,
+    run_seeds: Sequence[int],
     on_metrics: Callable[[int, Mapping[str, float]], None],
 ) -> Iterator[_Recorder]:
-    """Open the folder of a run, and yield its recorder.
+    """Open the folder of a run, record its usage, and yield its recorder.
 
     Args:
         configuration, folder, threads, on_metrics: see `train`.
         stays_on_device: whether the learner stays on a device: checkpoints are rarer, and other processes evaluate.
-        runs: runs that this process trains.
+        run_seeds: seeds of the runs that this process trains.
     """
     folder = Path(folder)
     record = configuration.record()
@@ -277,14 +289,36 @@ def _record(
         run_folder.check_latest_evaluation(folder, evaluated_step)
         context = configuration.context(folder, threads, run_files.arrays)
         if stays_on_device:
-            evaluator = ProcessEvaluator(configuration, folder, runs)
+            evaluator = ProcessEvaluator(configuration, folder, len(run_seeds))
         else:
             evaluator = Evaluator(configuration, threads)
         stack.enter_context(contextlib.closing(evaluator))
         # A buffer that overwrites transitions goes on from recent checkpoints alone.
         overwrites = getattr(configuration.hyperparameters, "buffer_size", context.steps) < context.steps
         interval = _SAVE_INTERVAL if stays_on_device and not overwrites else 0.0
-        yield _Recorder(configuration, run_files, context, evaluator, training_seeds, interval, runs, on_metrics)
+        recorder = _Recorder(
+            configuration, run_files, context, evaluator, training_seeds, interval, run_seeds, on_metrics
+        )
+        stack.enter_context(usage.record(recorder.usage))
+        yield recorder
+
+
+def _usage_so_far(configuration: Configuration, run_files: RunFolder, run_seeds: Sequence[int]) -> Usage:
+    """Return what a run has used until its checkpoint."""
+    algorithm = configuration.definition
+    counts = {name: run_files.progress[name] for name in STEP_COUNTS if name in run_files.progress}
+    if run_files.arrays is not None and not counts:  # of an earlier version
+        lines = [*run_folder.lines(run_files.path, "training"), *run_folder.lines(run_files.path, "times")]
+        steps = max((int(line["step"]) for line in lines), default=run_files.progress.get("evaluated", 0))
+        counts = {STEP_COUNTS[0] if algorithm.acts else STEP_COUNTS[1]: steps}
+    return Usage(
+        name=configuration.algorithm,
+        source=algorithm.source,
+        seeds=[seed_ranges.of_run(seed) for seed in run_seeds],
+        runs=len(run_seeds),
+        sources=run_files.progress.get("sources", ()),
+        **counts,
+    )
 
 
 def _cpu_clock() -> float:
@@ -328,15 +362,24 @@ class _CheckpointWriter:
         self._next_time = time.monotonic() + self._interval
 
 
-def _check_finite(learned_slice: Slice, folder: Path) -> None:
-    """Raise Diverged for a metric or an array of the learner that is not finite."""
+def _check_steps(usage_of_run: Usage, configuration: Configuration) -> None:
+    """Raise ValueError if an algorithm that does not act has made environment steps."""
+    if usage_of_run.environment_steps and not configuration.definition.acts:
+        raise ValueError(
+            f"algorithm {configuration.algorithm}: declares acts=False, and has made "
+            f"{usage_of_run.environment_steps} environment steps; declare acts=True, so that these are the run's steps"
+        )
+
+
+def _check_finite(learned_slice: Slice, step: int, folder: Path) -> None:
+    """Raise Diverged for a metric or an array of the learner that is not finite at an environment step."""
     for name, metric in (learned_slice.metrics or {}).items():
         if not np.isfinite(metric):
-            raise Diverged(f"{name} is {metric}", learned_slice.step, folder)
+            raise Diverged(f"{name} is {metric}", step, folder)
     for name, array in learned_slice.checkpoint.items():
         is_learned = array.dtype.kind == "f" and not name.startswith(UNLEARNED_PREFIXES)
         if is_learned and not np.isfinite(array).all():
-            raise Diverged(f"{name} is not finite", learned_slice.step, folder)
+            raise Diverged(f"{name} is not finite", step, folder)
 
 
 def _postfix(metrics: Mapping[str, float], progress_values: Mapping[str, Any]) -> str:

@@ -27,6 +27,7 @@ from arc_suite.policies.frozen import Frozen
 
 SCORES = "scores.csv"
 CLIP = (-0.5, 1.2)  # bounds of the score of a run
+MAX_OVERRUN = 1.05  # largest share of the steps of a division that a run may make, as slices end a little later
 HALF = 0.5  # score until which CPU time is counted
 STYLE = ("gait_compliance", "heading_error")
 STYLE_HEADS = ("gait compliance", "heading error, rad")
@@ -78,13 +79,24 @@ def score_results(run_results: Iterable[RunResult]) -> list[RunScore]:
 
 
 def _score_result(result: RunResult) -> RunScore:
-    setup = result.run.configuration.setup
+    """Return the score of a finished run.
+
+    Raises:
+        ValueError: the run has made more environment steps than its division gives.
+    """
+    configuration = result.run.configuration
+    if result.steps[-1] > MAX_OVERRUN * configuration.steps:
+        raise ValueError(
+            f"run {result.run.name}: expected about {configuration.steps:,} environment steps, made "
+            f"{result.steps[-1]:,}; its learner must yield a slice at the latest where the next evaluation is due"
+        )
+    setup = configuration.setup
     curve_scores = anchors.anchors(setup, result.curve_seeds).score(result.returns.mean(axis=1))
     reaching = np.flatnonzero(curve_scores >= HALF)
     minutes = result.cpu[reaching[0]] / 60.0 if reaching.size else np.inf
     notes = "; ".join(result.notes)
     score = anchors.anchors(setup, result.seeds).score(result.final)
-    run_score = _run_score(setup, result.run.configuration.seed, result.final, score, minutes, result.style, notes)
+    run_score = _run_score(setup, configuration.seed, result.final, score, minutes, result.style, notes)
     return run_score._replace(model_sha256=result.model_sha256)
 
 

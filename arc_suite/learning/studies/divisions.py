@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from arc_suite import usage
+
 SEEDS = 3  # of every place
 
 # Robot and task of each place, with default settings.
@@ -26,7 +28,7 @@ class Division(NamedTuple):
 
     steps: int
     far_steps: int
-    source: str = "nothing"
+    source: str = usage.NOTHING
     episodes: int = 0
 
     def steps_in(self, task: str) -> int:
@@ -37,5 +39,5 @@ class Division(NamedTuple):
 DIVISIONS = {
     "top": Division(1_000_000, 3_000_000),
     "samples": Division(100_000, 100_000),
-    "demonstrations": Division(100_000, 100_000, "prior data", 100),
+    "demonstrations": Division(100_000, 100_000, usage.PRIOR_DATA, 100),
 }

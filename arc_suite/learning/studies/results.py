@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import evaluation, parsers
+from arc_suite import evaluation, parsers, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, provenance
 from arc_suite.evaluation.published import CURVES
@@ -32,6 +32,7 @@ _NOT_METRICS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of
 SHARED_SEEDS = "data share seeds with evaluation"
 TEN_EPISODES = "ten episodes"
 EARLIER_MODEL = "earlier model"
+UNKNOWN_SOURCE = "source unknown"
 
 
 class RunResult(NamedTuple):
@@ -77,6 +78,8 @@ class RunResult(NamedTuple):
     def notes(self) -> tuple[str, ...]:
         """Reasons why the final return is not comparable with others."""
         reasons = list(note_few_episodes(self.finals))
+        if self.run.configuration.definition.source == usage.UNKNOWN:
+            reasons.append(UNKNOWN_SOURCE)
         if self.training_seeds is None:
             reasons.append(provenance.UNKNOWN)
         elif common_seeds(self.training_seeds, EVALUATION):

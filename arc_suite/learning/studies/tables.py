@@ -5,7 +5,7 @@ import itertools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from arc_suite import checks
+from arc_suite import checks, usage
 from arc_suite.cpg.selection import memoryless_preset
 from arc_suite.data import DatasetSettings
 from arc_suite.envs.setup import Setup
@@ -123,7 +123,7 @@ def benchmark(division: str, algorithm: str) -> Study:
     """
     rule = DIVISIONS[checks.name(division, DIVISIONS, "division")]
     source = algorithms.algorithm(algorithm).source
-    if source != rule.source:
+    if source not in (rule.source, usage.UNKNOWN):
         fitting_names = [name for name, entry in algorithms.ALGORITHMS.items() if entry.source == rule.source]
         what = f"algorithm {algorithm} learns from {source}, and the division {division} takes those that learn from"
         raise ValueError(f"{what} {rule.source}: {', '.join(fitting_names)}")

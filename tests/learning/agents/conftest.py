@@ -10,7 +10,7 @@ import inspect
 
 import pytest
 
-from arc_suite import data
+from arc_suite import data, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.configuration import Configuration
@@ -33,17 +33,21 @@ class Learning:
     Those of soft actor-critic are in its run and in the updates of it.
     """
 
-    def __init__(self, slices):
+    def __init__(self, slices, steps=0):
         self.slices, self.latest = slices, None
+        self.usage, self.step = usage.Usage("test", environment_steps=steps), steps
 
     def advance(self):
         """Learn a slice, and return it."""
-        self.latest = next(self.slices)
+        with usage.record(self.usage):
+            self.latest = next(self.slices)
+        if self.latest.is_complete:
+            self.step = self.usage.steps
         return self.latest
 
     def until(self, step):
         """Learn up to an environment step, phases included, and return the latest slice."""
-        while self.latest is None or self.latest.step < step:
+        while self.latest is None or self.step < step:
             self.advance()
         return self.latest
 
@@ -59,11 +63,11 @@ class Learning:
         return getattr(variables["runs"][0], name)
 
 
-def learning(algorithm, hyperparameters, folder, setup, steps=10_000, evaluate_every=1, **context):
+def learning(algorithm, hyperparameters, folder, setup, steps=10_000, evaluate_every=1, steps_before=0, **context):
     """Begin to learn; slices end after every step unless told otherwise."""
     of_run = {name: context.pop(name) for name in ("seed", "prior", "training") if name in context}
     run = Configuration.of(setup, algorithm, hyperparameters, steps=steps, evaluate_every=evaluate_every, **of_run)
-    return Learning(run.definition.learn(run.hyperparameters, run.context(folder, **context)))
+    return Learning(run.definition.learn(run.hyperparameters, run.context(folder, **context)), steps_before)
 
 
 @pytest.fixture(autouse=True)

@@ -25,7 +25,7 @@ def begun(tmp_path):
 def test_it_learns_the_actions_of_its_dataset(begun, prior):
     agent = begun(prior)
     errors = [agent.advance().metrics["error"] for _ in range(2)]
-    assert agent.latest.step == 1000
+    assert agent.usage.steps_by_learner == 1000 and not agent.usage.environment_steps
     assert errors[1] < 0.5 * errors[0]
     episodes = list(data.open(prior))
     observations = np.concatenate([episode.observations[:-1] for episode in episodes])
@@ -43,9 +43,10 @@ def test_it_learns_the_actions_of_its_dataset(begun, prior):
 def test_it_resumes_bit_exactly(begun, prior):
     whole = begun(prior)
     half = whole.advance()
+    assert whole.step == 500
     resumed = begun(prior, checkpoint=half.checkpoint).advance()
     last = whole.advance()
-    assert (half.step, last.step, resumed.step) == (500, 1000, 1000)
+    assert whole.step == 1000
     assert last.metrics == resumed.metrics
     for name, array in last.checkpoint.items():
         assert array.tobytes() == resumed.checkpoint[name].tobytes(), name

@@ -24,9 +24,9 @@ SMALL = {"num_envs": 8, "round": 10, "left_out": 2, "updates": 20, "last_updates
 def begun(tmp_path):
     """A function that begins to learn."""
 
-    def begin(robot="leaper", task="walk", changes=(), steps=240, checkpoint=None, **settings):
+    def begin(robot="leaper", task="walk", changes=(), steps=240, checkpoint=None, steps_before=0, **settings):
         setup, context = Setup.of(robot, task, settings), {"seed": 3, "checkpoint": checkpoint}
-        return learning("dagger", SMALL | dict(changes), tmp_path, setup, steps, steps, **context)
+        return learning("dagger", SMALL | dict(changes), tmp_path, setup, steps, steps, steps_before, **context)
 
     return begin
 
@@ -36,8 +36,9 @@ def test_it_resumes_bit_exactly(begun, robot, task):
     """The demonstrators of steer have a memory; episodes of 11 steps begin and end meanwhile."""
     whole, first = (begun(robot, task, time_limit=0.55) for _ in range(2))
     arrays = {name: array.copy() for name, array in first.until(80).checkpoint.items()}
-    second = begun(robot, task, time_limit=0.55, checkpoint=arrays)
-    assert second.advance().step == 160
+    second = begun(robot, task, time_limit=0.55, checkpoint=arrays, steps_before=80)
+    second.advance()
+    assert second.step == 160
     for other in (first, second):
         for name, array in whole.until(240).checkpoint.items():
             assert_array_equal(other.until(240).checkpoint[name], array, err_msg=name)

@@ -91,7 +91,7 @@ def test_first_three_updates(name, learner, recorded):
     first = recorded[0][0]
     recorded = [parts for _, parts in recorded]
     reference = begun_by_hand(hp, first)
-    updates = agent.latest.step * hp.utd_ratio
+    updates = agent.step * hp.utd_ratio
     assert len(recorded) == updates + STEPS * bool(phases)
     assert len(recorded[0][2]) == (512 if hp.prior == "symmetric_sampling" else 256)
 

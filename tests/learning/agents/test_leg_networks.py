@@ -121,7 +121,7 @@ def test_learning_goes_on_bit_exactly(tmp_path):
     straight.until(64)
     checkpoint = straight.latest.checkpoint
     straight.until(128)
-    resumed = learned(tmp_path / "resumed", checkpoint=checkpoint)
+    resumed = learned(tmp_path / "resumed", checkpoint=checkpoint, steps_before=64)
     resumed.until(128)
     assert isinstance(resumed.collector.architecture, Legs) and resumed.symmetry is None
     for one, other in zip(jax.tree.leaves(straight.state), jax.tree.leaves(resumed.state), strict=True):

@@ -97,12 +97,12 @@ def test_it_resumes_bit_exactly(algorithm, tmp_path):
         trained(tmp_path / "start")
         changes = PPO | {"start": str(tmp_path / "start")}
 
-    def begun(checkpoint=None):
-        return learning(algorithm, changes, tmp_path, SETUP, 96, 96, checkpoint=checkpoint)
+    def begun(checkpoint=None, steps_before=0):
+        return learning(algorithm, changes, tmp_path, SETUP, 96, 96, steps_before, checkpoint=checkpoint)
 
     whole, first = begun(), begun()
     arrays = {name: array.copy() for name, array in first.advance().checkpoint.items()}
-    second = begun(arrays)
+    second = begun(arrays, first.step)
     for other in (first, second):
         for name, array in whole.until(96).checkpoint.items():
             assert_array_equal(other.until(96).checkpoint[name], array, err_msg=name)

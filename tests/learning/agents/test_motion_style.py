@@ -62,7 +62,7 @@ def test_a_run_with_a_style_resumes_bit_exactly_and_its_policy_has_no_discrimina
     whole = styled(motion, tmp_path)
     first = styled(motion, tmp_path)
     arrays = {name: array.copy() for name, array in first.until(128).checkpoint.items()}
-    second = styled(motion, tmp_path, checkpoint=arrays)
+    second = styled(motion, tmp_path, checkpoint=arrays, steps_before=128)
     latest = whole.until(320)
     for name, array in latest.checkpoint.items():
         assert_array_equal(second.until(320).checkpoint[name], array, err_msg=name)

@@ -103,7 +103,7 @@ def test_phases_and_prior_data_go_with_it(learner, prior, drawn, changes):
     phases = {"phase_every": 95, "phase_updates": 40, "check_every": 20, "early_stop": "published", "batch": 16}
     agent = learner(NAME, small(NAME, prior="symmetric_sampling", **phases, **changes), prior=prior, evaluate_every=100)
     agent.advance()
-    assert agent.latest.step == 90 and agent.phase.next_actions is None
+    assert not agent.latest.is_complete and agent.usage.steps == 100 and agent.phase.next_actions is None
     agent.until(100)
     assert [with_policy for _, with_policy in drawn] == [True] * 20 + [False] * 40
     assert {len(batch.rewards) for batch, _ in drawn} == {32}

@@ -154,7 +154,7 @@ def test_the_critics_last_observation_of_an_episode_is_that_before_the_reset(beg
 def test_a_privileged_critic_resumes_bit_exactly(begun):
     whole, first = begun(CRITIC), begun(CRITIC)
     arrays = {name: array.copy() for name, array in first.until(128).checkpoint.items()}
-    second = begun(CRITIC, checkpoint=arrays)
+    second = begun(CRITIC, checkpoint=arrays, steps_before=128)
     for name, array in whole.until(320).checkpoint.items():
         assert_array_equal(second.until(320).checkpoint[name], array, err_msg=name)
 

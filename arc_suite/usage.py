@@ -1,0 +1,152 @@
+"""What runs of training use of the suite: environment steps, seeds of episodes, and sources.
+
+A run records its usage while it learns. All environments that are open add their steps, and the seeds of
+their episodes. Demonstrators, policies and datasets add what they are. Nothing is recorded outside of runs,
+and nothing while policies are judged.
+
+Other processes and other simulators are not seen. `RunContext.count_steps` adds their steps.
+"""
+
+import contextlib
+import contextvars
+from collections.abc import Iterable, Iterator, Sequence
+
+# Sources: what an algorithm may learn from in addition to its own steps.
+NOTHING = "nothing"
+PRIOR_DATA = "prior data"
+DEMONSTRATOR = "a demonstrator"
+POLICY = "a policy"
+UNKNOWN = "unknown"
+SOURCES = (NOTHING, PRIOR_DATA, DEMONSTRATOR, POLICY, UNKNOWN)
+
+
+class Usage:
+    """What a run has used so far.
+
+    Attributes:
+        environment_steps: steps of environments of the suite.
+        steps_by_learner: steps that the learner has counted, of other simulators, or updates.
+        sources: those of `SOURCES` that the learner has used.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        source: str = UNKNOWN,
+        seeds: Sequence[range] = (),
+        runs: int = 1,
+        environment_steps: int = 0,
+        steps_by_learner: int = 0,
+        sources: Iterable[str] = (),
+    ):
+        """Begin with what an interrupted run has used.
+
+        Args:
+            name: name of the algorithm, for errors.
+            source: what the algorithm may use, one of `SOURCES`; all of them if that is unknown.
+            seeds: ranges of seeds of the episodes that the run may play; empty for all seeds.
+            runs: runs that learn side by side in the same environments, each with an equal share.
+            environment_steps: steps before.
+            steps_by_learner: steps before.
+            sources: sources before.
+        """
+        self.environment_steps = environment_steps
+        self.steps_by_learner = steps_by_learner
+        self.sources = set(sources)
+        self._name = name
+        self._source = source
+        self._seeds = seeds
+        self._runs = runs
+
+    @property
+    def steps(self) -> int:
+        """All steps."""
+        return self.environment_steps + self.steps_by_learner
+
+    def count_steps(self, steps: int) -> None:
+        """Add steps of environments."""
+        self.environment_steps += steps // self._runs
+
+    def check_seeds(self, seeds: Iterable[int | None]) -> None:
+        """Raise ValueError for the seed of an episode that the run may not play."""
+        if not self._seeds:
+            return
+        for seed in seeds:
+            if seed is not None and not any(seed in allowed_seeds for allowed_seeds in self._seeds):
+                ranges = ", ".join(f"{allowed.start} to {allowed.stop - 1}" for allowed in self._seeds)
+                raise ValueError(
+                    f"algorithm {self._name}: seed {seed} is of an episode of others; this run learns in those of "
+                    f"seeds {ranges}"
+                )
+
+    def add_source(self, source: str) -> None:
+        """Add a source.
+
+        Raises:
+            ValueError: the algorithm does not declare it.
+        """
+        if self._source not in (source, UNKNOWN):
+            raise ValueError(
+                f"algorithm {self._name}: uses {source} and declares source={self._source!r}; declare source={source!r}"
+            )
+        self.sources.add(source)
+
+
+_recording: list[Usage] = []  # of the runs that learn in this process
+_is_paused = contextvars.ContextVar("is_paused", default=False)  # in this thread
+
+
+@contextlib.contextmanager
+def record(usage: Usage) -> Iterator[Usage]:
+    """Record the usage of a run within the context, in all threads."""
+    _recording.append(usage)
+    try:
+        yield usage
+    finally:
+        _recording.remove(usage)
+
+
+@contextlib.contextmanager
+def pause() -> Iterator[None]:
+    """Record nothing within the context, in this thread: a policy is judged."""
+    token = _is_paused.set(True)
+    try:
+        yield
+    finally:
+        _is_paused.reset(token)
+
+
+def count_steps(steps: int) -> None:
+    """Add steps of environments to the usage of the runs that learn."""
+    for usage in _active_usages():
+        usage.count_steps(steps)
+
+
+def count_steps_by_learner(steps: int) -> None:
+    """Add steps that a learner counts to the usage of the runs that learn."""
+    for usage in _active_usages():
+        usage.steps_by_learner += steps
+
+
+def check_seeds(seeds: Iterable[int | None]) -> None:
+    """Check the seeds of streams of episodes, None for unknown ones.
+
+    Raises:
+        ValueError: a run learns, and may not play the episodes of a seed.
+    """
+    for usage in _active_usages():
+        usage.check_seeds(seeds)
+
+
+def add_source(source: str) -> None:
+    """Add a source to the usage of the runs that learn.
+
+    Raises:
+        ValueError: a run learns whose algorithm does not declare it.
+    """
+    for usage in _active_usages():
+        usage.add_source(source)
+
+
+def _active_usages() -> Sequence[Usage]:
+    return () if not _recording or _is_paused.get() else _recording
