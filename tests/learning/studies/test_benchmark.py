@@ -13,6 +13,7 @@ from refusals import refused
 from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
+from arc_suite.learning.agents import algorithms
 from arc_suite.learning.studies import benchmark, csv_files, results, tables
 from arc_suite.learning.studies.benchmark import RunScore
 from arc_suite.learning.studies.divisions import FAR, PLACES, SEEDS
@@ -102,6 +103,26 @@ def test_scores_are_clipped_and_unfinished_runs_have_none():
     low, high = benchmark.score_results([result([0.0, -3.0]), result([0.0, 9.0])])
     assert (low.score, high.score) == (-0.5, 1.2)
     assert benchmark.score_results([result([0.0, 0.5], steps=(50_000, 90_000))]) == []
+
+
+def test_a_run_of_more_steps_than_its_division_gives_has_no_score():
+    """Slices end a little later than evaluations are due: 100,352 steps are those of `ppo`."""
+    assert len(benchmark.score_results([result([0.0, 0.5], steps=(50_000, 100_352))])) == 1
+    with pytest.raises(ValueError) as caught:
+        benchmark.score_results([result([0.0, 0.5], steps=(50_000, 200_000))])
+    assert str(caught.value) == (
+        "run tick-walk-sac-0: expected about 100,000 environment steps, made 200,000; its learner must yield a slice "
+        "at the latest where the next evaluation is due"
+    )
+
+
+def test_an_unknown_source_is_noted(monkeypatch):
+    """A division takes an algorithm of another package that declares none, and the table says so."""
+    unknown = algorithms.ALGORITHMS["sac"]._replace(source="unknown")
+    monkeypatch.setitem(algorithms.ALGORITHMS, "sac", unknown)
+    assert len(tables.study("samples-sac").runs) == 30
+    (score,) = benchmark.score_results([result([0.0, 0.5])])
+    assert score.notes == "ten episodes; source unknown"
 
 
 def test_headings_are_not_judged_where_commands_turn():
