@@ -152,7 +152,7 @@ TORCH ?= torch==2.13.0
 check-sb3: VENV := .venv-sb3
 check-sb3: FIRST = '$(TORCH)'
 check-sb3: EXTRAS := sb3
-check-sb3: PACKAGES := pytest matplotlib sbx-rl==0.28.0
+check-sb3: PACKAGES := pytest matplotlib sbx-rl==0.28.0 rsl-rl-lib==5.5.1
 check-sb3: RUN = $(VENV)/bin/python tools/check_sb3.py --steps 500 && \
 	$(PYTEST) tests/envs/test_sb3.py tests/policies/test_sb3_file.py tests/examples
 

@@ -34,6 +34,24 @@ def test_sac_of_stable_baselines3(tmp_path):
     assert report["robots"]["tick"]["return"]["mean"] > 0.0
 
 
+def test_ppo_of_stable_baselines3(tmp_path):
+    pytest.importorskip("matplotlib")
+    arguments = ("--task=steer", "--steps=128", "--checkpoints=1", "--episodes=1", "--output=tick")
+    done = run("sb3_ppo.py", *arguments, cwd=tmp_path)
+    assert done.stderr == ""
+    names = {"128.zip", "128_vecnormalize.pkl", "128.json", "curve.png"}
+    assert {path.name for path in (tmp_path / "tick").iterdir()} == names
+
+
+def test_ppo_of_rsl_rl(tmp_path):
+    pytest.importorskip("rsl_rl")
+    run("rsl_rl_ppo.py", "--task=steer", "--steps=1536", cwd=tmp_path)
+    (tmp_path / "rsl_rl_ppo.py").write_text((SCRIPTS / "rsl_rl_ppo.py").read_text())
+    flags = ("--robot=tick", "--task=steer", "--policy=rsl_rl_ppo:make", "--episodes=1", "--set=time_limit=1")
+    done = programs.arc_suite("evaluate", *flags, cwd=tmp_path)
+    assert done.returncode == 0 and "\ntick " in done.stdout, done.stderr
+
+
 def test_sac_of_sbx(tmp_path):
     pytest.importorskip("sbx")
     run("sbx_sac.py", "--steps=64", cwd=tmp_path)
