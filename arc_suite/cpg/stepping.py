@@ -44,7 +44,7 @@ class SteppingParameters(NamedTuple):
         wider: how much further out feet stand than in the body's pose at rest, see `posture.find_wide_pose`, in
             standing heights.
         lower: how much lower the torso is than in that pose, in standing heights. Of both numbers a body takes the
-            share that its legs reach. Where a task commands the pose, they have no effect.
+            share that its legs reach and its motors carry. Where a task commands the pose, they have no effect.
         ahead: how much further ahead the torso is over the feet of the pose at rest, in standing heights.
         higher: how much higher the torso is over them, in standing heights. Both numbers have no effect on a body that
             stands wide, or where a task commands the pose.

@@ -1,5 +1,6 @@
 """Poses of the torso over its feet."""
 
+import imports
 import numpy as np
 import pytest
 
@@ -18,6 +19,19 @@ def test_a_pose_is_as_wide_as_legs_reach_with_room_about_their_feet():
     for name, numbers in (("leaper", (0.2, 0.15)), ("tick", (0.0, 0.0))):
         kept = posture.find_wide_pose(ROBOTS[name], *numbers)
         np.testing.assert_array_equal(kept.joint_angles, posture.find_rest_pose(ROBOTS[name]).joint_angles)
+
+
+def test_robots_with_weak_motors_stand_half_as_wide():
+    robot = imports.quadruped()  # needs 0.64 of its torques in a trot in this pose
+
+    def weaken(link):
+        servo = link.joint.servo
+        return link.replace(joint=link.joint.replace(servo=servo.replace(limit=0.5 * servo.limit)))
+
+    legs = [leg.replace(links=tuple(weaken(link) if link.joint else link for link in leg.links)) for leg in robot.legs]
+    weak_robot = robot.replace(legs=tuple(legs))
+    assert posture.find_wide_pose(robot, 0.5, 0.25).ride_height == 0.75
+    assert posture.find_wide_pose(weak_robot, 0.5, 0.25).ride_height == 0.875
 
 
 def test_a_torso_moves_ahead_and_up_over_its_feet():
