@@ -10,6 +10,7 @@ Other processes and other simulators are not seen. `RunContext.count_steps` adds
 import contextlib
 import contextvars
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 # Sources: what an algorithm may learn from in addition to its own steps.
 NOTHING = "nothing"
@@ -18,6 +19,8 @@ DEMONSTRATOR = "a demonstrator"
 POLICY = "a policy"
 UNKNOWN = "unknown"
 SOURCES = (NOTHING, PRIOR_DATA, DEMONSTRATOR, POLICY, UNKNOWN)
+
+STEP_COUNTS = ("environment_steps", "steps_by_learner")  # attributes of `Usage`, and their names in checkpoints
 
 
 class Usage:
@@ -62,6 +65,11 @@ class Usage:
     def steps(self) -> int:
         """All steps."""
         return self.environment_steps + self.steps_by_learner
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the attributes by name, as plain values."""
+        counts = {name: getattr(self, name) for name in STEP_COUNTS}
+        return {**counts, "sources": sorted(self.sources)}
 
     def count_steps(self, steps: int) -> None:
         """Add steps of environments."""

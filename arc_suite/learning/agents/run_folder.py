@@ -30,7 +30,6 @@ LEG_VIEWS = "leg_views"  # name of a field of records: the version of what legs 
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
 _NUMBERS_OF_PROGRESS = {"evaluated", "wall", "cpu", "return"}  # those that a checkpoint may have
-_COUNTS_OF_PROGRESS = {"environment_steps", "steps_by_learner"}
 _IGNORED_FIELDS = ("learner",)  # fields of records of earlier versions, which may differ
 _MAX_TABLE = 1 << 30  # bytes
 _MAX_CHECKPOINT_BYTES = 1 << 34  # unpacked; the labels of imitation are the largest part
@@ -328,8 +327,8 @@ def _read_checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np
             checks.integer(f"length of {name}", lengths.get(name, 0), 0)
         for name in _NUMBERS_OF_PROGRESS & progress.keys():
             checks.number(name, progress[name])
-        for name in _COUNTS_OF_PROGRESS & progress.keys():
-            checks.integer(name, progress[name], 0)
+        for name in usage.STEP_COUNTS:
+            checks.integer(name, progress.get(name, 0), 0)
         for source in progress.get("sources", []):
             checks.name(source, usage.SOURCES, "source")
         for step in progress.get("pending", []):

@@ -12,7 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite import checks, evaluation, files, seed_ranges, usage
-from arc_suite.learning.agents import algorithms, priors, run_folder
+from arc_suite.learning.agents import algorithms, priors, run_folder, run_usage
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
 from arc_suite.learning.agents.evaluating import Evaluator, Lines, ProcessEvaluator
 from arc_suite.learning.agents.learner import UNLEARNED_PREFIXES, Damaged, Diverged, RunContext, Slice
@@ -21,9 +21,7 @@ from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
 from arc_suite.policies.network import Network
 from arc_suite.simulation.cores import usable_cores
-from arc_suite.usage import Usage
 
-STEP_COUNTS = ("environment_steps", "steps_by_learner")  # fields of `Usage`, and of the progress of a checkpoint
 _SAVE_INTERVAL = 30.0  # s between two checkpoints of a learner that stays on a device
 
 
@@ -181,7 +179,7 @@ class _Recorder:
         self._on_metrics = on_metrics
         self._writer = _CheckpointWriter(run_files, interval)
         self._progress = {"evaluated": 0, "pending": [], "wall": 0.0, "cpu": 0.0} | run_files.progress
-        self.usage = _usage_so_far(configuration, run_files, run_seeds)
+        self.usage = run_usage.begin(configuration, run_files, run_seeds)
         self._policy_step = self._progress["evaluated"]  # of the latest policy whose evaluation has begun
         self._is_policy_new = False  # whether the latest slice has a policy to evaluate
         # Where the clocks stood when the run began, if it had never stopped.
@@ -221,7 +219,7 @@ class _Recorder:
         """
         step = self.usage.steps
         metrics = learned_slice.metrics
-        _check_steps(self.usage, self._configuration)
+        run_usage.check_steps(self.usage, self._configuration)
         _check_finite(learned_slice, step, self.folder)
         self._bar.update(step - self._bar.n)
         if metrics is not None:
@@ -251,8 +249,7 @@ class _Recorder:
         self._progress["pending"] = list(self._evaluator.pending)
         self._progress["wall"] = time.monotonic() - self._wall_start  # s, of all processes of a run
         self._progress["cpu"] = self.cpu_seconds()  # s, of all processes of a run
-        self._progress |= {name: getattr(self.usage, name) for name in STEP_COUNTS}
-        self._progress["sources"] = sorted(self.usage.sources)
+        self._progress |= self.usage.to_dict()
         if learned_slice.metrics is not None or self._is_policy_new:
             seconds = {f"{name}_seconds": round(self._progress[name], 3) for name in ("wall", "cpu")}
             self._run_files.append("times", {"step": self.usage.steps, **seconds})
@@ -303,24 +300,6 @@ def _record(
         yield recorder
 
 
-def _usage_so_far(configuration: Configuration, run_files: RunFolder, run_seeds: Sequence[int]) -> Usage:
-    """Return what a run has used until its checkpoint."""
-    algorithm = configuration.definition
-    counts = {name: run_files.progress[name] for name in STEP_COUNTS if name in run_files.progress}
-    if run_files.arrays is not None and not counts:  # of an earlier version
-        lines = [*run_folder.lines(run_files.path, "training"), *run_folder.lines(run_files.path, "times")]
-        steps = max((int(line["step"]) for line in lines), default=run_files.progress.get("evaluated", 0))
-        counts = {STEP_COUNTS[0] if algorithm.acts else STEP_COUNTS[1]: steps}
-    return Usage(
-        name=configuration.algorithm,
-        source=algorithm.source,
-        seeds=[seed_ranges.of_run(seed) for seed in run_seeds],
-        runs=len(run_seeds),
-        sources=run_files.progress.get("sources", ()),
-        **counts,
-    )
-
-
 def _cpu_clock() -> float:
     """Return the CPU time of this process and of its ended children, s."""
     times = os.times()
@@ -360,15 +339,6 @@ class _CheckpointWriter:
         self._run_files.save(*self._unwritten)
         self._unwritten = None
         self._next_time = time.monotonic() + self._interval
-
-
-def _check_steps(usage_of_run: Usage, configuration: Configuration) -> None:
-    """Raise ValueError if an algorithm that does not act has made environment steps."""
-    if usage_of_run.environment_steps and not configuration.definition.acts:
-        raise ValueError(
-            f"algorithm {configuration.algorithm}: declares acts=False, and has made "
-            f"{usage_of_run.environment_steps} environment steps; declare acts=True, so that these are the run's steps"
-        )
 
 
 def _check_finite(learned_slice: Slice, step: int, folder: Path) -> None:
