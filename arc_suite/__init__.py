@@ -10,6 +10,8 @@ As a dm_env and as a Gymnasium environment::
 """
 
 import sys
+from collections.abc import Mapping
+from typing import Any
 
 if sys.orig_argv[1:3] == ["-m", "arc_suite"]:  # a program, from whose first import on Ctrl-C is one line
     from arc_suite.cli import interrupts
@@ -32,10 +34,12 @@ with versions.explain_import_errors():
     registration.register_ids()
 
 __version__ = "0.1.0"
+ALL_TASKS: tuple[tuple[str, str], ...]  # of __getattr__, as packages register further ones
+TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]]
 __all__ = ["load", "symmetry", "register", "Setup", "TASKS_BY_DOMAIN", "ALL_TASKS"]  # noqa: F822  # the last two are of __getattr__
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     if name == "ALL_TASKS":
         return registry.all_tasks()
     if name == "TASKS_BY_DOMAIN":

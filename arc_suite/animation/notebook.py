@@ -6,6 +6,7 @@ import dataclasses
 import io
 import itertools
 from collections.abc import Callable
+from typing import Any
 from xml.etree import ElementTree
 
 from arc_suite import checks, policies, style
@@ -38,7 +39,12 @@ class Inline:
 
 
 def show(
-    environment, policy: str | Policy | Callable = "cpg", *, seed: int = 0, steps: int | None = None, film: bool = False
+    environment: Any,
+    policy: str | Policy | Callable = "cpg",
+    *,
+    seed: int = 0,
+    steps: int | None = None,
+    film: bool = False,
 ) -> Inline:
     """Return a walk that a notebook shows inline.
 

@@ -13,6 +13,7 @@ from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepare_task
+from arc_suite.envs.timestep import TimeStep
 from arc_suite.models.soundness import hopeless_flaws
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -44,7 +45,7 @@ class Demonstrator:
         law: law of the preset, fitted to the task; see `cpg.law`.
     """
 
-    def __init__(self, task, preset=None):
+    def __init__(self, task: Any, preset: Any = None):
         """Fit a demonstrator.
 
         Args:
@@ -148,7 +149,7 @@ class Demonstrator:
         self._state = trees.map_leaves(lambda leaf: arrays[str(next(numbers))].copy(), initial)
         self._reset_indices = []
 
-    def __call__(self, timestep) -> np.ndarray:
+    def __call__(self, timestep: TimeStep) -> np.ndarray:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
         if timestep.first():
             self.reset([0])

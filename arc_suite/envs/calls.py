@@ -2,8 +2,8 @@
 
 import functools
 import threading
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from arc_suite.tasks.parameters import LARGEST
 
 # Kinds of arrays that NumPy would convert to floats although they are no real numbers: complex, objects, text, dates.
 _UNREAL_KINDS = "cOSUMmT"
+
+_Environment = TypeVar("_Environment")
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
 class KnownAttributes:
@@ -59,7 +63,9 @@ class Lock(type(threading.RLock())):  # type: ignore[misc]  # the class has no n
         return Lock, ()
 
 
-def one_thread_at_a_time(method):
+def one_thread_at_a_time(
+    method: Callable[Concatenate[_Environment, _Arguments], _Result],
+) -> Callable[Concatenate[_Environment, _Arguments], _Result]:
     """Make a method refuse calls while another thread is in such a method of the same environment.
 
     The environment has a `Lock` as its attribute `_lock`.
@@ -69,7 +75,7 @@ def one_thread_at_a_time(method):
     """
 
     @functools.wraps(method)
-    def call_alone(self, *args, **kwargs):
+    def call_alone(self, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
         lock = self._lock
         if not lock.acquire(False):
             raise RuntimeError(

@@ -6,10 +6,10 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-import dm_env
 import numpy as np
 from dm_control.rl import control
 from dm_env import specs
+from numpy.typing import ArrayLike
 
 from arc_suite import checks, usage
 from arc_suite.envs import snapshots, trees
@@ -23,6 +23,7 @@ from arc_suite.envs.calls import (
 )
 from arc_suite.envs.prepare import checked_changes, prepare_task, refuse_arguments
 from arc_suite.envs.task_view import TaskView
+from arc_suite.envs.timestep import TimeStep
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import check_fields
 from arc_suite.simulation.physics import Physics
@@ -116,8 +117,22 @@ class Environment(KnownAttributes, control.Environment):
         )
         self._sealed_by = __name__
 
+    @property
+    def physics(self) -> Physics:
+        """The simulation."""
+        return self._physics
+
+    @property
+    def task(self) -> "TaskRun":
+        """The run of the task, with its progress and the terms of its reward."""
+        return self._task
+
+    def action_spec(self) -> specs.BoundedArray:
+        """Return the spec of one control in [-1, 1] for each motor or servo of the legs."""
+        return self.task.action_spec(self.physics)
+
     @one_thread_at_a_time
-    def step(self, action) -> dm_env.TimeStep:
+    def step(self, action: ArrayLike) -> TimeStep:
         """Advance by one control step, or start an episode after the end of one; see dm_control.
 
         A fall terminates the episode, in its last possible step, too: its discount is 0.
@@ -205,7 +220,7 @@ class Environment(KnownAttributes, control.Environment):
         return self.task.state(simulations, self.physics, self._step_count, self._reset_next_step)
 
     @one_thread_at_a_time
-    def reset(self, seed: int | None = None) -> dm_env.TimeStep:
+    def reset(self, seed: int | None = None) -> TimeStep:
         """Start an episode.
 
         Args:
@@ -220,7 +235,7 @@ class Environment(KnownAttributes, control.Environment):
             self.task.random = _begin_stream(seed)
         return super().reset()
 
-    def command(self, name: str, value) -> None:
+    def command(self, name: str, value: ArrayLike | str | None) -> None:
         """Set a command of the task from the next step on, until the next episode; for example from a player's stick.
 
         Any thread may call it while another is in a step, which still uses the earlier command.
@@ -236,7 +251,7 @@ class Environment(KnownAttributes, control.Environment):
         self.physics.check_process()
         self.task.set_command(name, value)
 
-    def observation_spec(self):
+    def observation_spec(self) -> Mapping[str, specs.Array]:
         """Return the specs of the observation's blocks by name, or of the flat vector."""
         return self.task.observation_spec(self.physics)
 
@@ -321,7 +336,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._stream_begins = True  # with the next episode
 
     @property
-    def terms(self) -> Mapping[str, Any]:
+    def terms(self) -> Mapping[str, float]:
         """The unweighted terms of the latest reward by name; empty before the first step."""
         return self._now.terms
 
@@ -380,12 +395,12 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             raise ValueError(f"command {name!r}: no episode has begun; reset first")
         self._commands.put(name, value)
 
-    def action_spec(self, physics):
+    def action_spec(self, physics: Physics) -> specs.BoundedArray:
         """Return the spec of one control in [-1, 1] for each motor or servo of the legs."""
         shape = self._action_shape
         return specs.BoundedArray(shape, float, -np.ones(shape), np.ones(shape))
 
-    def observation_spec(self, physics):
+    def observation_spec(self, physics: Physics) -> collections.OrderedDict[str, specs.Array]:
         """Return the specs of the observation's blocks by name, or of the flat vector."""
         sizes = {_FLAT: self.definition.size} if self._flat else self.definition.sizes
         return collections.OrderedDict((name, specs.Array((size,), float, name)) for name, size in sizes.items())

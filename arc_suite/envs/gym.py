@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from numpy.typing import ArrayLike
 
 from arc_suite import checks, versions
 from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
@@ -144,7 +145,9 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         self._env.task.random = np.random.RandomState(value.bit_generator)
         self._np_random_seed = -1
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start an episode.
 
         Args:
@@ -170,7 +173,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         self._show()
         return _to_vector(observation), self._privileged_info()
 
-    def step(self, action):
+    def step(self, action: ArrayLike) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Advance by one control step.
 
         Args:
@@ -197,7 +200,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         info = _to_floats("reward", task.terms) | _to_floats("progress", task.progress) | self._privileged_info()
         return _to_vector(observation), float(reward), terminated, truncated, info
 
-    def command(self, name: str, value) -> None:
+    def command(self, name: str, value: ArrayLike | str | None) -> None:
         """Set a command of the task from now on, until the next episode; see `arc_suite.envs.dm.Environment.command`.
 
         Raises:
@@ -243,7 +246,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         self._np_random_seed = int(arrays["stream_seeds"][0])
         self._episode_is_running = not arrays["ended"][0]
 
-    def render(self):
+    def render(self) -> np.ndarray | None:
         """Return a picture of the present state, in the mode and size that were chosen at the start.
 
         Returns:
@@ -257,7 +260,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         return super().render()
 
     @one_thread_at_a_time
-    def close(self):
+    def close(self) -> None:
         """Free the simulation and the resources of rendering; a second call does nothing.
 
         Raises:

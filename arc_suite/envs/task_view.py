@@ -47,7 +47,7 @@ class TaskView:
         """Sizes of the observation's blocks by name, in the order of the vector."""
         return self.definition.sizes
 
-    def split(self, observation: np.ndarray) -> collections.OrderedDict:
+    def split(self, observation: np.ndarray) -> collections.OrderedDict[str, np.ndarray]:
         """Return an observation vector (..., size) as named blocks, views of it.
 
         Raises:

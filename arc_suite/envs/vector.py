@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike
 
 from arc_suite import checks, usage
 from arc_suite.envs import snapshots, stacked, trees
@@ -222,7 +223,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._sealed_by = __name__
 
     @one_thread_at_a_time
-    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start an episode in every environment, or in some.
 
         Args:
@@ -249,7 +252,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         return self._observation.copy(), self._privileged_info(mask)
 
     @one_thread_at_a_time
-    def step(self, actions):
+    def step(self, actions: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Advance every environment by one control step, except those that start an episode instead.
 
         Args:

@@ -6,7 +6,7 @@ from typing import Any
 from arc_suite.robots import bastion, leaper, queen, tick
 from arc_suite.robots.spec import Body
 
-ROBOTS = {module.BODY.name: module.BODY for module in (queen, bastion, tick, leaper)}
+ROBOTS: dict[str, Body] = {module.BODY.name: module.BODY for module in (queen, bastion, tick, leaper)}
 
 
 def is_robot(body: Body) -> bool:

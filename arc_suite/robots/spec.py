@@ -21,7 +21,7 @@ import math
 import operator
 import re
 from collections.abc import Iterable
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 Vector = tuple[float, float, float]
 
@@ -232,7 +232,7 @@ class _Spec:
         kind = type(self).__name__
         return f"{kind}({name})" if isinstance(name, str) and _NAME_PATTERN.fullmatch(name) else kind
 
-    def replace(self, **changes):
+    def replace(self, **changes: Any) -> Self:
         """Return a copy with some fields changed. The changed fields and all conditions are checked."""
         fields = {field.name: field for field in dataclasses.fields(self)}
         if not changes.keys() <= fields.keys():

@@ -20,6 +20,13 @@ def test_hooks_and_lint_have_the_same_ruff():
     assert re.findall(r"ruff==([\d.]+)", (ROOT / ".pre-commit-config.yaml").read_text()) == [pinned, pinned]
 
 
+def test_a_clone_on_the_path_shadows_no_module():
+    """Installed for editing, this folder is on Python's path; folders without `__init__.py` yield to any package."""
+    modules = {path.stem for path in ROOT.glob("*.py")} | {path.parent.name for path in ROOT.glob("*/__init__.py")}
+    assert modules == {"arc_suite", SETUP["options"]["py_modules"]}
+    assert SETUP["options"]["package_dir"].split() == ["=", "."]
+
+
 def test_the_citation_names_this_version():
     assert f"\nversion: {arc_suite.__version__}\n" in (ROOT / "CITATION.cff").read_text()
 
