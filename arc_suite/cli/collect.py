@@ -118,7 +118,8 @@ def main() -> None:
         policies.check_preset(FLAGS.policy, name)
         check_preset_name(name)
     policy, label = policy_and_label()
-    for setup in setups.values():
+    for judged_setup in setups.values():
+        setup = judged_setup.learning()  # with other falls, for example, than those by which policies are judged
         presets = tuple(presets_for(setup))
         settings = data.DatasetSettings(setup, policy, presets, FLAGS.noise, FLAGS.seed, step_limit(setup))
         dataset_id = settings.dataset_id(label) if FLAGS.id is None else FLAGS.id

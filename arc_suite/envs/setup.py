@@ -183,6 +183,13 @@ class Setup:
         settings = {name: value for name, value in self.task_kwargs.items() if name not in dropped}
         return Setup._make(self.domain, self.task, settings | dict(changes))
 
+    def learning(self) -> "Setup":
+        """Return the setup to learn in: with the settings that the task has for training, unless they are set.
+
+        Policies are judged in the setup itself.
+        """
+        return self.with_settings({**self.kind.training, **self.task_kwargs})
+
     def validation(self, count: int) -> "Setup":
         """Return the setup for evaluations of a policy while it learns.
 

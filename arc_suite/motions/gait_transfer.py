@@ -3,7 +3,6 @@
 All lengths are in standing heights, and times in shares of the loop.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from arc_suite.models.stride import fitted_gait
 from arc_suite.motions import motion as values
 from arc_suite.motions.ground_poses import compose, ground_poses, integrate_twist, relative_pose, twist_to
 from arc_suite.motions.motion import Motion
-from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns
+from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 
@@ -78,7 +77,7 @@ def transfer(motion: Motion, body: Body, size: Size) -> tuple[Paths, list[str]]:
 
     # With the same strides at the same speed, a loop of a shorter stance takes less time.
     time_ratio = duty_factor / gait.duty_factor
-    seconds = motion.seconds * time_ratio * math.sqrt(height / motion.standing_height)
+    seconds = motion.seconds * time_ratio * time_scale(motion.standing_height, height)
     notes = [
         f"gait: {cycles} cycles with a duty factor of {gait.duty_factor:.2f}, before {duty_factor:.2f}; "
         f"{seconds:.3f} s, before {motion.seconds:.3f} s"

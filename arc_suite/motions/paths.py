@@ -1,5 +1,6 @@
 """Paths of a torso and of feet in standing heights, and which feet of two bodies belong together."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -88,3 +89,8 @@ def _relative_places(soles: np.ndarray) -> np.ndarray:
     middle = 0.5 * (ground.max(axis=0) + ground.min(axis=0))
     half_extent = 0.5 * np.ptp(ground, axis=0)
     return (ground - middle) / np.maximum(half_extent, 1e-9)
+
+
+def time_scale(standing_height: float, other_height: float) -> float:
+    """Return by how much longer a motion of another standing height takes: as a pendulum of that length swings."""
+    return math.sqrt(other_height / standing_height)

@@ -17,7 +17,7 @@ from arc_suite.models.standing import measure_standing, stability_margin
 from arc_suite.motions import gait_transfer
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
-from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns
+from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
 from arc_suite.robots.spec import Body
 
 MAX_MISS = 0.05  # standing heights, of a foot from its path
@@ -82,11 +82,6 @@ def retarget(motion: Motion, body: Body) -> tuple[Motion, list[str]]:
     return retargeted._replace(planted=paths.planted), notes
 
 
-def time_scale(motion: Motion, body: Body) -> float:
-    """Return by how much longer the same motion of a body takes: as a pendulum of its standing height."""
-    return math.sqrt(body.torso.standing_height / motion.standing_height)
-
-
 # Gestures.
 
 
@@ -125,7 +120,7 @@ def _transfer_gesture(motion: Motion, body: Body, size: Size) -> tuple[Paths, li
     heights = motion.positions[:, 2] / motion.standing_height
     rest_height = rest_height / height
     positions[:, 2] = rest_height + size.all * (scale_heights(heights, motion.rest_height, rest_height) - rest_height)
-    seconds = motion.seconds * time_scale(motion, body)
+    seconds = motion.seconds * time_scale(motion.standing_height, height)
     paths = Paths(seconds, positions, shrink_turns(motion.quaternions, size.all * size.side), soles, planted)
     return _carry_torso(body, paths, notes), notes
 

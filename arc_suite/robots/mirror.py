@@ -67,6 +67,15 @@ def image(body: Body) -> Image:
     )
 
 
+def has_image(body: Body) -> bool:
+    """Return whether a body has a left-right symmetry."""
+    try:
+        image(body)
+    except ValueError:
+        return False
+    return True
+
+
 class _Tolerance:
     """Comparisons of numbers up to rounding."""
 

@@ -72,21 +72,25 @@ class MotionTables(NamedTuple):
         loops = [motion if motion.loops else _return_to_start(motion) for motion in body_motions]
         counts = np.array([max(1, round(loop.seconds / control_timestep)) for loop in loops])
         lengths = counts + POSES_AHEAD
-        tables = [_tabulate(body, loop, count) for loop, count in zip(loops, counts, strict=True)]
         mirror_offset = 0
-        if _has_image(body):
+        images = []
+        if mirror.has_image(body):
             mirror_offset = int(lengths.sum())
-            for loop, count in zip(loops, counts, strict=True):
-                tables.append(_tabulate(body, motions.mirror(loop, body), count))
-        columns = _join(tables)
-        spreads = _join([_measure_spreads(body, table, rate_unit) for table in tables], np.stack)
-        return cls(lengths.cumsum() - lengths, counts, mirror_offset, *columns, *spreads)
+            images = [motions.mirror(loop, body) for loop in loops]
+        tables = []
+        for loop, count in zip([*loops, *images], np.resize(counts, len(loops) + len(images)), strict=True):
+            tables.append(_tabulate(body, loop, int(count), rate_unit))
+        columns = {name: np.concatenate([getattr(table, name) for table in tables]) for name in _COLUMNS}
+        return cls(lengths.cumsum() - lengths, counts, mirror_offset, **columns)
 
     def at(self, table: np.ndarray, index):
         """Return the entries (..., n) of a table at indices (...), integers of Python, NumPy or JAX."""
         if not isinstance(index, int):
             table = index.__array_namespace__().asarray(table)
         return table[index]
+
+
+_COLUMNS = MotionTables._fields[3:]  # tables with rows, and spreads, which follow those of the motion before
 
 
 def _return_to_start(motion: Motion) -> Motion:
@@ -120,20 +124,8 @@ def split_next_angles(next_poses, joints: int) -> tuple:
     return next_poses[..., size - joints : size], next_poses[..., -joints:]
 
 
-class _Table(NamedTuple):
-    """The columns of one motion, as in `MotionTables`."""
-
-    places: np.ndarray
-    heights: np.ndarray
-    quaternions: np.ndarray
-    angles: np.ndarray
-    velocities: np.ndarray
-    feet: np.ndarray
-    circle: np.ndarray
-
-
-def _tabulate(body: Body, loop: Motion, count: int) -> _Table:
-    """Return the table of a loop with a number of rows in a cycle, and with those that continue it.
+def _tabulate(body: Body, loop: Motion, count: int, rate_unit: float) -> MotionTables:
+    """Return the table of one loop with a number of rows in a cycle, and with those that continue it.
 
     Velocities are differences between rows: motors that get an action a row can follow no faster change.
     """
@@ -155,35 +147,21 @@ def _tabulate(body: Body, loop: Motion, count: int) -> _Table:
     ground_velocities = rotations.to_heading_frame(linear[:, :2], -turns)
     phases = 2.0 * np.pi * np.arange(rows) / count
     columns = (ground_velocities, linear[:, 2:], velocities.angular[in_cycle], velocities.joints[in_cycle])
-    return _Table(
+    velocity_rows = np.concatenate(columns, axis=-1)
+    feet = np.concatenate([from_torso, center_heights], axis=-1)
+    foot_variances = feet.var(axis=0).sum(axis=-1)
+    return MotionTables(
+        starts=np.zeros(1, int),
+        counts=np.array([count]),
+        mirror_offset=0,
         places=np.concatenate([positions[:, :2], yaw[:, None]], axis=-1),
         heights=positions[:, 2],
         quaternions=quaternions,
         angles=angles,
-        velocities=np.concatenate(columns, axis=-1),
-        feet=np.concatenate([from_torso, center_heights], axis=-1),
+        velocities=velocity_rows,
+        feet=feet,
         circle=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
+        angle_spreads=angles.std(axis=0, keepdims=True).clip(_MIN_ANGLE_SPREAD),
+        rate_spreads=velocity_rows[:, 6:].std(axis=0, keepdims=True).clip(_MIN_RATE_SPREAD * rate_unit),
+        foot_spreads=np.sqrt(foot_variances)[None].clip(_MIN_FOOT_SPREAD * body.torso.standing_height),
     )
-
-
-def _measure_spreads(body: Body, table: _Table, rate_unit: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the spreads of angles, joint velocities and feet in a cycle."""
-    height = body.torso.standing_height
-    angle_spreads = table.angles.std(axis=0).clip(_MIN_ANGLE_SPREAD)
-    rate_spreads = table.velocities[:, 6:].std(axis=0).clip(_MIN_RATE_SPREAD * rate_unit)
-    foot_variances = table.feet.var(axis=0).sum(axis=-1)
-    foot_spreads = np.sqrt(foot_variances).clip(_MIN_FOOT_SPREAD * height)
-    return angle_spreads, rate_spreads, foot_spreads
-
-
-def _join(rows: Sequence[tuple], join=np.concatenate) -> list[np.ndarray]:
-    return [join(columns) for columns in zip(*rows, strict=True)]
-
-
-def _has_image(body: Body) -> bool:
-    """Return whether a body has a left-right symmetry."""
-    try:
-        mirror.image(body)
-    except ValueError:
-        return False
-    return True

@@ -150,10 +150,8 @@ class Recover(Task):
     @functools.cached_property
     def _mirror(self) -> mirrors.Mirror | None:
         """The mirror map of the joints; None for a body without mirror image."""
-        try:
-            return mirrors.joints(mirror.image(self.scene.body))
-        except ValueError:
-            return None
+        body = self.scene.body
+        return mirrors.joints(mirror.image(body)) if mirror.has_image(body) else None
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the start, in this order: pose of the table, heading, whether it is mirrored."""

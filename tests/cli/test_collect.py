@@ -8,6 +8,7 @@ import programs
 import pytest
 
 from arc_suite import data
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
 
 ID = "arc_suite/queen/walk/cpg-refined-20steps-v0"
@@ -48,6 +49,13 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     assert len(data.open(dataset_id).settings.setup.body.legs) == 4
     line = f"arc-suite collect: dataset {dataset_id!r} holds episodes of walker_4x2, and not of queen\n"
     programs.refused(run(f"--verify={dataset_id}", "--robot=queen"), line)
+
+
+@pytest.mark.long
+def test_datasets_have_other_falls_than_judges(root):
+    flags = ["--robot=tick", "--task=recover", "--policy=zero", "--episodes=1", "--steps=3", "--id=arc_suite/falls-v0"]
+    programs.passed(run(*flags))
+    assert data.open("arc_suite/falls-v0").settings.setup == Setup.of("tick", "recover").learning()
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,15 @@ def test_learners_have_falls_of_their_own():
     assert chosen.training_setup.task_kwargs["fall_seed"] == 7
 
 
+def test_others_learn_from_falls_of_training_unless_they_choose():
+    judged = Setup.of("tick", "recover", {"weights": {"up": 2.0}})
+    assert judged.learning() == judged.with_settings({"fall_seed": 1, "time_limit": 10.0})
+    chosen = Setup.of("tick", "recover", {"fall_seed": 7, "time_limit": 3.0})
+    assert chosen.learning() == chosen
+    walk = Setup.of("tick", "walk", {"time_limit": 3.0})
+    assert walk.learning() == walk
+
+
 def test_records_have_the_hash_of_the_falls():
     records = [provenance.of_setup(Setup.of("tick", "recover", {"fall_seed": seed})) for seed in (0, 1)]
     assert len(records[0]["start_sha256"]) == 64

@@ -108,7 +108,10 @@ def _check_dataset(dataset, context: RunContext) -> None:
     prior = checks.preview(context.prior)
     if dataset_setup.body != setup.body:
         raise ValueError(f"prior {prior}: of {dataset_setup.body.name}, and not of {setup.body.name}")
-    if dataset_setup != setup:
+    if dataset_setup == setup != setup.learning():
+        names = ", ".join(setup.kind.training)
+        raise ValueError(f"prior {prior}: expected other {names} than those of judges; collect it anew")
+    if dataset_setup != setup.learning():
         raise ValueError(f"prior {prior}: of {dataset_setup}, and not of {setup}")
     version = dataset.metadata["arc_suite"].get("task_version")
     if version != setup.kind.version:  # of other dynamics, rewards or observations

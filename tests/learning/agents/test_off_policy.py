@@ -10,8 +10,9 @@ from conftest import SHORT, small
 
 from arc_suite import data
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import algorithms, off_policy
+from arc_suite.learning.agents import algorithms, off_policy, priors
 from arc_suite.learning.agents import soft_actor_critic as sac
+from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.tasks import Walk
 
 
@@ -225,6 +226,20 @@ def test_prior_data_of_another_version_of_the_task(learner, monkeypatch):
     monkeypatch.setattr(Walk, "version", 1)
     with pytest.raises(ValueError, match=r"^prior '.*': of version 0 of walk; 1 is installed$"):
         learner("sope", small("sope")).advance()
+
+
+def test_prior_data_of_recover_have_the_falls_of_training(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    judged = Setup.of("tick", "recover")
+
+    def open_prior(name, setup):
+        data.collect(name, data.DatasetSettings(setup, "zero", (), steps=4), 2, threads=1)
+        run = Configuration.of(judged, "sope", small("sope"), prior=name)
+        return priors.open_replay(run.context(tmp_path / "run"), judged.definition)
+
+    assert open_prior("arc_suite/learning-v0", judged.learning()).total == 8
+    with pytest.raises(ValueError, match="^prior '.*': expected other fall_seed, time_limit than those of judges"):
+        open_prior("arc_suite/judged-v0", judged)
 
 
 def test_runs_share_the_files_of_prior_data(learner, tmp_path):
