@@ -11,7 +11,7 @@ _FOLDER = Path(__file__).with_name("arc_suite") / "cli"
 def main() -> None:
     """Print the help, or run the program of the first argument."""
     _run("interrupts.py")["exit_at_once"]()
-    if sys.argv[1:2] in ([], ["-h"], ["--help"]):
+    if sys.argv[1:] in ([], ["help"], ["-h"], ["--help"]):
         print(_run("programs.py")["usage"]())
     else:
         try:

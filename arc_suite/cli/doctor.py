@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from arc_suite import versions
+from arc_suite.cli.version import describe_suite
 from arc_suite.simulation import opengl
 from arc_suite.simulation.cores import usable_cores
 
@@ -52,7 +53,8 @@ def main() -> int:
 
 
 def examine() -> Iterator[Finding]:
-    """Yield findings about system, packages, cores, OpenGL and pictures."""
+    """Yield findings about the suite, system, packages, cores, OpenGL and pictures."""
+    yield Finding("arc_suite", describe_suite().removeprefix("arc_suite "))
     yield Finding("system", f"{platform.platform()}, Python {platform.python_version()}")
     yield from _examine_packages()
     yield Finding("cores", f"{os.cpu_count()}; vector environments use {usable_cores()}")

@@ -6,7 +6,10 @@ from types import ModuleType
 
 from arc_suite import checks, registry, versions
 from arc_suite.cli import interrupts, program
-from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, docstring_of, installed_programs, usage
+from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, WORDS, docstring_of, installed_programs, usage
+from arc_suite.cli.version import describe_suite
+
+_HELP_WORDS = ("help", "--help", "-h")
 
 
 def main(*arguments: str) -> None:
@@ -18,11 +21,14 @@ def main(*arguments: str) -> None:
     interrupts.exit_at_once()
     # Modules that flags name may lie in the current folder. It comes last: no file there hides an installed module.
     sys.path.append("")
-    program_name, *program_arguments = [*arguments, *sys.argv[1:]] or ["--help"]
+    program_name, *program_arguments = [*arguments, *sys.argv[1:]] or ["help"]
+    if program_name in _HELP_WORDS and program_arguments:  # as in `arc-suite help train`
+        program_name, *_ = program_arguments
+        program_arguments = ["--help"]
     # `guard` and `run` exit the process.
-    if program_name == "--version":
-        program.guard(lambda: print(program.VERSION), "arc-suite")
-    elif program_name in ("--help", "-h"):
+    if program_name in ("version", "--version", "-V"):
+        program.guard(lambda: print(describe_suite()), "arc-suite")
+    elif program_name in _HELP_WORDS:
         program.guard(lambda: print(usage()), "arc-suite")
     elif program_name in PROGRAMS:
         module = _import_program(program_name)
@@ -53,7 +59,7 @@ def _program_of_another_package(name: str) -> ModuleType:
         elif ":" in name:
             full_name = name
         else:
-            full_name = checks.name(name, [*PROGRAMS, *entry_points], "program")
+            full_name = checks.name(name, [*PROGRAMS, *entry_points, *WORDS], "program")
         module = registry.find("program", full_name, PROGRAMS)
         if not callable(getattr(module, "main", None)) or not docstring_of(module):
             raise ValueError(f"program {full_name!r}: expected a module with a docstring and a function main")

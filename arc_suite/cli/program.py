@@ -18,15 +18,13 @@ from absl import flags
 from dm_control.rl.control import PhysicsError
 from tqdm import tqdm
 
-import arc_suite
 from arc_suite import checks, files, policies, registry
 from arc_suite.cli import interrupts
 from arc_suite.cli.help_text import help_text
 from arc_suite.cli.programs import docstring_of
+from arc_suite.cli.version import describe_suite
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
-
-VERSION = f"arc_suite {arc_suite.__version__}"
 
 _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
@@ -34,7 +32,9 @@ _EXPECTED_ERRORS = (flags.Error, ValueError, OSError, RenderingUnavailable, Phys
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
-_VERSION = flags.DEFINE_bool("version", False, "Print the version of the package and exit.")
+_VERSION = flags.DEFINE_bool(
+    "version", False, "Print the version, the folder and the commit, and exit.", short_name="V"
+)
 
 
 def progress(*args, **kwargs) -> tqdm:
@@ -100,7 +100,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
             print(help_text(docstring_of(module), _flags_of(module)))
             return None
         if _VERSION.value:
-            print(VERSION)
+            print(describe_suite())
             return None
         max_arguments = len(inspect.signature(main).parameters)
         if len(positional_arguments) > max_arguments:

@@ -29,7 +29,11 @@ PROGRAMS = {
     "transfer": "arc_suite.learning.cli",
     "design": "arc_suite.animation.cli",
     "doctor": "arc_suite.cli",
+    "completion": "arc_suite.cli",
 }
+
+# Further first arguments, and what they do.
+WORDS = {"help": "Show the programs, or the flags of a program.", "version": "Print the version and the folder."}
 
 # Former programs, and what to run in place of each.
 FORMER_PROGRAMS = {
@@ -43,7 +47,7 @@ arc-suite PROGRAM [flags]
 
 {programs}
 
-arc-suite PROGRAM --help shows the flags of a program, arc-suite --version the version.
+arc-suite help PROGRAM shows the flags of a program, arc-suite version the version and the folder.
 arc-suite MODULE:NAME runs a program that another package registers."""
 
 
@@ -65,9 +69,13 @@ def installed_programs() -> dict[str, metadata.EntryPoint]:
 
 def program_summary(name: str) -> str:
     """Return the first line of a program's docstring, read from its source without importing it."""
+    return _read_docstring(source_path(name)).splitlines()[0]
+
+
+def source_path(name: str) -> Path:
+    """Return the path of a program's module."""
     top_folder = Path(__file__).parents[2]  # that of the package arc_suite
-    folder = top_folder.joinpath(*PROGRAMS[name].split("."))
-    return _read_docstring(folder / f"{name}.py").splitlines()[0]
+    return top_folder.joinpath(*PROGRAMS[name].split("."), f"{name}.py")
 
 
 def docstring_of(module: ModuleType) -> str:

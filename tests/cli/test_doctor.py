@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+import arc_suite
 from arc_suite import versions
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -23,7 +24,7 @@ def doctor(*path, **variables):
     assert done.stderr == ""
     *lines, verdict = done.stdout.splitlines()
     found = {line.split()[1]: (line.split()[0], line[21:]) for line in lines}
-    assert list(found) == ["system", *versions.REQUIREMENTS, "cores", "MUJOCO_GL", "picture"]
+    assert list(found) == ["arc_suite", "system", *versions.REQUIREMENTS, "cores", "MUJOCO_GL", "picture"]
     return done.returncode, found, verdict
 
 
@@ -39,6 +40,7 @@ def test_healthy():
     status, found, verdict = doctor(MUJOCO_GL="egl")
     assert (status, verdict) == (0, "all is well")
     assert {sign for sign, _ in found.values()} == {"ok"}
+    assert found["arc_suite"][1].startswith(f"{arc_suite.__version__}, {ROOT}")
     assert found["dm-control"] == ("ok", "1.0.50, made for ==1.0.50")
     assert found["MUJOCO_GL"] == ("ok", "egl, no display")
     assert found["picture"][1].startswith("drawn by egl, ")

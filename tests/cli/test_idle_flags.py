@@ -37,6 +37,7 @@ ALWAYS = {
     "transfer": f"{SET} policy families output",
     "design": "goal task around mass span height power map bodies random steps seed processes pages output",
     "doctor": "",
+    "completion": "",
 }
 NO_MODEL = "goes with --output, as no model is written"
 NEITHER = "a model holds body and ground, and this setting changes neither"

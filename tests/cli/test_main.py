@@ -13,13 +13,17 @@ import pytest
 
 import arc_suite
 from arc_suite.cli import main
+from arc_suite.cli.flag_names import flag_names
 from arc_suite.cli.help_text import FLAGS_BY_GROUP
-from arc_suite.cli.programs import FORMER_PROGRAMS, program_summary
+from arc_suite.cli.programs import FORMER_PROGRAMS, WORDS, program_summary
 from arc_suite.policies import POLICIES
 
 ROOT = pathlib.Path(__file__).parents[2]
-VERSION = f"arc_suite {arc_suite.__version__}\n"
-WITHOUT_TASK = {"import", "motion", "play", "study", "benchmark", "doctor"}
+FIRST_WORDS = [*main.PROGRAMS, *WORDS]
+COMMIT = subprocess.run(
+    ["git", "-C", ROOT, "rev-parse", "HEAD"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+).stdout
+WITHOUT_TASK = {"import", "motion", "play", "study", "benchmark", "doctor", "completion"}
 WRITING = (
     "build_model",
     "import",
@@ -39,7 +43,7 @@ def run(*arguments):
     return programs.run("-m", "arc_suite", *arguments)
 
 
-@pytest.mark.parametrize("arguments", [(), ("--help",), ("-h",)])
+@pytest.mark.parametrize("arguments", [(), ("--help",), ("-h",), ("help",)])
 def test_help_lists_the_programs(arguments):
     lines = programs.passed(run(*arguments)).splitlines()
     assert lines[0] == "arc-suite PROGRAM [flags]"
@@ -84,13 +88,25 @@ def test_help_needs_no_docstrings():
         assert program_summary(name) in lines
 
 
-def test_version():
-    assert programs.passed(run("--version")) == VERSION
+@pytest.mark.parametrize("arguments", [("--version",), ("version",), ("-V",), ("train", "-V")])
+def test_version_folder_and_commit(arguments):
+    text, _, commit = programs.passed(run(*arguments)).partition(", commit ")
+    assert text.strip() == f"arc_suite {arc_suite.__version__}, {ROOT}"
+    assert bool(commit) == bool(COMMIT) and COMMIT.startswith(commit.strip().removesuffix("-dirty"))
+
+
+@pytest.mark.parametrize("word", ["help", "--help", "-h"])
+def test_help_of_a_program_by_a_word(word):
+    assert programs.passed(run(word, "evaluate")) == help_of("evaluate")
+
+
+def test_help_of_an_unknown_program_is_one_line():
+    programs.refused(run("help", "evalute"), "arc-suite: unknown program 'evalute'; did you mean 'evaluate'? (there")
 
 
 @pytest.mark.parametrize(("argument", "near"), [("rendr", "render"), ("studys", "study"), ("stile", "style")])
 def test_an_unknown_program_is_one_line_with_the_nearest(argument, near):
-    line = f"arc-suite: unknown program {argument!r}; did you mean {near!r}? (there are: {', '.join(main.PROGRAMS)})\n"
+    line = f"arc-suite: unknown program {argument!r}; did you mean {near!r}? (there are: {', '.join(FIRST_WORDS)})\n"
     programs.refused(run(argument, "--robot=queen"), line)
 
 
@@ -107,8 +123,11 @@ def test_only_the_program_that_runs_is_imported():
         "try: main.main()\n"
         "finally: print(sorted(name for name in sys.modules if name.startswith('arc_suite.cli.')))"
     )
-    names = [f"arc_suite.cli.{name}" for name in ("doctor", "help_text", "interrupts", "main", "program", "programs")]
-    assert interpreters.printed(code) == [VERSION.strip(), f"{names}"]
+    names = [
+        f"arc_suite.cli.{name}"
+        for name in ("doctor", "help_text", "interrupts", "main", "program", "programs", "version")
+    ]
+    assert interpreters.printed(code)[1:] == [f"{names}"]
 
 
 @pytest.mark.parametrize("arguments", [[], ["-h"], ["--help"]])
@@ -182,6 +201,15 @@ def test_help_of_a_program(program):
     assert {"--task", "--set"} & set(names) == (set() if program in WITHOUT_TASK else {"--task", "--set"})
 
 
+@pytest.mark.parametrize("program", main.PROGRAMS)
+def test_flags_are_read_from_the_source_of_a_program(program):
+    usages = re.findall(r"^  (?:-(.), )?--(?:\[no\])?(\w+)(=?)", help_of(program), re.MULTILINE)
+    flags = {(name, short_name, bool(equals)) for short_name, name, equals in usages}
+    assert set(flag_names(program)) - {("seeds", "", True)} == flags - {
+        ("seeds", "", True)
+    }  # an alias, which has no help
+
+
 def test_help_says_what_each_policy_is():
     text = " ".join(help_of("evaluate").split("--policy=TEXT")[1].split())
     assert [name for name in POLICIES if not re.search(rf"\b{name}, \w+ ", text)] == []
@@ -189,7 +217,7 @@ def test_help_says_what_each_policy_is():
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    taking = ("check", "import", "motion", "export", "study", "benchmark")  # an argument
+    taking = ("check", "import", "motion", "export", "study", "benchmark", "completion")  # an argument
     done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
     programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; see --help\n")
 

@@ -164,7 +164,7 @@ def test_readme():
 def test_help(program):
     """Flags, and the values that they list."""
     text = programs.run("-m", "arc_suite", program, "--help", cwd=ROOT).stdout
-    flags = re.findall(r"^\s*(?:-\w,)?--(?:\[no\])?(\w+)", text, re.MULTILINE)
+    flags = re.findall(r"^\s*(?:-\w, )?--(?:\[no\])?(\w+)", text, re.MULTILINE)
     values = [value for listed in re.findall(r"<([\w|]+)>:", text) for value in listed.split("|")]
     assert "version" in flags
     assert_plain((program, name) for name in [program, *flags, *values])
