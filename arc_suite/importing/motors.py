@@ -99,6 +99,7 @@ def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Mo
     """
     inertias, loads = _mechanics(robot, stance)
     gains_of_file = _find_gains(robot)
+    delays_of_file = _find_delays(robot)
     limits_of_file = _find_limits(robot)
     servos = {}
     origins = {}
@@ -123,6 +124,7 @@ def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Mo
                 damping=gains.damping,
                 limit=limit.torque,
                 no_load_speed=speed if _is_speed(speed, stance.height) else None,
+                delay=delays_of_file.get(joint, 0.0),
             )
             origins[joint] = limit.origin
     all_notes = (
@@ -131,6 +133,7 @@ def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Mo
         *_one_sided_notes(robot, stance.joints, limits_of_file),
         *_mirror_notes(robot, stance.joints),
         *_range_notes(robot, gains_of_file),
+        *_delay_notes(stance.joints, servos),
         _gain_note(stance.joints, gains_of_file),
     )
     return Motors(servos, all_notes)
@@ -238,6 +241,15 @@ def _find_limits(robot: Robot) -> dict[int, _Limit]:
     return least_limits
 
 
+def _find_delays(robot: Robot) -> dict[int, float]:
+    """Return the delays of actuators, s, by joint; the longest of a joint counts."""
+    delays: dict[int, float] = {}
+    for drive in find_drives(robot):
+        delay = float(robot.model.actuator_delay[drive.actuator])
+        delays[drive.joint] = max(delay, delays.get(drive.joint, 0.0))
+    return delays
+
+
 def _limit_notes(joints_of_legs: Sequence[int], servos: dict[int, Servo], origins: dict[int, str]) -> Iterator[str]:
     """Yield a line for each origin of the limits of the legs' motors."""
     counts = Counter(origins[joint] for joint in joints_of_legs)
@@ -305,6 +317,13 @@ def _speed_notes(
     if unused:
         span = format_span(min(unused), max(unused))
         yield f"speeds: {span} rad/s of {len(unused)} motors is a placeholder, torques do not fall with speed"
+
+
+def _delay_notes(joints_of_legs: Sequence[int], servos: dict[int, Servo]) -> Iterator[str]:
+    """Yield a line on the delays of legs' motors."""
+    delays = [servos[joint].delay for joint in joints_of_legs if servos[joint].delay]
+    if delays:
+        yield f"delays: controls of {len(delays)} motors act after {format_span(min(delays), max(delays))} s"
 
 
 def format_span(low: float, high: float) -> str:

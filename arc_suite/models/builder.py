@@ -7,7 +7,7 @@ import numpy as np
 from dm_control import mjcf
 
 from arc_suite.models.outline import outline, torso_box
-from arc_suite.robots.spec import Body, Joint, Leg, Simulation, Solid
+from arc_suite.robots.spec import Body, Joint, Leg, Motor, Servo, Simulation, Solid
 
 # Sections of a model.
 WORLD = "worldbody"
@@ -96,7 +96,7 @@ def elements(body: Body) -> list[Element]:
     """
     body_elements = parts(body, body.simulation)
     for name, joint in zip(body.joint_names, body.joints, strict=True):
-        body_elements.append(_motor(name, joint))
+        body_elements.append(_motor(name, joint, body.simulation))
     for name, joint in zip(body.joint_names, body.joints, strict=True):
         if joint.motor.drag is not None:
             body_elements.append(_drag(name, joint.motor.drag))
@@ -199,13 +199,24 @@ def _joint(part: str, name: str, joint: Joint, simulation: Simulation | None) ->
         attributes["solreflimit"] = (simulation.contact_time, 1.0)
         if joint.friction_loss:
             attributes["frictionloss"] = joint.friction_loss
-        if joint.drive and joint.drive.drag is not None:  # of motor and drag together
+        if joint.drive and (joint.drive.drag is not None or joint.drive.delay):  # of motor and drag together
             attributes["actuatorfrclimited"] = True
             attributes["actuatorfrcrange"] = (-joint.torque, joint.torque)
     return Element("joint", part, attributes)
 
 
-def _motor(name: str, joint: Joint) -> Element:
+def delay_attributes(drive: Motor | Servo, simulation: Simulation) -> dict[str, Any]:
+    """Return the attributes of an actuator whose control acts after the delay of a drive; none without a delay.
+
+    The time lies in the middle of a substep, so that its rounding never moves a control to another substep.
+    """
+    substeps = round(drive.delay / simulation.timestep)
+    if substeps == 0:
+        return {}
+    return {"delay": (substeps - 0.5) * simulation.timestep, "nsample": substeps + 1}
+
+
+def _motor(name: str, joint: Joint, simulation: Simulation) -> Element:
     """Return the motor of a joint.
 
     With a drag d, its torque at a control u and a speed v is g u + d v, at most the stall torque. Another actuator
@@ -213,6 +224,7 @@ def _motor(name: str, joint: Joint) -> Element:
     """
     motor = joint.motor
     attributes = {"name": name, "joint": name, "gear": (motor.gear,), "ctrllimited": True, "ctrlrange": (-1.0, 1.0)}
+    attributes |= delay_attributes(motor, simulation)
     if motor.drag is None:
         return Element("motor", ACTUATOR, attributes)
     share = motor.stall_torque / motor.gear  # the gear multiplies forces, and speeds too

@@ -1,6 +1,6 @@
 """The model of a body by MuJoCo's own `MjSpec`: the bits of `builder.build`, without PyMJCF and its text."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import mujoco
@@ -94,12 +94,15 @@ def _add_camera(part: mujoco.MjsBody, mode: str, **attributes: Any) -> None:
     part.add_camera(mode=_CAMERA_MODES[mode], **attributes)
 
 
-def _add_motor(spec: mujoco.MjSpec, name: str, joint: str, gear, ctrllimited: bool, ctrlrange) -> None:
+def _add_motor(
+    spec: mujoco.MjSpec, name: str, joint: str, gear, ctrllimited: bool, ctrlrange, **attributes: Any
+) -> None:
     motor = spec.add_actuator(name=name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     motor.set_to_motor()
     motor.gear[0] = gear[0]
     motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE if ctrllimited else mujoco.mjtLimited.mjLIMITED_FALSE
     motor.ctrlrange = ctrlrange
+    _set_delay(motor, attributes)
 
 
 def _add_general(spec: mujoco.MjSpec, name: str, joint: str, biastype: str, biasprm, **attributes: Any) -> None:
@@ -114,6 +117,13 @@ def _add_general(spec: mujoco.MjSpec, name: str, joint: str, biastype: str, bias
         if attributes.get(limited):
             setattr(actuator, limited, mujoco.mjtLimited.mjLIMITED_TRUE)
             setattr(actuator, limits, attributes[limits])
+    _set_delay(actuator, attributes)
+
+
+def _set_delay(actuator: mujoco.MjsActuator, attributes: Mapping[str, Any]) -> None:
+    for name in ("delay", "nsample"):
+        if name in attributes:
+            setattr(actuator, name, attributes[name])
 
 
 def _add_accelerometer(spec: mujoco.MjSpec, name: str, site: str) -> None:

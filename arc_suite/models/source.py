@@ -140,13 +140,13 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
     leg_joints = [(leg.full_name(joint), joint) for leg in body.legs for joint in leg.joints]
     for name, joint in leg_joints:
         reach = np.radians(np.abs(joint.range_deg)).max()
-        _add_servo(actuators, joints[name], joint.servo, home[name], reach)
+        _add_servo(actuators, joints[name], joint.servo, home[name], reach, _delay_texts(joint.servo, body))
     if releases:
         for name, joint in leg_joints:
-            _add_release(actuators, name, joint.servo, home[name])
+            _add_release(actuators, name, joint.servo, home[name], _delay_texts(joint.servo, body))
     for held_joint in body.held:
         name = held_joint.name
-        _add_servo(actuators, joints[name], held_joint.servo, home[name], reach=0.0)
+        _add_servo(actuators, joints[name], held_joint.servo, home[name], reach=0.0, delay={})
     servos = {name: joint.servo for name, joint in leg_joints}
     servos |= {held_joint.name: held_joint.servo for held_joint in body.held}
     for name, servo in servos.items():
@@ -157,7 +157,12 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
 
 
 def _add_servo(
-    actuators: ElementTree.Element, joint: ElementTree.Element, servo: Servo, home: float, reach: float
+    actuators: ElementTree.Element,
+    joint: ElementTree.Element,
+    servo: Servo,
+    home: float,
+    reach: float,
+    delay: dict[str, str],
 ) -> None:
     """Add a servo, and limit the torque on its joint.
 
@@ -167,22 +172,28 @@ def _add_servo(
         servo: servo of the joint.
         home: angle in the standing pose, rad.
         reach: angle from there for a control of 1, rad.
+        delay: attributes of its delay.
     """
     name = joint.get("name")
     gain = exact(servo.stiffness * reach)
     damping = servo.damping - (servo.drag or 0.0)
     bias = exact((servo.stiffness * home, -servo.stiffness, -damping))
     limits = _stall_limits(servo)
-    _add_actuator(actuators, name, name, (-1.0, 1.0), biastype="affine", gainprm=gain, biasprm=bias, **limits)
+    _add_actuator(actuators, name, name, (-1.0, 1.0), biastype="affine", gainprm=gain, biasprm=bias, **limits, **delay)
     torque_range = exact((-servo.limit, servo.limit))  # of all actuators of the joint together
     joint.attrib |= {"actuatorfrclimited": "true", "actuatorfrcrange": torque_range}
 
 
-def _add_release(actuators: ElementTree.Element, joint: str, servo: Servo, home: float) -> None:
+def _add_release(actuators: ElementTree.Element, joint: str, servo: Servo, home: float, delay: dict[str, str]) -> None:
     """Add the release of the servo of a joint, given by name; `home` is its angle in the standing pose, rad."""
     gain = exact((-servo.stiffness * home, servo.stiffness, servo.damping - (servo.drag or 0.0)))
     limits = _stall_limits(servo)
-    _add_actuator(actuators, f"{joint}-release", joint, (0.0, 1.0), gaintype="affine", gainprm=gain, **limits)
+    _add_actuator(actuators, f"{joint}-release", joint, (0.0, 1.0), gaintype="affine", gainprm=gain, **limits, **delay)
+
+
+def _delay_texts(servo: Servo, body: Body) -> dict[str, str]:
+    """Return the attributes of the delay of a servo; see `builder.delay_attributes`."""
+    return {name: exact(value) for name, value in builder.delay_attributes(servo, body.simulation).items()}
 
 
 def _stall_limits(servo: Servo) -> dict[str, str]:

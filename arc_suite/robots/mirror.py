@@ -152,8 +152,9 @@ def _joint_axis(leg: Leg, link: Link) -> np.ndarray:
 
 
 def _drive_numbers(joint: Joint) -> list[float | None]:
-    """Return the numbers of a joint's drive: armature, damping and torque, and of a servo its own two."""
+    """Return the numbers of a joint's drive: armature, damping, torque, its line and delay, and two of a servo."""
     numbers = [joint.armature, joint.damping, joint.torque]
+    numbers += [getattr(joint.drive, name, None) for name in ("no_load_speed", "stall", "delay")]
     if joint.servo:
         numbers += [joint.servo.stiffness, joint.servo.damping]
     return numbers

@@ -20,9 +20,10 @@ import itertools
 import math
 import operator
 import re
-from collections.abc import Iterable
-from typing import Any, NoReturn, Self
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple, NoReturn, Self
 
+Vector2 = tuple[float, float]
 Vector = tuple[float, float, float]
 
 DENSITY = 10.0  # kg/m^3, of the published robots
@@ -52,6 +53,10 @@ _MAX_JOINT_CONSTANT = 1e35  # of armature and damping
 _MIN_SPEED = 1e-3  # rad/s, at which a motor gives no torque
 _MAX_SPEED = 1e6  # rad/s, the same
 _MAX_LOSS = 1e6  # W/(N m)^2
+_MAX_TABLE = 64  # points of a table of torques
+_MAX_TABLE_ERROR = 0.1  # of the nearest line from a table, in largest torques
+_MAX_DELAY = 1.0  # s
+_MAX_DELAY_SUBSTEPS = 1000
 
 _NAME_PATTERN = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
 _SIZE_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}  # numbers in `Solid.size`
@@ -146,6 +151,16 @@ def _check_texts(value: Any, high: int) -> tuple[str, ...]:
     if not isinstance(value, (tuple, list)) or len(value) > high:
         raise SpecError(f"expected a sequence of at most {high} texts, got {_preview(value)}")
     return tuple(_check_text(text, 1, MAX_ALIAS) for text in value)
+
+
+def _check_torque_table(value: Any) -> tuple[Vector2, ...]:
+    if not isinstance(value, (tuple, list)) or not 2 <= len(value) <= _MAX_TABLE:
+        raise SpecError(f"expected 2 to {_MAX_TABLE} pairs of speed and torque, got {_preview(value)}")
+    points = [_check_vector(pair, 2, 0.0, _MAX_GEAR) for pair in value]
+    for (speed, _), (next_speed, _) in itertools.pairwise(points):
+        if not speed < next_speed <= _MAX_SPEED:
+            raise SpecError(f"expected rising speeds up to {_MAX_SPEED:g}, got {next_speed:g} after {speed:g}")
+    return tuple(points)
 
 
 def _check_integer(value: Any, low: int, high: int) -> int:
@@ -256,12 +271,17 @@ class _Drive(_Spec):
     Attributes:
         no_load_speed: speed of the joint at which its motor gives no torque, rad/s; None: torques fall at no speed.
         stall: torque at rest without the limit of the largest torque, N m; None: the largest torque.
+        torque_by_speed: pairs of speed, rad/s, and torque, N m, speeds rising. The nearest `no_load_speed` and `stall`
+            replace it, and it is None then.
         winding_loss: heat of the windings per squared torque, W/(N m)^2, which counts as work of the motor.
+        delay: time after which a control acts, s, rounded to substeps. A servo measures its joint without delay.
     """
 
     no_load_speed: float | None = _number_field(low=_MIN_SPEED, high=_MAX_SPEED, default=None, optional=True)
     stall: float | None = _number_field(low=_MIN_GEAR, high=_MAX_GEAR, default=None, optional=True)
+    torque_by_speed: tuple[Vector2, ...] | None = _field(_check_torque_table, default=None, optional=True)
     winding_loss: float = _number_field(low=0.0, high=_MAX_LOSS, default=0.0)
+    delay: float = _number_field(low=0.0, high=_MAX_DELAY, default=0.0)
 
     @property
     def largest_torque(self) -> float:
@@ -279,12 +299,95 @@ class _Drive(_Spec):
         return None if self.no_load_speed is None else self.stall_torque / self.no_load_speed
 
     def _check_conditions(self):
+        if self.torque_by_speed is not None:
+            self._replace_table()
         if self.stall is None:
             return
         if self.no_load_speed is None:
             self._fail("stall", f"expected none without a no_load_speed, got {self.stall:g}")
         if self.stall < self.largest_torque:
             self._fail("stall", f"expected at least the largest torque, {self.largest_torque:g}, got {self.stall:g}")
+
+    def _replace_table(self) -> None:
+        """Set the speed without load and the stall torque to those of the line that is nearest to the table."""
+        field = "torque_by_speed"
+        if self.stall is not None or self.no_load_speed is not None:
+            self._fail(field, "expected none next to a no_load_speed or a stall")
+        line = _fit_torque_line(self.torque_by_speed, self.largest_torque)
+        if line is None:
+            self._fail(field, f"expected torques that fall from at least the largest torque, {self.largest_torque:g}")
+        if line.error > _MAX_TABLE_ERROR:
+            nearest = f"no_load_speed {line.no_load_speed:.4g} and stall {line.stall:.4g}"
+            limit = f"expected a table within {_MAX_TABLE_ERROR:.0%} of a falling line"
+            self._fail(field, f"{limit}, got {line.error:.0%}; the nearest has {nearest}")
+        object.__setattr__(self, "no_load_speed", line.no_load_speed)  # the dataclass is frozen
+        object.__setattr__(self, "stall", line.stall)
+        object.__setattr__(self, field, None)
+        self._check_fields([item for item in dataclasses.fields(self) if item.name in ("no_load_speed", "stall")])
+
+
+class _TorqueLine(NamedTuple):
+    """A limit of torques that falls with speed.
+
+    Attributes:
+        stall: torque at rest, N m.
+        no_load_speed: speed at which the torque is 0, rad/s.
+        error: largest distance from the table and the straight lines between its points, in largest torques.
+    """
+
+    stall: float
+    no_load_speed: float
+    error: float
+
+
+def _fit_torque_line(points: Sequence[Vector2], largest_torque: float) -> _TorqueLine | None:
+    """Return the line through two points of a table that is nearest to all of them.
+
+    Args:
+        points: of the table, speeds rising.
+        largest_torque: N m, above which torques of the table do not count.
+
+    Returns:
+        The line; None if no line falls, or if the table begins below the largest torque.
+    """
+    reaching = [index for index, (_, torque) in enumerate(points) if torque >= largest_torque]
+    if not reaching:
+        return None
+    falling_points = points[reaching[-1] :]
+    lines = []
+    for (speed, torque), (next_speed, next_torque) in itertools.combinations(falling_points, 2):
+        slope = (torque - next_torque) / (next_speed - speed)
+        if slope > 0.0:
+            stall = torque + slope * speed
+            error = _largest_error(stall, slope, falling_points, largest_torque)
+            lines.append(_TorqueLine(stall, stall / slope, error / largest_torque))
+    lines = [line for line in lines if line.stall >= largest_torque]
+    return min(lines, key=lambda line: line.error, default=None)
+
+
+def _largest_error(stall: float, slope: float, points: Sequence[Vector2], largest_torque: float) -> float:
+    """Return the largest difference, N m, of a limit and of a table whose torques have the largest one at most.
+
+    The difference is largest at a point of the table, or where the line meets the largest torque.
+    """
+    knee = (stall - largest_torque) / slope
+    speeds = [speed for speed, _ in points]
+    if speeds[0] < knee < speeds[-1]:
+        speeds.append(knee)
+    errors = []
+    for speed in speeds:
+        limit = min(stall - slope * speed, largest_torque)  # below 0 beyond the speed without load
+        errors.append(abs(limit - min(_torque_at(points, speed), largest_torque)))
+    return max(errors)
+
+
+def _torque_at(points: Sequence[Vector2], speed: float) -> float:
+    """Return the torque of a table at a speed within it, N m."""
+    for (low, torque), (high, next_torque) in itertools.pairwise(points):
+        if low <= speed <= high:
+            share = (speed - low) / (high - low)
+            return torque + share * (next_torque - torque)
+    raise ValueError(f"speed: expected one from {points[0][0]} to {points[-1][0]}, got {speed}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -652,6 +755,7 @@ class Body(_Spec):
         shape_names = [shape.name for shape in (*self.torso.solids, *self.ballast)]
         _check_unique(self, "ballast", shape_names)
         self._check_source()
+        self._check_delays()
         if self.source is None:
             self._check_inertia()
         if self.torso.standing_height is None:
@@ -690,6 +794,16 @@ class Body(_Spec):
             self._fail("density", "expected the default in a body with a source, which has its motors and weights")
         elif self.simulation is None:
             self._fail("simulation", "missing; a body with a source needs it")
+
+    def _check_delays(self) -> None:
+        """Raise SpecError for a delay of a motor that takes too many substeps."""
+        drives = [*(joint.drive for joint in self.joints), *(joint.servo for joint in self.held)]
+        longest_delay = max((drive.delay for drive in drives if drive), default=0.0)
+        timestep = (self.simulation or Simulation()).timestep
+        highest_delay = _MAX_DELAY_SUBSTEPS * timestep
+        if longest_delay > highest_delay:
+            what = f"{highest_delay:g} s, {_MAX_DELAY_SUBSTEPS} substeps"
+            self._fail("legs", f"expected delays of motors of at most {what}, got {longest_delay:g}")
 
     def _check_inertia(self):
         """Raise SpecError for a moving part whose inertia is too small for MuJoCo.

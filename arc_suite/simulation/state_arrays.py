@@ -12,6 +12,12 @@ from arc_suite.simulation.model import FIELDS, check_fields, field
 
 OF_MODEL = "model_"  # prefix of a field of the models
 LASTING = "lasting_"  # prefix of a field of the models that stays over resets
+_BEFORE_HISTORY = int(
+    mujoco.mjtState.mjSTATE_TIME
+    | mujoco.mjtState.mjSTATE_QPOS
+    | mujoco.mjtState.mjSTATE_QVEL
+    | mujoco.mjtState.mjSTATE_ACT
+)
 MAX_NUMBER = 1e10  # beyond it, MuJoCo calls a simulation diverged
 
 
@@ -36,6 +42,8 @@ def check_snapshot(
         raise ValueError(f"{name}: {'missing' if name in expected else 'no array of a snapshot'}")
     for name, array in like.items():
         check_finite(name, check_same_form(name, arrays[name], array))
+    for model, state in zip(models, arrays["state"], strict=True):
+        _check_cursors(model, state)
     for name in expected.keys() - like.keys():
         compiled = np.stack([field(model, fields[name]) for model in models])
         values = check_same_form(name, arrays[name], compiled)
@@ -44,6 +52,17 @@ def check_snapshot(
         for model, model_values in zip(models, values, strict=True):
             check_fields(model, {fields[name]: model_values})
     return arrays
+
+
+def _check_cursors(model: mujoco.MjModel, state: np.ndarray) -> None:
+    """Raise ValueError for a cursor of a delay outside of its buffer, of which MuJoCo would read another memory."""
+    sizes = model.actuator_history[:, 0]
+    has_history = sizes > 0
+    start = mujoco.mj_stateSize(model, _BEFORE_HISTORY)
+    cursors = state[start + 1 + model.actuator_historyadr[has_history]]
+    is_inside = (cursors >= 0.0) & (cursors < sizes[has_history]) & (cursors == cursors.round())
+    if not is_inside.all():
+        raise ValueError("state: expected cursors of delays inside of their buffers")
 
 
 def model_fields(arrays: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -231,6 +231,12 @@ def test_sizes_of_tables(robot, sizes):
     assert data.ncon < sizes[0] and data.nefc < sizes[1]
 
 
+def test_delays_of_motors_are_refused():
+    """MJX would ignore them."""
+    with pytest.raises(ValueError, match="delay: expected none of motors in worlds"):
+        mjx.load(with_drives(ROBOTS["leaper"], delay=0.01), "walk", num_starts=1)
+
+
 @pytest.mark.parametrize("impl", ["jax", "warp"])
 def test_torques_fall_with_speed(impl):
     """Worlds step bodies with such motors as C does."""

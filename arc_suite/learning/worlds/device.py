@@ -128,6 +128,8 @@ def put_model(model: mujoco.MjModel, impl: str) -> mjx.Model:
     Raises:
         ValueError: the implementation cannot simulate it.
     """
+    if model.nhistory:  # MJX ignores delays of actuators, and Warp 3.17 reads wrong controls at an episode's start
+        raise ValueError("delay: expected none of motors in worlds, which do not simulate it; use the setting delay")
     if impl == "warp":
         import warp
 
