@@ -126,13 +126,14 @@ def angles_at_home(body: Body) -> dict[str, float]:
 
 
 def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
-    """Add the servos of all joints: those of legs, their releases in the same order, those of held joints.
+    """Add the servos of all joints: those of legs, their releases and drags in the same order, those of held joints.
 
     A servo holds its joint in the standing pose for a control of 0, and a reach away from it for 1. Its torque is
     k (reach u + home - q) - d v for a control u. That of its release is -r (k (home - q) - d v) for a control r. With
     controls s u and 1 - s a joint has the share s of its torque.
 
-    A servo whose torque falls with speed has a drag: see `builder.elements`. Its release cancels it for s = 0 alone.
+    A servo whose torque falls with speed has a drag: see `builder.elements`. It is the limit's, not the joint's: a
+    control of 1 takes it away from a servo that fails. Where one servo has a drag, all of legs have one, which may be 0.
     """
     actuators = SubElement(root, "actuator")
     joints = {joint.get("name"): joint for joint in root.find("worldbody").iter("joint")}
@@ -144,16 +145,16 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
     if releases:
         for name, joint in leg_joints:
             _add_release(actuators, name, joint.servo, home[name], _delay_texts(joint.servo, body))
+    servos = [joint.servo for _, joint in leg_joints] + [held_joint.servo for held_joint in body.held]
+    if any(servo.drag is not None for servo in servos):
+        for name, joint in leg_joints:
+            _add_drag(actuators, name, joint.servo, _delay_texts(joint.servo, body) if releases else None)
     for held_joint in body.held:
         name = held_joint.name
         _add_servo(actuators, joints[name], held_joint.servo, home[name], reach=0.0, delay={})
-    servos = {name: joint.servo for name, joint in leg_joints}
-    servos |= {held_joint.name: held_joint.servo for held_joint in body.held}
-    for name, servo in servos.items():
-        if servo.drag is not None:
-            bias = exact((0.0, 0.0, -servo.drag))
-            drag = {"gainprm": "0", "biastype": "affine", "biasprm": bias}
-            SubElement(actuators, "general", name=f"{name}{builder.DRAG}", joint=name, **drag)
+    for held_joint in body.held:
+        if held_joint.servo.drag is not None:
+            _add_drag(actuators, held_joint.name, held_joint.servo)
 
 
 def _add_servo(
@@ -189,6 +190,27 @@ def _add_release(actuators: ElementTree.Element, joint: str, servo: Servo, home:
     gain = exact((-servo.stiffness * home, servo.stiffness, servo.damping - (servo.drag or 0.0)))
     limits = _stall_limits(servo)
     _add_actuator(actuators, f"{joint}-release", joint, (0.0, 1.0), gaintype="affine", gainprm=gain, **limits, **delay)
+
+
+def _add_drag(
+    actuators: ElementTree.Element, joint: str, servo: Servo, release_delay: dict[str, str] | None = None
+) -> None:
+    """Add the drag of the servo of a joint, given by name.
+
+    Args:
+        actuators: the section.
+        joint: name of the joint.
+        servo: servo of the joint.
+        release_delay: attributes of the delay of a control that takes the drag away; None for no such control.
+    """
+    drag = servo.drag or 0.0
+    bias = {"biastype": "affine", "biasprm": exact((0.0, 0.0, -drag))}
+    name = f"{joint}{builder.DRAG}"
+    if release_delay is None:
+        SubElement(actuators, "general", name=name, joint=joint, gainprm="0", **bias)
+        return
+    gain = {"gaintype": "affine", "gainprm": exact((0.0, 0.0, drag))}
+    _add_actuator(actuators, name, joint, (0.0, 1.0), **gain, **bias, **release_delay)
 
 
 def _delay_texts(servo: Servo, body: Body) -> dict[str, str]:

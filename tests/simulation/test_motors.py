@@ -80,12 +80,11 @@ def test_torques_of_servos_fall_with_speed():
         wanted = stiffness * (reach * controls - angles) - damping * speeds
         expected = within_limits(wanted, speeds, torques)
         assert_allclose(physics.data.qfrc_actuator[layout.joint_velocities], expected, atol=1e-9 * torques.max())
-        # A leg whose servos fail has their drag alone.
+        # Servos that fail give no torque: the drag is of the limit, not of the joint.
         physics.data.ctrl[:count] = 0.0
-        physics.data.ctrl[count : 2 * count] = 1.0
+        physics.data.ctrl[count : 3 * count] = 1.0
         mujoco.mj_forward(physics.model.ptr, physics.data.ptr)
-        drag = (-STALL * torques * speeds / SPEED).clip(-torques, torques)
-        assert_allclose(physics.data.qfrc_actuator[layout.joint_velocities], drag, atol=1e-9 * torques.max())
+        assert_allclose(physics.data.qfrc_actuator[layout.joint_velocities], 0.0, atol=1e-9 * torques.max())
 
 
 def test_one_environment_is_a_batch():
@@ -205,3 +204,19 @@ def test_weak_motors_ask_for_less():
     environment.step(np.full(JOINTS, 0.1))
     data = environment.physics.data
     assert_allclose(data.ctrl[:JOINTS], 0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("no_load_speed", [None, SPEED])
+def test_joints_of_failed_servos_have_their_damping_alone(no_load_speed):
+    body = with_drives(imports.quadruped(), no_load_speed=no_load_speed)
+    environment = arc_suite.load(body, "limp", {"random": 0, "actuator_failure": 1})
+    environment.reset()
+    for _ in range(45):
+        environment.step(np.full(len(body.joints), 0.05))
+    data = environment.physics.data
+    failed = environment.task.definition.scene.layout.joint_velocities
+    failed = np.arange(environment.physics.model.nv)[failed][3:6]  # of the second leg
+    assert abs(data.qvel[failed]).min() > 0.1
+    assert_allclose(data.qfrc_actuator[failed], 0.0, atol=1e-9)
+    assert_allclose(data.qfrc_passive[failed], -0.2 * data.qvel[failed], rtol=0.02)  # one substep behind

@@ -19,6 +19,7 @@ from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import readings
+from arc_suite.tasks.modifiers.drags import have_drags
 
 # Durations are multiples of sqrt(h / g), h being the standing height.
 _SINK_DURATION = 6.0
@@ -156,6 +157,7 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     substeps = sized_body.simulation.substeps
     joint_count = len(body.joint_names)
     is_imported = bool(body.source)
+    controls = 3 if have_drags(body) else 2  # of a servo; see `models.source`
     model = copy.copy(compile_model(body))
     model.dof_damping[6:] *= damping_share  # the first six are the torso's
     layout = readings.layout(model, body)
@@ -169,8 +171,8 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
         target_speeds = (next_target - target) / control_timestep
         actions = joint_drive.actions(target, target_speeds, angles, speeds)
         data.ctrl[:joint_count] = np.nan_to_num(actions)
-        if is_imported:  # its joints have servos, and a second control for each, which releases the servo
-            data.ctrl[joint_count : 2 * joint_count] = np.isnan(actions)
+        if is_imported:  # its joints have servos, and further controls for each, which release the servo
+            data.ctrl[joint_count : controls * joint_count] = np.tile(np.isnan(actions), controls - 1)
         for _ in range(substeps):
             mujoco.mj_step(model, data)
             positions.append(data.qpos.copy())

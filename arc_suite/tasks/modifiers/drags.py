@@ -37,10 +37,10 @@ def _find_drags(body: Body, model: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Return the parts of the fields that are drags: of servos, their releases, and the actuators of drags."""
     drags = np.array([servo.drag or 0.0 for servo in _servos(body)])
     joints = len(body.joints)
+    leg_drags = drags[:joints]
+    held_drags = drags[joints:]
+    biases = [leg_drags, np.zeros(joints), -leg_drags, held_drags, -held_drags[held_drags > 0.0]]
     fields = {name: np.zeros_like(model[name]) for name in SERVO_FIELDS}
-    bias = fields["actuator_biasprm"][:, _DAMPING]
-    bias[:joints] = drags[:joints]
-    bias[2 * joints : joints + len(drags)] = drags[joints:]
-    bias[joints + len(drags) :] = -drags[drags > 0.0]
-    fields["actuator_gainprm"][joints : 2 * joints, _DAMPING] = -drags[:joints]
+    fields["actuator_biasprm"][:, _DAMPING] = np.concatenate(biases)
+    fields["actuator_gainprm"][joints : 3 * joints, _DAMPING] = np.concatenate([-leg_drags, leg_drags])
     return fields

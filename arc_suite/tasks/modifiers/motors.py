@@ -140,6 +140,7 @@ class Motors(_MotorsFields, Modifier):
         """Return the inputs with the torques that motors give: weak and failing motors give less than commanded.
 
         Servos have a second input each, after those for their targets: the share of the torque that they do not give.
+        Where torques fall with speed, they have a third: the share of the drag that they do not give.
         """
         strength = state.strength
         if self.have_drags:
@@ -151,7 +152,8 @@ class Motors(_MotorsFields, Modifier):
             strength = strength * works
         if self.are_servos:
             xp = ctrl.__array_namespace__()
-            ctrl = xp.concatenate([ctrl, 1.0 - strength], axis=-1)
+            releases = 1.0 - strength
+            ctrl = xp.concatenate([ctrl, releases, *[releases] * self.have_drags], axis=-1)
         return inputs._replace(ctrl=ctrl)
 
     def privileged_blocks(self, body: Body) -> dict[str, Block]:
