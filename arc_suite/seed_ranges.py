@@ -1,15 +1,18 @@
 """Seeds of episodes by purpose, so that no policy is evaluated on episodes that it learned from.
 
-0 to 9,999          evaluation
-10,000 to 99,999    collecting of datasets
-from 100,000        learning: runs of algorithms, and searches for demonstrators
+0 to 9,999                  evaluation; from 9,000 on validation, while a policy learns
+10,000 to 99,999            collecting of datasets
+100,000 to 4,099,999,999    learning: runs of algorithms, and searches for demonstrators
+from 4,100,000,000          judging of final policies, see `evaluation.judging`
 """
 
 from collections.abc import Iterable, Sequence
 
 EVALUATION = range(10_000)
+VALIDATION = range(9_000, 10_000)  # a part of those of evaluation
 COLLECTING = range(10_000, 100_000)
-LEARNING = range(100_000, 1 << 32)
+LEARNING = range(100_000, 4_100_000_000)
+JUDGING = range(4_100_000_000, 1 << 32)
 
 Ranges = tuple[range, ...]
 _SEEDS_OF_A_RUN = 100_000  # of a search, too

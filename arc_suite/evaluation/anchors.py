@@ -1,7 +1,8 @@
 """Anchors of a score: returns of standing still and of the best demonstrator with a robot, a task and settings.
 
-`anchors.csv` holds both for robots of the suite in tasks with default settings: the returns of the protocol's episodes,
-written by `python tools/results.py --anchors`. Other anchors are measured in ten episodes. Episodes run in a batch,
+`judging.csv` holds both for the places of the benchmark, over the seeds of `judging`. `anchors.csv` holds returns in
+the episodes of seeds 0 to 99, for robots of the suite in tasks with default settings, written by
+`python tools/results.py --anchors`. Other anchors are measured in ten episodes. Episodes run in a batch,
 where policies observe float32 as learners do. `arc-suite evaluate` has float64, with which chaotic walks diverge:
 over ten episodes, Leaper's `medium` has a return of 2619.8 here and of 2610.4 there.
 """
@@ -20,7 +21,8 @@ from tqdm import tqdm
 from arc_suite import parsers, policies
 from arc_suite.cpg.selection import suited_preset, suited_presets
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import protocol
+from arc_suite.evaluation import judging, protocol
+from arc_suite.evaluation.judging import Level
 from arc_suite.robots import is_robot
 
 TABLE = Path(__file__).with_name("anchors.csv")
@@ -37,11 +39,15 @@ class Anchors(NamedTuple):
         zero: mean return of standing still, score 0.
         demonstrator: mean return of the best demonstrator, score 1; None where the body has none.
         preset: name of the best demonstrator; None where the body has none.
+        blind: mean return of a walker that sees no ground; None where nobody has measured it.
+        errors: standard errors of `zero` and `demonstrator`; None if they are unknown.
     """
 
     zero: float
     demonstrator: float | None = None
     preset: str | None = None
+    blind: float | None = None
+    errors: tuple[float, float] | None = None
 
     def score(self, returns):
         """Return (return - standing still) / (best demonstrator - standing still), or NaN.
@@ -79,8 +85,18 @@ def of_returns(returns_by_policy: Returns, seeds: Sequence[int] = ()) -> Anchors
     return Anchors(zero, None if best is None else means[best], best)
 
 
+def of_levels(levels: Mapping[str, Level]) -> Anchors:
+    """Return the anchors of mean returns by policy: `zero`, one demonstrator, and maybe `judging.BLIND`."""
+    ((preset, demonstrator),) = ((name, level) for name, level in levels.items() if name not in (ZERO, judging.BLIND))
+    blind = levels[judging.BLIND].mean if judging.BLIND in levels else None
+    zero = levels[ZERO]
+    return Anchors(zero.mean, demonstrator.mean, preset, blind, (zero.error, demonstrator.error))
+
+
 def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
     """Return the anchors of a robot, a task and settings; those that are not committed are measured.
+
+    They are those of `judging` where these are committed, except for episodes of seeds 0 to 99, which have their own.
 
     Args:
         setup: robot, task and settings.
@@ -92,6 +108,10 @@ def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
     if setup.several:
         return _of_several(setup)
     returns_by_policy = committed_returns(setup)
+    is_of_before = returns_by_policy is not None and len(seeds) and max(seeds) < protocol.EPISODES
+    levels = None if is_of_before else judging.levels(setup)
+    if levels is not None:
+        return of_levels(levels)
     if returns_by_policy is None:
         returns_by_policy = measure_returns(setup)
     return of_returns(returns_by_policy, seeds)

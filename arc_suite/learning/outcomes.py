@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.evaluation import CURVE_EPISODES, anchors
+from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import run_folder
 from arc_suite.learning.agents.configuration import Configuration
 
@@ -18,7 +18,7 @@ def return_of_score(run: Configuration, score: float) -> float:
         ValueError: a score that is no number, or a task without a demonstrator that earns more than standing still.
     """
     checks.number("score", score)
-    mean_return = anchors.anchors(run.validation, range(CURVE_EPISODES)).at(score)
+    mean_return = anchors.anchors(run.validation).at(score)
     if not np.isfinite(mean_return):
         what = "expected a task with a demonstrator that earns more than standing still"
         raise ValueError(f"score {score:g}: {what}, got {run.validation}")
@@ -65,9 +65,12 @@ def mean(runs: Sequence[Configuration], folder: Path) -> str:
 def _describe_returns(run: Configuration, returns: np.ndarray) -> str:
     """Return mean, standard deviation and score of returns as text, with the anchors of the score."""
     mean_return = returns.mean()
-    scale = anchors.anchors(run.validation, range(CURVE_EPISODES))
-    levels = f"standing still {scale.zero:.1f}"
+    scale = anchors.anchors(run.validation)
+    zero_error, demonstrator_error = (f" +- {error:.1f}" for error in scale.errors) if scale.errors else ("", "")
+    levels = f"standing still {scale.zero:.1f}{zero_error}"
+    if scale.blind is not None:
+        levels += f", blind walker {scale.blind:.1f}"
     if scale.demonstrator is not None:
         score = f"score {scale.score(mean_return):z.2f}"
-        levels = f"{score} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
+        levels = f"{score} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f}{demonstrator_error})"
     return f"return {mean_return:.1f} +- {returns.std():.1f}, {levels}"

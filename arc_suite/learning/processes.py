@@ -77,10 +77,10 @@ def log(logs: Path, name: str) -> Path:
     return logs / f"{name}.log"
 
 
-def last_line(path: Path) -> str:
-    """Return the last line of a log; `says nothing` for an empty log."""
+def last_line(path: Path, count: int = 1) -> str:
+    """Return the last line of a log, or so many lines; `says nothing` for an empty log."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    return lines[-1] if lines else "says nothing"
+    return "\n".join(lines[-count:]) if lines else "says nothing"
 
 
 def _start_process(arguments: Sequence[str], path: Path) -> subprocess.Popen:

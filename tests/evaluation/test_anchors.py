@@ -48,10 +48,24 @@ def test_a_place_of_the_table_has_standing_still_and_one_demonstrator():
 
 
 def test_standing_still_and_the_demonstrators_of_walk_earn_what_they_did():
-    found = {robot: anchors.anchors(Setup.of(robot)) for robot in ROBOTS}
+    found = {robot: anchors.of_returns(anchors.committed_returns(Setup.of(robot))) for robot in ROBOTS}
     assert {scale.preset for scale in found.values()} == {"refined"}
     zeros = {"queen": 1622.2, "bastion": 1613.2, "tick": 1628.1, "leaper": 1722.4}
     assert {robot: round(scale.zero, 1) for robot, scale in found.items()} == zeros
+
+
+def test_anchors_of_judging_agree_with_those_of_evaluation():
+    """Other episodes of the same policies: within five standard errors."""
+    for robot in ROBOTS:
+        setup = Setup.of(robot)
+        judged = anchors.anchors(setup)
+        paired = anchors.of_returns(anchors.committed_returns(setup))
+        assert judged.preset == paired.preset
+        if judged.errors is not None:
+            returns = anchors.committed_returns(setup)
+            errors = [values.std() / len(values) ** 0.5 for values in returns.values()]
+            assert abs(judged.zero - paired.zero) < 5.0 * np.hypot(errors[0], judged.errors[0])
+            assert abs(judged.demonstrator - paired.demonstrator) < 5.0 * np.hypot(errors[1], judged.errors[1])
 
 
 def _same_as_fresh(robot, task):

@@ -12,7 +12,7 @@ from datasets import ID, SETTINGS, collect, edited
 from refusals import refused
 from tqdm import tqdm
 
-from arc_suite import data, evaluation, policies, seed_ranges
+from arc_suite import checks, data, evaluation, policies, seed_ranges
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import provenance
 from arc_suite.learning.agents import priors
@@ -77,13 +77,16 @@ def test_data_with_episodes_of_evaluation_are_no_prior_data(tmp_path, monkeypatc
 
 
 def test_every_seed_has_one_owner():
-    owners = (seed_ranges.EVALUATION, seed_ranges.COLLECTING, seed_ranges.LEARNING)
+    """Up to the largest seed of NumPy."""
+    owners = (seed_ranges.EVALUATION, seed_ranges.COLLECTING, seed_ranges.LEARNING, seed_ranges.JUDGING)
     assert [owner.start for owner in owners] == [0, *(owner.stop for owner in owners[:-1])]
     for seed in (0, 1, MAX_RUN_SEED):
         run = seed_ranges.of_run(seed)
         assert run[0] in seed_ranges.LEARNING and run[-1] in seed_ranges.LEARNING
         assert run.stop == seed_ranges.of_run(seed + 1).start
     assert set(range(evaluation.EPISODES)) <= set(seed_ranges.EVALUATION)
+    assert set(seed_ranges.VALIDATION) <= set(seed_ranges.EVALUATION) - set(range(evaluation.EPISODES))
+    assert seed_ranges.JUDGING[-1] == checks.MAX_SEED
 
 
 @pytest.mark.parametrize(

@@ -56,9 +56,8 @@ TESTS = {
         "envs/test_vector.py::test_calls_at_the_wrong_time",
     ],
     "dm_env: it is a reset.": [f"{HERE}::test_a_step_of_a_dm_env_without_an_episode_is_a_reset"],
-    "Integers from 0 to 2**32 - 1: below 10,000 for evaluation, below 100,000 for datasets, then for learning.": [
-        f"{HERE}::test_seeds_and_their_ranges"
-    ],
+    "Integers from 0 to 2**32 - 1: below 10,000 for evaluation, below 100,000 for datasets, then for learning, and "
+    "from 4,100,000,000 on for judging.": [f"{HERE}::test_seeds_and_their_ranges"],
     "Evaluation refuses a policy whose file says that it learned from these episodes.": [
         "evaluation/test_memory.py::test_episodes_that_a_policy_learned_from_do_not_judge_it"
     ],
@@ -194,8 +193,13 @@ def test_a_step_of_a_dm_env_without_an_episode_is_a_reset():
 
 
 def test_seeds_and_their_ranges():
-    ranges = seed_ranges.EVALUATION, seed_ranges.COLLECTING, seed_ranges.LEARNING
-    assert ranges == (range(10_000), range(10_000, 100_000), range(100_000, 2**32))
+    ranges = seed_ranges.EVALUATION, seed_ranges.COLLECTING, seed_ranges.LEARNING, seed_ranges.JUDGING
+    assert ranges == (
+        range(10_000),
+        range(10_000, 100_000),
+        range(100_000, 4_100_000_000),
+        range(4_100_000_000, 2**32),
+    )
     assert checks.seed(0) == 0 and checks.seed(2**32 - 1) == 2**32 - 1
     assert seed_ranges.of_run(0).start == 100_000
     for seed in (-1, 2**32, 0.5):

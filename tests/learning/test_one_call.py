@@ -23,11 +23,11 @@ def test_its_policy_plays_and_earns_what_its_folder_says(tmp_path):
     metrics = {}
     policy = train(steps=40, folder=tmp_path / "run", on_metrics=lambda step, found: metrics.update(found))
     environment = policy.setup.load()
-    earned = evaluation.run(environment, policy, seed=3).total
+    earned = evaluation.run(environment, policy, seed=9003).total
     table = run_folder.table(tmp_path / "run", "evaluations")
     assert earned == table["return"][-7] and metrics["return"] == pytest.approx(table["return"][-10:].mean())
     stored = policies.policy(tmp_path / "run", "tick", task=environment.task.definition)
-    assert evaluation.run(environment, stored, seed=3).total == earned
+    assert evaluation.run(environment, stored, seed=9003).total == earned
 
 
 def test_the_code_of_the_page(monkeypatch):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from arc_suite import evaluation
+from arc_suite import evaluation, seed_ranges
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.policies import checkpoints, network
@@ -25,6 +25,7 @@ from arc_suite.policies.network import Network
 from arc_suite.simulation.cores import usable_cores
 
 _POLL_INTERVAL = 0.02  # s between two looks at the processes
+_SEEDS = seed_ranges.VALIDATION[: evaluation.CURVE_EPISODES]  # of the episodes of an evaluation
 
 Lines = list[dict[str, Any]]  # of the table of evaluations, one for each episode
 
@@ -32,7 +33,7 @@ Lines = list[dict[str, Any]]  # of the table of evaluations, one for each episod
 class Evaluator:
     """Evaluates policies in this process, as soon as they are there."""
 
-    def __init__(self, run: Configuration, threads: int, seeds: range = range(evaluation.CURVE_EPISODES)):
+    def __init__(self, run: Configuration, threads: int, seeds: range = _SEEDS):
         """Make the environments of evaluation, one for the episode of each seed."""
         self._seeds = seeds
         self._environment = run.validation.make_vec(
@@ -104,8 +105,8 @@ class ProcessEvaluator:
         """Evaluate the policy of a step, which is in the folder of the run, as soon as cores are free."""
         self.pending.append(step)
         self._processes[step] = []
-        count = min(self._max_processes, evaluation.CURVE_EPISODES) if step >= self._last_step else 1
-        parts = np.array_split(range(evaluation.CURVE_EPISODES), count)
+        count = min(self._max_processes, len(_SEEDS)) if step >= self._last_step else 1
+        parts = np.array_split(_SEEDS, count)
         self._waiting += [(step, part[0], part[-1] + 1) for part in parts]
         self._start_processes()
 

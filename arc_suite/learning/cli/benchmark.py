@@ -19,7 +19,7 @@ from absl import flags
 from arc_suite import checks
 from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable
-from arc_suite.learning.studies import benchmark, publication, report, results, runner, tables
+from arc_suite.learning.studies import benchmark, entries, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.simulation.cores import usable_cores
 
@@ -90,18 +90,21 @@ def run_division(division: str, places: list[str]) -> int:
 
 
 def score_policies(division: str) -> None:
-    """Score the policies of a folder, and write their scores.
+    """Judge the policies of a folder, and write their scores and their returns.
 
     Raises:
         ValueError: a name of other characters than letters, digits, `_`, `-` and `.`, or a folder that
-            `benchmark.score_policies` refuses.
+            `entries.score_policies` refuses.
         OSError: a file cannot be read.
     """
     folder = Path(FLAGS.policies)
     name = FLAGS.name or folder.resolve().name
     benchmark.check_name(name)
-    scores = benchmark.score_policies(folder, progress)
-    benchmark.write(Path(FLAGS.results), division, name, scores)
+    judged = entries.score_policies(folder, progress)
+    studies = Path(FLAGS.results)
+    lines_by_run = {f"{policy.score.robot}-{policy.score.task}-{policy.score.seed}": policy.lines for policy in judged}
+    publication.write_finals(studies / f"{division}-{name}", lines_by_run)
+    benchmark.write(studies, division, name, [policy.score for policy in judged])
 
 
 def _is_selected(run: tables.Run, places: list[str]) -> bool:

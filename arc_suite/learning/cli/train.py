@@ -43,7 +43,7 @@ from arc_suite.cli.interrupts import TERMINATED
 from arc_suite.cli.program import progress, resumable, say, watch_for_termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
-from arc_suite.learning import onnx_file, outcomes, processes
+from arc_suite.learning import finals, onnx_file, outcomes, processes
 from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import DEVICE_DEFAULTS
@@ -136,6 +136,8 @@ flags.DEFINE_string(
     short_name="o",
 )
 
+_LINES_OF_RESULT = 2  # that a run prints when it is complete: its latest evaluation, and the episodes that judge it
+
 # Flags that make up the configuration, with --evaluate_every.
 _CONFIGURATION_FLAGS = (
     "robot",
@@ -215,8 +217,17 @@ def train_run(run: Configuration, threshold: float | None) -> int:
             terminated = is_terminated()
     is_complete = finished or step is not None
     save_onnx(run, folder, is_complete)
-    print(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
+    say(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
+    if is_complete:
+        with resumable(folder):
+            print(f"{folder}: {describe_judging(run, folder, FLAGS.threads)}")
     return TERMINATED if terminated and not is_complete else 0
+
+
+def describe_judging(run: Configuration, folder: Path, threads: int | None) -> str:
+    """Play the episodes that judge the final policy of a run, and return their result as text."""
+    step = run_folder.read_progress(folder)["evaluated"]
+    return finals.describe(run, finals.play_once(run, folder, step, threads))
 
 
 def describe_end(folder: Path, step: int | None, finished: bool, terminated: bool) -> str:
@@ -242,7 +253,7 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
         return ["train", *arguments, f"--seed={run.seed}", f"--output={folder / run.name}"]  # the last of a flag holds
 
     def result(name):
-        return processes.last_line(processes.log(folder, name))
+        return processes.last_line(processes.log(folder, name), _LINES_OF_RESULT)
 
     commands = {run.name: functools.partial(command, run) for run in runs}
     with contextlib.ExitStack() as stack, resumable(folder):
@@ -269,6 +280,8 @@ def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
     for run, run_folder_path in zip(runs, folders, strict=True):
         end = describe_end(run_folder_path, None, finished, terminated)
         print(f"{run_folder_path}: {end}, {outcomes.latest_result(run, run_folder_path)}")
+        if finished:
+            print(f"{run_folder_path}: {describe_judging(run, run_folder_path, threads=None)}")
         save_onnx(run, run_folder_path, finished)
     print(f"{folder}: {outcomes.mean(runs, folder)}")
     return TERMINATED if terminated and not finished else 0

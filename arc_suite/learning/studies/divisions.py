@@ -1,17 +1,24 @@
 """Divisions of the benchmark: the places of every division, and what each division gives to an algorithm."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from arc_suite import usage
+from arc_suite.envs.setup import Setup
 
 SEEDS = 3  # of every place
 
-# Robot and task of each place, with default settings.
+# Robot and task of each place.
 PLACES = (
     *(("queen", "walk"), ("bastion", "walk"), ("tick", "walk"), ("leaper", "walk")),
     *(("queen", "steer"), ("tick", "steer"), ("leaper", "steer")),
     *(("tick", "rough"), ("queen", "stairs"), ("tick", "navigate")),
 )
+# Settings of places where they are not those of the task: ground on which a blind walker fails.
+SETTINGS: Mapping[tuple[str, str], Mapping[str, Any]] = {
+    ("tick", "rough"): {"rise": 0.126},  # m, 0.7 standing heights
+    ("queen", "stairs"): {"difficulty": 0.85},
+}
 FAR = ("rough", "slopes", "stairs", "navigate")  # tasks that take more steps: uneven ground and pillars
 TURNING = ("steer", "navigate")  # tasks with commands that turn: a heading error says nothing there
 
@@ -34,6 +41,11 @@ class Division(NamedTuple):
     def steps_in(self, task: str) -> int:
         """Return the environment steps of a run in a task."""
         return self.far_steps if task in FAR else self.steps
+
+
+def place_setup(robot: str, task: str) -> Setup:
+    """Return the setup of a place."""
+    return Setup.of(robot, task, SETTINGS.get((robot, task)))
 
 
 DIVISIONS = {

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import evaluation, files, policies, style
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
+from arc_suite.learning import finals
 from arc_suite.learning.agents import run_folder
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.results import RUN_COLUMNS, STYLE, TIMES
@@ -27,9 +27,6 @@ METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "
 PRESETS = ("medium", "refined")
 # The same in tasks with a command.
 COMMAND_PRESETS = ("steered", "surefooted")
-
-_CURVE_SEEDS = range(evaluation.CURVE_EPISODES)
-_FINAL_SEEDS = range(evaluation.CURVE_EPISODES, evaluation.EPISODES)  # seeds that complete the latest evaluation
 
 _EPISODE_COLUMNS = ("run", "step", "seed", "return", "length")  # first columns of an episode
 _STYLE_COLUMNS = tuple(STYLE + name for name in METRICS)
@@ -52,27 +49,59 @@ def publish(runs: Sequence[Run], folder: Path, published: Path, progress: Callab
     """
     run_rows = {row["run"]: row for row in csv_files.read(published / results.RUNS, RUN_COLUMNS)}
     episodes = results.read_episodes(published)
+    final_rows = results.read_episodes(published, results.FINALS)
     for run in progress(runs, desc=f"{published}: style and returns", unit="run", leave=False):
         output = folder / run.name
         rows = _complete_evaluations(output)
         if rows:
             run_rows[run.name] = _run_row(run, output)
-            rows = _add_style(run, output, rows)
-            episodes[run.name] = _add_final_episodes(run, output, rows)
+            episodes[run.name] = _add_style(run, output, rows)
+            final_rows.pop(run.name, None)  # of an earlier policy
+            last_step = int(rows[-1]["step"])
+            if last_step >= run.configuration.steps:
+                final_lines = finals.play_once(run.configuration, output, last_step)
+                final_rows[run.name] = final_lines
     names = [run.name for run in runs if run.name in episodes]
     if not names:
         return
-    other_columns = {*_EPISODE_COLUMNS, *TIMES, *_STYLE_COLUMNS}
-    metrics_by_run = []
-    for name in names:
-        first_row = episodes[name][0]
-        metrics_by_run.append([column for column in first_row if column not in other_columns])
-    columns = (*_EPISODE_COLUMNS, *_merge_orders(metrics_by_run), *TIMES, *_STYLE_COLUMNS)
-    all_rows = [row for name in names for row in episodes[name]]
-    csv_files.write(published / results.EVALUATIONS, columns, all_rows)
+    _write_episodes(published / results.EVALUATIONS, _EPISODE_COLUMNS, episodes, names)
+    write_finals(published, {name: final_rows[name] for name in names if name in final_rows})
     csv_files.write(published / results.RUNS, RUN_COLUMNS, [run_rows[name] for name in names])
     evaluated_runs = [run for run in runs if run.name in episodes]
     _publish_demonstrators(evaluated_runs, published, progress)
+
+
+def write_finals(published: Path, lines_by_run: Mapping[str, Sequence[Mapping[str, str]]]) -> None:
+    """Write the table of the episodes that judge policies, if there are any.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    episodes = {name: [{"run": name} | dict(row) for row in rows] for name, rows in lines_by_run.items()}
+    if episodes:
+        _write_episodes(published / results.FINALS, ("run", *finals.COLUMNS), episodes, list(episodes))
+
+
+def _write_episodes(
+    path: Path, first_columns: Sequence[str], episodes: Mapping[str, Sequence[Mapping[str, str]]], names: Sequence[str]
+) -> None:
+    """Write a table of episodes: the rows of runs in the order of their names.
+
+    Args:
+        path: path of the table.
+        first_columns: columns that all rows have; the metrics of their tasks follow.
+        episodes: rows by name of the run.
+        names: names of runs.
+    """
+    last_columns = (*TIMES, *_STYLE_COLUMNS)
+    metrics_by_run = []
+    has_last_columns = False
+    for name in names:
+        first_row = episodes[name][0]
+        metrics_by_run.append([column for column in first_row if column not in {*first_columns, *last_columns}])
+        has_last_columns |= not set(last_columns).isdisjoint(first_row)
+    columns = (*first_columns, *_merge_orders(metrics_by_run), *(last_columns if has_last_columns else ()))
+    csv_files.write(path, columns, [row for name in names for row in episodes[name]])
 
 
 def _complete_evaluations(folder: Path) -> list[dict[str, str]]:
@@ -123,8 +152,9 @@ def _add_style(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[
     """
     latest_step = rows[-1]["step"]
     style_rows = run_folder.lines(folder, "style", ("step", "seed"))
-    if not _has_episodes(style_rows, latest_step, _CURVE_SEEDS):
-        style_rows = _measure_style(run, folder, latest_step)
+    seeds = [row["seed"] for row in rows if row["step"] == latest_step]
+    if [(row["step"], row["seed"]) for row in style_rows] != [(latest_step, seed) for seed in seeds]:
+        style_rows = _measure_style(run, folder, latest_step, seeds)
     metrics_by_seed = {}
     for style_row in style_rows:
         metrics = {STYLE + name: text for name, text in style_row.items() if name not in ("step", "seed")}
@@ -132,12 +162,7 @@ def _add_style(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[
     return [row | metrics_by_seed[row["seed"]] if row["step"] == latest_step else row for row in rows]
 
 
-def _has_episodes(rows: Sequence[Mapping[str, str]], step: str, seeds: range) -> bool:
-    """Return whether rows are the episodes of a step, one for each seed."""
-    return [(row["step"], row["seed"]) for row in rows] == [(step, str(seed)) for seed in seeds]
-
-
-def _measure_style(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
+def _measure_style(run: Run, folder: Path, step: str, seeds: Sequence[str]) -> list[dict[str, str]]:
     """Measure the style of the checkpoint of a step, write its table, and return its rows; slow.
 
     The policy in the folder itself may be a later one.
@@ -147,40 +172,12 @@ def _measure_style(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
     rows = []
     with contextlib.closing(setup.load()) as environment:
         policy = policies.policy(path, setup.body, task=environment.task.definition)
-        for seed in _CURVE_SEEDS:
-            metrics = style.measure(style.record(environment, policy, seed))
+        for seed in seeds:
+            metrics = style.measure(style.record(environment, policy, int(seed)))
             texts = {name: repr(metrics[name].value) for name in METRICS if name in metrics}
-            rows.append({"step": step, "seed": str(seed)} | texts)
+            rows.append({"step": step, "seed": seed} | texts)
     csv_files.write(folder / "style.csv", list(rows[0]), rows)
     return rows
-
-
-def _add_final_episodes(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
-    """Return rows of episodes, and further episodes of the latest evaluation.
-
-    The further episodes come from their table in the folder; they are played if it has another step.
-    """
-    latest = rows[-1]
-    final_rows = run_folder.lines(folder, "final", _EPISODE_COLUMNS[1:])
-    if not _has_episodes(final_rows, latest["step"], _FINAL_SEEDS):
-        _play_final_episodes(run, folder, latest["step"])
-        final_rows = run_folder.lines(folder, "final")
-    run_and_times = {name: latest[name] for name in ("run", *TIMES)}
-    return [*rows, *(run_and_times | row for row in final_rows)]
-
-
-def _play_final_episodes(run: Run, folder: Path, step: str) -> None:
-    """Play the episodes that complete the evaluation of a step, and write their table."""
-    setup = run.configuration.validation
-    policy = network.load(folder / checkpoints.FOLDER / step)
-    environment = setup.make_vec(len(_FINAL_SEEDS), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
-    with contextlib.closing(environment):
-        episodes = evaluation.episodes_in_batch(environment, policy, _FINAL_SEEDS)
-    rows = [
-        {"step": step, "seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
-        for seed, episode in zip(_FINAL_SEEDS, episodes, strict=True)
-    ]
-    csv_files.write(folder / "final.csv", list(rows[0]), rows)
 
 
 def _publish_demonstrators(runs: Sequence[Run], published: Path, progress: Callable = tqdm) -> None:

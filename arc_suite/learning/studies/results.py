@@ -1,5 +1,6 @@
 """Results of studies: the published tables of their runs, and statistics over them."""
 
+import dataclasses
 import functools
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,13 +21,22 @@ from arc_suite.seed_ranges import EVALUATION, Ranges, common_seeds, from_json
 # Files of a study's tables.
 RUNS = "runs.csv"
 EVALUATIONS = "evaluations.csv"  # a line for each episode
+FINALS = "finals.csv"  # a line for each episode that judges a final policy, with the hash of the policy
 DEMONSTRATORS = "demonstrators.csv"
 
 # Columns of the table of runs: the configuration, then the updates of stabilization phases by environment step.
 RUN_COLUMNS = ("run", "kind", *CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, "phases")
 TIMES = ("wall_seconds", "cpu_seconds")  # from the start of the run to the end of an evaluation
 STYLE = "style_"  # prefix of the columns with metrics of style, which the latest evaluation has
-_NOT_METRICS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode without a metric
+_NOT_METRICS = (
+    "run",
+    "step",
+    "policy_sha256",
+    "seed",
+    "return",
+    "length",
+    *TIMES,
+)  # columns of an episode without a metric
 
 # Notes on a final return.
 SHARED_SEEDS = "data share seeds with evaluation"
@@ -39,17 +49,20 @@ class RunResult(NamedTuple):
     """Result of a run.
 
     Attributes:
-        run: the run.
+        run: the run; a run from before may have other settings of the task than the study has now.
         steps: (evaluations,) environment steps before each evaluation.
         returns: (evaluations, episodes) returns of the learning curve.
-        finals: (episodes,) returns of the latest policy.
+        finals: (episodes,) returns of the latest policy, in the episodes that judge it if it is judged.
         progress: metrics of the task in the latest evaluation by name, each (episodes,).
         cpu: (evaluations,) s of CPU time before the end of each evaluation.
         style: metrics of style of the latest policy by name, each (episodes,).
         phases: (phases,) updates of each stabilization phase; empty if they are not published.
         training_seeds: seeds of the episodes that the run learned from; None if they are unknown.
-        seeds: seeds of the episodes of `finals`; the first ones are those of the curve. Empty if they are unknown.
+        seeds: seeds of the episodes of `finals`; empty if they are unknown.
         model_sha256: hash of the model in which the run learned; empty if it is unknown.
+        curve_seeds: seeds of the episodes of `returns`; empty if they are unknown.
+        policy_sha256: hash of the judged policy; empty if it is not judged.
+        other_settings: whether the task had other settings than the study has now.
     """
 
     run: Run
@@ -63,11 +76,9 @@ class RunResult(NamedTuple):
     training_seeds: Ranges | None = ()
     seeds: Sequence[int] = ()
     model_sha256: str = ""
-
-    @property
-    def curve_seeds(self) -> Sequence[int]:
-        """Seeds of the episodes of `returns`."""
-        return self.seeds[: evaluation.CURVE_EPISODES]
+    curve_seeds: Sequence[int] = ()
+    policy_sha256: str = ""
+    other_settings: bool = False
 
     @property
     def final(self) -> float:
@@ -102,27 +113,41 @@ def read_results(runs: Sequence[Run], published: Path) -> list[RunResult]:
         OSError: a table cannot be read.
     """
     episodes_by_run = read_episodes(published)
+    finals_by_run = read_episodes(published, FINALS)
     row_by_run = {row["run"]: row for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
-    published_runs = [run for run in runs if run.name in episodes_by_run]
+    study_results = []
     with parsers.guard(f"{published / EVALUATIONS}: damaged"):
-        return [_result(run, episodes_by_run[run.name], row_by_run[run.name]) for run in published_runs]
+        for run in runs:
+            if run.name in episodes_by_run:
+                finals = finals_by_run.get(run.name, ())
+                study_results.append(_result(run, episodes_by_run[run.name], finals, row_by_run[run.name]))
+    return study_results
 
 
-def read_episodes(published: Path) -> dict[str, list[dict[str, str]]]:
-    """Return the rows of the table of episodes by run, without the columns that a row leaves empty."""
+def read_episodes(published: Path, table: str = EVALUATIONS) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of a table of episodes by run, without the columns that a row leaves empty."""
     rows_by_run: dict[str, list[dict[str, str]]] = {}
-    for row in csv_files.read(published / EVALUATIONS):
+    for row in csv_files.read(published / table):
         cells = {column: text for column, text in row.items() if text}
         rows_by_run.setdefault(row["run"], []).append(cells)
     return rows_by_run
 
 
-def _result(run: Run, episodes: Sequence[Mapping[str, str]], run_row: Mapping[str, str]) -> RunResult:
-    """Return the result of a run from its rows in the table of episodes, and its row in the table of runs."""
-    episodes_by_step: dict[str, list[Mapping[str, str]]] = {}
-    for episode in episodes:
-        episodes_by_step.setdefault(episode["step"], []).append(episode)
-    evaluations = list(episodes_by_step.values())
+def _result(
+    run: Run,
+    episodes: Sequence[Mapping[str, str]],
+    finals: Sequence[Mapping[str, str]],
+    run_row: Mapping[str, str],
+) -> RunResult:
+    """Return the result of a run from its rows in the tables of episodes, and its row in the table of runs.
+
+    Args:
+        run: the run.
+        episodes: episodes of the evaluations.
+        finals: episodes that judge the latest policy; none for a run from before, or one that is not finished.
+        run_row: row in the table of runs.
+    """
+    evaluations = _group_by_step(episodes)
     _check_counts(run.name, [len(evaluation_rows) for evaluation_rows in evaluations])
 
     def curve_column(name: str) -> np.ndarray:
@@ -131,30 +156,50 @@ def _result(run: Run, episodes: Sequence[Mapping[str, str]], run_row: Mapping[st
         return np.array([[row[name] for row in rows] for rows in first_episodes], float)
 
     latest = evaluations[-1]
+    judged = finals or latest
     progress = {}
+    for name in judged[0]:
+        if name not in _NOT_METRICS and not name.startswith(STYLE):
+            progress[name] = np.array([row[name] for row in judged], float)
     style = {}
     for name in latest[0]:
-        if name in _NOT_METRICS:
-            continue
-        values = np.array([row[name] for row in latest if name in row], float)
         if name.startswith(STYLE):
-            style[name.removeprefix(STYLE)] = values
-        else:
-            progress[name] = values
+            style[name.removeprefix(STYLE)] = np.array([row[name] for row in latest if name in row], float)
+    published_run = _with_settings(run, run_row["task_kwargs"])
     updates_by_step = json.loads(run_row["phases"] or "{}")
     return RunResult(
-        run=run,
+        run=published_run,
         steps=curve_column("step")[:, 0].astype(int),
         returns=curve_column("return"),
-        finals=np.array([row["return"] for row in latest], float),
+        finals=np.array([row["return"] for row in judged], float),
         progress=progress,
         cpu=curve_column("cpu_seconds")[:, 0],
         style=style,
         phases=np.array(list(updates_by_step.values())),
         training_seeds=from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
-        seeds=[int(row["seed"]) for row in latest],
+        seeds=[int(row["seed"]) for row in judged],
+        curve_seeds=[int(row["seed"]) for row in latest[: evaluation.CURVE_EPISODES]],
         model_sha256=run_row["model_sha256"],
+        policy_sha256=judged[0].get("policy_sha256", ""),
+        other_settings=published_run != run,
     )
+
+
+def _group_by_step(episodes: Sequence[Mapping[str, str]]) -> list[list[Mapping[str, str]]]:
+    """Return the rows of each evaluation."""
+    episodes_by_step: dict[str, list[Mapping[str, str]]] = {}
+    for episode in episodes:
+        episodes_by_step.setdefault(episode["step"], []).append(episode)
+    return list(episodes_by_step.values())
+
+
+def _with_settings(run: Run, settings_text: str) -> Run:
+    """Return a run with the settings of the task in a cell of the table of runs; unchanged for an empty cell."""
+    setup = run.configuration.setup
+    if not settings_text or json.loads(settings_text) == setup.task_kwargs:
+        return run
+    published_setup = Setup.of(setup.domain, setup.task, json.loads(settings_text))
+    return run._replace(configuration=dataclasses.replace(run.configuration, setup=published_setup))
 
 
 def _check_counts(name: str, counts: Sequence[int]) -> None:

@@ -11,7 +11,7 @@ from arc_suite.data import DatasetSettings
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
+from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, SETTINGS, place_setup
 
 _EPISODES = 1000  # of prior data, as in the paper
 
@@ -130,13 +130,14 @@ def benchmark(division: str, algorithm: str) -> Study:
     runs = []
     for seed, (robot, task) in itertools.product(range(SEEDS), PLACES):
         prior = Prior(_collecting_preset(robot, task), rule.episodes) if rule.episodes else None
-        runs.append(run(robot, algorithm, rule.steps_in(task), seed, task, prior=prior))
+        settings = SETTINGS.get((robot, task))
+        runs.append(run(robot, algorithm, rule.steps_in(task), seed, task, settings, prior=prior))
     return Study(f"division {division} of the benchmark: {algorithm}", tuple(runs))
 
 
 def _collecting_preset(robot: str, task: str) -> str:
     """Return the preset that collects prior data: on `walk` that of the paper, elsewhere see `memoryless_preset`."""
-    return "medium" if task == "walk" else memoryless_preset(Setup.of(robot, task).definition)
+    return "medium" if task == "walk" else memoryless_preset(place_setup(robot, task).definition)
 
 
 def folder_name(name: str) -> str:

@@ -16,7 +16,8 @@ import programs
 import pytest
 from refusals import refused
 
-from arc_suite import registry
+from arc_suite import policies, registry
+from arc_suite.evaluation import judging
 from arc_suite.learning.agents import configuration, run_folder
 
 HAS_JAX = importlib.util.find_spec("jax") is not None
@@ -131,9 +132,17 @@ def test_until_a_score(tmp_path):
     shutil.copy(ROOT / "tests" / "fixtures" / "tiny_studies.py", tmp_path)
     for _ in range(2):
         done = run("train", *CLIMB, "--until_score=-100", "-o", "run", cwd=tmp_path)
-        last = done.stdout.splitlines()[-1]
-        assert done.returncode == 0 and re.fullmatch(REACHED, last), done
-        assert run_folder.table(tmp_path / "run", "evaluations")["step"].tolist() == [20] * 10
+        reached, judged = done.stdout.splitlines()[-2:]
+        assert done.returncode == 0 and re.fullmatch(REACHED, reached), done
+        evaluations = run_folder.table(tmp_path / "run", "evaluations")
+        assert evaluations["step"].tolist() == [20] * 10 and evaluations["seed"].tolist() == [*range(9000, 9010)]
+        finals = run_folder.lines(tmp_path / "run", "final")
+        sha256 = policies.digest(str(tmp_path / "run"))
+        assert {row["policy_sha256"] for row in finals} == {sha256}
+        assert [int(row["seed"]) for row in finals] == list(judging.seeds_of(sha256))
+        returns = np.array([float(row["return"]) for row in finals])
+        line = f"run: judged in 100 episodes, seeds {finals[0]['seed']} on: {returns.mean():.1f} +- "
+        assert judged.startswith(f"{line}{returns.std(ddof=1) / 10.0:.1f}, score ")
     done = run("train", *CLIMB, "--minutes=0", "-o", "other", cwd=tmp_path)
     assert done.stdout.endswith(STOPPED)
 
@@ -154,6 +163,7 @@ def test_several_seeds(tmp_path):
     for seed, each in zip((0, 2), returns, strict=True):
         (line,) = (line for line in lines if line.startswith(f"runs/{name}-{seed}: finished"))
         assert f", return {each.mean():.1f} +- {each.std():.1f}, score " in line
+        assert f"runs/{name}-{seed}: judged in 100 episodes, seeds 4" in lines[lines.index(line) + 1]
     means = [each.mean() for each in returns]
     assert lines[-1].startswith(f"runs: mean of 2 seeds, return {np.mean(means):.1f} +- {np.std(means):.1f}, score ")
     assert run("train", *CLIMB, "--seed=2", "-o", "alone", cwd=tmp_path).returncode == 0
@@ -167,7 +177,8 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("trained")
     done = run("train", *TINY, "--tensorboard", cwd=path)
     assert done.returncode == 0, done.stderr
-    first, *evaluations, last = done.stdout.splitlines(keepends=True)
+    first, *evaluations, last, judged = done.stdout.splitlines(keepends=True)
+    assert judged.startswith("runs/tick-walk-sope_eo-0: judged in 100 episodes, seeds 4")
     assert first == 'runs/tick-walk-sope_eo-0: tick, walk, {"time_limit": 2}, sope_eo, 200 steps\n'
     line = re.compile(r"runs/tick-walk-sope_eo-0: return \d+\.\d after (\d+) steps\n")
     returns = list(map(line.fullmatch, evaluations))

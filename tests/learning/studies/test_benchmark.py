@@ -12,12 +12,13 @@ from refusals import refused
 
 from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import anchors
+from arc_suite.evaluation import anchors, judging
 from arc_suite.learning.agents import algorithms
-from arc_suite.learning.studies import benchmark, csv_files, results, tables
+from arc_suite.learning.studies import benchmark, csv_files, entries, results, tables
 from arc_suite.learning.studies.benchmark import RunScore
-from arc_suite.learning.studies.divisions import FAR, PLACES, SEEDS
+from arc_suite.learning.studies.divisions import FAR, PLACES, SEEDS, place_setup
 from arc_suite.learning.studies.results import RunResult
+from arc_suite.policies import frozen
 from arc_suite.policies.network import PACKAGED
 from arc_suite.tasks import TASKS
 
@@ -44,9 +45,10 @@ def test_a_track_is_a_study(name, steps, far, prior):
     assert len(study.runs) == SEEDS * len(PLACES)
     assert [each.configuration.seed for each in study.runs] == sorted(each.configuration.seed for each in study.runs)
     for each in study.runs:
-        task = each.configuration.setup.kind.name
+        setup = each.configuration.setup
+        task = setup.kind.name
         assert each.configuration.steps == (far if task in FAR else steps)
-        assert each.configuration.setup.task_kwargs == {}
+        assert setup == place_setup(setup.name, task) and bool(setup.task_kwargs) == (task in ("rough", "stairs"))
         if prior is None:
             assert each.prior is None
         else:
@@ -79,7 +81,9 @@ def result(levels, steps=(50_000, 100_000), **fields):
     returns = np.array([[scale().at(level)] * 10 for level in levels])
     style = {"gait_compliance": np.full(10, 0.9), "heading_error": np.array([np.nan, *[0.2, -0.2] * 4, 0.2])}
     run = tables.run("tick", "sac", 100_000, **fields)
-    return RunResult(run, np.array(steps), returns, returns[-1], {}, np.array([60.0, 180.0]), style, np.empty(0))
+    finals = returns[-1]
+    result = RunResult(run, np.array(steps), returns, finals, {}, np.array([60.0, 180.0]), style, np.empty(0))
+    return result._replace(policy_sha256="ab" * 32, seeds=range(4_200_000_000, 4_200_000_010))
 
 
 def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
@@ -90,6 +94,7 @@ def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
     assert (score.gait_compliance, score.heading_error) == (pytest.approx(0.9), pytest.approx(0.2))
     (slow,) = benchmark.score_results([result([0.1, 0.4], seed=1)])
     assert slow.minutes == np.inf and slow.seed == 1
+    assert (slow.policy_sha256, slow.first_seed) == ("ab" * 32, 4_200_000_000)
 
 
 def test_scores_of_ten_episodes_are_those_of_their_seeds():
@@ -99,9 +104,17 @@ def test_scores_of_ten_episodes_are_those_of_their_seeds():
     assert [round(score.score, 3) for score in benchmark.score_results([unpaired, paired])] == [0.154, 0.095]
 
 
-def test_scores_are_clipped_and_unfinished_runs_have_none():
+def test_runs_from_before_are_scored_by_the_episodes_of_their_seeds():
+    before = result([0.6, 0.4])._replace(policy_sha256="", seeds=range(10))
+    (score,) = benchmark.score_results([before])
+    paired = anchors.of_returns(anchors.committed_returns(before.run.configuration.setup), range(10))
+    assert score.score == paired.score(before.final)
+    assert "judged on seeds from 0 on" in score.notes
+
+
+def test_no_score_is_cut_and_unfinished_runs_have_none():
     low, high = benchmark.score_results([result([0.0, -3.0]), result([0.0, 9.0])])
-    assert (low.score, high.score) == (-0.5, 1.2)
+    assert (low.score, high.score) == (pytest.approx(-3.0), pytest.approx(9.0))
     assert benchmark.score_results([result([0.0, 0.5], steps=(50_000, 90_000))]) == []
 
 
@@ -267,7 +280,7 @@ def test_policies_of_other_names_are_refused_before_any_plays(tmp_path, name, li
     for each in (path, tmp_path / "tick-walk-0.npz"):
         each.write_bytes(b"")
     with refused(f"{tmp_path / name.partition('/')[0]}: {line}"):
-        benchmark.score_policies(tmp_path, progress=None)
+        entries.score_policies(tmp_path, progress=None)
 
 
 MODULE = """
@@ -280,17 +293,24 @@ def make(robot):
 """
 
 
+@pytest.mark.long
 def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypatch):
     """A module acts by the weights next to it; this one stands still, for one episode."""
-    for name in ("EPISODES", "CURVE_EPISODES"):
-        monkeypatch.setattr(evaluation, name, 1)
+    monkeypatch.setattr(judging, "EPISODES", 1)
+    monkeypatch.setattr(evaluation, "CURVE_EPISODES", 1)
     (tmp_path / "tick-walk-2.py").write_text(MODULE)
     np.save(tmp_path / "tick-walk-2.npy", np.zeros(18))
     for name in ("README.md", ".hidden.py", "_helpers.py", "tick-walk-2_vecnormalize.pkl", "studies/other.zip"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(b"")
-    (found,) = benchmark.score_policies(tmp_path, lambda each, **_: each)
+    (judged,) = entries.score_policies(tmp_path, lambda each, **_: each)
+    found = judged.score
     assert found[:3] == ("tick", "walk", 2) and found.score == pytest.approx(0.0, abs=0.05)
+    with frozen.freeze(tmp_path) as copy:
+        assert found.policy_sha256 == copy.sha256
+    assert found.first_seed == judging.seeds_of(found.policy_sha256).start >= 4_100_000_000
+    (episode,) = judged.lines
+    assert episode["seed"] == str(found.first_seed) and float(episode["return"]) == found.result
 
 
 @pytest.mark.release
@@ -338,12 +358,14 @@ def test_a_track_is_run_and_resumed(tmp_path):
     folder = tmp_path / "studies" / "samples-tiny_studies.climb"
     (row,) = csv_files.read(folder / results.RUNS)
     assert row["steps"] == "300"
-    returns = [float(each["return"]) for each in csv_files.read(folder / results.EVALUATIONS) if each["step"] == "300"]
-    assert found.result == pytest.approx(np.mean(returns)) and len(returns) == evaluation.EPISODES
+    rows = csv_files.read(folder / results.FINALS)
+    assert found.result == pytest.approx(np.mean([float(each["return"]) for each in rows]))
+    assert [int(each["seed"]) for each in rows] == list(judging.seeds_of(found.policy_sha256))
     assert (folder / "README.md").is_file() and printed.count("not run") == 9
-    episodes = (folder / results.EVALUATIONS).read_bytes()
+    names = (results.EVALUATIONS, results.FINALS)
+    tables = [(folder / name).read_bytes() for name in names]
     go()
-    assert (folder / results.EVALUATIONS).read_bytes() == episodes
+    assert [(folder / name).read_bytes() for name in names] == tables
 
 
 @pytest.mark.parametrize("name", [f"{division}-{learner}" for division, learner in benchmark.read(COMMITTED)])

@@ -23,6 +23,7 @@ from refusals import refused
 from arc_suite import data, evaluation, policies, registry, style
 from arc_suite.bodies import generator
 from arc_suite.envs.dm import load
+from arc_suite.evaluation import judging
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.training import train
 from arc_suite.learning.studies import csv_files, publication, results, runner
@@ -128,7 +129,7 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
 
     # What is published of the policy's style is what the style room measures of it, also a second time.
     def tables_of():
-        return [(tmp_path / "results" / name).read_bytes() for name in ("runs.csv", "evaluations.csv")]
+        return [(tmp_path / "results" / name).read_bytes() for name in ("runs.csv", "evaluations.csv", "finals.csv")]
 
     tables_before = tables_of()
     publication.publish(tiny_studies.WITH_NUMPY.runs, folder, tmp_path / "results")
@@ -137,10 +138,10 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     assert [each.run.name for each in published] == [names[0], names[1], names[7]]
     environment = load("tick", "walk", tiny_studies.SHORT)
     policy = policies.policy(folder / first.name, "tick")
-    for seed in (0, 7):
-        measured = style.measure(style.record(environment, policy, seed))
+    for index in (0, 7):
+        measured = style.measure(style.record(environment, policy, 9000 + index))
         for name in METRICS:
-            assert np.array_equal(published[0].style[name][seed], measured[name].value, equal_nan=True)
+            assert np.array_equal(published[0].style[name][index], measured[name].value, equal_nan=True)
 
     # Rows of runs whose folders are gone stay.
     shutil.rmtree(folder / names[0])
@@ -207,11 +208,17 @@ def test_a_run_is_judged_without_its_settings_of_training(tmp_path):
     assert results.read_demonstrators(published).keys() == {each.place}
     with contextlib.closing(load("tick", "gaps", tiny_studies.SHORT)) as environment:
         policy = policies.policy(folder / each.name, "tick", task=environment.task.definition)
-        assert evaluation.run(environment, policy, 4).total == table["return"][4]
-        (found,) = results.read_results([each], published)
-        assert found.finals[:10].tolist() == found.returns[-1].tolist() == table["return"].tolist()
-        assert len(found.finals) == evaluation.EPISODES and found.notes == ()
-        assert evaluation.run(environment, policy, 57).total == found.finals[57], "the first ten are the curve's"
+        assert evaluation.run(environment, policy, 9004).total == table["return"][4]
+    (found,) = results.read_results([each], published)
+    assert found.returns[-1].tolist() == table["return"].tolist()
+    assert len(found.finals) == evaluation.EPISODES and found.notes == ()
+    assert found.policy_sha256 == policies.digest(str(folder / each.name))
+    seeds = judging.seeds_of(found.policy_sha256)
+    assert list(found.seeds) == list(seeds) and list(found.curve_seeds) == [*range(9000, 9010)]
+    judged_setup = judging.setup_of(each.configuration.setup, seeds)
+    assert judged_setup.task_kwargs["terrain_seed"] == seeds.start
+    with contextlib.closing(judged_setup.load()) as environment:
+        assert evaluation.run(environment, policy, seeds[57]).total == found.finals[57]
 
 
 def test_robots_of_other_packages_and_unknown_ones(monkeypatch):

@@ -90,6 +90,28 @@ def test_demonstrators_play_where_runs_were_evaluated_alone(tmp_path, monkeypatc
     assert bars == [(3, "run"), (1, "place")] * 2
 
 
+def test_finals_are_those_that_judge_the_policy(tmp_path):
+    """A run from before has the episodes of its last evaluation; its settings are those of its row."""
+    new, old = (run("tick", "sac", 1_000_000, seed, "rough", {"rise": 0.1}) for seed in (0, 1))
+    for each in (new, old):
+        publish(tmp_path, each, constant(100.0, 200.0))
+    rows = csv_files.read(tmp_path / results.RUNS)
+    rows[1]["task_kwargs"] = "{}"
+    csv_files.write(tmp_path / results.RUNS, results.RUN_COLUMNS, rows)
+    sha256 = "ab" * 32
+    judged = [
+        {"policy_sha256": sha256, "seed": str(4_200_000_000 + index), "return": "300.5", "length": "9", "fell": "1.0"}
+        for index in range(100)
+    ]
+    publication.write_finals(tmp_path, {new.name: judged})
+    first, second = results.read_results([new, old], tmp_path)
+    assert first.policy_sha256 == sha256 and first.final == 300.5 and first.progress["fell"].tolist() == [1.0] * 100
+    assert list(first.seeds) == list(range(4_200_000_000, 4_200_000_100)) and first.curve_seeds == [*range(10)]
+    assert first.run == new and not first.other_settings
+    assert second.policy_sha256 == "" and second.final == 204.5 and second.seeds == [*range(10)]
+    assert second.other_settings and second.run.place == "tick, rough" != new.place
+
+
 def test_damaged_tables_are_one_line(tmp_path):
     each = run("tick", "sac", 1_000_000)
     publish(tmp_path, each, constant(100.0))

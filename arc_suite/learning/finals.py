@@ -1,0 +1,82 @@
+"""The episodes that judge the final policy of a run, played once, when its training has ended: `RUN/final.csv`.
+
+Their seeds follow from the hash of the policy's content, see `evaluation.judging`. Each line holds this hash.
+"""
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from arc_suite import evaluation, files
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors, judging
+from arc_suite.learning.agents import run_folder
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.policies import checkpoints, network
+from arc_suite.policies.network import Network
+
+TABLE = "final"
+COLUMNS = ("policy_sha256", "seed", "return", "length")  # the metrics of the task follow
+
+Lines = list[dict[str, str]]
+
+
+def play_once(run: Configuration, folder: Path, step: int, threads: int | None = 1) -> Lines:
+    """Return the rows of the episodes that judge the final policy of a run; play them if nobody has.
+
+    Args:
+        run: configuration of the run.
+        folder: folder of the run.
+        step: environment step of the policy.
+        threads: threads of the simulation; None for as many as there are cores.
+
+    Raises:
+        ValueError: a damaged file.
+        OSError: a file cannot be read or written.
+    """
+    policy = network.load(folder / checkpoints.FOLDER / str(step))
+    sha256 = network.digest(policy)
+    final_lines = run_folder.lines(folder, TABLE)
+    if not _are_of(final_lines, sha256):
+        final_lines = _play(run.validation, policy, sha256, threads)
+        lines = [",".join(final_lines[0]), *(",".join(row.values()) for row in final_lines)]
+        files.write(folder / f"{TABLE}.csv", "\n".join([*lines, ""]))
+    return final_lines
+
+
+def _are_of(final_lines: Sequence[Mapping[str, str]], sha256: str) -> bool:
+    """Return whether rows are the episodes that judge the policy of a hash."""
+    seeds = [(row.get("policy_sha256"), row["seed"]) for row in final_lines]
+    return seeds == [(sha256, str(seed)) for seed in judging.seeds_of(sha256)]
+
+
+def _play(setup: Setup, policy: Network, sha256: str, threads: int | None) -> Lines:
+    """Play the episodes that judge a policy, and return their rows."""
+    seeds = judging.seeds_of(sha256)
+    environment = judging.setup_of(setup, seeds).make_vec(
+        len(seeds), num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
+    )
+    with contextlib.closing(environment):
+        return to_lines(sha256, seeds, evaluation.episodes_in_batch(environment, policy, seeds))
+
+
+def to_lines(sha256: str, seeds: Sequence[int], episodes: Sequence[evaluation.EpisodeResult]) -> Lines:
+    """Return the rows of the episodes that judge the policy of a hash."""
+    episode_lines = []
+    for seed, episode in zip(seeds, episodes, strict=True):
+        values = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
+        episode_lines.append({"policy_sha256": sha256} | {name: repr(value) for name, value in values.items()})
+    return episode_lines
+
+
+def describe(run: Configuration, final_lines: Sequence[Mapping[str, str]]) -> str:
+    """Return the mean return of judging episodes, its standard error, and the score, as text."""
+    returns = np.array([row["return"] for row in final_lines], float)
+    error = returns.std(ddof=1) / np.sqrt(returns.size)
+    score = anchors.anchors(run.validation).score(returns.mean())
+    score_text = f", score {score:z.2f}" if np.isfinite(score) else ""
+    first_seed = final_lines[0]["seed"]
+    return f"judged in {returns.size} episodes, seeds {first_seed} on: {returns.mean():.1f} +- {error:.1f}{score_text}"
