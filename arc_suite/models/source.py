@@ -133,7 +133,7 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
     controls s u and 1 - s a joint has the share s of its torque.
 
     A servo whose torque falls with speed has a drag: see `builder.elements`. It is the limit's, not the joint's: a
-    control of 1 takes it away from a servo that fails. Where one servo has a drag, all of legs have one, which may be 0.
+    control of 1 takes it away from a servo that fails. Where one servo has a drag, all of legs have one, maybe 0.
     """
     actuators = SubElement(root, "actuator")
     joints = {joint.get("name"): joint for joint in root.find("worldbody").iter("joint")}
