@@ -6,6 +6,7 @@ import math
 import operator
 import os
 import pkgutil
+import re
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,38 @@ import numpy as np
 
 MAX_SEED = 2**32 - 1  # the largest seed of a NumPy `RandomState`
 
+# Names of other libraries, and the names that this suite has for the same; errors suggest the first that is valid.
+SYNONYMS: Mapping[str, tuple[str, ...]] = {
+    "algo": ("algorithm",),
+    "batch_size": ("minibatch", "batch"),
+    "clip_range": ("clip",),
+    "env": ("robot",),
+    "env_id": ("robot",),
+    "gamma": ("discount",),
+    "learning_starts": ("start_steps",),
+    "learning_rate": ("policy_rate",),
+    "lr": ("learning_rate", "policy_rate"),
+    "max_grad_norm": ("gradient_norm",),
+    "model": ("policy",),
+    "n_envs": ("num_envs",),
+    "n_epochs": ("epochs",),
+    "n_eval_episodes": ("episodes",),
+    "n_steps": ("horizon", "n_step", "steps"),
+    "net_arch": ("hidden",),
+    "num_workers": ("threads", "jobs"),
+    "timesteps": ("steps",),
+    "total_timesteps": ("steps",),
+}
+
 # Lower bounds between 0 and this number only exclude 0, so errors say "above 0" in place of the bound.
 _MIN_NAMED_BOUND = 1e-6
 _MAX_DIGITS = 20  # of an integer in a text
 _MAX_QUOTE = 300  # characters
 _MAX_PATH = 80  # characters of a path `module:name` in an error
+_COUNT = re.compile(r"(\d{1,20}(?:\.\d{0,20})?(?:e\d\d?)?)([km]?)", re.IGNORECASE)  # such as 1e5, 100k
+_FACTORS = {"": 1, "k": 1_000, "m": 1_000_000}  # of the letters after a count
+_NUMBER = r"-?\d{1,20}(?:\.\d{0,20})?(?:e-?\d\d?)?"
+_TWO_NUMBERS = re.compile(rf"\D{{0,3}}?({_NUMBER})(?:, *| +|-|:|\.\.)({_NUMBER})\D?", re.IGNORECASE)
 
 
 def name(value, valid: Iterable[str], kind: str, suggestions: Iterable[str] = ()) -> str:
@@ -56,13 +84,51 @@ def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
     items = (value,) if isinstance(value, str) else value
     if not isinstance(items, tuple | list):
         raise ValueError(f"{what}: expected names of {kind}s, got {preview(value)}")
+    if isinstance(value, str) and "," in value:
+        raise ValueError(
+            f"{what}: expected names of {kind}s, got {preview(value)}{_suggest(json.dumps(value.split(',')))}"
+        )
     return tuple(name(item, valid, f"{kind} of {what}") for item in items)
 
 
 def hint(value, valid: Iterable[str]) -> str:
-    """Return the part of an error that suggests the valid name most similar to a value; empty if none is similar."""
-    similar_names = difflib.get_close_matches(preview(value).strip("'"), valid, n=1)
-    return f"; did you mean {similar_names[0]!r}?" if similar_names else ""
+    """Return the part of an error that suggests a valid name: a synonym of a value, or the most similar one.
+
+    Empty if there is neither.
+    """
+    valid_names = list(valid)
+    text = preview(value).strip("'")
+    synonyms = [synonym for synonym in SYNONYMS.get(text, ()) if synonym in valid_names]
+    suggestions = synonyms or difflib.get_close_matches(text, valid_names, n=1)
+    return f"; did you mean {suggestions[0]!r}?" if suggestions else ""
+
+
+def hint_integer(value: Any, low: int | None = None, high: int | None = None, before: str = "") -> str:
+    """Return the part of an error that suggests an integer for a value such as "1e5", "100k" or 100.0; else "".
+
+    Args:
+        value: the value in place of an integer.
+        low: the smallest valid value; None for no bound.
+        high: the largest valid value; None for no bound.
+        before: what the suggestion begins with, such as the name of a flag.
+    """
+    text = f"{value}" if isinstance(value, str | float) else ""
+    match = _COUNT.fullmatch(text)
+    if match is None or text.isdecimal():
+        return ""
+    result = float(match[1]) * _FACTORS[match[2].lower()]
+    is_valid = result.is_integer() and result >= (low or 0) and result <= (MAX_SEED if high is None else high)
+    return _suggest(f"{before}{int(result)}") if is_valid else ""
+
+
+def _hint_span(value: Any) -> str:
+    """Return the part of an error that suggests two numbers for a text such as "0.5-1.2"; else ""."""
+    match = _TWO_NUMBERS.fullmatch(value) if isinstance(value, str) else None
+    return "" if match is None else _suggest(f"[{match[1]}, {match[2]}]")
+
+
+def _suggest(text: str) -> str:
+    return f"; did you mean {text}?"
 
 
 def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
@@ -105,7 +171,7 @@ def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
         result = None
     if result is None or result < low or (high is not None and result > high):
         bounds = f"from {low}" if high is None else f"from {low} to {high}"
-        raise ValueError(f"{what}: expected an integer {bounds}, got {preview(value)}")
+        raise ValueError(f"{what}: expected an integer {bounds}, got {preview(value)}{hint_integer(value, low, high)}")
     return result
 
 
@@ -172,7 +238,8 @@ def span(what: str, value: Any, low: float, high: float) -> tuple[float, float]:
         upper_end = number(what, last, lower_end, high)
     except ValueError:
         raise ValueError(
-            f"{what}: expected a {_describe_range(low, high)}, or two of them, the lower first, got {preview(value)}"
+            f"{what}: expected a {_describe_range(low, high)}, or two of them, the lower first, "
+            f"got {preview(value)}{_hint_span(value)}"
         ) from None
     return lower_end, upper_end
 

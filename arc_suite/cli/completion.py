@@ -164,8 +164,10 @@ def _fish_script() -> str:
 def _first_words() -> dict[str, str]:
     """Return what may follow `arc-suite`, with a summary each."""
     summaries = {program: program_summary(program) for program in PROGRAMS}
-    others = {name: f"of the package {entry_point.dist.name}" for name, entry_point in installed_programs().items()}
-    return summaries | others | WORDS
+    programs_of_packages = {
+        name: f"of the package {entry_point.dist.name}" for name, entry_point in installed_programs().items()
+    }
+    return summaries | programs_of_packages | WORDS
 
 
 def _quote(text: str) -> str:

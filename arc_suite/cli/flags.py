@@ -1,5 +1,6 @@
 """Flags that several programs have: body, task and its settings."""
 
+import contextlib
 import json
 import warnings
 from collections.abc import Iterable, Mapping
@@ -369,7 +370,7 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
 
     Args:
         flag: its name, for errors.
-        texts: texts of the command line; values are JSON where they parse, else text.
+        texts: texts of the command line; values are JSON where they parse, or numbers with commas between, else text.
 
     Raises:
         ValueError: a text without a name or without =, or a name twice.
@@ -381,8 +382,14 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
             raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value")
         if name in values:
             raise ValueError(f"--{flag} {checks.quote(text)}: {checks.quote(name)} has a value already")
-        try:
-            values[name] = json.loads(value)
-        except ValueError:
-            values[name] = value
+        values[name] = _parse_value(value)
     return values
+
+
+def _parse_value(text: str) -> Any:
+    """Return the JSON value of a text, the numbers of a text such as "0.5,1.2", or else the text."""
+    with contextlib.suppress(ValueError):
+        return json.loads(text)
+    with contextlib.suppress(ValueError):
+        return [checks.number("", json.loads(part)) for part in text.split(",")]
+    return text

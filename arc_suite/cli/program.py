@@ -25,6 +25,7 @@ from arc_suite.cli.programs import docstring_of
 from arc_suite.cli.version import describe_suite
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
+from arc_suite.tasks.modifiers import MODIFIERS
 
 _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
@@ -173,6 +174,8 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
         positional_arguments = flags.FLAGS(with_underscores)
     except flags.UnrecognizedFlagError as error:
         names = sorted({flag.name for flag in _flags_of(module)})
+        _, _, value = error.flagvalue.partition("=")
+        _refuse_name_of_value(error.flagname, value, names)
         checks.name(error.flagname, names, "flag")  # raises a ValueError that suggests a name
         raise
     except flags.IllegalFlagValueError as error:
@@ -181,11 +184,34 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
         parser = flags.FLAGS[name].parser
         choices = getattr(parser, "enum_values", ("true", "false"))
         expected = parser.syntactic_help or " or ".join(choices)
-        raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}") from None
+        hint = ""
+        if isinstance(parser, flags.IntegerParser):
+            _, _, value = flag_and_value.partition("=")
+            hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
+        raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None
     for flag in _flags_of(module):
         if flag.present and flag.value in ("", []):
             raise ValueError(f"--{flag.name}=: expected a value, got none")
     return positional_arguments
+
+
+def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> None:
+    """Raise ValueError for a flag that is the name of a setting or of a hyperparameter, with the flag that takes it."""
+    words_of_flags = {
+        "set": registry.task_setting_names() | MODIFIERS.keys(),
+        "hp": set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flag_names else set(),
+    }
+    meanings = (name, *checks.SYNONYMS.get(name, ()))
+    if any(meaning in flag_names for meaning in meanings):
+        return
+    suggestions = [
+        f"--{flag} {meaning}={checks.quote(value) or 'VALUE'}"
+        for flag, words in words_of_flags.items()
+        for meaning in meanings
+        if flag in flag_names and meaning in words
+    ]
+    if suggestions:
+        raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {' or '.join(suggestions)}?")
 
 
 def _suggest_flag(argument: str) -> str:

@@ -18,7 +18,7 @@ from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import check_preset_name, preset_names
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import network, other_libraries
+from arc_suite.policies import cures, network, other_libraries
 from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.other_libraries import PolicyFile
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
@@ -128,6 +128,8 @@ def policy(
     for preset in preset_list:
         check_preset_name(preset)
     checks.number("noise", noise, 0.0)
+    if isinstance(name, str | os.PathLike) and name not in POLICIES:
+        cures.refuse_other_files(name)
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
         checkpoints = network.checkpoint_files(Path(name))
         if checkpoints:
@@ -252,6 +254,9 @@ def setup_of(name) -> Setup | None:
     """
     if not isinstance(name, str | os.PathLike):
         return name.setup if isinstance(name, Network) else None
+    if name in POLICIES:
+        return None
+    cures.refuse_other_files(name)
     if not (isinstance(name, os.PathLike) or _is_path(name)):
         return None
     policy_file = other_libraries.find(name)
@@ -365,6 +370,7 @@ def _from_path(path: str, body: Body, num_envs: int) -> Policy:
     factory = checks.import_object(path, "policy", resolve)
     if not callable(factory):
         raise ValueError(f"policy {checks.preview(path)}: expected a function that makes a policy from a robot's name")
+    cures.check_takes_robot(path, factory)
     make = _add_check(path, factory, body.name if is_robot(body) else body)
     make()  # raises an error at once if the function does not fit
     return Individuals(make, num_envs, len(body.joint_names), f"policy {checks.preview(path)}")
@@ -390,6 +396,7 @@ def _add_check(path: str, factory: Callable, robot: str | Body) -> Callable[[], 
             kind = type(act).__name__
             raise ValueError(
                 f"policy {checks.preview(path)}: expected it to return a function of a TimeStep, got {kind}"
+                f"{cures.suggest_method(act)}"
             )
         return act
 

@@ -33,9 +33,13 @@ def colors(palette: str | int) -> dict[str, Color]:
 
 
 def parse(text: str) -> str | int:
-    """Return the palette that a text names: digits are a seed."""
+    """Return the palette that a text names: digits are a seed.
+
+    Raises:
+        ValueError: neither a name nor digits.
+    """
     seed = checks.digits(text)
-    return text if seed is None else seed
+    return checks.name(text, PALETTES, "palette", suggestions=["a seed, such as 7"]) if seed is None else seed
 
 
 def _draw_colors(seed: int) -> tuple[Color, ...]:

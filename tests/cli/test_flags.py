@@ -16,7 +16,7 @@ from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 
 SPIDER, WORDS = EXAMPLES["spider"], ", ".join(registry.robot_words())
-NO_PALETTE = f"Body(walker_4x3).palette: expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got 'mos'"
+NO_PALETTE = f"unknown palette 'mos'; did you mean 'moss'? (there are: {', '.join(PALETTES)}, a seed, such as 7)"
 
 
 @pytest.mark.parametrize("program", ["evaluate", "render", "style", "collect"])
@@ -73,7 +73,7 @@ def test_bad_tasks_and_settings_are_one_line(program, arguments, message, tmp_pa
     assert not (tmp_path / "a.png").exists()
 
 
-def test_settings_are_json_where_they_parse():
+def test_settings_are_json_or_numbers_where_they_parse():
     code = """
 import sys
 from absl import flags
@@ -83,9 +83,11 @@ flags.FLAGS(["program", *sys.argv[1:]])
 print(task_from_flags())
 """
     settings = ["a=1", "b=2.5", "c=ripple", 'd="ripple"', 'e={"x": [1, null]}', "f=x=y", "g=", "h=Infinity", "i=true"]
+    settings += ["j=0.5,1.2", "k=0.5,b", "l=1,NaN"]
     printed = interpreters.printed(code, *(f"--set={setting}" for setting in settings))
     expected = {"a": 1, "b": 2.5, "c": "ripple", "d": "ripple", "e": {"x": [1, None]}, "f": "x=y", "g": ""}
-    assert printed == [f"{('walk', expected | {'h': float('inf'), 'i': True})}"]
+    expected |= {"h": float("inf"), "i": True, "j": [0.5, 1.2], "k": "0.5,b", "l": "1,NaN"}
+    assert printed == [f"{('walk', expected)}"]
 
 
 @pytest.mark.parametrize("body", [generator.generate(5, 2), SPIDER, str(SPIDER)], ids=["body", "path", "string"])

@@ -67,7 +67,7 @@ CASES = [
     ("build_model", "--robot=tick --summary --json", f"--json: {NO_MODEL}"),
     ("build_model", "--robot=tick --layout=radial", "--layout=radial: goes with --legs or --seed, not with --robot"),
     ("build_model", "--robot=tick --palette=moss", "--palette: goes with --spec or --legs"),
-    ("build_model", "--seed=4 --palette=nonsense", "Body(random_4).palette: expected one of"),
+    ("build_model", "--seed=4 --palette=nonsense", "unknown palette 'nonsense' (there are: "),
     ("build_model", "--seed=4 --length=shin=2", "unknown link 'shin'"),
     ("check", "spider --robot=tick", "--robot: goes with --task, not with a spec file"),
     ("check", "spider --arena=rough", "--arena: goes with --task, not with a spec file"),

@@ -90,7 +90,9 @@ class Algorithm(NamedTuple):
             if not _has_type_of(changed_fields[name], fields[name]):
                 expected = f"{type(fields[name]).__name__} like {fields[name]!r}"
                 preview = checks.preview(changed_fields[name])
-                raise ValueError(f"hyperparameter {name}: expected {expected}, got {preview}")
+                takes_integer = isinstance(fields[name], int) and not isinstance(fields[name], bool)
+                hint = checks.hint_integer(changed_fields[name]) if takes_integer else ""
+                raise ValueError(f"hyperparameter {name}: expected {expected}, got {preview}{hint}")
         return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changed_fields))
 
 

@@ -1,0 +1,93 @@
+"""What to type in place of files and functions that are no policies."""
+
+import ast
+import inspect
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from arc_suite import checks, files
+from arc_suite.policies import network
+
+_MAX_SIZE = 1 << 20  # bytes of a file of Python whose names an error lists
+_MAX_NAMES = 8  # in an error
+_METHODS = ("act", "predict", "select_action", "get_action")  # by which agents of other libraries act
+_AS_FUNCTION = "write a function that loads it, and name it as file.py:function"
+# By extension of a file that is no policy: what the file is, and what helps.
+_CURES = {
+    ".onnx": "it is for other programs; expected the folder of the run that it comes from",
+    ".json": "it is no policy; expected the folder of a run",
+    ".csv": "it is no policy; expected the folder of a run",
+    ".pt": _AS_FUNCTION,
+    ".pth": _AS_FUNCTION,
+    ".ckpt": _AS_FUNCTION,
+    ".h5": _AS_FUNCTION,
+    ".pkl": _AS_FUNCTION,
+    ".safetensors": _AS_FUNCTION,
+}
+
+
+def refuse_other_files(name: str | os.PathLike) -> None:
+    """Raise ValueError for a file or a folder that is no policy, with what to type instead.
+
+    Raises:
+        OSError: a file of Python cannot be read.
+    """
+    path = Path(name)
+    extension = path.suffix.lower()
+    if extension == ".py":
+        _refuse_file_of_python(path)
+    elif extension in _CURES:
+        raise ValueError(f"policy {checks.preview(os.fspath(name))}: {_CURES[extension]}")
+    else:
+        _refuse_folder_of_runs(path)
+
+
+def _refuse_file_of_python(path: Path) -> NoReturn:
+    """Raise ValueError that lists the functions and classes of a file, which is not run."""
+    with files.reading(path):
+        size = path.stat().st_size
+        source = path.read_bytes() if size <= _MAX_SIZE else b""
+    try:
+        statements = ast.parse(source).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        statements = []
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    names = [f"{path}:{node.name}" for node in statements if isinstance(node, kinds) and node.name[0] != "_"]
+    name_list = f" (there are: {', '.join(names[:_MAX_NAMES])})" if names else ""
+    expected = "a function in it that makes a policy from a robot's name"
+    raise ValueError(checks.quote(f"policy '{path}': expected {path}:NAME, {expected}{name_list}"))
+
+
+def _refuse_folder_of_runs(path: Path) -> None:
+    """Raise ValueError for a folder that has runs in it and is none."""
+    try:
+        is_policy = (path / network.FILE).exists() or bool(network.checkpoint_files(path))
+        runs = [] if is_policy else sorted(path.glob(f"*/{network.FILE}"))
+    except OSError:  # the text is too long for a path
+        return
+    if runs:
+        raise ValueError(checks.quote(f"policy '{path}': it has runs in it; did you mean '{runs[0].parent}'?"))
+
+
+def check_takes_robot(name: str, factory: Callable) -> None:
+    """Raise ValueError for the function of a policy's name that does not take a robot's name."""
+    try:
+        signature = inspect.signature(factory)
+    except (TypeError, ValueError):  # a function of C
+        return
+    try:
+        signature.bind("queen")
+    except TypeError:
+        call = checks.quote(f"{name.rpartition(':')[2]}{signature}")
+        expected = "expected a function of one argument, a robot's name"
+        raise ValueError(f"policy {checks.preview(name)}: {expected}, got {call}") from None
+
+
+def suggest_method(policy: Any) -> str:
+    """Return the part of an error that suggests the method by which an agent acts; "" for none."""
+    for method in _METHODS:
+        if callable(getattr(policy, method, None)):
+            return f"; did you mean its method {method}?"
+    return ""

@@ -1,0 +1,86 @@
+"""What people type by habit, of other libraries and other notations, is taken or answered by one line with the cure."""
+
+import programs
+import pytest
+
+from arc_suite import checks
+
+POLICY = """
+class Agent:
+    pass
+
+
+class Learner:
+    def __init__(self, robot):
+        self.predict = print
+"""
+INTEGER = "expected an integer in the range [1, 100000]"
+SPAN = "expected a number from 0 to 100, or two of them, the lower first"
+LINES = {
+    "train --lr=1e-4": "unknown flag 'lr'; did you mean --hp learning_rate=1e-4 or --hp policy_rate=1e-4?\n",
+    "train --gamma .9": "unknown flag 'gamma'; did you mean --hp discount=VALUE?\n",
+    "train --n_envs=8": "unknown flag 'n_envs'; did you mean --hp num_envs=8?\n",
+    "train --batch-size=8": "unknown flag 'batch_size'; did you mean --hp minibatch=8 or --hp batch=8?\n",
+    "train --hp lr=1e-4": "unknown hyperparameter 'lr'; did you mean 'policy_rate'? (there are: ",
+    "train --hp gamma=.9": "unknown hyperparameter 'gamma'; did you mean 'discount'? (there are: ",
+    "train --hp num_envs=1k": "hyperparameter num_envs: expected int like 64, got '1k'; did you mean 1000?\n",
+    "train --algo=sac": "unknown flag 'algo'; did you mean 'algorithm'? (there are: ",
+    "train --total_timesteps=1e5": "unknown flag 'total_timesteps'; did you mean 'steps'? (there are: ",
+    "train --steps=1e5": "flag --steps=1e5: expected a positive integer; did you mean --steps=100000?\n",
+    "evaluate --episodes=1.5k": f"flag --episodes=1.5k: {INTEGER}; did you mean --episodes=1500?\n",
+    "evaluate --episodes=1.5": f"flag --episodes=1.5: {INTEGER}\n",
+    "evaluate --episodes=1e6": f"flag --episodes=1e6: {INTEGER}\n",
+    "evaluate --friction=0.5,1.2": "unknown flag 'friction'; did you mean --set friction=0.5,1.2?\n",
+    "evaluate --set friction=0.5-1.2": f"friction: {SPAN}, got '0.5-1.2'; did you mean [0.5, 1.2]?\n",
+    "evaluate --set exclude_blocks=posture,gait_clock": "exclude_blocks: expected names of blocks, got "
+    '\'posture,gait_clock\'; did you mean ["posture", "gait_clock"]?\n',
+    "build_model --legs=6 --palette=purple": "unknown palette 'purple' (there are: moss, rust, bone, coral, night, a",
+    "evaluate --policy=x.onnx": "policy 'x.onnx': it is for other programs; expected the folder of the run",
+    "evaluate --policy=out/x.pt": "policy 'out/x.pt': write a function that loads it, and name it as file.py:",
+    "render --policy=config.json -o a.png": "policy 'config.json': it is no policy; expected the folder of a run\n",
+    "evaluate --policy=pol.py": "policy 'pol.py': expected pol.py:NAME, a function in it that makes a policy from a "
+    "robot's name (there are: pol.py:Agent, pol.py:Learner)\n",
+    "evaluate --policy=other.py": "cannot read other.py: no such file",
+    "evaluate --policy=pol.py:Agent": "policy 'pol.py:Agent': expected a function of one argument, a robot's name, got "
+    "Agent()\n",
+    "evaluate --policy=pol.py:Learner": "policy 'pol.py:Learner': expected it to return a function of a TimeStep, got "
+    "Learner; did you mean its method predict?\n",
+    "evaluate --policy=runs": "policy 'runs': it has runs in it; did you mean 'runs/tick-walk-ppo-0'?\n",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("habits")
+    (folder / "pol.py").write_text(POLICY)
+    (folder / "runs" / "tick-walk-ppo-0").mkdir(parents=True)
+    (folder / "runs" / "tick-walk-ppo-0" / "policy.npz").touch()
+    return folder
+
+
+@pytest.mark.parametrize("command", LINES)
+def test_one_line_with_the_cure(command, folder):
+    program, *arguments = command.split()
+    robot = [] if "--legs" in command else ["--robot=tick"]
+    done = programs.arc_suite(program, *robot, *arguments, cwd=folder)
+    programs.refused(done, f"arc-suite {program}: {LINES[command]}")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("1e5", "100000"),
+        ("2M", "2000000"),
+        (64.0, "64"),
+        ("0.5k", "500"),
+        ("1e-5", ""),
+        ("1.5", ""),
+        ("9e99", ""),
+        ("k", ""),
+        (64, ""),
+        ("64", ""),
+        ("-1e3", ""),
+    ],
+)
+def test_an_integer_in_another_notation(value, text):
+    assert checks.hint_integer(value) == (f"; did you mean {text}?" if text else "")
