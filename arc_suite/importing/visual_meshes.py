@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.importing import bounds, units, urdf
+from arc_suite.importing import bounds, mesh_colors, units, urdf
 from arc_suite.importing.facing import Facing
 from arc_suite.importing.meshes import file_of
 
@@ -29,11 +29,13 @@ class Visual(NamedTuple):
         body: body of the file's model that shows it.
         points: (n, 3) in the body's frame, m.
         faces: (m, 3) indices of points.
+        color: (3,) sRGB, 0 to 1; None if the file gives none.
     """
 
     body: int
     points: np.ndarray
     faces: np.ndarray
+    color: np.ndarray | None = None
 
 
 class Visuals(NamedTuple):
@@ -81,8 +83,13 @@ def _read_visual_urdf(robot: ElementTree.Element, folder: Path) -> mujoco.MjSpec
             link.remove(collision)
         for visual in link.findall("visual"):
             visual.tag = "collision"
+    colors = mesh_colors.name_urdf_shapes(robot)
     text, *_ = urdf.repair_urdf(robot, folder)
-    return _keep_meshes(mujoco.MjSpec.from_string(text))
+    spec = mujoco.MjSpec.from_string(text)
+    for geom in spec.geoms:
+        if geom.name in colors:
+            geom.rgba = colors[geom.name]
+    return _keep_meshes(spec)
 
 
 def _read_visual_mjcf(path: Path) -> mujoco.MjSpec:
@@ -100,6 +107,7 @@ def _keep_meshes(spec: mujoco.MjSpec) -> mujoco.MjSpec:
         for element in list(kind):
             spec.delete(element)
     for geom in list(spec.geoms):
+        geom.rgba = mesh_colors.find_rgba(spec, geom)
         geom.material = ""
         if geom.type != _MESH:
             spec.delete(geom)
@@ -121,6 +129,7 @@ def _collect_visuals(
     """Return the meshes of a spec whose bodies are those of the file's model."""
     triangles = {mesh.name: _read_mesh(spec, mesh) for mesh in spec.meshes}
     geoms = [(geom, geom.meshname) for geom in spec.geoms]
+    colors = mesh_colors.find_colors(spec, {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file})
     for geom, _ in geoms:  # balls lie where the file puts meshes, and are compiled at once
         geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
         geom.meshname = ""
@@ -133,12 +142,13 @@ def _collect_visuals(
     ]:
         return Visuals()
     whole_visuals = []
-    for geom, mesh_name in geoms:
+    for (geom, mesh_name), color in zip(geoms, colors, strict=True):
         body = int(places.geom_bodyid[geom.id])
         if places.body_rootid[body] == torso:
             points, faces = triangles[mesh_name]
             points = points @ rotations.matrix(places.geom_quat[geom.id]).T + places.geom_pos[geom.id]
-            whole_visuals.append(Visual(body, points @ facing.rotation.T if body == torso else points, faces))
+            turned_points = points @ facing.rotation.T if body == torso else points
+            whole_visuals.append(Visual(body, turned_points, faces, color))
     point_count = sum(len(visual.points) for visual in whole_visuals)
     share = min(1.0, _MAX_POINTS / max(point_count, 1))
     visuals = [_simplify(visual, max(_MIN_POINTS, int(share * len(visual.points)))) for visual in whole_visuals]
@@ -173,7 +183,7 @@ def _simplify(visual: Visual, max_points: int) -> Visual:
     points = np.stack([np.bincount(clusters, column) / counts for column in visual.points.T], axis=1)
     faces = clusters[visual.faces]
     is_flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    return Visual(visual.body, points, np.unique(faces[~is_flat], axis=0))
+    return visual._replace(points=points, faces=np.unique(faces[~is_flat], axis=0))
 
 
 def _cluster(coordinates: np.ndarray) -> np.ndarray:
@@ -190,4 +200,6 @@ def note(visuals: Visuals) -> Sequence[str]:
         return ()
     count = sum(len(visual.points) for visual in visuals.meshes)
     reduction = f", with {count} of {visuals.point_count} points" if count < visuals.point_count else ""
-    return (f"looks: {len(visuals.meshes)} visual meshes{reduction}, for pictures, clips and pages",)
+    colored = sum(visual.color is not None for visual in visuals.meshes)
+    colors = f", {colored} with the file's color" if colored else ""
+    return (f"looks: {len(visuals.meshes)} visual meshes{reduction}{colors}, for pictures, clips and pages",)

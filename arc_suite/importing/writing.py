@@ -161,7 +161,8 @@ def _add_visuals(root: ElementTree.Element, elements: Mapping[int, ElementTree.E
         points = " ".join(f"{coordinate:.4g}" for coordinate in visual.points.ravel())
         faces = " ".join(map(str, visual.faces.ravel().tolist()))
         SubElement(asset, "mesh", name=name, inertia="shell", vertex=points, face=faces)
-        SubElement(elements[visual.body], "geom", name=name, mesh=name, **sources.VISUAL_GEOM)
+        color = {} if visual.color is None else {"rgba": " ".join(f"{share:.3g}" for share in (*visual.color, 1.0))}
+        SubElement(elements[visual.body], "geom", name=name, mesh=name, **sources.VISUAL_GEOM, **color)
 
 
 def _add_body(

@@ -27,6 +27,7 @@ _SECTIONS_OF_SCENES = ("option", "keyframe")  # a scene that takes the body has 
 _TORSO = 1  # its index in the model
 _DECORATION = {"mass": "0", "group": "2", "contype": "0", "conaffinity": "0"}
 _HIDDEN_GROUP = "4"  # of colliders of parts with visual meshes; pictures do not show it
+_FINISH = {"specular": "0.35", "shininess": "0.4"}  # of visual meshes with colors of the file
 _FOOT_COVER = 1.04  # radius of the sphere around a foot, in radii of the foot
 
 
@@ -54,7 +55,7 @@ def mjcf_tree(body: Body, arena: Arena | None, decorated: bool = False, releases
     sensors = SubElement(root, "sensor")
     SubElement(sensors, "accelerometer", name="torso_acceleration", site="torso")
     if decorated:
-        _show_colliders(parts, body)
+        _show_colliders(root, parts, body)
     if arena is None:
         torso.remove(torso.find("joint"))
         for section in list(root):
@@ -277,18 +278,28 @@ def _center_of_mass(model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
     return data.subtree_com[_TORSO] - data.xpos[_TORSO]
 
 
-def _show_colliders(parts: dict[str, ElementTree.Element], body: Body) -> None:
-    """Give shapes materials, hide colliders next to visual meshes, and give feet spheres that can show a reward."""
+def _show_colliders(root: ElementTree.Element, parts: dict[str, ElementTree.Element], body: Body) -> None:
+    """Give shapes materials, hide colliders next to visual meshes, and give feet spheres that can show a reward.
+
+    Visual meshes have the colors of the file, unless the body has a palette.
+    """
+    material_of_color: dict[str, str] = {}
     for name, part in parts.items():
         geoms = part.findall("geom")
         visuals = [geom for geom in geoms if geom.get("group") == sources.VISUAL_GROUP]
         for geom in geoms:
-            geom.set("material", "shell" if name == "torso" else "limb")
+            material = "shell" if name == "torso" else "limb"
+            color = geom.attrib.pop("rgba", None)
+            if color is not None and body.palette is None:
+                material = material_of_color.setdefault(color, f"{sources.VISUAL}_color{len(material_of_color)}")
+            geom.set("material", material)
             if visuals:
                 geom.set("group", "0" if geom in visuals else _HIDDEN_GROUP)
     for leg, name in zip(body.legs, body.foot_names, strict=True):
         cover = {"name": f"visual-{name}", "type": "sphere", "size": exact(_FOOT_COVER * leg.foot.radius)}
         SubElement(parts[name], "geom", **cover, material="glow", **_DECORATION)
+    for color, material in material_of_color.items():
+        SubElement(_find_or_add(root, "asset"), "material", name=material, rgba=color, **_FINISH)
 
 
 def _set_options(root: ElementTree.Element, body: Body) -> None:

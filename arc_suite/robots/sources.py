@@ -143,6 +143,7 @@ _ELEMENTS = {
             "contype": ("0", "1"),
             "conaffinity": ("0",),
             "group": (VISUAL_GROUP,),
+            "rgba": _Range(0.0, 1.0),
             "size": _SIZE,
             **dict.fromkeys(("mass", "friction"), _AMOUNT),
             **dict.fromkeys(("condim", "priority", "solmix", "margin", "gap"), _NUMBERS),

@@ -150,3 +150,63 @@ def test_the_file_of_a_mesh_is_followed(tmp_path):
     assert registry.body_of(path) is body
     write_stl(tmp_path / "trunk.stl", 2.0 * WEDGE, FACES)
     assert registry.body_of(path) != body
+
+
+def write_obj(folder):
+    lines = ["mtllib looks.mtl", *(f"v {x} {y} {z}" for x, y, z in WEDGE)]
+    for number, face in enumerate(FACES):
+        lines += ["usemtl dark" if number else "usemtl light", "f " + " ".join(str(index + 1) for index in face)]
+    (folder / "trunk.obj").write_text("\n".join(lines))
+    (folder / "looks.mtl").write_text("newmtl light\nKd 1 1 1\nnewmtl dark\nNs 9\nKd 0.1 0.2 0.3\n")
+
+
+def write_looks(folder, kind):
+    """Write a robot whose visual mesh has the color (0.1, 0.2, 0.3), and return its path."""
+    if kind == "mjcf":
+        path = write_mjcf(folder)
+        text = path.read_text().replace('class="looks" type="mesh"', 'class="looks" material="m" type="mesh"')
+        path.write_text(text.replace("<asset>", '<asset><material name="m" rgba="0.1 0.2 0.3 1"/>'))
+        return path
+    path = write_urdf(folder)
+    text = path.read_text()
+    mesh = '<mesh filename="trunk.stl"/></geometry>'
+    assert text.count(mesh) == 1
+    if kind == "urdf":
+        text = text.replace(mesh, f'{mesh}<material name="m"><color rgba="0.1 0.2 0.3 1"/></material>')
+    elif kind == "shared":
+        text = text.replace(mesh, f'{mesh}<material name="m"/>')
+        text = text.replace("</robot>", '<material name="m"><color rgba="0.1 0.2 0.3 0.5"/></material></robot>')
+    else:
+        write_obj(folder)
+        text = text.replace("trunk.stl", "trunk.obj")
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["mjcf", "urdf", "shared", "obj"])
+def test_a_mesh_keeps_its_color(kind, tmp_path):
+    body, notes = import_robot(write_looks(tmp_path, kind))
+    assert "looks: 1 visual meshes, 1 with the file's color, for pictures, clips and pages" in notes
+    assert body_from_json(body_to_json(body)) == body
+    described, materials = parts.describe_body(body)
+    assert materials["visual_color0"].color == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
+    assert [shape.kind for part in described for shape in part.shapes if shape.material == "visual_color0"] == ["hull"]
+    assert "visual_color0" not in parts.describe_body(body.replace(palette="moss"))[1]
+
+
+@pytest.mark.parametrize("rgba", ["", "1 0", "a b c d", "nan 0 0 1"])
+def test_a_color_that_is_none_is_left_out(rgba, tmp_path):
+    path = write_looks(tmp_path, "urdf")
+    path.write_text(path.read_text().replace("0.1 0.2 0.3 1", rgba))
+    body, notes = import_robot(path)
+    assert "looks: 1 visual meshes, for pictures, clips and pages" in notes and "rgba" not in body.source
+
+
+def test_materials_of_an_obj_file_are_read_in_its_folder_alone(tmp_path):
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    path = write_looks(folder, "obj")
+    (folder / "looks.mtl").rename(tmp_path / "looks.mtl")
+    obj = folder / "trunk.obj"
+    obj.write_text(obj.read_text().replace("looks.mtl", "../looks.mtl"))
+    assert "rgba" not in import_robot(path).body.source
