@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from arc_suite import motions, registry
+from arc_suite.cpg import Demonstrator
+from arc_suite.envs.setup import Setup
 from arc_suite.models.standing import measure_standing, stability_margin
-from arc_suite.motions import gait_transfer
+from arc_suite.motions import gait_transfer, motion_text
 from arc_suite.motions.paths import match_feet
 
 QUEEN = registry.body_of("queen")
@@ -53,6 +55,22 @@ def test_gesture_has_the_foot_that_stands_in_the_same_place():
     assert notes[0] == "without a partner, planted: l3, r3"
     assert motion.seconds == pytest.approx(raised.seconds * np.sqrt(0.25 / 0.75), rel=1e-6)
     assert not motion.planted[20, front_left] and motion.planted.sum(axis=1).min() == 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("draw", [drawn_motions.step_loop, lambda body: drawn_motions.raise_leg(body, 0)])
+def test_an_imported_body_follows_the_motion_of_a_robot(draw):
+    motion, _ = motions.retarget(draw(QUEEN), imports.quadruped())
+    setup = Setup.of(imports.quadruped(), "mimic", {"motion": motion_text.to_text(motion)})
+    environments = setup.make_vec(8)
+    tracked = Demonstrator(environments)
+    observation, _ = environments.reset(seed=0)
+    tracked.reset(range(8))
+    for _ in range(100):
+        observation, _, terminations, *_ = environments.step(tracked.act(environments.task.split(observation)))
+        assert not terminations.any()
+    assert environments.task.progress["torso_error"].max() < 0.05
+    assert environments.task.progress["joint_error"].max() < 0.08
 
 
 def test_torso_moves_over_the_feet_that_carry():
