@@ -6,11 +6,11 @@ const share = (value) => value - Math.floor(value); // of a cycle
 export class Law {
   constructor(constants) {
     this.constants = constants;
-    this.leap = null; // the targets of a leap that are left, first those of this control step
     this.begin();
   }
 
   begin() {
+    this.leap = null; // the targets of a leap that are left, first those of this control step
     const zero = [0, 0, 0], angles = this.constants.legs.map((leg) => leg.angles);
     this.state = { command: zero, integral: zero, motion: zero, size: 0, angles, off: zero };
   }

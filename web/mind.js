@@ -1,28 +1,44 @@
 // A body's task and policy, on its share of the data of a model with several like bodies.
 import { Graph } from "./graph.js";
 import { Law } from "./law.js";
+import { Recovery } from "./recovery.js";
 import { Task } from "./task.js";
 
 const POLICIES = { law: Law, graph: Graph };
 
 export class Mind {
   // Takes a body of a page's data, the height of the ground at [x, y], and a function that returns its share of data.
-  constructor({ task, policy }, ground, share) {
+  constructor({ task, policy, recovery }, ground, share) {
     this.share = share;
     this.task = new Task(task, ground);
     this.task.begin(share());
     this.driver = new POLICIES[policy.kind](policy.constants);
+    this.recovery = recovery && new Recovery(recovery);
+  }
+
+  // Whether the body lies, or is getting up.
+  get fell() {
+    return this.task.fell || this.rises;
+  }
+
+  get rises() {
+    return Boolean(this.recovery?.on);
   }
 
   // Starts a control step with a new action, and with the commands that a function returns.
   act(asked) {
-    const data = this.share(), action = this.driver.act(this.task.observe(data));
+    const data = this.share(), driver = this.rises ? this.recovery.driver : this.driver;
+    const action = driver.act(this.task.observe(data));
     this.task.command(asked());
     data.ctrl.set(action);
   }
 
-  after() {
-    this.task.after(this.share());
+  // Ends a control step. A body that lies, as a function tells, begins to get up; one that is up walks on.
+  after(lies) {
+    const data = this.share(), rose = this.rises;
+    this.task.after(data);
+    this.recovery?.after(lies(), this.task.height(data.qpos), this.task.upright(data.qpos));
+    if (rose && !this.rises) this.driver.begin?.();
   }
 }
 

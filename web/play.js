@@ -17,6 +17,7 @@ import { Traces } from "./traces.js";
 import { View } from "./view.js";
 
 const RESTART = 1.5; // s that a fallen body lies
+const GIVE_UP = 8; // s that a body has for getting up
 const BUSY = 20; // ms of a picture's time for physics: a slower machine shows slow motion
 const KICK = 0.8; // sqrt(g h), the velocity that a kick adds
 const GRAVITY = 9.81; // m/s^2
@@ -95,9 +96,10 @@ class Play {
     if (seconds > 0) this.pace += 0.05 * (Math.min(stepped / seconds, 1) - this.pace);
     if (!simulation.pull) this.goals.advance(stepped, simulation.task.place);
     this.lain = simulation.fell ? this.lain + stepped : 0;
-    this.down = simulation.minds[1]?.task.fell ? this.down + stepped : 0;
-    if (this.down >= RESTART) simulation.raise();
-    if (this.lain >= RESTART) this.restart();
+    this.down = simulation.minds[1]?.fell ? this.down + stepped : 0;
+    const most = body.recovery ? GIVE_UP : RESTART;
+    if (this.down >= most) simulation.raise();
+    if (this.lain >= most) this.restart();
   }
 
   pose() {
@@ -209,6 +211,7 @@ function shown({ simulation, body, pace, goals }, command, gait, playing) {
     paused: !playing,
     held: simulation.pull,
     landing: simulation.landing,
+    "getting up": simulation.minds[0].rises,
     fallen: simulation.fell,
     [`slow motion, ${pace.toFixed(1)} of real time`]: pace < 0.9,
   };

@@ -106,8 +106,8 @@ export class Simulation {
     mujoco.mj_step(model, data);
     this.count += 1;
     if (this.count % substeps !== 0) return;
-    own.after();
-    rival?.after();
+    own.after(() => this.fell);
+    rival?.after(() => rival.task.fell);
     if (this.landing === Infinity && this.touches()) this.landing = LANDING;
     this.landing = Math.max(this.landing - task.constants.step, 0);
   }
@@ -136,13 +136,14 @@ export class Simulation {
     return parts.some((part) => forces[6 * part + 5] > TOUCH * weight);
   }
 
-  // Whether the body lies; neither in the player's hand nor on its way down from there.
+  // Whether the body lies or gets up; neither in the player's hand nor on its way down from there.
   get fell() {
-    return this.task.fell && !this.pull && this.landing !== Infinity;
+    return this.minds[0].fell && !this.pull && this.landing !== Infinity;
   }
 
   // Leaps ahead, or jumps where the body is slow; a body that can do only one of them does that.
   leap() {
+    if (this.minds[0].rises) return;
     const leaps = this.body.policy.constants.leaps ?? {}, ahead = this.task.desired[0] > AHEAD;
     const [name] = (ahead ? ["leap", "jump"] : ["jump", "leap"]).filter((each) => leaps[each]);
     if (name) this.driver.play(name);

@@ -25,6 +25,11 @@ function cross([ax, ay, az], [bx, by, bz]) {
   return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
 }
 
+// The world's up axis in the frame of an orientation.
+function vertical([w, x, y, z]) {
+  return [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)];
+}
+
 // A vector of a frame in the world, given the orientation of the frame.
 function rotated([w, x, y, z], vector) {
   const twice = cross([x, y, z], vector).map((value) => 2 * value), turn = cross([x, y, z], twice);
@@ -97,9 +102,14 @@ export class Task {
 
   fallen({ qpos, cfrc_ext: forces }) {
     const { lowest, lying, least_upright: least, weight, parts: [torso] } = this.constants;
-    const [, x, y] = qpos.subarray(3, 7);
     const high = this.height(qpos) >= lowest * (this.direction?.crouch ?? 1);
-    return !(high && forces[6 * torso + 5] / weight < lying && 1 - 2 * (x * x + y * y) >= least);
+    return !(high && forces[6 * torso + 5] / weight < lying && this.upright(qpos) >= least);
+  }
+
+  // The cosine of the torso's tilt.
+  upright(qpos) {
+    const [, x, y] = qpos.subarray(3, 7);
+    return 1 - 2 * (x * x + y * y);
   }
 
   height(qpos) {
@@ -120,6 +130,7 @@ export class Task {
       contact_forces: this.forces(data.cfrc_ext, heading),
       gait_clock: [shown * Math.sin(this.phase), shown * Math.cos(this.phase)],
       command: [...this.desired, ...this.motion],
+      vertical: vertical(qpos.subarray(3, 7)),
       ...this.direction?.observe(),
     };
   }

@@ -33,12 +33,15 @@ from arc_suite.policies import other_libraries
 from arc_suite.policies.network import Network
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock, readings
+from arc_suite.tasks.recover import LEAST_HEIGHT, LEAST_UPRIGHT
 
 GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
 
 # Tasks whose command the player gives.
 _DEMONSTRATOR_TASK = "directed"
 _NETWORK_TASK = "steer"
+_RECOVERY_TASK = "recover"
+_PATIENCE = 0.5  # s for which a body lies before it gets up
 _DEFAULT_PRESET = "steered"
 _PAGE_LAWS = (Stepping, Limping)  # one law where the pose is by command, see web/law.js
 _OBSERVABLE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # by scripts of a page
@@ -105,6 +108,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
         "grounds": {name: _describe_ground(setup, word) for name, word in _grounds(arena).items()},
         "task": pages.to_json_values(_describe_task(task, command_task), decimals=None),
         "policy": pages.to_json_values(driver, decimals=None),
+        "recovery": pages.to_json_values(_describe_recovery(body, task), decimals=None),
     }
 
 
@@ -210,6 +214,30 @@ def _describe_law(task: Task, preset: str) -> dict[str, Any]:
         raise ValueError(f"preset {preset!r}: a page runs {', '.join(names)}, which follow a command by steps")
     stepping = Demonstrator(task, preset).law
     return {"kind": "law", "constants": stepping.constants() | {"leaps": _describe_leaps(stepping)}}
+
+
+def _describe_recovery(body: Body, task: Task) -> dict[str, Any] | None:
+    """Return how a body gets up: by its policy of the package, or by the law `rising`; see web/recovery.js.
+
+    Args:
+        body: the body.
+        task: task of the page's policy; None is returned for one without a command, in whose frame nothing gets up.
+    """
+    if "command" not in task.commands:
+        return None
+    recover = Setup.of(body, _RECOVERY_TASK).definition
+    if policies.is_packaged(body, _RECOVERY_TASK):
+        driver = _describe_network(policies.policy("ppo", body, task=recover))  # type: ignore[arg-type]
+    else:
+        driver = {"kind": "rising", "constants": Demonstrator(recover).law.constants()}
+    height = recover.unwrapped.height  # type: ignore[attr-defined]
+    return {
+        "policy": driver,
+        "lowest": LEAST_HEIGHT * height,
+        "least_upright": LEAST_UPRIGHT,
+        "steps": recover.unwrapped.hold_steps,  # type: ignore[attr-defined]
+        "patience": max(1, round(_PATIENCE / recover.scene.control_timestep)),
+    }
 
 
 def _describe_leaps(stepping: Stepping) -> dict[str, Any]:

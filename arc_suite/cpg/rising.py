@@ -4,7 +4,7 @@ It does not turn a torso that lies on its side or back.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,11 @@ class Rising:
             stiffness=parameters.stiffness * control.stiffness,
             damping=np.sqrt(parameters.stiffness) * control.damping,
         )
+
+    def constants(self) -> dict[str, Any]:
+        """Return the constants of the law, as pages take them."""
+        drive = self._drive
+        return {"stiffness": drive.stiffness, "damping": drive.damping, "servos": drive.reach is not None}
 
     def initial(self, count: int) -> Clock:
         """Return the state at the start of episodes in a number of environments."""

@@ -9,6 +9,7 @@ from arc_suite.policies.named import (
     digest,
     function_file,
     is_file,
+    is_packaged,
     load_network,
     policy,
     preset_names,
@@ -18,6 +19,7 @@ from arc_suite.policies.named import (
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum, alone
 
 __all__ = [
+    "is_packaged",
     "policy",
     "POLICIES",
     "preset_names",

@@ -55,11 +55,20 @@ def _random(body: Body, presets: Sequence[str], num_envs: int, task: Task | None
     return Script(draw, num_envs, joints)
 
 
+def is_packaged(body: Body, task_name: str) -> bool:
+    """Return whether the package has a trained policy of a body for a task: `ppo`."""
+    return is_robot(body) and _packaged_path(body, task_name).is_file()
+
+
+def _packaged_path(body: Body, task_name: str) -> Path:
+    return PACKAGED / f"{body.name}-{task_name}{network.EXTENSION}"
+
+
 def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
     """Return a trained policy of the package; `policies.json` holds its command, hash and return."""
     task_name = "walk" if task is None else task.name
-    path = PACKAGED / f"{body.name}-{task_name}{network.EXTENSION}"
-    if not (is_robot(body) and path.is_file()):
+    path = _packaged_path(body, task_name)
+    if not is_packaged(body, task_name):
         names = ", ".join(sorted(file.stem for file in PACKAGED.glob(f"*{network.EXTENSION}")))
         cure = "arc-suite train makes others, and universal moves any body"
         raise ValueError(f"policy ppo: none for {path.stem} (there are: {names}); {cure}")

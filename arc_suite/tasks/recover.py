@@ -80,7 +80,7 @@ class Recover(Task):
     demonstrators = ("rising",)
     training = {"fall_seed": _LEARNING_SEED, "time_limit": 10.0}
     # Attributes that follow from the body; see `Task.from_body`.
-    from_body = ("clearances", "height", "_force_unit", "_hold_steps")
+    from_body = ("clearances", "height", "_force_unit", "hold_steps")
     weights: ClassVar[Mapping[str, float]] = {
         "upright": 1.0,
         "height": 1.0,
@@ -133,7 +133,8 @@ class Recover(Task):
         return force_unit(self.scene.body)
 
     @functools.cached_property
-    def _hold_steps(self) -> int:
+    def hold_steps(self) -> int:
+        """Control steps without a break after which a body has got up."""
         return math.ceil(HOLD_TIME / self.scene.control_timestep - _ROUNDING)
 
     @functools.cached_property
@@ -201,7 +202,7 @@ class Recover(Task):
             steps=memory.steps + 1,
             is_up=is_up,
             steps_up=steps_up,
-            got_up=memory.got_up | (steps_up >= self._hold_steps),
+            got_up=memory.got_up | (steps_up >= self.hold_steps),
             seconds=memory.seconds + timestep * ~memory.got_up,
         )
 

@@ -257,13 +257,23 @@ def test_bodies_and_grounds_are_chosen(tab):
         tab.select_option("#body", str(index % 2))
 
 
-def test_a_fallen_body_restarts(tab):
+def test_a_fallen_body_gets_up(tab):
     tab.evaluate("play.state.play.simulation.data.qpos.set([0, 0, 0.1, 0, 1, 0, 0])")
     advanced(tab, 1.0)
-    assert tab.evaluate("play.state.play.simulation.task.fell")
-    advanced(tab, 1.0)
-    _, _, z, w, *_ = advanced(tab, 0.5)[0]
-    assert w > 0.9 and z > 0.7 * ROBOTS["tick"].torso.standing_height
+    assert tab.evaluate("play.state.play.simulation.minds[0].rises && play.state.play.simulation.fell")
+    _, _, z, _, roll, pitch, *_ = advanced(tab, 5.0)[0]
+    assert 1.0 - 2.0 * (roll**2 + pitch**2) > 0.9 and z > 0.7 * ROBOTS["tick"].torso.standing_height
+    assert tab.evaluate("!play.state.play.simulation.fell && play.state.play.simulation.count > 2000")  # no restart
+
+
+def test_a_body_that_cannot_get_up_restarts(tab):
+    """On its back, no leg of Queen reaches the ground."""
+    tab.select_option("#body", "2")
+    tab.evaluate("play.state.play.simulation.data.qpos.set([0, 0, 0.4, 0, 1, 0, 0])")
+    advanced(tab, 6.0)
+    assert tab.evaluate("play.state.play.simulation.fell")
+    _, _, z, w, *_ = advanced(tab, 3.5)[0]
+    assert w > 0.9 and z > 0.7 * ROBOTS["queen"].torso.standing_height
 
 
 def test_a_gamepad_steers(tab):

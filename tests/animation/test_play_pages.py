@@ -218,6 +218,38 @@ def test_a_policy_of_any_body_is_that_of_python(script, tmp_path, task):
     assert_networks_agree(script, setup, policy(name, body, task=setup.definition), name)
 
 
+@pytest.mark.slow
+@nodes.needs_node
+@pytest.mark.parametrize(("name", "of_python", "tolerance"), [("tick", "ppo", 1e-4), ("queen", "cpg", 1e-6)])
+def test_a_body_gets_up_as_in_python(script, name, of_python, tolerance):
+    """By the policy of the package, or by `rising`; a network computes in float32."""
+    setup, creature = Setup.of(name, "recover"), play_pages.creature(ROBOTS[name])
+    given = [upright(creature, [0.0] * 3) for _ in range(12)]
+    start, positions, actions, observations = played(setup, policy(of_python, name, task=setup.definition), given)
+    episode = {"creature": creature, "ground": "level", "asked": given, "rises": True}
+    (found,) = nodes.run(script, [episode | start | {"desired": [0.0] * 3}])
+    for block, values in observations[1].items():
+        np.testing.assert_allclose(found["observations"][1][block], values, atol=tolerance, err_msg=block)
+    np.testing.assert_allclose(found["actions"][:4], actions[:4], rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(found["positions"][:4], positions[:4], rtol=0.0, atol=tolerance)
+
+
+@pytest.mark.slow
+@nodes.needs_node
+def test_a_body_on_its_back_gets_up_and_walks_on(script):
+    creature = play_pages.creature(ROBOTS["tick"])
+    start = creature["grounds"]["level"]["start"]
+    steps = 200  # 10 s
+    fallen = {"creature": creature, "ground": "level", "qvel": [], "desired": [0.0] * 3}
+    fallen |= {"qpos": [0.0, 0.0, 0.15, 0.0, 1.0, 0.0, 0.0, *start[7:]]}
+    fallen |= {"asked": [upright(creature, [1.0, 0.0, 0.0])] * steps}
+    (path,) = nodes.run(script, [fallen])
+    patience = creature["recovery"]["patience"]
+    assert all(path["falls"][:patience]) and not any(path["falls"][-60:])
+    ways = np.linalg.norm(np.diff(np.array(path["positions"])[-60:, :2], axis=0), axis=-1).sum()
+    assert ways > 0.6 * 60 * creature["task"]["step"] * creature["task"]["units"][0]
+
+
 @pytest.mark.long
 @nodes.needs_node
 def test_heights_on_bumps_are_those_of_python(script):

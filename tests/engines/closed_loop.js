@@ -9,11 +9,12 @@ const episodes = JSON.parse(fs.readFileSync(0, "utf8"));
 const mujoco = await loadMujoco({ wasmBinary: zlib.inflateSync(fs.readFileSync(process.argv[2])) });
 
 // Positions, actions and falls at the ends of control steps, and observations before their beginnings. Actions that are
-// given are applied in place of the policy's.
-function path({ creature, ground, qpos, qvel, desired, asked, replayed }) {
+// given are applied in place of the policy's. A body that rises gets up from the start on.
+function path({ creature, ground, qpos, qvel, desired, asked, replayed, rises }) {
   const simulation = new Simulation(mujoco, creature, creature.grounds[ground]);
   simulation.restart(qpos, qvel);
-  const { data, driver, task } = simulation;
+  const { data, task, minds: [{ recovery }] } = simulation, driver = rises ? recovery.driver : simulation.driver;
+  if (rises) recovery.on = true;
   task.desired = desired;
   const act = driver.act.bind(driver);
   const positions = [], actions = [], observations = [], falls = [];
