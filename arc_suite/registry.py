@@ -50,6 +50,13 @@ ADDITIONS: dict[str, dict[str, Any]] = {"law": {}, "network": {}, "algorithm": {
 # (kind, name) of what other packages register -> the module whose import registers it.
 MODULE_OF_NAME = {}
 
+# Robot and task of each place of the benchmark.
+BENCHMARKING = (
+    *(("queen", "walk"), ("bastion", "walk"), ("tick", "walk"), ("leaper", "walk")),
+    *(("queen", "steer"), ("tick", "steer"), ("leaper", "steer")),
+    *(("tick", "rough"), ("queen", "stairs"), ("tick", "navigate")),
+)
+
 SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")
 
 MAX_BODIES = 1 << 16  # the most bodies that one text may name

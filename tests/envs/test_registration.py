@@ -11,7 +11,7 @@ from interpreters import ROOT, printed
 from refusals import refused
 
 import arc_suite
-from arc_suite import registration, registry
+from arc_suite import registration, registry, suite
 from arc_suite.arenas import ARENAS
 from arc_suite.cpg.law import Clocked
 from arc_suite.cpg.presets import PRESETS
@@ -78,6 +78,7 @@ tasks = arc_suite.TASKS_BY_DOMAIN["queen"]
 assert tasks[:2] == ("walk", "steer") and tasks[-1] == "stroll"
 assert arc_suite.ALL_TASKS == tuple((d, t) for d in arc_suite.TASKS_BY_DOMAIN for t in tasks)
 assert list(arc_suite.TASKS_BY_DOMAIN)[-1] == "hopper"
+assert arc_suite.suite.ALL_TASKS == arc_suite.ALL_TASKS
 for task in ("walk", "steer", "stroll"):
     env_id = f"arc_suite/hopper-{task}-v0"
     env = gymnasium.make(env_id, render_mode="rgb_array", width=32, height=24)
@@ -324,3 +325,12 @@ def test_an_id_of_an_earlier_version_is_refused(monkeypatch):
     finally:
         for name in [name for name in gymnasium.registry if name.startswith("arc_suite/")]:
             del gymnasium.registry[name]
+
+
+def test_names_of_the_suite_of_dm_control():
+    assert suite.load is arc_suite.load
+    assert suite.BENCHMARKING is arc_suite.BENCHMARKING and set(suite.BENCHMARKING) < set(suite.ALL_TASKS)
+    assert suite.TASKS_BY_DOMAIN == arc_suite.TASKS_BY_DOMAIN
+    for module in (arc_suite, suite):
+        with pytest.raises(AttributeError, match="no attribute 'HARD'"):
+            _ = module.HARD

@@ -40,13 +40,15 @@ TYPES = {
     "VectorEnv('queen', 'walk').task.split": f"def (observation: {ARRAY}) -> collections.OrderedDict[str, {ARRAY}]",
     "ROBOTS['queen'].replace(name='king')": "arc_suite.robots.spec.Body",
     "arc_suite.ALL_TASKS": "tuple[tuple[str, str], ...]",
+    "suite.ALL_TASKS": "tuple[tuple[str, str], ...]",
+    "suite.load('queen', 'walk').reset()": TIMESTEP,
     "arc_suite.TASKS_BY_DOMAIN": "typing.Mapping[str, tuple[str, ...]]",
     "arc_suite.Setup.of('queen').load()": "arc_suite.envs.dm.Environment",
     "animation.show(environment)": "arc_suite.animation.notebook.Inline",
 }
 HEAD = """\
 import arc_suite
-from arc_suite import animation
+from arc_suite import animation, suite
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv

@@ -260,3 +260,26 @@ def test_an_empty_device_is_to_be_unset(device):
     _, _, first, again, _ = interpreters.printed(SCRIPT, **EGL, MUJOCO_EGL_DEVICE_ID=device)
     line = "cannot render: MUJOCO_EGL_DEVICE_ID is set, but empty; unset it to take any device"
     assert first == again == f"RenderingUnavailable: {line}"
+
+
+LAUNCH = """
+import io, sys
+{imports}
+environment = arc_suite.load("queen", "walk")
+sys.stderr = io.StringIO()
+try:
+    viewer.launch(environment)
+except arc_suite.simulation.opengl.RenderingUnavailable as error:
+    print(error, sys.stderr.getvalue().count("Traceback"))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "imports",
+    ["import arc_suite\nfrom dm_control import viewer", "from dm_control import viewer\nimport arc_suite"],
+    ids=["later", "earlier"],
+)
+def test_the_viewer_of_dm_control_without_a_display_is_one_error_with_the_cure(imports):
+    (line,) = interpreters.printed(LAUNCH.format(imports=imports), **UNSET, PYTHONWARNINGS="ignore")
+    assert line == f"cannot open a window: {NO_DISPLAY}; arc-suite render --robot ROBOT -o walk.mp4 films a walk 0"

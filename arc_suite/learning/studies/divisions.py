@@ -3,17 +3,12 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from arc_suite import usage
+from arc_suite import registry, usage
 from arc_suite.envs.setup import Setup
 
 SEEDS = 3  # of every place
 
-# Robot and task of each place.
-PLACES = (
-    *(("queen", "walk"), ("bastion", "walk"), ("tick", "walk"), ("leaper", "walk")),
-    *(("queen", "steer"), ("tick", "steer"), ("leaper", "steer")),
-    *(("tick", "rough"), ("queen", "stairs"), ("tick", "navigate")),
-)
+PLACES = registry.BENCHMARKING  # robot and task of each place
 # Settings of places where they are not those of the task: ground on which a blind walker fails.
 SETTINGS: Mapping[tuple[str, str], Mapping[str, Any]] = {
     ("tick", "rough"): {"rise": 0.126},  # m, 0.7 standing heights
