@@ -19,8 +19,8 @@ from absl import flags
 from arc_suite import versions
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, sources
-from arc_suite.arenas import ARENAS, ground_text
-from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name, preset_from_flags
+from arc_suite.arenas import ground_text
+from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name, preset_from_flags, task_from_flags
 from arc_suite.cpg.selection import check_preset_name
 
 FLAGS = flags.FLAGS
@@ -50,14 +50,17 @@ def _sketch_from_flags() -> Sketch:
         check_preset_name(preset)
     settings = setup.task_kwargs
     ground = settings.pop("arena", "flat")
+    ground_file = ""
     if ground_text.is_text(ground):
-        raise ValueError(f"arena {ground_text.name_of(ground)!r}: the studio takes one by name: {', '.join(ARENAS)}")
+        ground_file = ground
+        ground = task_from_flags()[1]["arena"]  # the file
     kicks = settings.pop("kicks", 0.0)
     policy = policy_name(FLAGS.policy)
     has_default_task = policy == "cpg" and not FLAGS["task"].present
     sketch = Sketch(
         task=Sketch.task if has_default_task else setup.task,
         ground=ground,
+        ground_file=ground_file,
         kicks=kicks,
         settings=json.dumps(settings),
         policy=policy,

@@ -21,7 +21,8 @@ RANDOM = "random"  # source: a random body
 FILE = "file"  # source: the text of a spec file
 DEFAULT_CHOICE = "own"  # leaves the gait, layout, preset or palette to the body or the task
 
-_TASK_FIELDS = ("task", "gait", "speed", "ground", "kicks", "settings", "policy", "preset")  # not about the body
+# Fields that are not about the body.
+_TASK_FIELDS = ("task", "gait", "speed", "ground", "ground_file", "kicks", "settings", "policy", "preset")
 _MAX_END_DIFFERENCE = 3e-5  # share of two vectors' lengths; equal ends differ as much, as they are rounded
 
 
@@ -43,7 +44,8 @@ class Sketch:
         task: name of the task.
         gait: name of the gait, or `DEFAULT_CHOICE`.
         speed: target velocity, as a multiple of the body's own.
-        ground: name of an arena; ignored by a task that has its own.
+        ground: name of an arena, or a file with ground and its scale; ignored by a task that has its own.
+        ground_file: ground of the file as text, see `arenas.ground_text`; no file is read.
         kicks: see `modifiers.Kicks`.
         settings: further settings of the task, as the text of a JSON object.
         policy: see `policies.policy`.
@@ -68,6 +70,7 @@ class Sketch:
     gait: str = DEFAULT_CHOICE
     speed: float = 1.0
     ground: str = "flat"
+    ground_file: str = ""
     kicks: float = 0.0
     settings: str = "{}"
     policy: str = "cpg"
@@ -146,7 +149,7 @@ def make_settings(sketch: Sketch, body: Body) -> dict[str, Any]:
             raise ValueError(f"speed: {expected}, got {sketch.speed:g}")
         settings["target_velocity"] = float(f"{sketch.speed * parameters.target_velocity:.4g}")
     if sketch.ground != "flat" and not task_class.own_arena:
-        settings["arena"] = sketch.ground
+        settings["arena"] = sketch.ground if registry.names_arena(sketch.ground) else sketch.ground_file
     if sketch.kicks:
         settings["kicks"] = sketch.kicks
     settings |= typed_settings
@@ -181,9 +184,12 @@ def spec_file_name(body: Body) -> str:
 
 
 def python_lines(sketch: Sketch) -> str:
-    """Return Python that opens the same environment and policy; a body from a file is read from `spec_file_name`."""
+    """Return Python that opens the same environment and policy.
+
+    A body from a file is read from `spec_file_name`, ground from the file that it came from.
+    """
     code, names_by_package = _body_code(sketch)
-    settings = make_settings(sketch, make_body(sketch))
+    settings = _settings_with_files(sketch, make_body(sketch))
     settings_argument = f", {settings!r}" if settings else ""
     preset = chosen_preset(sketch)
     imports = "".join(
@@ -241,11 +247,19 @@ def command_line(sketch: Sketch) -> str:
         body_flags = ["--legs", str(sketch.legs), "--links", str(sketch.links)]
     else:
         body_flags = ["--spec", spec_file_name(body)]
-    setting_flags = [f"--set={name}={_flag_value(value)}" for name, value in make_settings(sketch, body).items()]
+    setting_flags = [f"--set={name}={_flag_value(value)}" for name, value in _settings_with_files(sketch, body).items()]
     policy_flags = [] if sketch.policy == "cpg" else ["--policy", sketch.policy]
     preset_flags = [] if sketch.preset == DEFAULT_CHOICE else ["--preset", sketch.preset]
     task_flags = ["--task", sketch.task, *setting_flags]
     return shlex.join(["arc-suite", "view", *body_flags, *task_flags, *policy_flags, *preset_flags])
+
+
+def _settings_with_files(sketch: Sketch, body: Body) -> dict[str, Any]:
+    """Return all settings of the task, with the file in place of its ground."""
+    settings = make_settings(sketch, body)
+    if sketch.ground_file and settings.get("arena") == sketch.ground_file:
+        settings["arena"] = sketch.ground
+    return settings
 
 
 def _flag_value(value: Any) -> str:

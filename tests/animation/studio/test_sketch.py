@@ -4,11 +4,14 @@ import dataclasses
 import re
 import shlex
 
+import ground_files
 import programs
 import pytest
 from refusals import refused
 
+from arc_suite import registry
 from arc_suite.animation.studio import sketch as sketches
+from arc_suite.animation.studio import states
 from arc_suite.animation.studio.creature import open_creature
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
 from arc_suite.bodies import generator, shaping
@@ -131,6 +134,19 @@ def test_command_lines():
     assert sketches.command_line(SKETCHES["random"]).endswith("--spec random_7.json --task directed --policy zero")
 
 
+def test_ground_of_a_file_stays_with_the_sketch(tmp_path):
+    word = ground_files.write_png(tmp_path / "hill.png")
+    sketch = dataclasses.replace(SKETCHES["robot"], ground=word, ground_file=registry.arena_word(word))
+    (tmp_path / "hill.png").unlink()
+    creature = open_creature(sketch)
+    arena = creature.environment.task.definition.scene.arena
+    assert not arena.is_level and arena.map.name == "hill"
+    assert f"--set=arena={word} " in sketches.command_line(sketch)
+    assert f"'arena': {word!r}" in sketches.python_lines(sketch)
+    state = states.PageState(sketch)
+    assert states.from_json(states.to_json(state)).sketch == sketch
+
+
 @pytest.mark.parametrize("name", ["legs", "robot", "example"])
 def test_a_creature_walks(name):
     creature = open_creature(SKETCHES[name])
@@ -170,6 +186,9 @@ def test_legs_that_overlap_are_moved_apart():
         (Sketch(settings='{"random": 1}'), "setting 'random': expected none, as every episode has a seed, got 1"),
         (Sketch(settings='{"arena": "os:path"}'), ""),
         (Sketch(settings='{"arena": "antigravity:x"}'), "arena 'antigravity:x': files import nothing"),
+        (Sketch(ground="a.png"), "unknown arena ''"),
+        (Sketch(ground="a.png", ground_file="/etc/hill.png"), "arena '/etc/hill.png': files name no other files"),
+        (Sketch(ground="a.png", ground_file="{}"), "arena: expected a name, a file or ground as JSON"),
         (Sketch(palette="mos"), "Body(walker_8x3).palette: expected one of moss, "),
         (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),
         (Sketch(source=FILE, file="{}"), "name: missing; a Body needs it"),
