@@ -189,7 +189,7 @@ def test_legs_that_overlap_are_moved_apart():
         (Sketch(ground="a.png"), "unknown arena ''"),
         (Sketch(ground="a.png", ground_file="/etc/hill.png"), "arena '/etc/hill.png': files name no other files"),
         (Sketch(ground="a.png", ground_file="{}"), "arena: expected a name, a file or ground as JSON"),
-        (Sketch(palette="mos"), "Body(walker_8x3).palette: expected one of moss, "),
+        (Sketch(palette="mos"), "unknown palette 'mos'; did you mean 'moss'?"),
         (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),
         (Sketch(source=FILE, file="{}"), "name: missing; a Body needs it"),
         (Sketch(task="walk", preset="balanced"), "unknown preset 'balanced'"),
