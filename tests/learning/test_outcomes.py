@@ -12,7 +12,7 @@ from arc_suite.learning.agents.configuration import Configuration
 
 def test_the_return_of_a_score():
     run = Configuration.of(Setup.of("tick", "walk"))
-    scale = anchors.anchors(run.setup, range(10))  # those of the episodes that evaluate
+    scale = anchors.anchors(run.setup)
     assert outcomes.return_of_score(run, 0.5) == pytest.approx((scale.zero + scale.demonstrator) / 2.0)
 
 
