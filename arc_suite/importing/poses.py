@@ -1,15 +1,15 @@
 """Which chains of a robot are legs, and the pose in which it stands on them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.importing import kinds, loops, tree
+from arc_suite.importing import candidates, kinds, loops, tree
+from arc_suite.importing.candidates import ChainEnd
 from arc_suite.importing.tree import Chain, Robot
-from arc_suite.models.kinematics import least_changes
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots.spec import SpecError
 
@@ -30,20 +30,8 @@ _SOLE_TILT = 0.05  # rad, of the directions in which the sole of a flat foot is 
 _SOLE_DIRECTIONS = 16
 
 # Wheels.
-_MIN_WHEEL_RANGE = 6.0  # rad; a joint that turns farther may turn a wheel, and has no middle position
 _MAX_HUB_OFFSET = 0.1  # of the wheel's radius, between its joint and its middle
 _MAX_WHEEL_AXIS_RISE = 0.5  # vertical part of a wheel's axis, a unit vector
-
-# The search for a pose with bent knees. Lengths are shares of the leg's length, from the joint before the last down to
-# the foot.
-_LEG_HEIGHT = 0.65
-_FOOT_OFFSET = 0.1  # outwards from the foot of a straight leg: a wide stance is steady
-_START_BEND = 0.65  # rad, of the thigh; the knee bends back twice as much
-_ITERATIONS = 80
-_MAX_STEP = 0.2  # rad
-_DAMPING = 0.05
-_MAX_MISS = 0.05
-_MIN_FOOT_DEPTH = 0.4  # of the deepest foot; chains that end higher are arms and heads
 
 # Integers, since numpy's integers are not found in a tuple of MuJoCo's enumerations.
 _SPHERE = int(mujoco.mjtGeom.mjGEOM_SPHERE)
@@ -99,18 +87,6 @@ class _Unfit(Exception):
     """A pose in which the robot does not stand; the message says why."""
 
 
-class _ChainEnd(NamedTuple):
-    """The lowest point at the end of a chain, in the torso's frame.
-
-    Attributes:
-        point: (3,) m.
-        geom: the collider that has it.
-    """
-
-    point: np.ndarray
-    geom: int
-
-
 def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
     """Return the pose in which a robot stands.
 
@@ -131,14 +107,14 @@ def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
         return _stance_of_keyframe(robot, home, named_feet)
     # Straight legs are better than none: a second round admits them.
     origins_by_reason: dict[str, str] = {}
-    candidates = []
-    for origin, qpos in _candidate_poses(robot, named_feet):
+    tried_poses = []
+    for origin, qpos in candidates.list_poses(robot, named_feet):
         try:
             return _stance_of_pose(robot, qpos, origin, named_feet)
         except _Unfit as reason:
             origins_by_reason.setdefault(str(reason), origin)
-        candidates.append((origin, qpos))
-    for origin, qpos in candidates:
+        tried_poses.append((origin, qpos))
+    for origin, qpos in tried_poses:
         try:
             return _stance_of_pose(robot, qpos, origin, named_feet, admits_straight_legs=True)
         except _Unfit as reason:
@@ -189,41 +165,6 @@ def _find_named_feet(robot: Robot, feet: Sequence[str]) -> dict[Chain, list[int]
     return foot_colliders
 
 
-def _candidate_poses(robot: Robot, named_feet: dict[Chain, list[int]] | None) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the poses (nq,) to try, each with where it comes from: keyframes first, `home` before others."""
-    model = robot.model
-    for key in sorted(range(model.nkey), key=lambda key: model.key(key).name != "home"):
-        yield f"keyframe {model.key(key).name or key}", model.key_qpos[key]
-    yield "zero angles", _relax(robot, model.qpos0)
-    foot_colliders = robot.end_colliders() if named_feet is None else named_feet
-    for front_sign, rear_sign in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
-        qpos = _search_bent_knees(robot, foot_colliders, front_sign, rear_sign)
-        if qpos is not None:
-            yield "search for bent knees", qpos
-    yield "middle of the ranges", _middle_pose(robot)
-    yield "zero angles within the ranges", robot.clip_to_limits(_relax(robot, model.qpos0))
-
-
-def _middle_pose(robot: Robot) -> np.ndarray:
-    """Return the pose (nq,) with joints in the middle of their ranges; joints that turn without end stay at zero."""
-    qpos = robot.model.qpos0.copy()
-    for joint in robot.joints:
-        low, high = robot.limits(joint)
-        if high - low < _MIN_WHEEL_RANGE:
-            qpos[robot.qpos_index(joint)] = 0.5 * (low + high)
-    return robot.clip_to_limits(_relax(robot, qpos))
-
-
-def _relax(robot: Robot, qpos: np.ndarray) -> np.ndarray:
-    """Return a pose (nq,) in which passive joints are where their springs have no load."""
-    relaxed_qpos = qpos.copy()
-    for joint in robot.passive:
-        index = robot.qpos_index(joint)
-        has_spring = robot.model.jnt_stiffness[joint] > 0.0
-        relaxed_qpos[index] = (robot.model.qpos_spring if has_spring else robot.model.qpos0)[index]
-    return relaxed_qpos
-
-
 def _stance_of_pose(
     robot: Robot,
     qpos: np.ndarray,
@@ -255,7 +196,7 @@ def _stance_of_pose(
     ends = {}
     for chain, geoms in foot_colliders.items():
         if chain:
-            ends[chain] = _ChainEnd(*tree.lowest_point(robot, data, geoms))
+            ends[chain] = ChainEnd(*tree.lowest_point(robot, data, geoms))
     if not ends:
         raise _Unfit("no chain of joints ends in a collider")
     height = -min(end.point[2] for end in ends.values())
@@ -279,7 +220,7 @@ def _find_legs(
     robot: Robot,
     data: mujoco.MjData,
     foot_colliders: Mapping[Chain, list[int]],
-    low_ends: Mapping[Chain, _ChainEnd],
+    low_ends: Mapping[Chain, ChainEnd],
     height: float,
 ) -> tuple[Leg, ...]:
     """Return the legs of chains that end low; joints of several chains, and of wheels, belong to none."""
@@ -299,14 +240,14 @@ def _find_legs(
     return tuple(legs)
 
 
-def _is_wheel(robot: Robot, data: mujoco.MjData, joint: int, end: _ChainEnd) -> bool:
+def _is_wheel(robot: Robot, data: mujoco.MjData, joint: int, end: ChainEnd) -> bool:
     """Return whether a joint turns a foot without end about the foot's own middle."""
     low, high = robot.limits(joint)
     axis = data.xaxis[joint]
     anchor = data.xanchor[joint]
     hub_offset = np.linalg.norm(np.cross(axis, data.geom_xpos[end.geom] - anchor))
     wheel_radius = np.linalg.norm(np.cross(axis, end.point - anchor))
-    turns_without_end = high - low > _MIN_WHEEL_RANGE
+    turns_without_end = high - low > candidates.MIN_WHEEL_RANGE
     is_axis_level = abs(axis[2]) < _MAX_WHEEL_AXIS_RISE
     return bool(turns_without_end and is_axis_level and hub_offset < _MAX_HUB_OFFSET * wheel_radius)
 
@@ -344,7 +285,7 @@ def _check_limits(robot: Robot, qpos: np.ndarray) -> None:
             raise _Unfit(f"joint {robot.joint_name(joint)} is out of its range")
 
 
-def _check_feet(robot: Robot, ends: Mapping[Chain, _ChainEnd], legs: tuple[Leg, ...], height: float) -> None:
+def _check_feet(robot: Robot, ends: Mapping[Chain, ChainEnd], legs: tuple[Leg, ...], height: float) -> None:
     """Refuse feet that hang above the floor."""
     foot_geoms = {leg.geom for leg in legs}
     for chain, end in ends.items():
@@ -381,68 +322,3 @@ def _check_knees(data: mujoco.MjData, legs: tuple[Leg, ...], height: float) -> N
         is_straight = np.linalg.norm(leg.sole - hip) > _MAX_STRAIGHTNESS * (thigh + shank)
         if thigh > _MIN_THIGH * height and is_straight:
             raise _Unfit("the legs are straight")
-
-
-def _search_bent_knees(
-    robot: Robot, foot_colliders: Mapping[Chain, list[int]], front_sign: int, rear_sign: int
-) -> np.ndarray | None:
-    """Return a pose (nq,) with bent knees and each foot below the joint before the last; None if there is none.
-
-    Args:
-        robot: robot of the file.
-        foot_colliders: by chain.
-        front_sign: sign of the bend of legs in front of the torso's origin, 1 or -1.
-        rear_sign: sign of the bend of the other legs.
-    """
-    zero_qpos = robot.clip_to_limits(_relax(robot, robot.model.qpos0 * 0.0))
-    data = robot.forward_kinematics(zero_qpos)
-    ends = {}
-    for chain, geoms in foot_colliders.items():
-        if len(chain) > 1:
-            ends[chain] = _ChainEnd(*tree.lowest_point(robot, data, geoms))
-    deepest = min((end.point[2] for end in ends.values()), default=0.0)
-    qpos = _middle_pose(robot)
-    for chain, end in ends.items():
-        if end.point[2] >= _MIN_FOOT_DEPTH * deepest:
-            continue
-        is_in_front = data.xanchor[chain[-2]][0] > 0.0
-        sign = front_sign if is_in_front else rear_sign
-        leg_qpos = _bend_leg(robot, zero_qpos, chain, end, sign)
-        if leg_qpos is None:
-            return None
-        for joint in chain:
-            qpos[robot.qpos_index(joint)] = leg_qpos[robot.qpos_index(joint)]
-    return qpos
-
-
-def _bend_leg(robot: Robot, zero_qpos: np.ndarray, chain: Chain, end: _ChainEnd, sign: int) -> np.ndarray | None:
-    """Return a pose (nq,) in which one leg stands with a bent knee, by damped least squares; None if it cannot."""
-    model = robot.model
-    body = int(model.geom_bodyid[end.geom])
-    data = robot.forward_kinematics(zero_qpos)
-    foot_in_body = data.xmat[body].reshape(3, 3).T @ (end.point - data.xpos[body])
-    hip = data.xanchor[chain[-2]].copy()
-    knee = data.xanchor[chain[-1]].copy()
-    leg_length = np.linalg.norm(knee - hip) + np.linalg.norm(end.point - knee)
-    moved_outwards = end.point[1] + np.sign(end.point[1]) * _FOOT_OFFSET * leg_length
-    goal_y = moved_outwards if len(chain) > 2 else hip[1]
-    goal = np.array((hip[0], goal_y, hip[2] - _LEG_HEIGHT * leg_length))
-
-    qpos_indices = [robot.qpos_index(joint) for joint in chain]
-    dofs = [int(model.jnt_dofadr[joint]) for joint in chain]
-    qpos = zero_qpos.copy()
-    qpos[qpos_indices[-2]] = _START_BEND * sign
-    qpos[qpos_indices[-1]] = -2.0 * _START_BEND * sign
-    for _ in range(_ITERATIONS):
-        qpos = robot.clip_to_limits(qpos)
-        robot.forward_kinematics(qpos, data)
-        foot = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot_in_body
-        jacobian = np.zeros((3, model.nv))
-        mujoco.mj_jac(model, data, jacobian, None, foot, body)
-        leg_jacobian = jacobian[:, dofs]
-        change = least_changes(leg_jacobian, (goal - foot)[:, None], _DAMPING * float(leg_length))
-        qpos[qpos_indices] += change.clip(-_MAX_STEP, _MAX_STEP)
-    miss = np.linalg.norm((goal - foot)[[0, 2]])  # m, forward and up
-    if miss > _MAX_MISS * leg_length:
-        return None
-    return robot.clip_to_limits(qpos)
