@@ -24,8 +24,8 @@ _MAX_DEPTH = 0.01  # standing heights, of an overlap that does not count
 _MIN_STRETCH = 1.25
 # Demonstrators also step aside and turn, to follow commands and to keep their course: forward, left and turning.
 _MOTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
-# To spare, and between stretches that are tried: legs come late, and balance shifts their feet.
-_STRETCH_STEP = 0.125
+_STRETCH_STEP = 0.125  # between stretches that are tried, and to spare, as balance shifts feet
+_DELAY = 0.5  # poses of a cycle by which every other leg of a side may come later than its neighbors
 
 # Owners of geoms that are no legs.
 _TORSO = -1
@@ -75,8 +75,14 @@ def find_largest_stretch(body: Body, stretch_steps: Callable[[float], np.ndarray
     if body.source or body.name in ROBOTS:
         return math.inf
 
+    ranks = [np.full(len(leg.joints), rank) for leg, rank in zip(body.legs, body.ranks, strict=True)]
+    is_even = np.concatenate(ranks) % 2 == 0  # (joints,) whether they belong to every other leg of a side
+
     def passes(stretch: float) -> bool:
-        poses = (("a stride", angles) for angles in stretch_steps(stretch))
+        angles = stretch_steps(stretch)
+        late_angles = angles + _DELAY * (np.roll(angles, 1, axis=0) - angles)
+        cycles = (angles, np.where(is_even, late_angles, angles), np.where(is_even, angles, late_angles))
+        poses = (("a stride", pose) for pose in np.concatenate(cycles))
         return not any(overlaps_in_poses(body, poses))
 
     if passes(largest + _STRETCH_STEP):
