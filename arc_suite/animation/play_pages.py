@@ -23,7 +23,7 @@ from arc_suite.bodies.universal import Universal
 from arc_suite.cpg import Demonstrator, leaps
 from arc_suite.cpg.limping import Limping
 from arc_suite.cpg.presets import DEFAULTS
-from arc_suite.cpg.selection import law_class, preset_of, presets_of
+from arc_suite.cpg.selection import law_class, preset_of, presets_of, suited_preset
 from arc_suite.cpg.stepping import Stepping
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
@@ -42,7 +42,6 @@ _DEMONSTRATOR_TASK = "directed"
 _NETWORK_TASK = "steer"
 _RECOVERY_TASK = "recover"
 _PATIENCE = 0.5  # s for which a body lies before it gets up
-_DEFAULT_PRESET = "steered"
 _PAGE_LAWS = (Stepping, Limping)  # one law where the pose is by command, see web/law.js
 _OBSERVABLE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # by scripts of a page
 
@@ -90,7 +89,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
     command_task = setup.definition
     if policy == "cpg":
         task = command_task
-        driver = _describe_law(task, preset or _DEFAULT_PRESET)
+        driver = _describe_law(task, preset or suited_preset(task))
     else:
         network = _load_network(body, policy, command_task)
         task = network.setup.definition

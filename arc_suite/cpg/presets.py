@@ -59,8 +59,11 @@ def _command_presets(sighted: SightedParameters, leaping: LeapingParameters = _L
 _SIGHTED = SightedParameters(lead=0.24, longer=0.12, trust=0.5)
 DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_command_presets(_SIGHTED)}
 # Of bodies with four legs or fewer, which tip between two feet. Others walk better without these corrections.
+# In gaits and poses by command, a slow integral and low steps disturb them less.
+_POSED = {"lift": 0.2, "integral": 0.1}
 DEFAULTS_OF_FOUR_LEGS = {
     **DEFAULTS,
+    "posed": DEFAULTS["steered"]._replace(**_POSED),
     "climbing": ClimbingParameters(
         DEFAULTS["surefooted"]._replace(gain=(2.0, 2.0, 1.0), lean=0.2, capture=0.4),
         rough_lift=0.35,
@@ -173,6 +176,7 @@ PRESETS["tick"] |= _command_presets(SightedParameters(trust=0.5), lead=0.1)
 PRESETS["leaper"] |= _command_presets(
     SightedParameters(), gain=(1.0, 1.0, 0.5), integral=0.45, most=1.05, lead=0.04, lean=0.0
 )
+PRESETS["leaper"]["posed"] = PRESETS["leaper"]["steered"]._replace(**_POSED)
 PRESETS["leaper"]["braced"] = PRESETS["leaper"]["steered"]
 PRESETS["leaper"]["surefooted"] = PRESETS["leaper"]["steered"]._replace(integral=0.2, lean=0.4)
 PRESETS["leaper"]["climbing"] = ClimbingParameters(

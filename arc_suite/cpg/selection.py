@@ -46,6 +46,7 @@ _STRAIGHT_PRESETS = ("refined", "tuned", "straight", "medium")  # presets that w
 _MEMORYLESS = {
     "straight": "medium",
     "steered": "reactive",
+    "posed": "reactive",
     "braced": "reactive",
     "limping": "reactive",
     "climbing": "surefooted",

@@ -146,7 +146,7 @@ class Stepping(CommandLaw):
         """Return the pose over whose feet a body walks."""
         parameters = self.parameters
         if self.directed:
-            return posture.find_rest_pose(body)
+            return posture.find_pose_with_room(body)
         if parameters.wider or parameters.lower:
             return posture.find_wide_pose(body, parameters.wider, parameters.lower)
         return posture.find_shifted_pose(body, parameters.ahead, parameters.higher)

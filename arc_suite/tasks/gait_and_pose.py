@@ -167,7 +167,7 @@ class GaitAndPose:
     def reference(self, scene, parameters) -> Reference:
         """Return the reference of a body, in a task with `parameters.Parameters`."""
         body = scene.body
-        rest_pose = posture.find_rest_pose(body)
+        rest_pose = posture.find_pose_with_room(body)
         height = body.torso.standing_height
         step = scene.control_timestep
         prescribed = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))

@@ -47,7 +47,7 @@ class Directed(CommandTask):
     command = Schedule()
     gait_and_pose = GaitAndPose()
     from_body = _FROM_BODY
-    demonstrators = ("steered",)
+    demonstrators = ("posed", "steered")
     weights: ClassVar[Mapping[str, float]] = {
         "progress": 0.25,
         "tracking": 0.25,

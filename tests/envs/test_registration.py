@@ -190,7 +190,7 @@ for program, *arguments in (
         *(f"{program} 0" for program in ("evaluate", "style", "style", "collect", "collect", "render")),
         "evaluate 1 arc-suite evaluate: unknown preset 'prwl'; did you mean 'prowl'? "
         "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, "
-        "sighted, leaping, planned, tracked, in_step, balanced, limping, prowl)",
+        "sighted, leaping, planned, tracked, in_step, posed, balanced, limping, prowl)",
     ]
 
 

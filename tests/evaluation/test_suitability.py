@@ -14,7 +14,7 @@ SEEDS = suitability.SEEDS[:2]
 def test_presets_that_obey_are_tried_once_each_and_the_default_first():
     names = [trial.preset for trial in suitability.try_presets(ROBOTS["leaper"], "steer", SEEDS, 10)]
     # Braced and balanced are other names of these.
-    assert names == ["steered", "surefooted", "reactive", "in_step"]
+    assert names == ["steered", "surefooted", "reactive", "posed", "in_step"]
 
 
 def test_a_trial_has_return_metric_and_falls():

@@ -44,3 +44,18 @@ def test_a_torso_moves_ahead_and_up_over_its_feet():
     assert shifted.ride_height == pytest.approx(rest.ride_height + 0.1)
     out_of_reach = posture.find_shifted_pose(leaper, 3.0, 0.0)
     np.testing.assert_array_equal(out_of_reach.joint_angles, rest.joint_angles)
+
+
+def test_a_body_that_takes_poses_by_command_rests_where_its_joints_have_room():
+    """The rear knees of Leaper are at their limits in its pose at rest, so that it could not lean at all."""
+    leaper = ROBOTS["leaper"]
+    posed = posture.find_pose_with_room(leaper)
+    rest = posture.find_rest_pose(leaper)
+    moved = (rest.sole_positions - posed.sole_positions) / leaper.torso.standing_height
+    np.testing.assert_allclose(moved, np.tile((0.05, 0.0, 0.1), (4, 1)), atol=0.02)
+    assert posed.ride_height == pytest.approx(rest.ride_height + 0.1)
+    low, high = posture.measure_room(leaper, planted=False).T
+    assert (low <= -0.05).all() and (high >= 0.05).all()
+    # Others keep their pose.
+    for name in ("queen", "bastion", "tick"):
+        assert posture.find_pose_with_room(ROBOTS[name]) is posture.find_rest_pose(ROBOTS[name])

@@ -16,7 +16,7 @@ from arc_suite.robots import ROBOTS
 
 ALL = (
     "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, "
-    "planned, tracked, rising, in_step, balanced, limping"
+    "planned, tracked, rising, in_step, posed, balanced, limping"
 )
 GENERAL = (
     "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, "
@@ -82,7 +82,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
             f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.robot_words())})",
         ),
         (("cpg", "queen", "midium"), f"unknown preset 'midium'; did you mean 'medium'? (there are: {ALL})"),
-        (("cpg", generate(4, 2), "tuned"), f"unknown preset 'tuned' (there are: {GENERAL})"),
+        (("cpg", generate(4, 2), "tuned"), f"unknown preset 'tuned' (there are: {GENERAL}, posed)"),
         (("cpg", "queen", ()), f"preset: expected one or more of {ALL}, got none"),
         (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number of at least 0, got -0.1"),
         (("cpg", ROBOTS["bastion"].replace(name="queen")), f"walk: {JOINTS}, got 12; give it another name"),
