@@ -21,11 +21,13 @@ _MAX_PIXELS = 8192  # of a picture along either side
 _MAX_NAME = 40  # characters
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER_BYTES = 26  # of a PNG, to its kind of colors
+_SIZE_BYTES = slice(16, 24)  # of a PNG: its columns and rows
 _GRAY = 0  # PNG's number for pictures of one channel without opacity
 _DIGITS = 6  # of lengths, m
 
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
+_FIELD = mujoco.mjtGeom.mjGEOM_HFIELD
 _KIND_OF_GEOM = {
     _PLANE: "plane",
     mujoco.mjtGeom.mjGEOM_BOX: "box",
@@ -84,8 +86,7 @@ def _decode_png(content: bytes) -> np.ndarray:
     columns, rows, bits, kind = struct.unpack(">IIBB", header[16:])
     if kind != _GRAY or bits not in (8, 16):
         raise ValueError("expected a PNG in shades of gray of 16 bits, or of 8, without colors and opacity")
-    if not (2 <= rows <= _MAX_PIXELS and 2 <= columns <= _MAX_PIXELS):
-        raise ValueError(f"expected 2 to {_MAX_PIXELS} pixels along each side, got {columns} by {rows}")
+    _check_pixels(rows, columns)
     with parsers.guard("expected a PNG"):  # damaged ones raise errors of files that cannot be read
         pixels = imageio.imread(content, extension=".png", plugin="pillow")
     return pixels.astype(float) / (2**bits - 1)
@@ -119,16 +120,17 @@ def _read_mesh(path: Path, scale: tuple[float, ...]) -> HeightMap:
     return _make_map(path, (float(size[0]), float(size[1]), height), nodes / height)
 
 
-def _read_scene(path: Path, scale: tuple[float, ...]) -> Solids:
-    """Return the colliding geoms of a scene, in which nothing moves."""
+def _read_scene(path: Path, scale: tuple[float, ...]) -> HeightMap | Solids:
+    """Return the colliding geoms of a scene, in which nothing moves, or its height field if it is all that collides."""
     if scale:
         raise ValueError("expected no scale: MJCF is in m")
     root_element, _ = bounds.parse(path)
     if root_element.tag != "mujoco":
         raise ValueError(f"expected MJCF (mujoco), got an element {root_element.tag[:_MAX_NAME]!r}")
     spec = mujoco.MjSpec.from_file(str(path))
-    if spec.hfields:
-        raise ValueError("hfield: expected planes, boxes and other solids; give the picture of the height field itself")
+    field_geoms = [geom for geom in spec.geoms if geom.type == _FIELD]
+    if field_geoms:
+        return _read_field(path, spec, field_geoms[0].hfieldname)
     opening.delete_visuals(spec)
     bounds.check_mesh_files([file_of(spec, mesh) for mesh in spec.meshes if mesh.file])
     model = spec.compile()
@@ -140,6 +142,49 @@ def _read_scene(path: Path, scale: tuple[float, ...]) -> Solids:
     if not geoms:
         raise ValueError("expected geoms that collide, got none")
     return Solids(_choose_name(path), tuple(_read_geom(model, data, geom) for geom in geoms))
+
+
+def _read_field(path: Path, spec: mujoco.MjSpec, field_name: str) -> HeightMap:
+    """Return the height field of a scene in which nothing else collides."""
+    for geom in list(spec.geoms):
+        if not (geom.contype or geom.conaffinity):
+            spec.delete(geom)
+        elif geom.type != _FIELD or geom.hfieldname != field_name:
+            name = geom.name or "without a name"
+            raise ValueError(f"geom {name[:_MAX_NAME]!r}: expected nothing next to a height field that collides")
+        else:
+            geom.material = ""
+    for element in (*spec.meshes, *spec.materials, *spec.textures, *spec.skins):
+        spec.delete(element)
+    for field in list(spec.hfields):
+        if field.name != field_name:
+            spec.delete(field)
+        elif field.file:
+            _check_field_file(file_of(spec, field))
+    model = spec.compile()
+    if model.njnt or model.ngeom != 1:
+        raise ValueError("hfield: expected a scene with one geom that collides, in which nothing moves")
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    is_level = np.allclose(data.geom_xmat[0].reshape(3, 3), np.eye(3), atol=1e-6)
+    if not is_level or abs(data.geom_xpos[0, :2]).max() > 1e-6:
+        raise ValueError("hfield: expected a height field that is not turned, with its middle at x = y = 0")
+    half_length, half_width, height, _ = model.hfield_size[0]
+    nodes = model.hfield_data.reshape(model.hfield_nrow[0], model.hfield_ncol[0])
+    return _make_map(path, (2.0 * float(half_length), 2.0 * float(half_width), float(height)), nodes.astype(float))
+
+
+def _check_field_file(path: Path) -> None:
+    """Refuse a file of a height field that is too large; one that is no PNG has as many nodes as its bytes say."""
+    content = _read_bytes(path)
+    if content.startswith(_SIGNATURE):
+        columns, rows = struct.unpack(">II", content[_SIZE_BYTES].ljust(8, b"\0"))
+        _check_pixels(rows, columns)
+
+
+def _check_pixels(rows: int, columns: int) -> None:
+    if not (2 <= rows <= _MAX_PIXELS and 2 <= columns <= _MAX_PIXELS):
+        raise ValueError(f"expected 2 to {_MAX_PIXELS} pixels along each side, got {columns} by {rows}")
 
 
 def _read_geom(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:

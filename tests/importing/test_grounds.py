@@ -39,6 +39,15 @@ HILLS = {
 }
 
 
+FIELD = '<geom type="hfield" hfield="a"'
+
+
+def field(geoms, nodes='nrow="2" ncol="3" elevation="0 1 2 3 4 5"'):
+    """Return a scene with a height field, whose first row is the far side in y."""
+    asset = f'<hfield name="a" size="6 4 0.5 1" {nodes}/>'
+    return f"<mujoco><asset>{asset}</asset><worldbody>{geoms}</worldbody></mujoco>".encode()
+
+
 def model_of(arena, body=TICK):
     return mujoco.MjModel.from_xml_string(models.assemble(body, arena).to_xml_string())
 
@@ -225,10 +234,15 @@ REFUSED = {
         scene('<geom name="a" type="plane" size="1 1 1" euler="9 0 0"/>'),
         "geom 'a': expected a level plane; a tilted one can be a box",
     ),
-    "field.xml": (
-        b'<mujoco><asset><hfield name="a" nrow="9" ncol="9" size="1 1 1 1"/></asset></mujoco>',
-        "hfield: expected planes, boxes and other solids",
+    "next.xml": (field(f"{FIELD}/>{PLANE}"), "expected nothing next to a height field that collides"),
+    "turned.xml": (field(f'{FIELD} euler="0 0 9"/>'), "expected a height field that is not turned"),
+    "aside.xml": (field(f'{FIELD} pos="1 0 0"/>'), "with its middle at x = y = 0"),
+    "falling.xml": (
+        field(f'<body><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>{FIELD}/></body>'),
+        "",
     ),
+    "passwd.xml": (field(f"{FIELD}/>", 'file="/etc/passwd"'), ""),
+    "wide.xml": (field(f"{FIELD}/>", 'nrow="9999" ncol="9"'), "nrow"),
     "missing.xml": (
         b'<mujoco><asset><mesh file="no.stl"/></asset><worldbody><geom type="mesh" mesh="no"/></worldbody></mujoco>',
         "",
@@ -246,6 +260,33 @@ REFUSED = {
     "scale.xml:2": (scene(BOX), "expected no scale: MJCF is in m"),
     "ground.tif": (b"", "expected a file .png, .obj, .stl, .xml, or one of flat, bumps,"),
 }
+
+
+@pytest.mark.parametrize("from_file", [False, True])
+def test_a_height_field_of_a_scene_is_a_map(tmp_path, from_file):
+    path = tmp_path / "field.xml"
+    path.write_bytes(field(f'{FIELD} pos="0 0 3"/><geom type="box" size="1 1 1" contype="0" conaffinity="0"/>'))
+    if from_file:
+        levels = np.arange(6).reshape(2, 3) * 51
+        imageio.imwrite(tmp_path / "levels.png", levels.astype(np.uint8))
+        path.write_bytes(field(f"{FIELD}/>", 'file="levels.png"'))
+    scene = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(scene)
+    mujoco.mj_forward(scene, data)
+    arena = registry.arena_of(str(path), TICK)
+    places = np.random.RandomState(0).uniform(-0.95, 0.95, (20, 2)) * (6.0, 4.0)
+    heights = []
+    for place in [(0.0, 0.0), *places]:
+        above = np.array([*place, 9.0])
+        hit = mujoco.mj_ray(scene, data, above, np.array([0.0, 0.0, -1.0]), None, 1, -1, np.zeros(1, np.int32))
+        heights.append(9.0 - hit)
+    assert_allclose(arena.height(*places.T), np.array(heights[1:]) - heights[0], atol=2e-5)
+
+
+def test_the_picture_of_a_height_field_is_missing(tmp_path):
+    (tmp_path / "lost.xml").write_bytes(field(f"{FIELD}/>", 'file="no.png"'))
+    with pytest.raises(OSError, match="cannot read .*no.png: no such file"):
+        registry.arena_of(f"{tmp_path}/lost.xml", TICK)
 
 
 @pytest.mark.parametrize("word", REFUSED)
