@@ -33,6 +33,7 @@ from arc_suite.policies import other_libraries
 from arc_suite.policies.network import Network
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock, readings
+from arc_suite.tasks.blocks import PAGE_BLOCKS
 from arc_suite.tasks.recover import LEAST_HEIGHT, LEAST_UPRIGHT
 
 GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
@@ -43,7 +44,6 @@ _NETWORK_TASK = "steer"
 _RECOVERY_TASK = "recover"
 _PATIENCE = 0.5  # s for which a body lies before it gets up
 _PAGE_LAWS = (Stepping, Limping)  # one law where the pose is by command, see web/law.js
-_OBSERVABLE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # by scripts of a page
 
 
 def page(creatures: Sequence[Mapping[str, Any]]) -> str:
@@ -280,8 +280,8 @@ def _load_network(body: Body, name: str, command_task: Task) -> Network:
     if not isinstance(policy, Network):
         raise ValueError(f"policy {name}: a page runs cpg, ppo, universal, or one trained network")
     for block in policy.blocks:
-        if block not in _OBSERVABLE_BLOCKS:
-            available = ", ".join(_OBSERVABLE_BLOCKS)
+        if block not in PAGE_BLOCKS:
+            available = ", ".join(PAGE_BLOCKS)
             raise ValueError(f"policy {name}: observes {block}, and a page has {available} alone")
     actions = policy.setup.definition.actions
     if actions != command_task.actions:

@@ -24,6 +24,8 @@ ANGULAR_VELOCITY_NOISE = 0.05  # sqrt(g / h)
 JOINT_VELOCITY_NOISE = 0.3  # sqrt(g / h)
 CONTACT_FORCE_NOISE = 0.02  # share of the range to which forces are clipped
 
+PAGE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # that scripts of a page compute
+
 
 class Block(NamedTuple):
     """A block of the observation.

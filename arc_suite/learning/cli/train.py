@@ -14,7 +14,8 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --spec spider --algorithm speq --hp phase_updates=7500
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
   arc-suite train --robot varied:0-127 --algorithm dagger_bodies
-  arc-suite evaluate --policy runs/tick-walk-ppo-0
+
+A run of one seed ends with the commands that score, film and play its policy.
 """
 
 import contextlib
@@ -49,6 +50,7 @@ from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import DEVICE_DEFAULTS
 from arc_suite.learning.agents.learner import MAX_RUN_SEED
 from arc_suite.learning.agents.training import train, train_in_one_program
+from arc_suite.learning.next_commands import next_commands
 from arc_suite.policies import network
 from arc_suite.simulation.cores import prepare_jax, usable_cores
 
@@ -221,6 +223,8 @@ def train_run(run: Configuration, threshold: float | None) -> int:
     if is_complete:
         with resumable(folder):
             print(f"{folder}: {describe_judging(run, folder, FLAGS.threads)}")
+    if is_complete and FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
+        print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
     return TERMINATED if terminated and not is_complete else 0
 
 
