@@ -20,6 +20,7 @@ STILL = (
     "hit",
     "limp_loop",
     "rise",
+    "get_up",
     "jump",
     "leap",
     "death",

@@ -6,16 +6,19 @@ import math
 import mujoco
 import numpy as np
 
+from arc_suite import policies, rotations
 from arc_suite.animation.clips import gestures
-from arc_suite.animation.clips.recordings import Recording
-from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, stay_at_start
+from arc_suite.animation.clips.recordings import Recording, record
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, put_on_root, stay_at_start
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.selection import presets_of
+from arc_suite.envs.setup import Setup
 from arc_suite.models import sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
 from arc_suite.models.standing import pose_mechanics, standing_qpos
+from arc_suite.motions.ground_poses import ground_poses, relative_pose
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import readings
@@ -26,6 +29,11 @@ _SINK_DURATION = 6.0
 _HOLD_DURATION = 2.0
 _COLLAPSE_DURATION = 1.5  # in which legs give way in a death
 _LIMP_DURATION = 6.0
+
+_RECOVERY_TASK = "recover"
+_FALL_SECONDS = 4.0  # of getting up, and of standing after it
+_FALLS = 20  # that are tried, of the judges' table
+_ON_BACK = -0.7  # cosine of the tilt of a torso that lies on its back
 
 _LIMP_DAMPING_SHARE = 0.05  # of the damping of joints, in joints without life
 _LYING_HEIGHT = 0.6  # of the torso's height at rest: a lower torso lies
@@ -48,6 +56,30 @@ def rise(body: Body, rest: Pose) -> ClipMotion:
     _check_lies(body, rest, recording.poses[first])
     last = len(recording.poses) - 1
     return stay_at_start(recording, first, samples=last - first)
+
+
+def get_up(body: Body, rest: Pose) -> ClipMotion:
+    """Return how a body gets up from its back, by the policy of the package for the task recover.
+
+    The root stays where the torso is in the end.
+
+    Raises:
+        ValueError: the package has no such policy, or the body does not get up.
+    """
+    if not policies.is_packaged(body, _RECOVERY_TASK):
+        raise ValueError(f"the package has no policy of {_RECOVERY_TASK} for it")
+    setup = Setup.of(body, _RECOVERY_TASK)
+    policy = policies.policy("ppo", body, task=setup.definition)
+    for seed in range(_FALLS):
+        environment = setup.load(seed)
+        recording = record(environment, policy, settle=0, steps=round(_FALL_SECONDS / environment.control_timestep()))
+        has_got_up = environment.task.progress["up"]
+        environment.close()
+        if has_got_up and rotations.upright(recording.poses[0, 3:7]) < _ON_BACK:
+            torso = ground_poses(recording.poses)
+            root = np.zeros((len(torso), 3))
+            return put_on_root(recording.time_step, recording.poses, root, relative_pose(torso[-1], torso))
+    raise ValueError(f"it does not get up from its back within {_FALL_SECONDS:g} s")
 
 
 def jump(body: Body, rest: Pose) -> ClipMotion:

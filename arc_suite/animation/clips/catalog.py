@@ -124,6 +124,7 @@ CLIPS: dict[str, Kind] = {
     "hit_right": Acted(functools.partial(gestures.hit, side="right"), BOTH_ENDS, additive=True),
     "attack": Acted(gestures.strike, BOTH_ENDS, steps=True),
     "rise": Acted(acting.rise, ends=(-1,)),
+    "get_up": Acted(acting.get_up, ends=(-1,)),
     "jump": Acted(acting.jump, BOTH_ENDS),
     "leap": Acted(acting.leap, BOTH_ENDS),
     "death": Acted(acting.death, ends=(0,)),

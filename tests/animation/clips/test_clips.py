@@ -15,7 +15,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import drafts, foot_contacts, loops, recordings
+from arc_suite.animation.clips import acting, drafts, foot_contacts, loops, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.gestures import HIT_DIRECTIONS
 from arc_suite.bodies.generator import random_body
@@ -69,6 +69,24 @@ def assert_kinematics(body, file, clips):
             turns = turns[..., axes, :][..., axes]
             given, wanted = (each @ each[0].swapaxes(-1, -2) for each in (world[..., :3, :3], turns))
             assert abs(given - wanted).max() < 1e-5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("robot", ["tick", "leaper"])
+def test_a_robot_gets_up_from_its_back(robot):
+    clips = made(robot, "get_up", "idle")
+    motion, idle = clips["get_up"].motion, clips["idle"].motion
+    assert rotations.upright(motion.quaternions[0]) < -0.7 < 0.99 < rotations.upright(motion.quaternions[-1])
+    assert not clips["get_up"].loops and not clips["get_up"].moves
+    last, first = motion.pose(-1), idle.pose(0)
+    np.testing.assert_allclose(last.position, first.position, atol=1e-6)
+    np.testing.assert_allclose(last.joints, first.joints, atol=1e-6)
+    assert abs(last.quaternion @ first.quaternion) == pytest.approx(1.0)  # q and -q are one orientation
+
+
+def test_without_a_policy_of_the_package_there_is_no_get_up():
+    with refused("the package has no policy of recover for it"):
+        acting.get_up(ROBOTS["queen"], rest=None)
 
 
 def test_the_bytes_of_a_walk_hold_its_kinematics():
