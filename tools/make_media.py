@@ -93,6 +93,8 @@ TASK_VIEWS = {
     "mimic": View("tick", "mimic", azimuth=-20.0, elevation=18.0, distance=6.0),
     "recover": View("tick", "recover", 3, 0, 12, elevation=18.0, distance=5.0, drives=False, policy="ppo"),
 }
+ONE_VIEWS = {name: view for name, view in {**ROBOT_VIEWS, **TASK_VIEWS}.items() if name != "recover"}
+FALL_VIEWS = {f"fall {seed}": TASK_VIEWS["recover"]._replace(seed=seed) for seed in range(12)}
 _CLIP_FPS = 30.0
 _CUT_ABOVE = 0.82  # share of the rows cut from a square picture that are cut above, where it is empty
 _CAPTION_HEIGHT = 22  # pixels: legible where a page shows a picture at half its width
@@ -228,7 +230,8 @@ MEDIA = (
         large=True,
         limit=800_000,
     ),
-    *(Media(f"docs/films/{name}.webp", {name: view}) for name, view in {**ROBOT_VIEWS, **TASK_VIEWS}.items()),
+    Media("docs/films/recover.webp", FALL_VIEWS, columns=4, size=(120, 84), limit=240_000, quality=12),
+    *(Media(f"docs/films/{name}.webp", {name: view}) for name, view in ONE_VIEWS.items()),
 )
 
 
