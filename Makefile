@@ -13,7 +13,8 @@
 # make clean    deletes environments and what is built
 # make check-NAME, of the table below; most have an environment of their own, so that heavy packages stay out of .venv:
 #   long, release       tests that take long, and those for a release: half an hour
-#   types, lowest       annotations, by mypy, also in programs of pages; the environments with the oldest Gymnasium that setup.cfg admits
+#   editor              programs of pages, by mypy: what users' editors show
+#   types, lowest       annotations, by mypy; the environments with the oldest Gymnasium that setup.cfg admits
 #   agents, agents-release, jax, mjx, mjx-release    learners, tasks and worlds on JAX, on a processor
 #   sb3, clients        stable-baselines3 and our scripts for it; the clients of docs/clients.md: gigabytes
 #   first-steps         a newcomer's five first successes, by the commands of the pages; an hour
@@ -138,10 +139,14 @@ check-long: RUN = $(PYTEST) $(PARALLEL) -m "long and not release"
 check-release: RUN = $(PYTEST) $(PARALLEL) -m release
 
 check-types: VENV := .venv-types
-# The environment of README's install line, whose types users' editors show.
-check-types: EXTRAS := learn,animate
-check-types: PACKAGES := pytest mypy==2.4.1
-check-types: RUN = $(PYTEST) tests/house/test_editor_types.py && $(VENV)/bin/mypy
+check-types: PACKAGES := mypy==2.4.1
+check-types: RUN = $(VENV)/bin/mypy
+
+# The environment of README's install line.
+check-editor: VENV := .venv-editor
+check-editor: EXTRAS := learn,animate
+check-editor: PACKAGES := pytest mypy==2.4.1
+check-editor: RUN = $(PYTEST) tests/house/test_editor_types.py
 
 check-lowest: VENV := .venv-lowest
 check-lowest: PACKAGES := gymnasium==1.2.0

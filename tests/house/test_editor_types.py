@@ -1,4 +1,4 @@
-"""Type checkers follow README's install line, and know what users touch; `make check-types` runs this.
+"""Type checkers follow README's install line, and know what users touch; `make check-editor` runs this.
 
 The environment has the packages of the line and mypy, and no path to the clone but that of the line.
 """
