@@ -82,7 +82,7 @@ def _check_stillness(spec: str, body: Body) -> bool:
         stiffness = max(joint.servo.stiffness for joint in body.joints)
         armature = calming_armature(stiffness, body.simulation.timestep)
         problem = f"buzzes as it stands: its joints shake at {stillness.joint_speed:.2g} rad/s"
-        print(f"{spec}: {body.name} {problem}: an armature of {armature:.2g} kg m^2 at each joint fits")
+        print(f"{spec}: {body.name} {problem}: an armature of {armature:.2g} kg m^2 at each joint of its file fits")
     return not stillness.buzzes
 
 

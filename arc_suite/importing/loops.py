@@ -7,7 +7,6 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite import rotations
 from arc_suite.importing.tree import Robot
 from arc_suite.robots.spec import SpecError
 
@@ -64,11 +63,8 @@ def find_frames(robot: Robot, loop: Loop) -> list[tuple[int, dict[str, np.ndarra
     first, second = loop.parts
     if model.eq_type[loop.equality] == _CONNECT:
         return [(first, {"pos": data[:3]}), (second, {"pos": data[3:6]})]
-    # A weld has the pose of the second body in the first one, and an anchor in the second one.
-    anchor = data[:3]
-    quaternion = data[6:10]
-    anchor_in_first = data[3:6] + rotations.matrix(quaternion) @ anchor
-    return [(first, {"pos": anchor_in_first, "quat": quaternion}), (second, {"pos": anchor})]
+    # A weld has an anchor in the second body, the same point in the first one, and the second's orientation in it.
+    return [(first, {"pos": data[3:6], "quat": data[6:10]}), (second, {"pos": data[:3]})]
 
 
 def name_parts(robot: Robot, loop: Loop) -> str:

@@ -57,7 +57,8 @@ CASES = {
     "ankles that welds hold": {
         "foot": ANKLE,
         "thigh": CRANK,
-        "equality": '<weld body1="{name}_end" body2="{name}_shank" torquescale="0.5" solref="0.01 1"/>',
+        "equality": '<weld body1="{name}_end" body2="{name}_shank" anchor="0.03125 0 -0.0625" torquescale="0.5" '
+        'solref="0.01 1"/>',
     },
     "a tail": {
         "foot": FOOT,
