@@ -108,7 +108,7 @@ MUTANTS = {
     # Environments.
     "dropped clip of the action": "return array«.clip(-1.0, 1.0)→»",
     "NaN let through": "is_finite = np.«isfinite(array→ones(array.shape, bool»)",
-    "ignored seed": "RandomState(«None if random is None else checks.seed(random)→»)",
+    "ignored seed": "return np.random.RandomState(«valid_seed→»)",
     "fall reported as a time limit": "if terminated:\n            return «0.0→1.0»",
     "a new stream carries on the old one": "self._stream_begins = «True→False»  # with the next episode",
     "a new stream of an environment carries on the old one": "self._streams_begin[index] = «True→False»",
