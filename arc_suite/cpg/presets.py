@@ -173,7 +173,7 @@ PRESETS["bastion"] |= _command_presets(
     lead=0.08,
 )
 PRESETS["tick"] |= _command_presets(SightedParameters(trust=0.5), lead=0.1)
-# With a lower torso its chassis hits the ground: it fell in four of four episodes of `rough` at difficulty 1, now in none.
+# With a lower torso its chassis hits the ground: it fell in each episode of `rough` at difficulty 1, now in none.
 PRESETS["tick"]["surefooted"] = PRESETS["tick"]["surefooted"]._replace(lower=0.0)
 PRESETS["tick"]["climbing"] = ClimbingParameters(PRESETS["tick"]["surefooted"])
 PRESETS["leaper"] |= _command_presets(
