@@ -100,18 +100,18 @@ class Usage:
         self.sources.add(source)
 
 
-_recording: list[Usage] = []  # of the runs that learn in this process
+recording: list[Usage] = []  # of the runs that learn in this process; empty outside of runs
 _is_paused = contextvars.ContextVar("is_paused", default=False)  # in this thread
 
 
 @contextlib.contextmanager
 def record(usage: Usage) -> Iterator[Usage]:
     """Record the usage of a run within the context, in all threads."""
-    _recording.append(usage)
+    recording.append(usage)
     try:
         yield usage
     finally:
-        _recording.remove(usage)
+        recording.remove(usage)
 
 
 @contextlib.contextmanager
@@ -157,4 +157,4 @@ def add_source(source: str) -> None:
 
 
 def _active_usages() -> Sequence[Usage]:
-    return () if not _recording or _is_paused.get() else _recording
+    return () if _is_paused.get() else recording

@@ -138,7 +138,7 @@ class Environment(KnownAttributes, control.Environment):
         A fall terminates the episode, in its last possible step, too: its discount is 0.
         """
         timestep = super().step(action)
-        if not timestep.first():
+        if usage.recording and not timestep.first():
             usage.count_steps(1)
         # dm_control does not ask the task in the step of the time limit.
         if timestep.last() and timestep.discount and self.task.has_failed(self.physics):

@@ -283,7 +283,8 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         memory_of_inputs, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
         self._write_inputs(inputs, is_stepping)
         has_diverged = self.batch.step(task.scene.substeps, is_stepping)
-        usage.count_steps(int(np.count_nonzero(is_stepping)))
+        if usage.recording:
+            usage.count_steps(int(np.count_nonzero(is_stepping)))
         readings = task.read(self.batch.data)
         memory = trees.where(is_stepping, task.after(memory_of_inputs, readings), earlier_memory)
         self._memory = memory

@@ -107,10 +107,7 @@ def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Mo
         largest_load = max(loads[joint] for joint in joints)
         for joint in joints:
             load = max(loads[joint], _MIN_LOAD_SHARE * largest_load)
-            limit = limits_of_file.get(joint)
-            if limit is None:
-                torque = _torque_by_rule(load, inertias[joint])
-                limit = _Limit(-torque, torque, _BY_RULE)
+            limit = limits_of_file.get(joint) or _limit_by_rule(load, inertias[joint])
             exceeds_load = largest_load > 0.0 and limit.torque > _MAX_LOADS_PER_LIMIT * largest_load
             if limit.torque >= _PLACEHOLDER_TORQUE or exceeds_load:
                 limit = limit._replace(origin=_PLACEHOLDER)
@@ -155,10 +152,11 @@ def _group_joints(robot: Robot, stance: Stance) -> list[tuple[int, ...]]:
     return groups
 
 
-def _torque_by_rule(load: float, inertia: float) -> float:
-    """Return the torque limit, N m, of a motor without one in the file; without a load it still moves its link."""
+def _limit_by_rule(load: float, inertia: float) -> _Limit:
+    """Return the torque limit of a motor without one in the file; without a load it still moves its link."""
     least_load = inertia * _MIN_FREQUENCY**2 * _RULE_ERROR / _RULE_LOADS
-    return _LOADS_PER_LIMIT * max(load, least_load)
+    torque = _LOADS_PER_LIMIT * max(load, least_load)
+    return _Limit(-torque, torque, _BY_RULE)
 
 
 def _gains_by_rule(load: float, inertia: float, torque_limit: float, joint_damping: float) -> _Gains:

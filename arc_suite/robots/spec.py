@@ -797,8 +797,9 @@ class Body(_Spec):
 
     def _check_delays(self) -> None:
         """Raise SpecError for a delay of a motor that takes too many substeps."""
-        drives = [*(joint.drive for joint in self.joints), *(joint.servo for joint in self.held)]
-        longest_delay = max((drive.delay for drive in drives if drive), default=0.0)
+        drives = [joint.motor or joint.servo for joint in self.joints]
+        drives += [joint.servo for joint in self.held]
+        longest_delay = max([drive.delay for drive in drives if drive], default=0.0)
         timestep = (self.simulation or Simulation()).timestep
         highest_delay = _MAX_DELAY_SUBSTEPS * timestep
         if longest_delay > highest_delay:

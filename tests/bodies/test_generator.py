@@ -68,7 +68,7 @@ def test_even_counts_stand_in_mirrored_pairs_and_odd_ones_around():
     ("legs", "links", "message"),
     [
         (3, 3, "legs: expected an integer from 4 to 12, got 3"),
-        (6.0, 3, "legs: expected an integer from 4 to 12, got 6.0"),
+        (6.0, 3, "legs: expected an integer from 4 to 12, got 6.0; did you mean 6?"),
         (True, 3, "legs: expected an integer from 4 to 12, got True"),
         (6, 0, "links: expected an integer from 1 to 4, got 0"),
         (6, None, "links: expected an integer from 1 to 4, got None"),
