@@ -71,7 +71,9 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
         names = archive.namelist()
     folder = ROOT / "arc_suite"
     paths = [*folder.rglob("*.py"), *folder.glob("policies/packaged/*"), *folder.glob("robots/examples/*.json")]
-    paths += [folder / name for name in ("py.typed", "cpg/searched.json", "evaluation/anchors.csv")]
+    paths += [
+        folder / name for name in ("py.typed", "cpg/searched.json", "evaluation/anchors.csv", "evaluation/judging.csv")
+    ]
     paths += [folder / "animation" / name for name in ("page.html", "play.html", "design/gallery.html")]
     paths += [folder / "animation" / "web" / name for name in BUILT]
     package = {str(path.relative_to(ROOT)) for path in paths} | {"arc_suite_command.py"}
