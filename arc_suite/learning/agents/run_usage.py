@@ -20,7 +20,7 @@ def begin(configuration: Configuration, run_files: RunFolder, run_seeds: Sequenc
     algorithm = configuration.definition
     counts = {name: run_files.progress[name] for name in STEP_COUNTS if name in run_files.progress}
     if run_files.arrays is not None and not counts:  # of an earlier version
-        counts = {STEP_COUNTS[0] if algorithm.acts else STEP_COUNTS[1]: _latest_step(run_files)}
+        counts = {"environment_steps" if algorithm.acts else "steps_by_learner": _latest_step(run_files)}
     return Usage(
         name=configuration.algorithm,
         source=algorithm.source,

@@ -227,7 +227,7 @@ def _result_cells(groups: Groups) -> list[str]:
         total_cell,
         f"{' '.join(lowest_place)} {mean_scores[lowest_place]:z.2f}",
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
-        *(f"{_meanstyle_fields(name, nonempty_groups):.3f}" for name in STYLE),
+        *(f"{_mean_style(name, nonempty_groups):.3f}" for name in STYLE),
         *(_place_text(scores) for scores in groups.values()),
         _notes_text(groups),
     ]
@@ -248,7 +248,7 @@ def _place_text(scores: Sequence[RunScore]) -> str:
     return f"{mean} ({', '.join(f'{score.score:z.2f}' for score in by_seed)})" if len(scores) > 1 else mean
 
 
-def _meanstyle_fields(name: str, groups: Groups) -> float:
+def _mean_style(name: str, groups: Groups) -> float:
     """Return the mean over places of the mean size of a metric of style."""
     sizes = []
     for scores in groups.values():

@@ -180,7 +180,7 @@ def _measure_style(run: Run, folder: Path, step: str, seeds: Sequence[str]) -> l
     return rows
 
 
-def _publish_demonstrators(runs: Sequence[Run], published: Path, progress: Callable = tqdm) -> None:
+def _publish_demonstrators(runs: Sequence[Run], published: Path, progress: Callable) -> None:
     """Add the returns of standing still and of demonstrators in the places of runs that the table lacks."""
     published_returns = results.read_demonstrators(published)
     setups = {run.place: run.configuration.validation for run in runs if run.place not in published_returns}
