@@ -10,7 +10,6 @@ from arc_suite.robots.spec import SpecError
 
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 BALL = int(mujoco.mjtJoint.mjJNT_BALL)
-SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 DOWN = np.array((0.0, 0.0, -1.0))
