@@ -17,6 +17,7 @@ import types
 import numpy as np
 import programs
 import pytest
+from tqdm import tqdm
 import tiny_studies
 from refusals import refused
 
@@ -311,7 +312,7 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
 )
 def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, monkeypatch, task, presets):
     monkeypatch.setattr(evaluation, "EPISODES", 10)
-    each = run("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
-    publication._publish_demonstrators([each], tmp_path)
-    found = results.read_demonstrators(tmp_path)[each.place]
-    assert set(found) == presets and all(len(totals) == 10 for totals in found.values())
+    trained = run("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
+    publication._publish_demonstrators([trained], tmp_path, progress=tqdm)
+    returns = results.read_demonstrators(tmp_path)[trained.place]
+    assert set(returns) == presets and all(len(totals) == 10 for totals in returns.values())
