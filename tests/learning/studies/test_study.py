@@ -17,9 +17,9 @@ import types
 import numpy as np
 import programs
 import pytest
-from tqdm import tqdm
 import tiny_studies
 from refusals import refused
+from tqdm import tqdm
 
 from arc_suite import data, evaluation, policies, registry, style
 from arc_suite.bodies import generator
