@@ -25,7 +25,7 @@ from arc_suite.cli import program
 # By name: a page and the heading of a section, or a command of `make` on a page.
 SUCCESSES = {
     "train and compare": (("README", "Use"), ("first_steps", "A creature learns to walk")),
-    "pixels and a task": (("environments", "Pixels and depth"), ("adding_a_task", "Adding a task")),
+    "pixels and a task": (("observations", "Pixels and depth"), ("adding_a_task", "Adding a task")),
     "eight legs, Blender, play": (
         *(("clips", "Animation clips"), ("engines", "Clips in Blender, Godot and three.js")),
         *(("engines", "FBX, BVH and Blender"), ("play", "make web"), ("play", "Play")),

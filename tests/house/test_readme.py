@@ -25,7 +25,7 @@ README = (ROOT / "README.md").read_text()
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "examples").glob("*.md"))]
 
 # Pages whose code needs files or packages of its own; tests of their own run it.
-ELSEWHERE = {"adding_a_robot", "adding_a_task", "adding_an_algorithm", "modifiers"}
+ELSEWHERE = {"adding_a_robot", "adding_a_task", "adding_an_algorithm", "adding_an_arena", "modifiers"}
 ELSEWHERE |= {"agents", "clients", "doors", "first_steps", "gpu", "imported", "study"}
 BLOCKS = [
     pytest.param(block, id=f"{page.stem}{place}", marks=() if page.stem == "README" else pytest.mark.slow)

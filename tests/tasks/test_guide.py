@@ -1,4 +1,4 @@
-"""The guide to adding a task and an arena: its code runs, and what it adds is like the suite's own."""
+"""The guides to adding a task and an arena: their code runs, and what it adds is like the suite's own."""
 
 import functools
 import re
@@ -8,7 +8,7 @@ import pytest
 from interpreters import ROOT, printed
 from tiers import never, tiers
 
-GUIDE = (ROOT / "docs" / "adding_a_task.md").read_text()
+GUIDE = "".join((ROOT / "docs" / f"adding_{name}.md").read_text() for name in ("a_task", "an_arena"))
 CROUCHING, USING_A_TASK, LEVEL_STEER, USING_A_TERM, CIRCLING, USING_A_COMMAND, RAMPS, USING_AN_ARENA = re.findall(
     r"```python\n(.*?)```", GUIDE, re.DOTALL
 )
