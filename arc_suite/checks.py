@@ -139,9 +139,12 @@ def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
         valid: the valid extensions, each with its dot.
 
     Raises:
-        ValueError: the file has another extension.
+        ValueError: the file has another extension, or none.
     """
-    return name(Path(path).suffix.lower(), valid, "extension")
+    suffix = Path(path).suffix.lower()
+    if not suffix:
+        raise ValueError(f"{path}: expected a name that ends in {', '.join(valid)}")
+    return name(suffix, valid, "extension")
 
 
 def seed(value) -> int:

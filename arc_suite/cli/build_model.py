@@ -13,6 +13,7 @@ The body is a robot of the suite, a spec file, or one made to order:
 """
 
 import contextlib
+from pathlib import Path
 
 import imageio.v3 as imageio
 from absl import flags
@@ -65,11 +66,12 @@ def main() -> None:
     if FLAGS.render is not None:
         checks.extension(FLAGS.render, [".png"])
     _check_flags()
+    output_path = _output_from_flags()
     body = _body_from_flags()
     arena = _arena_from_flags(body)
     with contextlib.ExitStack() as stack:
-        if FLAGS.output is not None:
-            output = stack.enter_context(files.writing(FLAGS.output))
+        if output_path is not None:
+            output = stack.enter_context(files.writing(output_path))
             output.write_text(_text(body, arena), encoding="utf-8")
         elif not FLAGS.summary and FLAGS.render is None:
             print(_text(body, arena), end="")
@@ -80,8 +82,8 @@ def main() -> None:
             imageio.imwrite(picture_path, physics.render(camera_id="portrait", quality="still"))
         if FLAGS.summary:
             print(body_summary(body))
-    for path in (FLAGS.output, FLAGS.render):
-        if path:
+    for path in (output_path, FLAGS.render):
+        if path is not None:
             print(f"wrote {path}")
 
 
@@ -96,6 +98,19 @@ def _check_flags() -> None:
         refuse_flags(("visuals", "no_arena"), "goes without --json, as a spec has no decorations and no arena")
         if FLAGS.render is None:
             refuse_flags(("task", "set", "arena"), "goes without --json, as a spec has no arena")
+
+
+def _output_from_flags() -> Path | None:
+    """Return the file to write, by default with the extension of its content; None for standard output."""
+    if FLAGS.output is None:
+        return None
+    path = Path(FLAGS.output)
+    extension = ".json" if FLAGS.json else ".xml"
+    if not path.suffix and not path.exists():  # a pipe or a device keeps its name
+        return path.with_suffix(extension)
+    if not FLAGS.json and path.suffix.lower() == ".json":
+        raise ValueError(f"--output={path}: a model is .xml; --json writes the spec")
+    return path
 
 
 def _body_from_flags() -> Body:

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import warnings
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -19,6 +20,8 @@ from arc_suite.robots.spec import PALETTES, Body
 from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 MAX_COUNT = 100_000  # episodes, or bodies: more than anyone waits for
 DEFAULT_LINKS = 3  # of each leg of a body made to order
@@ -391,5 +394,13 @@ def _parse_value(text: str) -> Any:
     with contextlib.suppress(ValueError):
         return json.loads(text)
     with contextlib.suppress(ValueError):
-        return [checks.number("", json.loads(part)) for part in text.split(",")]
+        numbers = [_parse_number(part) for part in text.split(",")]
+        return numbers if "," in text else numbers[0]
     return text
+
+
+def _parse_number(text: str) -> float:
+    """Return the number of a text; .5 and 2. are numbers, too."""
+    if _NUMBER.fullmatch(text.strip()) is None:
+        raise ValueError(f"expected a number, got {text!r}")
+    return checks.number("", float(text))

@@ -153,7 +153,26 @@ def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES) -> Re
     return returns_by_policy
 
 
-def play_returns(setup: Setup, name: str, seeds: range) -> np.ndarray:
+def measure_suited_preset(setup: Setup, seeds: Sequence[int]) -> Anchors:
+    """Return the anchors of standing still and of the preset that suits task and body, measured in some episodes.
+
+    Args:
+        setup: robot, task and settings.
+        seeds: seeds of the episodes.
+    """
+    preset = suited_preset(setup.definition)
+    means = {}
+    for name in tqdm((ZERO, preset), desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
+        try:
+            means[name] = float(play_returns(setup, name, seeds).mean())
+        except ValueError:
+            if name == ZERO:
+                raise
+            # The demonstrator refuses the body, such as one whose feet hang in the air.
+    return Anchors(means[ZERO], means.get(preset), preset if preset in means else None)
+
+
+def play_returns(setup: Setup, name: str, seeds: Sequence[int]) -> np.ndarray:
     """Return the returns (episodes,) of standing still, `zero`, or of a preset of the demonstrator.
 
     Raises:

@@ -1,6 +1,7 @@
 """Evaluation of a policy in a setup: `evaluate` plays the episodes, and a report holds and prints their results."""
 
 import functools
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -48,7 +49,8 @@ class Report(NamedTuple):
         preset: preset of the demonstrator; None for another policy.
         returns: over the episodes.
         zero: mean return of standing still.
-        score: 0 for standing still, 1 for the best demonstrator; None where no anchors are committed.
+        score: 0 for standing still, 1 for the best demonstrator where its returns are committed, elsewhere for the
+            preset that suits task and body; None where it earns no more than standing still.
         length: control steps.
         progress: the task's metrics by name.
         expert: return of the paper's demonstrator; None for other setups than the paper's.
@@ -190,17 +192,22 @@ def report(
     setup, policy, environment, preset = evaluated
     episodes = protocol.episodes(environment, policy, progress(seeds))
     returns = statistics.summary([episode.total for episode in episodes])
+    first_seeds = seeds[:CURVE_EPISODES]
     anchor_returns = anchors.committed_returns(setup)
-    score = None
-    if anchor_returns is not None:
-        score = float(anchors.of_returns(anchor_returns, seeds).score(returns.mean))
+    if anchor_returns is None:
+        scale = anchors.measure_suited_preset(setup, first_seeds)
+        zero = scale.zero
+    else:
+        scale = anchors.of_returns(anchor_returns, seeds)
+        zero = float(anchors.play_returns(setup, anchors.ZERO, first_seeds).mean())
+    score = float(scale.score(returns.mean))
     metrics = episodes[0].progress
     return Report(
         setup=setup,
         preset=preset,
         returns=returns,
-        zero=float(anchors.play_returns(setup, anchors.ZERO, seeds[:CURVE_EPISODES]).mean()),
-        score=score,
+        zero=zero,
+        score=score if math.isfinite(score) else None,
         length=statistics.summary([episode.length for episode in episodes]),
         progress={name: statistics.summary([episode.progress[name] for episode in episodes]) for name in metrics},
         expert=protocol.expert_return(setup),

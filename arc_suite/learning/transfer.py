@@ -146,11 +146,11 @@ def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mappi
         autoreset_mode=AutoresetMode.DISABLED,
         task_kwargs=settings,
     )
-    with contextlib.closing(environment):
+    with contextlib.closing(environment), tqdm(total=3 * STEPS, desc="control steps", leave=False, disable=None) as bar:
         standing_still = Script(lambda seed: (), *environment.action_space.shape)
-        policy_episodes = _play_episodes(environment, network)
-        demonstrator_episodes = _play_episodes(environment, Teacher(environment))
-        zero_episodes = _play_episodes(environment, standing_still)
+        policy_episodes = _play_episodes(environment, network, bar)
+        demonstrator_episodes = _play_episodes(environment, Teacher(environment), bar)
+        zero_episodes = _play_episodes(environment, standing_still, bar)
     names = [body.name for body in bodies]
     episodes = zip(names, policy_episodes, demonstrator_episodes, zero_episodes, strict=True)
     return [Comparison(*body_episodes) for body_episodes in episodes]
@@ -193,8 +193,14 @@ def _summed_score(comparisons: list[Comparison]) -> float:
     return float(policy_gain / demonstrator_gain)
 
 
-def _play_episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
-    """Play an episode in every environment, from the seed of its index, and judge the walks."""
+def _play_episodes(environment: BodiesEnv, policy: Policy, bar: tqdm) -> list[Judged]:
+    """Play an episode in every environment, from the seed of its index, and judge the walks.
+
+    Args:
+        environment: environments of all bodies.
+        policy: made for them.
+        bar: progress bar, which counts control steps.
+    """
     # Lists of arrays (num_envs, ...) at the start and after every control step.
     step_positions = []
     step_targets = []
@@ -209,6 +215,7 @@ def _play_episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
         step_targets.append(list(map(walking.target, environment.tasks, blocks, positions)))
         # A batch has no list of its contacts; the observed forces on the torso are those of the ground.
         step_touching.append(playing & [block["contact_forces"][:6].any() for block in blocks])
+        bar.update(int(playing.any()))
         step_fallen.append(playing & walking.has_fallen(terminated, environment.quaternions()))
 
     episodes = protocol.episodes_in_batch(environment, policy, range(environment.num_envs), watch)

@@ -107,11 +107,20 @@ def test_summary_prints_the_figures_alone():
         ),
         (["--legs=5", "--layout=row"], "flag --layout=row: expected pairs or radial"),
         (["--legs=4", "--render=x.txt"], "unknown extension '.txt' (there are: .png)"),
+        (["--legs=4", "--render=x"], "x: expected a name that ends in .png"),
+        (["--legs=4", "--output=x.json"], "--output=x.json: a model is .xml; --json writes the spec"),
         (["--spec=missing.json"], "cannot read missing.json: no such file or directory"),
     ],
 )
 def test_bad_arguments_are_one_line(arguments, message):
     programs.refused(build_model(*arguments), f"arc-suite build_model: {message}\n")
+
+
+def test_a_name_without_an_extension_gets_that_of_what_is_written(tmp_path):
+    for flags, name in (((), "walker.xml"), (("--json",), "walker.json")):
+        done = build_model("--legs=4", *flags, "--output", tmp_path / "walker")
+        assert programs.passed(done) == f"wrote {tmp_path / name}\n"
+        assert (tmp_path / name).stat().st_size > 1000
 
 
 def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):

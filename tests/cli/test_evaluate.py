@@ -36,8 +36,15 @@ def test_table_of_all_robots(tmp_path):
     for row in rows:  # standing earns more than a fall
         total, zero = float(row.split()[4]), float(row.split()[7])
         assert zero == pytest.approx(reports[row.split()[0]]["zero_return"], abs=0.05)
-        assert row.split()[8] == "-" and reports[row.split()[0]]["score"] is None  # of a task with settings
+        assert float(row.split()[8]) == pytest.approx(reports[row.split()[0]]["score"], abs=0.005)
         assert total < zero == pytest.approx(163.0, abs=20.0)
+
+
+@pytest.mark.parametrize("body", ["--spec=spider", "--legs=7"])
+def test_a_body_of_the_users_has_a_score(body):
+    """Of its demonstrator against standing still, in the same episode."""
+    *_, row = evaluated(body, "--episodes=1", "--set=time_limit=2")
+    assert float(row.split()[9]) == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.parametrize(("robot", "strength"), [("queen", None), ("leaper", 137)])

@@ -83,10 +83,11 @@ flags.FLAGS(["program", *sys.argv[1:]])
 print(task_from_flags())
 """
     settings = ["a=1", "b=2.5", "c=ripple", 'd="ripple"', 'e={"x": [1, null]}', "f=x=y", "g=", "h=Infinity", "i=true"]
-    settings += ["j=0.5,1.2", "k=0.5,b", "l=1,NaN"]
+    settings += ["j=0.5,1.2", "k=0.5,b", "l=1,NaN", "m=.5", "n=-2.", "o=.5,2", "p=."]
     printed = interpreters.printed(code, *(f"--set={setting}" for setting in settings))
     expected = {"a": 1, "b": 2.5, "c": "ripple", "d": "ripple", "e": {"x": [1, None]}, "f": "x=y", "g": ""}
     expected |= {"h": float("inf"), "i": True, "j": [0.5, 1.2], "k": "0.5,b", "l": "1,NaN"}
+    expected |= {"m": 0.5, "n": -2.0, "o": [0.5, 2.0], "p": "."}
     assert printed == [f"{('walk', expected)}"]
 
 

@@ -23,7 +23,7 @@ def test_the_program_prints_and_writes_the_same(tmp_path):
     written = json.loads(path.read_text())["robots"]["queen"]
     assert written["return"]["mean"] == report.returns.mean and written["preset"] == report.preset == "refined"
     assert written["episodes"][1]["total"] == report.episodes[1].total
-    assert report.score is None and report.returns.episodes == 2
+    assert written["score"] == report.score and report.returns.episodes == 2
 
 
 def test_policies_of_any_kind():
