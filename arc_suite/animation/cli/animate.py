@@ -12,7 +12,8 @@ Metrics go to .clips.json. One policy makes all clips, each under a command of i
 of the gait and hold the same number of cycles. start and stop connect idle and walk. tuned and refined are presets of
 the four robots' demonstrators, with a gait of their own. A clip that cannot be made is left out with a line. A motion
 (.npz) is what `arc-suite motion` and tasks read; --clips takes motions, too. A film (.mp4, .gif, .webp) shows one clip,
-in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction.
+in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction; its
+cells, rate and ground line go to .sprites.json, as Aseprite writes them.
 """
 
 import math
@@ -84,11 +85,10 @@ def main() -> None:
         progress=progress,
         **options,
     )
-    if FLAGS.output.lower().endswith(".glb"):
+    if FLAGS.output.lower().endswith(clip_files.GLB_EXTENSION):
         print_table(clips)
-        print(f"wrote {FLAGS.output} and {clip_files.metrics_file(FLAGS.output)}")
-    else:
-        print(f"wrote {FLAGS.output}")
+    metrics = clip_files.metrics_file(FLAGS.output)
+    print(f"wrote {FLAGS.output}" if metrics is None else f"wrote {FLAGS.output} and {metrics}")
 
 
 def print_table(clips: list[catalog.Clip]) -> None:

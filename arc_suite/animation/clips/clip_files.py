@@ -10,7 +10,7 @@ from typing import Any
 from tqdm import tqdm
 
 from arc_suite import checks, files, motions, versions
-from arc_suite.animation.clips import catalog, filming
+from arc_suite.animation.clips import catalog, filming, sprites
 from arc_suite.animation.clips.catalog import ALL, DEFAULT
 from arc_suite.animation.clips.clips import FPS, Clip
 from arc_suite.animation.clips.clips import clips as make_clips
@@ -44,6 +44,8 @@ OPTION_BOUNDS = {"size": (16, MAX_HEIGHT), "directions": (1, 64), "triangles": (
 DEFAULT_SIZE = 480  # pixels, width and height of a picture
 DEFAULT_DIRECTIONS = 8  # of a sheet
 
+# Suffixes of the JSON files next to files. A spec of the same name, .json, stays as it is.
+_METRICS_SUFFIXES = {GLB_EXTENSION: ".clips.json", SHEET_EXTENSION: ".sprites.json"}
 _MAX_SHEET_WIDTH = 16384  # pixels
 _BLENDER_EXTENSIONS = (".fbx", ".bvh", ".blend")  # of the files that tools/to_fbx.py writes
 
@@ -66,7 +68,8 @@ def animate(
     """Write animation clips of a body, as `arc-suite animate` does, and return them.
 
     The extension of the path says what is written: `.glb`, with metrics in `.clips.json`; one clip as a motion,
-    `.npz`, see `arc_suite.motions`; one as a film, `.mp4`, `.gif` or `.webp`; or one as a sheet of sprites, `.png`.
+    `.npz`, see `arc_suite.motions`; one as a film, `.mp4`, `.gif` or `.webp`; or one as a sheet of sprites, `.png`,
+    with its cells in `.sprites.json`, see `sprites.describe_sheet`.
 
     Args:
         robot, task, task_kwargs: see `arc_suite.load`.
@@ -87,11 +90,10 @@ def animate(
     names = [clips] if isinstance(clips, str) else list(clips)
     path = Path(path)
     extension = _check_arguments(path, names, fps, options)
-    metrics_path = metrics_file(path) if extension == GLB_EXTENSION else None
     recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
     with contextlib.ExitStack() as stack:
         temporary = stack.enter_context(files.writing(path))
-        metrics = stack.enter_context(files.writing_json(metrics_path))
+        metrics = stack.enter_context(files.writing_json(metrics_file(path)))
         if names == [ALL]:
             names = catalog.clip_names()
         catalog_names = [name for name in names if not _is_motion(name)]
@@ -104,7 +106,7 @@ def animate(
         elif extension == motion_files.EXTENSION:
             motions.save(motion_of_clip(setup.body, made_clips[0]), temporary)
         elif extension == SHEET_EXTENSION:
-            _write_sheet(temporary, setup.body, made_clips[0], **options)
+            metrics |= _write_sheet(temporary, path.name, setup.body, made_clips[0], **options)
         else:
             _write_film(temporary, extension, setup.body, made_clips[0], progress, **options)
     return made_clips
@@ -125,9 +127,11 @@ def _check_names(clips: Sequence[Clip]) -> None:
         raise ValueError(f"clips: expected each name once, got {', '.join(names)}")
 
 
-def metrics_file(path: str | os.PathLike) -> Path:
-    """Return the file next to a glTF file that holds the metrics of its clips."""
-    return Path(path).with_suffix(".clips.json")
+def metrics_file(path: str | os.PathLike) -> Path | None:
+    """Return the file next to a glTF file or a sheet that says what is in it; None for files of other kinds."""
+    path = Path(path)
+    suffix = _METRICS_SUFFIXES.get(path.suffix.lower())
+    return None if suffix is None else path.with_suffix(suffix)
 
 
 def _check_arguments(path: Path, names: Sequence[str], fps: float, options: Mapping[str, Any]) -> str:
@@ -190,15 +194,17 @@ def _write_film(
 
 def _write_sheet(
     path: Path,
+    name: str,
     body: Body,
     clip: Clip,
     size: int = DEFAULT_SIZE,
     transparent: bool = False,
     directions: int = DEFAULT_DIRECTIONS,
-) -> None:
-    """Write a sheet of sprites of a clip."""
+) -> dict[str, Any]:
+    """Write a sheet of sprites of a clip, and return its description, given the name that the file will have."""
     width = size * len(clip.times)
     if width > _MAX_SHEET_WIDTH:
         raise ValueError(f"the sheet is {width} pixels wide, more than {_MAX_SHEET_WIDTH}; lower fps or size")
     sheet = filming.sprite_sheet(body, clip, size, directions, transparent)
-    films.write_png(path, [sheet], 0.0)
+    films.write_png(path, [sheet.picture], 0.0)
+    return sprites.describe_sheet(name, clip, sheet)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,32 @@ _TRANSPARENT_QUALITY = pictures.QUALITIES["still"]
 _OPAQUE_QUALITY = pictures.QUALITIES["film"]
 
 
+class Sheet(NamedTuple):
+    """A sheet of sprites.
+
+    Attributes:
+        picture: (height, width, 3 or 4) uint8, of square cells: a row for each direction, a column for each frame.
+        cell_size: width and height of a cell, pixels.
+        ground_line: where the ground below the torso is in each cell, pixels from its top.
+    """
+
+    picture: np.ndarray
+    cell_size: int
+    ground_line: float
+
+
+class _Stage(NamedTuple):
+    """A model to draw.
+
+    Attributes:
+        drawing: with the free camera on all of the body.
+        ground_line: where the ground below the torso is in a picture, as a share of its height from the top.
+    """
+
+    drawing: pictures.Decorated
+    ground_line: float
+
+
 def film_pictures(
     body: Body, clip: Clip, size: int, transparent: bool = False, turntable: bool = False, heading: float = 0.0
 ) -> Iterator[np.ndarray]:
@@ -50,7 +77,8 @@ def film_pictures(
     frames = np.arange(picture_count) % _count_frames(clip)
     turn = 2.0 * np.pi if turntable else 0.0
     headings = heading + np.linspace(0.0, turn, picture_count, endpoint=False)
-    yield from _render(body, clip, frames, headings, size, transparent)
+    stage, positions = _open_stage(body, clip, frames, headings, transparent)
+    yield from _render(stage, positions, size, transparent)
 
 
 def count_film_pictures(clip: Clip, turntable: bool = False) -> int:
@@ -61,8 +89,8 @@ def count_film_pictures(clip: Clip, turntable: bool = False) -> int:
     return repetitions * _count_frames(clip)
 
 
-def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent: bool = False) -> np.ndarray:
-    """Return one picture with a row for each direction and a column for each frame of the clip.
+def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent: bool = False) -> Sheet:
+    """Return a sheet with a row for each direction and a column for each frame of the clip.
 
     The first row goes to the right in the picture; each next one is turned further to the left. Other arguments are
     those of `film_pictures`.
@@ -77,11 +105,12 @@ def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent
     columns = _count_frames(clip)
     frames = np.tile(np.arange(columns), directions)
     headings = np.repeat(2.0 * np.pi * np.arange(directions) / directions, columns)
-    squares = list(_render(body, clip, frames, headings, size, transparent))
+    stage, positions = _open_stage(body, clip, frames, headings, transparent)
+    squares = list(_render(stage, positions, size, transparent))
     sheet_rows = []
     for first in range(0, len(squares), columns):
         sheet_rows.append(np.concatenate(squares[first : first + columns], axis=1))
-    return np.concatenate(sheet_rows)
+    return Sheet(np.concatenate(sheet_rows), size, size * stage.ground_line)
 
 
 def _count_frames(clip: Clip) -> int:
@@ -91,8 +120,8 @@ def _count_frames(clip: Clip) -> int:
     return len(clip.times)
 
 
-def _render(body: Body, clip: Clip, frames, headings, size: int, transparent: bool) -> Iterator[np.ndarray]:
-    """Yield pictures (size, size, channels) of frames (n,) under headings (n,), rad, with the root at 0."""
+def _open_stage(body: Body, clip: Clip, frames, headings, transparent: bool) -> tuple[_Stage, np.ndarray]:
+    """Return a stage, and positions (n, nq) for frames (n,) under headings (n,), rad, with the root at 0."""
     motion_in_place = clip.motion._replace(root=np.zeros_like(clip.motion.root))
     poses = motion_in_place.poses()[frames]
     poses[:, :2] = rotations.to_heading_frame(poses[:, :2], -headings)
@@ -100,22 +129,26 @@ def _render(body: Body, clip: Clip, frames, headings, size: int, transparent: bo
     model = compile_model(body)
     positions = readings.positions(poses, readings.layout(model, body), standing_qpos(model))
     framed_positions = positions[: _count_frames(clip)]
-    stage = opengl.call(lambda: _prepare_stage(body, framed_positions, transparent))
+    return opengl.call(lambda: _prepare_stage(body, framed_positions, transparent)), positions
+
+
+def _render(stage: _Stage, positions: np.ndarray, size: int, transparent: bool) -> Iterator[np.ndarray]:
+    """Yield pictures (size, size, channels) of positions (n, nq), and free the stage."""
     try:
         for qpos in positions:
-            yield opengl.call(lambda qpos=qpos: _render_pose(stage, qpos, size, transparent))
+            yield opengl.call(lambda qpos=qpos: _render_pose(stage.drawing, qpos, size, transparent))
     finally:
-        opengl.call(stage.free)
+        opengl.call(stage.drawing.free)
 
 
-def _prepare_stage(body: Body, positions: np.ndarray, transparent: bool) -> pictures.Decorated:
+def _prepare_stage(body: Body, positions: np.ndarray, transparent: bool) -> _Stage:
     """Return a model to draw, with the free camera on all of the body in all positions (n, nq)."""
     if transparent:
-        stage = pictures.Decorated.from_body(body, quality=_TRANSPARENT_QUALITY, ground=_NO_GROUND)
+        drawing = pictures.Decorated.from_body(body, quality=_TRANSPARENT_QUALITY, ground=_NO_GROUND)
     else:
-        stage = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
-    model = stage.model.ptr
-    radius, height = _bounding_cylinder(stage, positions)
+        drawing = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
+    model = drawing.model.ptr
+    radius, height = _bounding_cylinder(drawing, positions)
     camera = model.vis.global_
     camera.azimuth = _AZIMUTH
     camera.elevation = _ELEVATION
@@ -124,7 +157,10 @@ def _prepare_stage(body: Body, positions: np.ndarray, transparent: bool) -> pict
     distance = _FRAMING * math.hypot(radius, 0.5 * height) / math.sin(half_view)
     model.vis.map.shadowclip *= model.stat.extent * _EXTENTS_TO_CAMERA / distance
     model.stat.extent = distance / _EXTENTS_TO_CAMERA
-    return stage
+    # The ground is half a height below the point that the camera looks at.
+    depth = distance - 0.5 * height * math.sin(math.radians(_ELEVATION))
+    drop = 0.5 * height * math.cos(math.radians(_ELEVATION))
+    return _Stage(drawing, 0.5 + 0.5 * drop / (depth * math.tan(half_view)))
 
 
 def _bounding_cylinder(stage: pictures.Decorated, positions: np.ndarray) -> tuple[float, float]:

@@ -1,8 +1,11 @@
 """Films and sheets of clips: the body alone or on plain ground, from all around."""
 
+import json
+
 import numpy as np
 import pytest
 
+from arc_suite import animation
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import filming
 from arc_suite.envs.setup import Setup
@@ -19,12 +22,14 @@ def idle():
 
 @pytest.mark.slow
 def test_a_sheet_has_a_row_for_each_direction(idle):
-    sheet = filming.sprite_sheet(BODY, idle, SIZE, 4, transparent=True)
-    columns = len(idle.times) - 1
+    made = filming.sprite_sheet(BODY, idle, SIZE, 4, transparent=True)
+    sheet, columns = made.picture, len(idle.times) - 1
     assert sheet.shape == (4 * SIZE, columns * SIZE, 4) and sheet.dtype == np.uint8
     rows = [row[:, :SIZE] for row in np.split(sheet, 4)]
     for row in rows:
         assert 0.1 < (row[..., 3] > 0).mean() < 0.7 and not row[[0, -1], :, 3].any() and not row[:, [0, -1], 3].any()
+    lowest = [np.flatnonzero(row[..., 3].any(axis=1)).max() for row in rows]  # of feet nearer than the torso
+    assert made.ground_line < min(lowest) < made.ground_line + 0.2 * SIZE
     # Seen from either side the outline is the same, mirrored.
     assert abs(rows[0][..., 3].astype(int) - rows[2][:, ::-1, 3]).mean() < 25.0
     assert abs(rows[0][..., 3].astype(int) - rows[1][..., 3]).mean() > 5.0
@@ -39,3 +44,23 @@ def test_a_film_is_as_long_as_its_loop(idle):
     assert len(turning) == len(plain) * round(6.0 / idle.motion.seconds)
     np.testing.assert_array_equal(turning[0], plain[0])
     assert (turning[-1] != plain[-1]).any()
+
+
+@pytest.mark.slow
+def test_an_importer_reads_where_cells_are(tmp_path):
+    """The names are those of Aseprite's arrays: Phaser and PixiJS look frames up by their number."""
+    animation.animate("tick", tmp_path / "tick.PNG", "idle", fps=3, size=32, directions=2)
+    sheet = json.loads((tmp_path / "tick.sprites.json").read_text())
+    frames, meta = sheet["frames"], sheet["meta"]
+    columns = meta["columns"]
+    assert meta["image"] == "tick.PNG" and meta["rows"] == 2
+    assert meta["size"] == {"w": 32 * columns, "h": 64} and meta["format"] == "RGB888"
+    assert [frame["filename"] for frame in frames] == [str(number) for number in range(2 * columns)]
+    assert frames[columns + 1]["frame"] == {"x": 32, "y": 32, "w": 32, "h": 32}
+    assert [(tag["name"], tag["from"], tag["to"]) for tag in meta["frameTags"]] == [
+        ("idle_0", 0, columns - 1),
+        ("idle_180", columns, 2 * columns - 1),
+    ]
+    milliseconds = sum(frame["duration"] for frame in frames[:columns])
+    assert milliseconds == round(1000.0 * columns / meta["fps"]) and "repeat" not in meta["frameTags"][0]
+    assert frames[-1]["anchor"] == {"x": 0.5, "y": pytest.approx(meta["ground_line"] / 32, abs=1e-3)}
