@@ -20,9 +20,11 @@ import re
 import sys
 import tempfile
 from typing import Any, NamedTuple
+from unittest import mock
 
 try:
     import bpy
+    from io_scene_fbx import fbx_utils  # of Blender, next to bpy
 except ImportError as error:
     sys.exit(f"to_fbx: {error}: pip install bpy==5.0.1, in an environment of its own")
 import numpy as np
@@ -31,6 +33,9 @@ FPS = 60  # clips last whole frames at this rate
 MAX_METADATA_BYTES = 64 * 2**20  # of a .clips.json
 TORSO_SHIFT = 1e-7  # m
 MAX_ROUNDING_ERROR = 1e-3  # frames, of a time that the file rounds
+MAX_CONSTANT_CHANGE = 1e-5  # degrees, m, or of a scale, of a curve that is taken for constant
+FRAME_AT_REST = -1  # before all clips
+ROTATION = "R"  # FBX's name of the node of a rotation
 MAX_OFF_AXIS = 1e-4  # components of a hinge's quaternion about other axes
 ARMATURE_NAME = "Armature"  # importers of engines leave a bone of this name out of the skeleton
 CONTACTS_PROPERTY = "foot_contacts"  # of the armature
@@ -219,16 +224,34 @@ def write_fbx(armature: bpy.types.Object, path: pathlib.Path) -> None:
     armature.animation_data.action = None
     for track in armature.animation_data.nla_tracks:
         track.mute = False
-    bpy.ops.export_scene.fbx(
-        filepath=str(path),
-        object_types={"ARMATURE", "MESH"},
-        apply_scale_options="FBX_SCALE_ALL",
-        add_leaf_bones=False,
-        use_custom_props=True,
-        bake_anim_use_nla_strips=True,  # whose names are those of clips
-        bake_anim_use_all_actions=False,
-        bake_anim_simplify_factor=0.0,
-    )
+        for strip in track.strips:
+            strip.extrapolation = "NOTHING"
+    bpy.context.scene.frame_set(FRAME_AT_REST)  # bones without curves then stay as in the bind pose
+    with mock.patch.object(fbx_utils.AnimationCurveNodeWrapper, "simplify", _leave_out_constant_curves):
+        bpy.ops.export_scene.fbx(
+            filepath=str(path),
+            object_types={"ARMATURE", "MESH"},
+            apply_scale_options="FBX_SCALE_ALL",
+            add_leaf_bones=False,
+            use_custom_props=True,
+            bake_anim_use_nla_strips=True,  # whose names are those of clips
+            bake_anim_use_all_actions=False,
+        )
+
+
+def _leave_out_constant_curves(node: Any, *_: Any) -> None:
+    """Choose the keys of a node's curves: all of a curve that changes, the first and the last of one that does not.
+
+    A node that stays as in the bind pose has no curves, except a rotation: some importers need a curve of each bone.
+    Blender's exporter would key nine curves of each bone at each frame.
+    """
+    keys = node._frame_write_mask_array  # (curves, frames), what is written
+    values = node._frame_values_array
+    changes = np.ptp(values, axis=1) > MAX_CONSTANT_CHANGE
+    moves = changes.any() or abs(values[:, 0] - node.default_values).max() > MAX_CONSTANT_CHANGE
+    keys[:] = changes[:, None]
+    if moves or ROTATION in node.fbx_gname:
+        keys[:, [0, -1]] = True
 
 
 def write_bvh(armature: bpy.types.Object, path: pathlib.Path) -> None:

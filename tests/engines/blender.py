@@ -17,6 +17,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tools"))
 import to_fbx  # noqa: E402
 
 NEAR = 1e-5  # m
+MOST_BYTES = 3.0  # of an FBX file, times those of its .glb
 STRAIGHT = 1e-6  # of a cosine: a hinge is an axis of its bone
 BOUND = 0.01  # standing heights of the lowest point from the ground
 CONVERTED = ("queen", "spider")
@@ -128,16 +129,18 @@ def converted(path: pathlib.Path, truth, parts, wholly: bool) -> str:
         folder = pathlib.Path(name)
         for kind in to_fbx.WRITERS if wholly else (".fbx",):
             to_fbx.convert(path, folder / f"body{kind}")
+        larger = (folder / "body.fbx").stat().st_size / path.stat().st_size
+        assert larger < MOST_BYTES, larger
         markers = {
             name: [[f"{each['foot']} {each['event']}", round(60.0 * each["time"])] for each in clip["foot_contacts"]]
             for name, clip in clips.items()
         }
-        told = []
+        told = [f".fbx {larger:.1f} times as large"]
         for kind in (".fbx", ".blend") if wholly else (".fbx",):
             told.append(f"{kind} within {read(folder / f'body{kind}', truth, parts):.1e} m")
             assert json.loads(only("ARMATURE")["foot_contacts"]) == markers
         if not wholly:
-            return told[0]
+            return ", ".join(told)
         marked(clips, markers)
         walk = "walk_loop"
         bpy.ops.wm.read_factory_settings(use_empty=True)
