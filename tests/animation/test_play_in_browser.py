@@ -25,6 +25,7 @@ def page(tmp_path_factory):
         play_pages.creature(ROBOTS["tick"]),
         play_pages.creature(generator.generate(6, 3)),
         play_pages.creature(ROBOTS["queen"], "ppo"),
+        play_pages.creature(ROBOTS["queen"]),
     ]
     path.write_text(play_pages.page(bodies), "utf-8")
     return path
@@ -228,7 +229,7 @@ def test_the_pointer_pulls(tab):
 
 
 def test_bodies_and_grounds_are_chosen(tab):
-    assert tab.locator("#body option").all_text_contents() == ["tick", "walker_6x3", "queen"]
+    assert tab.locator("#body option").all_text_contents() == ["tick", "walker_6x3", "queen", "queen"]
     tab.select_option("#ground", "bumps")
     tab.keyboard.down("ArrowUp")
     heights = [advanced(tab, 1.0)[0][2] for _ in range(6)]
@@ -266,13 +267,14 @@ def test_a_fallen_body_gets_up(tab):
     assert tab.evaluate("!play.state.play.simulation.fell && play.state.play.simulation.count > 2000")  # no restart
 
 
-def test_a_body_that_cannot_get_up_restarts(tab):
-    """On its back, no leg of Queen reaches the ground."""
-    tab.select_option("#body", "2")
+@pytest.mark.parametrize(("body", "seconds"), [("2", 1.5), ("3", 8.0)], ids=["a policy of walk", "a demonstrator"])
+def test_a_body_that_cannot_get_up_restarts(tab, body, seconds):
+    """On its back, no leg of Queen reaches the ground; a policy of walk does not try to get up."""
+    tab.select_option("#body", body)
     tab.evaluate("play.state.play.simulation.data.qpos.set([0, 0, 0.4, 0, 1, 0, 0])")
-    advanced(tab, 6.0)
+    advanced(tab, seconds - 0.5)
     assert tab.evaluate("play.state.play.simulation.fell")
-    _, _, z, w, *_ = advanced(tab, 3.5)[0]
+    _, _, z, w, *_ = advanced(tab, 1.5)[0]
     assert w > 0.9 and z > 0.7 * ROBOTS["queen"].torso.standing_height
 
 
@@ -400,7 +402,7 @@ def other(tab):
     return tab.evaluate("(({ task: { place, fell } }) => [...place, fell])(play.state.play.simulation.minds[1])")
 
 
-def test_another_body_is_pushed_and_rises_where_it_lies(tab):
+def test_another_body_is_pushed_and_rises_near_where_it_lies(tab):
     tab.select_option("#mode", "rival")
     advanced(tab, 1.0)
     start = other(tab)
@@ -415,7 +417,7 @@ def test_another_body_is_pushed_and_rises_where_it_lies(tab):
     assert other(tab)[-1]
     advanced(tab, 1.5)
     x, y, _, fell = other(tab)
-    assert (x, y) == pytest.approx((3.0, 0.5), abs=0.15) and not fell
+    assert math.hypot(x - 3.0, y - 0.5) < 1.0 and not fell  # its policy rolls it over
     tab.evaluate("play.state.play.draw()")
 
 

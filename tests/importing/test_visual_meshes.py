@@ -5,12 +5,13 @@ import pathlib
 import struct
 import sys
 
+import gltf_reader
 import mujoco
 import numpy as np
 import pytest
 
 from arc_suite import models, registry
-from arc_suite.animation import parts
+from arc_suite.animation import clips, parts
 from arc_suite.importing import import_robot
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 
@@ -192,6 +193,14 @@ def test_a_mesh_keeps_its_color(kind, tmp_path):
     assert materials["visual_color0"].color == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
     assert [shape.kind for part in described for shape in part.shapes if shape.material == "visual_color0"] == ["hull"]
     assert "visual_color0" not in parts.describe_body(body.replace(palette="moss"))[1]
+    for options in ({}, {"uv": True}, {"triangles": 800}):
+        file = gltf_reader.read(clips.glb(body, [], **options))
+        (material,) = [place for place, each in enumerate(file.json["materials"]) if each["name"] == "visual_color0"]
+        color = file.json["materials"][material]["pbrMetallicRoughness"]["baseColorFactor"]
+        assert color == pytest.approx((0.01, 0.033, 0.073, 1.0), abs=1e-3)  # linear
+        primitives = [primitive for mesh in file.json["meshes"] for primitive in mesh["primitives"]]
+        (shown,) = [each for each in primitives if each["material"] == material]
+        assert len(file.arrays[shown["indices"]]) == 3 * len(FACES)
 
 
 @pytest.mark.parametrize("rgba", ["", "1 0", "a b c d", "nan 0 0 1"])
