@@ -12,7 +12,6 @@ from arc_suite.cpg.drives import drive
 from arc_suite.cpg.law import Clock, proprioception
 from arc_suite.models.sizing import size_body
 from arc_suite.models.standing import measure_standing, mechanics_of_poses
-from arc_suite.motions.motion import MAX_PLANTED_HEIGHT
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.motion_tables import MotionTables, split_next_angles
 
@@ -50,9 +49,7 @@ class Tracked:
         self._tables = tables
         self._control_timestep = task.scene.control_timestep
         torques = np.array([joint.torque for joint in body.joints])
-        radii = np.array([leg.foot.radius for leg in body.legs])
-        is_planted = tables.feet[..., 2] - radii < MAX_PLANTED_HEIGHT * body.torso.standing_height
-        mechanics = mechanics_of_poses(body, zip(tables.angles, is_planted, strict=True))
+        mechanics = mechanics_of_poses(body, zip(tables.angles, tables.planted, strict=True))
         self._loads = np.stack([pose.loads for pose in mechanics]) / torques  # (rows, joints)
 
     def initial(self, count: int) -> Clock:

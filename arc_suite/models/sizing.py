@@ -55,6 +55,11 @@ def simulation(body: Body) -> Simulation:
     )
 
 
+def sole_clearance(body: Body) -> float:
+    """Return how high soles are over level ground that carries the body, m: the margins of a foot and of the ground."""
+    return 2.0 * simulation(body).contact_margin
+
+
 def natural_frequency(body: Body) -> float:
     """Return the natural frequency of the position control of the body's joints, rad/s."""
     return _FREQUENCY_SHARE / control_timestep(body)

@@ -2,6 +2,8 @@
 
 A motion becomes a cycle of whole control steps: its duration changes by up to half a step. A loop goes on where it
 ends; any other motion returns to its first pose, and so becomes a loop. Places in a cycle are relative to its start.
+Soles of a motion stand on the ground. In the physics they rest above it, by the margins of contacts, and tables are
+higher than the motion by as much.
 """
 
 from collections.abc import Sequence
@@ -10,9 +12,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from arc_suite import motions, rotations
+from arc_suite.models import sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.motions import Motion
-from arc_suite.motions.motion import find_soles
+from arc_suite.motions.motion import MAX_PLANTED_HEIGHT, find_soles
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 
@@ -34,11 +37,12 @@ class MotionTables(NamedTuple):
         counts: (motions,) rows in a cycle of each motion.
         mirror_offset: rows from a motion to its mirror image; 0 for a body without one.
         places: (rows, 3) of the torso: x and y, m, and yaw, rad, from the start of the cycle.
-        heights: (rows,) of the torso, m.
+        heights: (rows,) of the torso, as high as a body in contact carries it, m.
         quaternions: (rows, 4) of the torso, w first, in the frame of the start of the cycle.
         angles: (rows, joints) from the standing pose, rad.
         velocities: (rows, 6 + joints) as in `Readings`, in the frame of the start of the cycle.
         feet: (rows, legs, 3) centers of feet: forward and left of the torso, and over the ground, m.
+        planted: (rows, legs) whether a foot stands on the ground.
         circle: (rows, 2) sine and cosine of the share of the cycle.
         angle_spreads: (motions, joints) standard deviations of angles, rad; those of the mirror images follow.
         rate_spreads: the same of joint velocities, rad/s.
@@ -54,6 +58,7 @@ class MotionTables(NamedTuple):
     angles: np.ndarray
     velocities: np.ndarray
     feet: np.ndarray
+    planted: np.ndarray
     circle: np.ndarray
     angle_spreads: np.ndarray
     rate_spreads: np.ndarray
@@ -140,7 +145,9 @@ def _tabulate(body: Body, loop: Motion, count: int, rate_unit: float) -> MotionT
     legs = Legs.of(body)
     soles = find_soles(legs, positions, quaternions, angles)  # edits of frames may have left `soles` behind
     from_torso = rotations.to_heading_frame((soles - positions[:, None])[..., :2], yaw[:, None])
-    center_heights = soles[..., 2:] + legs.radii[:, None]
+    clearance = sizing.sole_clearance(body)
+    standing_height = body.torso.standing_height
+    center_heights = soles[..., 2:] + legs.radii[:, None] + clearance
     in_cycle = np.arange(rows) % count
     turns = yaw - yaw[in_cycle]
     linear = velocities.linear[in_cycle]
@@ -155,13 +162,14 @@ def _tabulate(body: Body, loop: Motion, count: int, rate_unit: float) -> MotionT
         counts=np.array([count]),
         mirror_offset=0,
         places=np.concatenate([positions[:, :2], yaw[:, None]], axis=-1),
-        heights=positions[:, 2],
+        heights=positions[:, 2] + clearance,
         quaternions=quaternions,
         angles=angles,
         velocities=velocity_rows,
         feet=feet,
+        planted=soles[..., 2] < MAX_PLANTED_HEIGHT * standing_height,
         circle=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
         angle_spreads=angles.std(axis=0, keepdims=True).clip(_MIN_ANGLE_SPREAD),
         rate_spreads=velocity_rows[:, 6:].std(axis=0, keepdims=True).clip(_MIN_RATE_SPREAD * rate_unit),
-        foot_spreads=np.sqrt(foot_variances)[None].clip(_MIN_FOOT_SPREAD * body.torso.standing_height),
+        foot_spreads=np.sqrt(foot_variances)[None].clip(_MIN_FOOT_SPREAD * standing_height),
     )

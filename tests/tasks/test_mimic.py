@@ -10,7 +10,9 @@ import arc_suite
 from arc_suite import motions, rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
+from arc_suite.models.kinematics import Legs
 from arc_suite.motions import motion_text
+from arc_suite.motions.motion import find_soles
 from arc_suite.robots import ROBOTS
 
 TICK = ROBOTS["tick"]
@@ -135,6 +137,27 @@ def test_tracked_follows_within_the_motors_reach(motion):
         timestep = environment.step(act(timestep))
     assert not timestep.last()
     assert environment.task.progress["joint_error"] < 0.05
+
+
+@pytest.mark.parametrize(("robot", "largest_error"), [("tick", 0.015), ("queen", 0.015)])
+def test_a_body_at_rest_is_as_high_as_a_motion_at_rest(robot, largest_error):
+    """Feet in contact are higher than the ground by the margin of contacts: 0.055 standing heights of Tick."""
+    body = ROBOTS[robot]
+    frames = 31
+    quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (frames, 1))
+    angles = np.zeros((frames, len(body.joint_names)))
+    soles = find_soles(Legs.of(body), np.zeros((frames, 3)), quaternions, angles)
+    positions = np.tile((0.0, 0.0, -soles[0, :, 2].max()), (frames, 1))
+    rest = motions.make(body, "rest", RATE, True, positions, quaternions, angles)
+    settings = {"random": 3, "motion": [motion_text.to_text(rest)], **STILL}
+    environment = arc_suite.load(robot, "mimic", settings)
+    environment.reset()
+    tables = environment.task.definition.unwrapped.tables
+    for _ in range(60):
+        environment.step(np.zeros(angles.shape[1]))
+    miss = environment.physics.data.qpos[2] - tables.heights[0]
+    assert abs(miss) < largest_error * body.torso.standing_height
+    assert tables.planted.all()
 
 
 def test_an_action_of_zero_holds_the_next_pose():
