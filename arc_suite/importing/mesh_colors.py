@@ -5,7 +5,7 @@ Colors of textures are not read.
 
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import mujoco
@@ -64,17 +64,36 @@ def find_colors(spec: mujoco.MjSpec, file_of_mesh: Mapping[str, Path]) -> list[n
     return colors
 
 
+def find_libraries(paths: Iterable[Path]) -> tuple[Path, ...]:
+    """Return the files of materials that .obj files name, with those that are missing."""
+    libraries = [_find_library(path) for path in paths if path.suffix.lower() == ".obj"]
+    return tuple(dict.fromkeys(library for library in libraries if library is not None))
+
+
+def _find_library(path: Path) -> Path | None:
+    """Return the file of materials of an .obj file, which lies in the same folder; None where it names none."""
+    library = None
+    for keyword, value in _read_statements(path, _MAX_OBJ_BYTES):
+        if keyword == "mtllib":
+            library = path.with_name(Path(value.replace("\\", "/")).name)
+    return library
+
+
+def _read_statements(path: Path, most_bytes: int) -> Iterator[tuple[str, str]]:
+    """Yield keyword and value of each line of an .obj or .mtl file."""
+    for line in files.read_bytes(path, most_bytes).decode("utf-8", "replace").splitlines():
+        keyword, _, value = line.strip().partition(" ")
+        yield keyword, value.strip()
+
+
 def _read_obj_color(path: Path) -> np.ndarray | None:
     """Return the color of the material of most faces of an .obj file; None without a file of materials."""
-    library = None
+    library = _find_library(path)
     material = None
     faces_of_material: Counter[str | None] = Counter()
-    for line in files.read_bytes(path, _MAX_OBJ_BYTES).decode("utf-8", "replace").splitlines():
-        keyword, _, value = line.strip().partition(" ")
-        if keyword == "mtllib":
-            library = path.with_name(Path(value.strip().replace("\\", "/")).name)  # in the same folder alone
-        elif keyword == "usemtl":
-            material = value.strip()
+    for keyword, value in _read_statements(path, _MAX_OBJ_BYTES):
+        if keyword == "usemtl":
+            material = value
         elif keyword == "f":
             faces_of_material[material] += 1
     if library is None or not faces_of_material or not library.is_file():
@@ -86,10 +105,9 @@ def _read_mtl(path: Path) -> dict[str | None, np.ndarray | None]:
     """Return the diffuse colors (4,) of an .mtl file by the name of their material."""
     colors: dict[str | None, np.ndarray | None] = {}
     material = None
-    for line in files.read_bytes(path, _MAX_MTL_BYTES).decode("utf-8", "replace").splitlines():
-        keyword, _, value = line.strip().partition(" ")
+    for keyword, value in _read_statements(path, _MAX_MTL_BYTES):
         if keyword == "newmtl":
-            material = value.strip()
+            material = value
         elif keyword == "Kd":
             colors[material] = _check_color([*value.split(), 1.0])
     return colors

@@ -43,7 +43,7 @@ class Visuals(NamedTuple):
 
     Attributes:
         meshes: simplified.
-        files: files that were read.
+        files: files that were read, with files of materials that are missing.
         point_count: number of points in these files.
     """
 
@@ -72,7 +72,8 @@ def read_visuals(
         is_small = sum(file.stat().st_size for file in files) <= _MAX_FILE_BYTES
         if 0 < len(spec.meshes) <= _MAX_MESHES and is_small:
             units.scale_lengths(spec, scale)
-            return _collect_visuals(spec, model, torso, facing, files)
+            visuals = _collect_visuals(spec, model, torso, facing, files)
+            return visuals._replace(files=(*files, *mesh_colors.find_libraries(files)))
     return Visuals()
 
 

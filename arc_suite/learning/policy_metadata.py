@@ -28,6 +28,7 @@ def metadata(network: Network) -> dict:
                                 the standing pose, rad; reach, change of the angle by an action of 1, rad; stiffness,
                                 N m/rad; damping, N m s/rad; limit, N m; where torques fall with speed, no_load_speed,
                                 rad/s, and stall, N m
+    motor_delays                s after which a control acts, by joint; only where motors have delays
     torque_held                 how long a torque holds: "control step", or "substep" of servos of imported bodies
     file_joints                 names of the joints in the order of the imported file; only of imported bodies
     gait_clock                  frequency, Hz, and rule of the block of that name; only if the task has this block
@@ -54,6 +55,9 @@ def metadata(network: Network) -> dict:
         values["servos"] = _imported_servos(body)
     else:
         values["servos"] = servos_of_motors(body, model.actuator_gear[:, 0])
+    motor_delays = [joint.drive.delay if joint.drive else 0.0 for joint in body.joints]
+    if any(motor_delays):
+        values["motor_delays"] = dict(zip(body.joint_names, motor_delays, strict=True))
     values["torque_held"] = "substep" if body.source else "control step"
     if body.source:
         values["file_joints"] = list(body.file_joints)

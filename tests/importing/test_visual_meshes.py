@@ -161,6 +161,19 @@ def write_obj(folder):
     (folder / "looks.mtl").write_text("newmtl light\nKd 1 1 1\nnewmtl dark\nNs 9\nKd 0.1 0.2 0.3\n")
 
 
+def test_materials_of_an_obj_file_are_followed(tmp_path):
+    path = write_looks(tmp_path, "obj")
+    body = registry.body_of(path)
+    assert registry.body_of(path) is body
+    materials = tmp_path / "looks.mtl"
+    text = materials.read_text()
+    materials.unlink()
+    bare_body = registry.body_of(path)
+    assert bare_body != body and registry.body_of(path) is bare_body
+    materials.write_text(text)
+    assert registry.body_of(path) == body
+
+
 def write_looks(folder, kind):
     """Write a robot whose visual mesh has the color (0.1, 0.2, 0.3), and return its path."""
     if kind == "mjcf":

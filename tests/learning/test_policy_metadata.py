@@ -3,10 +3,12 @@
 import imports
 import numpy as np
 import pytest
+from limited import with_drives
 from networks import made
 
 from arc_suite.bodies import generator
 from arc_suite.learning.policy_metadata import metadata
+from arc_suite.robots import ROBOTS
 
 
 def torques(facts, action, angles, speeds):
@@ -93,6 +95,13 @@ def test_delay_is_that_of_training():
     assert metadata(made("tick", delay=(1, 3)))["delay"] == [1, 3]
     assert metadata(made("tick", delay=2))["delay"] == [2, 2]
     assert "delay" not in metadata(made("tick"))
+
+
+@pytest.mark.parametrize("body", [ROBOTS["tick"], imports.quadruped()], ids=["tick", "mjcf"])
+def test_motors_that_are_late_say_so(body):
+    assert "motor_delays" not in metadata(made(body))
+    late_body = with_drives(body, delay=0.01)
+    assert metadata(made(late_body))["motor_delays"] == dict.fromkeys(body.joint_names, 0.01)
 
 
 def test_the_clock_of_a_command_stands_still_at_a_stop():
