@@ -24,6 +24,9 @@ _MP4_CRF = 10  # constant rate factor of the encoder, 0 to 51; the lower, the be
 _WEBP_METHOD = 4  # of the encoder, 0 to 6
 _BOX_HEADER = 16  # bytes at the beginning of a box of MP4: size, kind, and the size once more where it is long
 _MIN_BOX = 8  # bytes
+_CAPTION_COLOR = (235, 240, 245)
+_CAPTION_SCALE = 4  # pixels drawn for each of a caption along its sides
+_EMPTY_COLOR = (92, 102, 115)  # that of plain ground
 _GIF_COLORS = 128
 _GIF_SAMPLES = 4  # frames from which the palette is made
 
@@ -190,15 +193,24 @@ def add_caption(picture: np.ndarray, text: str, size: int | None = None) -> np.n
     image = Image.fromarray(picture)
     if size is None:
         size = max(11, image.height // 22)
-    font = ImageFont.load_default(size)
-    ImageDraw.Draw(image).text((size, image.height - size), text, (235, 240, 245), font, anchor="ls")
+    # Letters of a few pixels would stand at whole pixels, some too close together: they are drawn larger.
+    letters = Image.new("L", (_CAPTION_SCALE * image.width, _CAPTION_SCALE * image.height))
+    font = ImageFont.load_default(_CAPTION_SCALE * size)
+    corner = (_CAPTION_SCALE * size, letters.height - _CAPTION_SCALE * size)
+    ImageDraw.Draw(letters).text(corner, text, 255, font, anchor="ls")
+    image.paste(_CAPTION_COLOR, mask=letters.resize(image.size, Image.Resampling.BOX))
     return np.asarray(image)
 
 
+def empty_cell(shape: tuple[int, ...]) -> np.ndarray:
+    """Return a picture (height, width, 3) of a plain color, for a cell of a grid that shows nothing."""
+    return np.full(shape, _EMPTY_COLOR, np.uint8)
+
+
 def grid(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
-    """Return pictures of one size side by side, row by row; black fills the last row."""
+    """Return pictures of one size side by side, row by row; a plain color fills the last row."""
     empty_cells = -len(pictures) % columns
-    cells = [*pictures, *empty_cells * [np.zeros_like(pictures[0])]]
+    cells = [*pictures, *empty_cells * [empty_cell(pictures[0].shape)]]
     rows = [np.concatenate(cells[first : first + columns], axis=1) for first in range(0, len(cells), columns)]
     return np.concatenate(rows, axis=0)
 

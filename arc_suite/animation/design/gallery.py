@@ -135,9 +135,9 @@ def draw_pictures(elites: Iterable[Elite], cell_map: Map, trial: Trial) -> dict[
 
 
 def write_picture(path: Path, pictures: Mapping[Cell, np.ndarray]) -> None:
-    """Write pictures as one picture, with black in place of cells without an elite."""
+    """Write pictures as one picture, with a plain color in place of cells without an elite."""
     layout = _arrange_cells(pictures)
-    empty_picture = np.zeros((_PICTURE_HEIGHT, _PICTURE_WIDTH, 3), np.uint8)
+    empty_picture = films.empty_cell((_PICTURE_HEIGHT, _PICTURE_WIDTH, 3))
     all_pictures = [pictures.get(cell, empty_picture) for cell in layout.cells]
     with files.writing(path) as temporary:
         films.write_png(temporary, [films.grid(all_pictures, layout.columns)], seconds=0.0)
