@@ -1,23 +1,27 @@
-"""Clips of robots, examples and random bodies: `make check-clip-sets`, half an hour.
+"""All clips of robots, examples and random bodies: `make check-clip-sets`, an hour or two.
 
 python tests/clip_sets.py [NUMBER OF RANDOM BODIES]
 
 Prints for each body the cycles of its loops and the largest seam, how far its start and stop are from walk and idle
 before they are made to meet, the slip of its walk as it is and planted, and what was left out. Lengths are in standing
-heights. Fails if a body has no file, fewer than 85 % of the random bodies have loops of one cycle, or fewer than 85 %
-of the bodies stop from a pose within 0.08 of the walk's.
+heights. Then prints how many bodies have each clip, and the most frequent line of those that are left out. Fails if a
+frame of a clip breaks a bound, a body has no file, fewer than 85 % of the random bodies have loops of one cycle, or
+fewer than 85 % of the bodies stop from a pose within 0.08 of the walk's.
 """
 
+import collections
 import functools
+import re
 import sys
 
 import mujoco
 import numpy as np
 from tqdm import tqdm
 
-from arc_suite.animation.clips import planting
-from arc_suite.animation.clips.catalog import CLIPS, DEFAULT, WalkLoop
-from arc_suite.animation.clips.drafts import cut_passage, make_drafts
+from arc_suite.animation.clips import bounds, clips, planting
+from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
+from arc_suite.animation.clips.drafts import make_drafts
+from arc_suite.animation.clips.from_rest import cut_passage
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
@@ -59,14 +63,26 @@ def slip(body, motion) -> tuple[float, float]:
     return float(paths.sum(axis=0).mean() / root), float(-feet[..., 2].min() / height)
 
 
+def broken(body, made) -> dict[str, str]:
+    """Return which bounds are broken in the frames of clips, by name."""
+    excesses = {}
+    for name, draft in made.items():
+        excess = bounds.find_excess(body, CLIPS[name], clips._sample_clip(name, body, draft, clips.FPS).motion)
+        if excess:
+            excesses[name] = excess
+    return excesses
+
+
 def measured(body) -> tuple[dict[str, float], dict[str, str]]:
-    """Return numbers of the default clips of a body by name, and the reasons of those that are left out."""
+    """Return numbers of the clips of a body by name, and the reasons of those that are left out."""
     recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
-    made = make_drafts(recorder, DEFAULT, iter, left_out)
+    made = make_drafts(recorder, list(CLIPS), iter, left_out)
     loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], WalkLoop)]
-    found = {"clips": len(DEFAULT) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
+    found = {"clips": len(CLIPS) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
+    found["broken"] = len(excesses := broken(body, {name: made[name] for name in CLIPS if name not in left_out}))
+    left_out |= {name: f"BROKEN: {excess}" for name, excess in excesses.items()}
     found["seam"] = np.degrees(max((draft.motion.seam for draft in loops), default=np.nan))
-    if "walk" in made:
+    if "walk" in made and "idle" in made:
         walk, transition = made["walk"], recorder.record_transition(CLIPS["walk"].command)
         start, stop = (cut_passage(body, CLIPS[name], transition).motion for name in ("start", "stop"))
         pairs = {"start": (start.pose(-1), walk.start), "stop": (stop.pose(0), walk.start)}
@@ -77,16 +93,32 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     return found, left_out
 
 
+def table(left_out_of_body: dict[str, dict[str, str]], others) -> str:
+    """Return a table in Markdown: how many bodies have each clip, and the line that leaves it out most often."""
+    lines = ["| clip | robots and examples | random bodies | most frequent line |", "|---|---|---|---|"]
+    for clip in CLIPS:
+        counts = []
+        for is_other in (True, False):
+            reasons = [left_out for name, left_out in left_out_of_body.items() if (name in others) == is_other]
+            counts.append(f"{sum(clip not in left_out for left_out in reasons)} of {len(reasons)}")
+        lines_of_clip = [left_out[clip] for left_out in left_out_of_body.values() if clip in left_out]
+        kinds = collections.Counter(re.sub(r"-?\d+(\.\d+)?", "n", line) for line in lines_of_clip)
+        ((kind, number),) = kinds.most_common(1) or [("", 0)]
+        lines.append(f"| `{clip}` | {' | '.join(counts)} | {f'{kind} ({number})' if number else '-'} |")
+    return "\n".join(lines)
+
+
 def main(count: str = "100") -> int:
     """Measure the bodies, and return the exit status."""
     bodies = {f"random_{seed}": sound_body(seed) for seed in range(int(count))}
     others = dict(ROBOTS) | {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
-    numbers = {}
+    numbers, left_out_of_body = {}, {}
     for name, body in tqdm((others | bodies).items(), disable=None, unit="body"):
         try:
             numbers[name], left_out = measured(body)
         except ValueError as error:
-            numbers[name], left_out = {"clips": 0}, {"all": str(error)}
+            numbers[name], left_out = {"clips": 0}, dict.fromkeys(CLIPS, str(error))
+        left_out_of_body[name] = left_out
         told = ", ".join(f"{key} {value:.3g}" for key, value in numbers[name].items())
         missing = [f"no {clip}: {reason}" for clip, reason in left_out.items()]
         print("; ".join([f"{name}: {told}", *missing]), flush=True)
@@ -98,6 +130,9 @@ def main(count: str = "100") -> int:
         for kind, names in (("robots and examples", others), ("random bodies", bodies)):
             quantiles = ", ".join(f"{value:.3f}" for value in np.nanquantile(values(key, names), (0.5, 0.9, 0.95, 1.0)))
             print(f"{key}, {kind}: median, 90 %, 95 % and most: {quantiles}")
+    print(table(left_out_of_body, others))
+    breaks = np.nansum(values("broken", numbers))
+    print(f"clips that break a bound: {breaks:.0f}")
     one_cycle = (values("cycles", bodies) == 1).mean()
     connected = (values("stop", numbers) <= APART).mean()
     files = (values("clips", numbers) > 0).sum()
@@ -105,7 +140,7 @@ def main(count: str = "100") -> int:
         f"loops of one cycle: {one_cycle:.0%} of random bodies; stop within {APART} of the walk: {connected:.0%} of all"
     )
     print(f"a file for {files} of {len(numbers)} bodies")
-    return int(one_cycle < ONE_CYCLE or connected < CONNECTED or files < len(numbers))
+    return int(breaks > 0 or one_cycle < ONE_CYCLE or connected < CONNECTED or files < len(numbers))
 
 
 if __name__ == "__main__":

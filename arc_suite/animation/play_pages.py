@@ -249,9 +249,13 @@ def _describe_leaps(stepping: Stepping) -> dict[str, Any]:
     rest_joints = tuple(legs.by_joint(stepping.rest_angles).tolist())
     forward_leaps = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
     leap_of_name = {}
-    for name, candidates, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", forward_leaps, "distance")):
+    choices = {
+        "jump": lambda: leaps.choose_jump(body, rest_joints),
+        "leap": lambda: leaps.choose_leap(body, rest_joints, forward_leaps),
+    }
+    for name, choose in choices.items():
         try:
-            leap = leaps.choose_leap(body, rest_joints, candidates, measure)
+            leap = choose()
         except ValueError:
             continue  # and the page has no key for it
         leap_of_name[name] = {

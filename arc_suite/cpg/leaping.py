@@ -39,7 +39,7 @@ class LeapingParameters(NamedTuple):
     most: float = 0.36
 
 
-_MIN_LEAP = leaps.MIN_BY_MEASURE["distance"]  # standing heights; a body with a shorter leap gets a warning, and walks
+_MIN_LEAP = leaps.MIN_DISTANCE  # standing heights; a body with a shorter leap gets a warning, and walks
 _GATHERING_CYCLES = 4  # cycles on the spot before it walks on; it may leap after each, and in the last one
 _SUPPORT_POINTS = 1.6 * footholds.SUPPORT_POINTS  # of a landing, standing heights along the path
 _PROBE_SPACING = 0.1  # standing heights between the points ahead of a foot that are looked at

@@ -7,7 +7,7 @@ Control steps of a leap count from 1.
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +37,7 @@ class Leap(NamedTuple):
         ahead: distance by which feet land ahead of their positions at rest.
         stretch: duration of the stretch.
         fly: duration from the stretch to the landing.
+        sink: duration of the crouch.
     """
 
     crouch: float = 0.5
@@ -47,21 +48,25 @@ class Leap(NamedTuple):
     ahead: float = 0.25
     stretch: float = 1.0
     fly: float = 2.0
+    sink: float = 2.0
 
 
-_JUMP = Leap(back=0.0, forward=0.0, ahead=0.0)
-JUMPS = tuple(_JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.35, 0.5) for drive in (1.5, 2.5, 4.0))
-# The clearance of feet in a jump, and the distance of feet in a leap, that are enough: standing heights.
-MIN_BY_MEASURE = {"clearance": 0.1, "distance": 0.8}
+_JUMP = Leap(back=0.0, forward=0.0, ahead=0.0, sink=4.0)
+_JUMPS = tuple(_JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.35, 0.5) for drive in (0.5, 1.0, 1.5, 2.5))
+_JUMP_SLANTS = (0.0, -0.03, 0.03, -0.08, 0.08)  # standing heights ahead: tried in turn for a jump that stays
+MIN_CLEARANCE = 0.1  # standing heights, of feet in a jump
+MIN_DISTANCE = 0.8  # standing heights, of feet in a leap
+MAX_DRIFT = 0.1  # standing heights, between the mean positions of feet before a jump and after it
 
 # Durations of a leap's parts that do not differ between leaps.
-_SINKING_TIME = 2.0  # of the crouch
 _WAITING_TIME = 0.5  # in the crouch
 _SETTLING_TIME = 3.0  # after the landing
 
 _STRETCH_GOAL = 0.6  # standing heights that the torso is to rise in the stretch: more than any legs can
 _IK_ITERATIONS = 40  # of inverse kinematics, for each pose
 _HORIZONTAL_WEIGHT = 0.45  # of a sole's position, against 1 for its height: feet may slide rather than stay behind
+
+_DOES_NOT_LAND = "it does not land on its feet"
 
 # What counts as a flight.
 _AIRBORNE_HEIGHT = 0.03  # standing heights; soles that are higher have left the ground
@@ -95,7 +100,7 @@ def lay_out_movement(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap
     def count_steps(duration: float) -> int:
         return max(1, round(steps_per_time_unit * duration))
 
-    sinking_steps = count_steps(_SINKING_TIME)
+    sinking_steps = count_steps(leap.sink)
     waiting_steps = count_steps(_WAITING_TIME)
     stretch_steps = count_steps(leap.stretch)
     flight_steps = count_steps(leap.fly)
@@ -163,6 +168,7 @@ class Flight(NamedTuple):
 
     Attributes:
         distance: between the mean position of the feet before the leap and after it; 0 if they do not leave the ground.
+        drift: horizontal distance between the mean positions of the feet before the leap and after it.
         torso_distance: distance that the torso moves while no foot is on the ground.
         air_time: time for which no foot is on the ground, s.
         clearance: the largest height of the lowest foot.
@@ -171,6 +177,7 @@ class Flight(NamedTuple):
     """
 
     distance: float
+    drift: float
     torso_distance: float
     air_time: float
     clearance: float
@@ -263,8 +270,10 @@ def _measure_flight(body: Body, track: _Track, leap: int, crouch_end: int) -> Fl
     if is_airborne.any():
         foot_displacement = (soles[-1] - soles[crouch_end - 1])[:, 0].mean()
         distance = float(foot_displacement / standing_height)
+    drift = np.linalg.norm((soles[-1] - soles[0])[:, :2].mean(axis=0))
     return Flight(
         distance=distance,
+        drift=float(drift / standing_height),
         torso_distance=float((torso[last_step, 0] - torso[first_step, 0]) / standing_height),
         air_time=control_timestep(body) * steps_in_air,
         clearance=float(sole_heights.min(axis=-1).max() / standing_height),
@@ -273,26 +282,102 @@ def _measure_flight(body: Body, track: _Track, leap: int, crouch_end: int) -> Fl
     )
 
 
-@functools.lru_cache(maxsize=64)
-def find_best_leap(
-    body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, ...], measure: str = "distance"
-) -> tuple[Leap, Flight]:
-    """Return the leap of a choice by which a body lands and gets farthest or highest, and its flight.
+def find_best_leap(body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, ...]) -> tuple[Leap, Flight]:
+    """Return the leap of a choice by which a body lands and gets farthest, and its flight.
 
     Args:
         body: any.
         rest_angles: (joints,) angles of a pose in which soles are level, rad.
         choice: leaps to try.
-        measure: `distance` or `clearance`.
     """
+    flights = _try_leaps(body, rest_angles, choice)
+    distances = [flight.distance if flight.landed else 0.0 for flight in flights]
+    best = distances.index(max(distances))
+    return choice[best], flights[best]
+
+
+def choose_leap(body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, ...]) -> Leap:
+    """Return the leap of a choice by which a body gets farthest; see `find_best_leap`.
+
+    Raises:
+        ValueError: the body hardly leaves the ground, or does not land on its feet.
+    """
+    leap, flight = find_best_leap(body, rest_angles, choice)
+    if not flight.landed:
+        raise ValueError(_DOES_NOT_LAND)
+    if flight.distance < MIN_DISTANCE:
+        size = f"{flight.distance:.2f} standing heights"
+        raise ValueError(f"the distance of its feet is {size}, less than {MIN_DISTANCE}")
+    return leap
+
+
+def choose_jump(body: Body, rest_angles: tuple[float, ...]) -> Leap:
+    """Return a jump by which a body comes down on its feet where it stood; see `jumps_that_stay`.
+
+    Raises:
+        ValueError: there is none.
+    """
+    for jump in jumps_that_stay(body, rest_angles):
+        return jump
+    flights = []
+    for slant in _JUMP_SLANTS:
+        flights += _try_leaps(body, rest_angles, _slant_jumps(slant))
+    raise ValueError(_why_no_jump(flights))
+
+
+def jumps_that_stay(body: Body, rest_angles: tuple[float, ...]) -> Iterator[Leap]:
+    """Yield jumps by which a body comes down on its feet where it stood, of one slant after the other.
+
+    Args:
+        body: any.
+        rest_angles: (joints,) angles of a pose in which soles are level, rad.
+
+    Yields:
+        Jumps; of each slant the highest first.
+    """
+    for slant in _JUMP_SLANTS:
+        jumps = _slant_jumps(slant)
+        flights = _try_leaps(body, rest_angles, jumps)
+        good_jumps = [
+            (flight.clearance, jump)
+            for jump, flight in zip(jumps, flights, strict=True)
+            if flight.landed and flight.clearance >= MIN_CLEARANCE and flight.drift <= MAX_DRIFT
+        ]
+        for _, jump in sorted(good_jumps, reverse=True):
+            yield jump
+
+
+def _slant_jumps(slant: float) -> tuple[Leap, ...]:
+    """Return the jumps that are tried, with legs that stretch the torso ahead by a slant."""
+    return tuple(jump._replace(forward=slant) for jump in _JUMPS)
+
+
+def _why_no_jump(flights: Sequence[Flight]) -> str:
+    """Return what is wrong with jumps of which none is good: with that which is nearest to a good one."""
+    landed = [flight for flight in flights if flight.landed]
+    if not landed:
+        return _DOES_NOT_LAND
+    high = [flight for flight in landed if flight.clearance >= MIN_CLEARANCE]
+    if not high:
+        clearance = max(flight.clearance for flight in landed)
+        return f"the clearance of its feet is {clearance:.2f} standing heights, less than {MIN_CLEARANCE}"
+    drift = min(flight.drift for flight in high)
+    return describe_drift(drift)
+
+
+def describe_drift(drift: float) -> str:
+    """Return what is wrong with a jump whose feet come down elsewhere."""
+    return f"its feet come down {drift:.2f} standing heights from where they stood, more than {MAX_DRIFT}"
+
+
+@functools.lru_cache(maxsize=64)
+def _try_leaps(body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, ...]) -> list[Flight]:
+    """Return the flights of leaps from angles (joints,), rad."""
     legs = Legs.of(size_body(body))
     leg_angles = legs.by_leg(np.array(rest_angles))
     targets_of_leaps = [leap_targets(body, legs, leg_angles, leap) for leap in choice]
     crouch_ends = [lay_out_movement(body, legs, leg_angles, leap).crouch_end for leap in choice]
-    flights = simulate_flights(body, np.array(rest_angles), _pad_and_stack(targets_of_leaps), crouch_ends)
-    scores = [getattr(flight, measure) if flight.landed else 0.0 for flight in flights]
-    best = scores.index(max(scores))
-    return choice[best], flights[best]
+    return simulate_flights(body, np.array(rest_angles), _pad_and_stack(targets_of_leaps), crouch_ends)
 
 
 def _pad_and_stack(arrays: Sequence[np.ndarray]) -> np.ndarray:
@@ -303,19 +388,3 @@ def _pad_and_stack(arrays: Sequence[np.ndarray]) -> np.ndarray:
         missing_steps = np.tile(array[-1], (step_count - len(array), 1))
         padded.append(np.concatenate([array, missing_steps]))
     return np.stack(padded)
-
-
-def choose_leap(body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, ...], measure: str) -> Leap:
-    """Return the leap of a choice by which a body gets farthest or highest; see `find_best_leap`.
-
-    Raises:
-        ValueError: the body hardly leaves the ground, or does not land on its feet.
-    """
-    leap, flight = find_best_leap(body, rest_angles, choice, measure)
-    if not flight.landed:
-        raise ValueError("it does not land on its feet")
-    size = getattr(flight, measure)
-    required_size = MIN_BY_MEASURE[measure]
-    if size < required_size:
-        raise ValueError(f"the {measure} of its feet is {size:.2f} standing heights, less than {required_size}")
-    return leap

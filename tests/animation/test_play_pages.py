@@ -139,8 +139,10 @@ def test_leaps_follow_the_keyframes_of_python(script, name, speed, plays):
         policy("cpg", body, "steered", task=Setup.of(body, "directed").definition).law,
     )
     legs, pose = Legs.of(law.body), tuple(law.legs.by_joint(law.rest_angles).tolist())
-    choice, measure = {"jump": (leaps.JUMPS, "clearance"), "leap": (PRESETS[name]["leaping"].choice, "distance")}[plays]
-    leap, _ = leaps.find_best_leap(body, pose, choice, measure)
+    if plays == "jump":
+        leap = leaps.choose_jump(body, pose)
+    else:
+        leap = leaps.choose_leap(body, pose, PRESETS[name]["leaping"].choice)
     targets = leaps.leap_targets(body, legs, law.rest_angles, leap)
     asked = [upright(creature, [speed, 0.0, 0.0]) for _ in range(pressed + len(targets) + 40)]
     asked[pressed] |= {"leaps": True}
@@ -318,7 +320,7 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     choices = creature["task"]["direction"]
     assert choices["names"] == ["height", "forward", "left", "roll", "pitch", "yaw"] and len(choices["room"]) == 6
     assert list(choices["gaits"]) == ["own", "trot", "pace", "bound", "walk", "wave"]
-    assert creature["policy"]["constants"]["leaps"] == {}  # its feet hardly leave the ground: no key
+    assert list(creature["policy"]["constants"]["leaps"]) == ["jump"]  # it gets too little ahead to leap: no key
     assert play_pages.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
 
 

@@ -1,15 +1,15 @@
 """Motions simulated from the pose at rest: a rise, jumps, a death."""
 
-import copy
+import itertools
 import math
 
 import mujoco
 import numpy as np
 
 from arc_suite import policies, rotations
-from arc_suite.animation.clips import gestures
+from arc_suite.animation.clips import hard_ground, standing_legs
 from arc_suite.animation.clips.recordings import Recording, record
-from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, put_on_root, stay_at_start
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, stay_at_end, stay_at_start
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.selection import presets_of
@@ -18,9 +18,7 @@ from arc_suite.models import sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
 from arc_suite.models.standing import pose_mechanics, standing_qpos
-from arc_suite.motions.ground_poses import ground_poses, relative_pose
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import readings
 from arc_suite.tasks.modifiers.drags import have_drags
 
@@ -29,6 +27,11 @@ _SINK_DURATION = 6.0
 _HOLD_DURATION = 2.0
 _COLLAPSE_DURATION = 1.5  # in which legs give way in a death
 _LIMP_DURATION = 6.0
+_STIFFENING_DURATION = 24.0  # after which joints without life have come to rest
+
+_MAX_JUMP_TRIES = 6  # jumps that are simulated from rest, of those that a trial finds
+
+_MAX_ASIDE = 0.3  # of the distance ahead, by which a leap goes aside
 
 _RECOVERY_TASK = "recover"
 _FALL_SECONDS = 4.0  # of getting up, and of standing after it
@@ -36,6 +39,8 @@ _FALLS = 20  # that are tried, of the judges' table
 _ON_BACK = -0.7  # cosine of the tilt of a torso that lies on its back
 
 _LIMP_DAMPING_SHARE = 0.05  # of the damping of joints, in joints without life
+_STIFF_FRICTION = 1.0  # of the torques of motors: dry friction of joints that have become stiff
+_REST_SPEED = np.radians(1.0)  # rad/s: slower joints are at rest
 _LYING_HEIGHT = 0.6  # of the torso's height at rest: a lower torso lies
 _LYING_CLEARANCE = 0.1  # of the torso's height at rest: a torso whose lowest point is nearer to the ground lies
 
@@ -50,12 +55,11 @@ def rise(body: Body, rest: Pose) -> ClipMotion:
     hold_steps = _to_steps(body, _HOLD_DURATION)
     sinking = _ease_in(sink_steps)
     depth_shares = np.concatenate([sinking, np.ones(hold_steps), sinking[::-1], np.zeros(hold_steps)])
-    joints = gestures.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
+    joints = standing_legs.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
     recording = _simulate(body, rest, _bear_weight(body, rest, joints))
     first = sizing.simulation(body).substeps * (sink_steps + hold_steps)
     _check_lies(body, rest, recording.poses[first])
-    last = len(recording.poses) - 1
-    return stay_at_start(recording, first, samples=last - first)
+    return stay_at_end(recording, first)
 
 
 def get_up(body: Body, rest: Pose) -> ClipMotion:
@@ -76,9 +80,7 @@ def get_up(body: Body, rest: Pose) -> ClipMotion:
         has_got_up = environment.task.progress["up"]
         environment.close()
         if has_got_up and rotations.upright(recording.poses[0, 3:7]) < _ON_BACK:
-            torso = ground_poses(recording.poses)
-            root = np.zeros((len(torso), 3))
-            return put_on_root(recording.time_step, recording.poses, root, relative_pose(torso[-1], torso))
+            return stay_at_end(recording, first=0)
     raise ValueError(f"it does not get up from its back within {_FALL_SECONDS:g} s")
 
 
@@ -86,24 +88,38 @@ def jump(body: Body, rest: Pose) -> ClipMotion:
     """Return how a body jumps on the spot.
 
     Raises:
-        ValueError: its feet do not leave the ground, or it does not land on them.
+        ValueError: its feet do not leave the ground, or it does not land on them where it stood.
     """
-    recording = _simulate_leap(body, rest, leaps.JUMPS, "clearance")  # the largest height of the lowest foot
-    return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
+    rest_joints = tuple(rest.joints.tolist())
+    leaps.choose_jump(body, rest_joints)
+    drifts = []
+    for chosen_jump in itertools.islice(leaps.jumps_that_stay(body, rest_joints), _MAX_JUMP_TRIES):
+        recording = _simulate_leap(body, rest, chosen_jump)
+        drifts.append(float(np.linalg.norm(_measure_drift(body, recording))))
+        if drifts[-1] <= leaps.MAX_DRIFT:
+            return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
+    raise ValueError(leaps.describe_drift(min(drifts)))
 
 
 def leap(body: Body, rest: Pose) -> ClipMotion:
     """Return how a body leaps ahead, over a root that goes along below its torso.
 
     Raises:
-        ValueError: its feet do not leave the ground, or it does not land on them.
+        ValueError: its feet do not leave the ground, or it does not land on them straight ahead.
     """
     candidates = presets_of(body)["leaping"].choice  # leaps, of which bodies take the one that suits them
-    return advance_straight(_simulate_leap(body, rest, candidates, "distance"))
+    best_leap = leaps.choose_leap(body, tuple(rest.joints.tolist()), candidates)
+    recording = _simulate_leap(body, rest, best_leap)
+    ahead, aside = _measure_drift(body, recording)
+    if abs(aside) > _MAX_ASIDE * ahead:
+        raise ValueError(f"its feet come down {ahead:.2f} standing heights ahead and {abs(aside):.2f} aside")
+    return advance_straight(recording)
 
 
 def death(body: Body, rest: Pose) -> ClipMotion:
-    """Return how a body collapses: its legs give way, then its joints are without torque and nearly without damping.
+    """Return how a body collapses: its legs give way, its joints are limp, then become stiff, until it is at rest.
+
+    Limp joints have no torque, and hardly any damping.
 
     Raises:
         ValueError: the legs hardly fold.
@@ -111,21 +127,40 @@ def death(body: Body, rest: Pose) -> ClipMotion:
     collapse_steps = _to_steps(body, _COLLAPSE_DURATION)
     limp_steps = _to_steps(body, _LIMP_DURATION)
     depth_shares = np.append(_ease_in(collapse_steps), 1.0)  # 1 is reached after the last step
-    joints = gestures.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
-    no_torque = np.full((limp_steps, len(rest.joints)), np.nan)
-    recording = _simulate(body, rest, np.concatenate([joints, no_torque]), damping_share=_LIMP_DAMPING_SHARE)
-    _check_lies(body, rest, recording.poses[-1])
-    return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
+    joints = standing_legs.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
+    stiffening_steps = _to_steps(body, _STIFFENING_DURATION)
+    no_torque = np.full((limp_steps + stiffening_steps, len(rest.joints)), np.nan)
+    stiffness = np.zeros(len(joints) + len(no_torque))
+    stiffness[-stiffening_steps:] = np.linspace(0.0, 1.0, stiffening_steps) ** 2
+    recording = _simulate(body, rest, np.concatenate([joints, no_torque]), stiffness)
+    samples = _samples_to_rest(recording)
+    _check_lies(body, rest, recording.poses[samples])
+    return stay_at_start(recording, first=0, samples=samples)
 
 
-def _simulate_leap(body: Body, rest: Pose, candidates: tuple[leaps.Leap, ...], measure: str) -> Recording:
-    """Return the best of some leaps by a measure of `leaps`, from rest to rest."""
+def _simulate_leap(body: Body, rest: Pose, chosen_leap: leaps.Leap) -> Recording:
+    """Return a leap from rest to rest."""
     legs = Legs.of(sizing.size_body(body))
-    best_leap = leaps.choose_leap(body, tuple(rest.joints.tolist()), candidates, measure)
-    leap_joints = leaps.leap_targets(body, legs, legs.by_leg(rest.joints), best_leap)
+    leap_joints = leaps.leap_targets(body, legs, legs.by_leg(rest.joints), chosen_leap)
     rest_joints = np.tile(rest.joints, (_to_steps(body, _HOLD_DURATION), 1))
     joints = np.concatenate([leap_joints, rest_joints])
     return _simulate(body, rest, _bear_weight(body, rest, joints))
+
+
+def _measure_drift(body: Body, recording: Recording) -> np.ndarray:
+    """Return the distance (2,) along x and y between the mean positions of feet at both ends, standing heights."""
+    ends = recording.poses[[0, -1]]
+    legs = Legs.of(body)
+    soles, _ = legs.soles(legs.by_leg(ends[:, 7:]))  # in the torso's frame
+    feet = soles @ rotations.matrix(ends[:, 3:7]).swapaxes(-1, -2) + ends[:, None, :3]
+    return (feet[1] - feet[0])[:, :2].mean(axis=0) / body.torso.standing_height
+
+
+def _samples_to_rest(recording: Recording) -> int:
+    """Return the samples after which no joint moves any more; all of them if some still do."""
+    speeds = abs(np.diff(recording.poses[:, 7:], axis=0)).max(axis=-1) / recording.time_step
+    moving = np.flatnonzero(speeds > _REST_SPEED)
+    return min(int(moving[-1]) + 2, len(speeds)) if len(moving) else len(speeds)
 
 
 def _belly_height(body: Body, rest: Pose) -> float:
@@ -170,15 +205,15 @@ def _loaded_targets(body: Body, rest: Pose) -> np.ndarray:
     return rest.joints + standing_pose.loads / (torque_limits * stiffness)  # loads: N m that hold the pose
 
 
-def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float = 1.0) -> Recording:
-    """Simulate a body from rest.
+def _simulate(body: Body, rest: Pose, targets: np.ndarray, stiffness: np.ndarray | None = None) -> Recording:
+    """Simulate a body from rest on hard ground.
 
     Args:
         body: the spec.
         rest: first pose.
         targets: (steps + 1, joints) targets of position control at the start and after each step, rad. A step that
             begins or ends with NaN has no torque.
-        damping_share: damping of the joints, as a share of their own.
+        stiffness: (steps + 1,) of joints without life, from 0 to 1; None for joints with their own damping.
 
     Returns:
         A pose for every substep.
@@ -190,14 +225,21 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, damping_share: float 
     joint_count = len(body.joint_names)
     is_imported = bool(body.source)
     controls = 3 if have_drags(body) else 2  # of a servo; see `models.source`
-    model = copy.copy(compile_model(body))
-    model.dof_damping[6:] *= damping_share  # the first six are the torso's
+    model = hard_ground.compile_on_hard_ground(body)
     layout = readings.layout(model, body)
+    if stiffness is None:
+        frictions = np.tile(model.dof_frictionloss, (len(targets), 1))
+    else:
+        model.dof_damping[6:] *= _LIMP_DAMPING_SHARE  # the first six are the torso's
+        torques = np.zeros(model.nv)  # N m
+        torques[layout.joint_velocities] = [joint.torque for joint in sized_body.joints]
+        frictions = _STIFF_FRICTION * stiffness[:, None] * torques
     data = mujoco.MjData(model)
     rest_pose = np.concatenate(rest)  # position, quaternion and joint angles
     data.qpos[:] = readings.positions(rest_pose, layout, standing_qpos(model))
     positions = [data.qpos.copy()]
-    for target, next_target in zip(targets[:-1], targets[1:], strict=True):
+    for target, next_target, friction in zip(targets[:-1], targets[1:], frictions[:-1], strict=True):
+        model.dof_frictionloss[:] = friction
         angles = readings.pose(data.qpos, layout)[7:]
         speeds = data.qvel[layout.joint_velocities]
         target_speeds = (next_target - target) / control_timestep

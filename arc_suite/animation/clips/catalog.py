@@ -38,7 +38,7 @@ class Passage(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A turn on the spot, from rest to rest.
+    """A turn on the spot, from rest to rest, drawn; see `turning`.
 
     Attributes:
         angle: degrees, to the left.
@@ -55,6 +55,7 @@ class Acted(NamedTuple):
         ends: ends at which it has the first pose of idle: the first sample, 0, the last one, -1, or both.
         loops: whether it is a loop.
         steps: whether feet step in it.
+        planted: whether standing feet are to stay where they are; not in falls and jumps, which are simulated.
         additive: whether it is added to other clips, as its difference from the first pose of idle.
     """
 
@@ -63,6 +64,7 @@ class Acted(NamedTuple):
     loops: bool = False
     steps: bool = False
     additive: bool = False
+    planted: bool = True
 
 
 class Difference(NamedTuple):
@@ -107,6 +109,7 @@ CLIPS: dict[str, Kind] = {
     "back": WalkLoop((-0.5, 0.0, 0.0)),
     "start": Passage(starts=True, cycles=3),
     "stop": Passage(starts=False, cycles=3),
+    "turn_90": Turn(90.0),
     "turn_180": Turn(180.0),
     "idle": Acted(gestures.idle, ends=(0,), loops=True),
     "idle_look": Acted(gestures.glance, BOTH_ENDS, loops=True),
@@ -123,11 +126,11 @@ CLIPS: dict[str, Kind] = {
     "hit_left": Acted(functools.partial(gestures.hit, side="left"), BOTH_ENDS, additive=True),
     "hit_right": Acted(functools.partial(gestures.hit, side="right"), BOTH_ENDS, additive=True),
     "attack": Acted(gestures.strike, BOTH_ENDS, steps=True),
-    "rise": Acted(acting.rise, ends=(-1,)),
-    "get_up": Acted(acting.get_up, ends=(-1,)),
-    "jump": Acted(acting.jump, BOTH_ENDS),
-    "leap": Acted(acting.leap, BOTH_ENDS),
-    "death": Acted(acting.death, ends=(0,)),
+    "rise": Acted(acting.rise, ends=(-1,), planted=False),
+    "get_up": Acted(acting.get_up, ends=(-1,), planted=False),
+    "jump": Acted(acting.jump, BOTH_ENDS, planted=False),
+    "leap": Acted(acting.leap, BOTH_ENDS, planted=False),
+    "death": Acted(acting.death, ends=(0,), planted=False),
     "tuned": Showcase("tuned"),
     "refined": Showcase("refined"),
 }
@@ -185,8 +188,6 @@ def _required_recordings(name: str, clip: Kind) -> tuple[str, ...]:
     match clip:
         case Difference():
             return clip.loop, REST
-        case Turn():
-            return name, REST
         case WalkLoop() | Showcase():
             return (name,)
         case _:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, registry
-from arc_suite.animation.clips import additive, catalog, planting
-from arc_suite.animation.clips.drafts import Draft, make_drafts
+from arc_suite.animation.clips import additive, bounds, catalog, planting
+from arc_suite.animation.clips.draft import Draft
+from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.animation.clips.root_motion import ClipMotion
@@ -34,6 +35,7 @@ class Clip(NamedTuple):
         foot_contacts: events, in the order of time.
         feet: names of all feet.
         slip: mean path of a foot in stance over the ground, m a meter of the root; None if the root stays.
+        slide: largest diagonal of the way of a standing foot, m; None for a clip in which feet are not to stand still.
         additive_over: names of the clips that an additive clip can be added to; None for a clip that is not additive.
     """
 
@@ -44,6 +46,7 @@ class Clip(NamedTuple):
     foot_contacts: tuple[FootContact, ...]
     feet: tuple[str, ...]
     slip: float | None = None
+    slide: float | None = None
     additive_over: tuple[str, ...] | None = None
 
     @property
@@ -78,7 +81,7 @@ def clips(
     second. The median height of soles in stance is 0.
 
     A clip that cannot be made is left out with a warning: a loop that does not close, a slow or fast walk whose speed
-    is within 10 % of the walk's, a preset that the body lacks.
+    is within 10 % of the walk's, a preset that the body lacks, a motion that breaks one of the `bounds`.
 
     Args:
         setup: body and task.
@@ -146,4 +149,7 @@ def _sample_clip(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     motion = draft.motion.sample_at(np.linspace(0.0, seconds, frames + 1))
     _, contacts = draft.stance_height_and_contacts(body)
     slip = planting.slip(body, motion) if draft.loops else None
-    return Clip(name, motion, draft.loops, draft.cycles, tuple(contacts), body.foot_names, slip)
+    slide = None
+    if bounds.is_planted(catalog.clip_of(name)):
+        slide = bounds.measure(body, motion).slide * body.torso.standing_height
+    return Clip(name, motion, draft.loops, draft.cycles, tuple(contacts), body.foot_names, slip, slide)

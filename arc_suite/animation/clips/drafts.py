@@ -2,34 +2,28 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
-from typing import NamedTuple, cast
 
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import planting, root_motion
+from arc_suite.animation.clips import bounds
 from arc_suite.animation.clips.catalog import (
     REST,
     SPEED_RATIOS,
     WALK,
-    Acted,
     Difference,
-    Passage,
     Showcase,
-    Turn,
     WalkLoop,
     clip_of,
     recordings_for_clips,
 )
+from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.foot_contacts import (
-    MIN_RISE,
-    MIN_RISE_IN_GESTURE,
     TOUCH_DOWN,
-    FootContact,
     count_odd_feet,
-    find_foot_contacts,
     sole_heights,
 )
+from arc_suite.animation.clips.from_rest import make_clips_from_rest
 from arc_suite.animation.clips.loops import (
     GOOD_SEAM,
     MAX_SEAM,
@@ -40,69 +34,16 @@ from arc_suite.animation.clips.loops import (
     find_starts,
     straighten_loop,
 )
-from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording, TurnRecording
+from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
-from arc_suite.motions.ground_poses import twist_to
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 
 _MAX_CYCLES_IN_STEP = 4  # gait cycles of loops that stay in step
 _MAX_CYCLES_ALONE = 12  # gait cycles of a loop with a gait of its own
 _MIN_SPEED_SHARE = 0.25  # of its command's velocity, that a loop has at least
-_MAX_SOLE_DEPTH = 0.025  # standing heights, that a sole is below the ground where others are on it
-_MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
 _CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
-
-
-class Draft(NamedTuple):
-    """A motion with a sample for every substep.
-
-    Attributes:
-        motion: motion of the body.
-        cycles: gait cycles that it holds; 0 without a gait.
-        cycle: duration of a gait cycle, s; NaN without a gait.
-        loops: whether its last pose is its first one.
-        stands: whether all feet stay on the ground, so that there are no foot contact events.
-    """
-
-    motion: ClipMotion
-    cycles: int = 0
-    cycle: float = math.nan
-    loops: bool = True
-    stands: bool = False
-
-    @property
-    def start(self) -> Pose:
-        """First pose."""
-        return self.motion.pose(0)
-
-    @property
-    def cycle_samples(self) -> int:
-        """Samples in a gait cycle."""
-        return round(self.cycle / self.motion.time_step)
-
-    def stance_height_and_contacts(self, body: Body) -> tuple[float, list[FootContact]]:
-        """Return the median height of soles in stance, m, and the foot contact events; none without a gait."""
-        heights = sole_heights(compile_model(body), body, self.motion.poses())
-        if self.stands:
-            return float(np.median(heights)), []
-        min_rise = MIN_RISE if self.cycles else MIN_RISE_IN_GESTURE
-        contacts, stance = find_foot_contacts(self.motion, body, heights, self.cycle, self.loops, min_rise)
-        if not stance.any():
-            return 0.0, contacts
-        return float(np.median(heights[stance])), contacts
-
-    def plant_feet(self, body: Body) -> "Draft":
-        """Return the draft with feet in stance that do not slide; see `planting.plant_feet`."""
-        return self._replace(motion=planting.plant_feet(body, self.motion, self.cycle, self.loops))
-
-    def put_on_ground(self, body: Body) -> "Draft":
-        """Return the draft with soles in stance on the ground, and none deep in it."""
-        lowest = float(sole_heights(compile_model(body), body, self.motion.poses()).min())
-        stance_height, _ = self.stance_height_and_contacts(body)
-        height = min(stance_height, lowest + _MAX_SOLE_DEPTH * body.torso.standing_height)
-        return self._replace(motion=self.motion.lower(height))
 
 
 def make_drafts(
@@ -124,7 +65,7 @@ def make_drafts(
         plant: whether feet in stance do not slide.
     """
     body = recorder.body
-    gaits, transition, turns = _make_recordings(recorder, names, progress, left_out)
+    gaits, transition = _make_recordings(recorder, names, progress, left_out)
     drafts = _cut_loops(body, gaits, left_out)
     for name, draft in list(drafts.items()):
         reason = _refusal_reason(name, draft, recorder.velocity_units, drafts.get("walk"))
@@ -134,13 +75,15 @@ def make_drafts(
     if straight:
         drafts = {name: draft._replace(motion=_straighten(name, draft.motion)) for name, draft in drafts.items()}
 
-    walk = drafts.get("walk")
-    planted_walk = None
+    unplanted_drafts = drafts
     if plant:
         drafts = {name: draft.plant_feet(body) for name, draft in drafts.items()}
-        planted_walk = drafts.get("walk")
+    drafts = _keep_within_bounds(body, drafts, left_out)
+    walk = unplanted_drafts["walk"] if "walk" in drafts else None
+    planted_walk = drafts.get("walk") if plant else None
     if transition is not None:
-        drafts |= _make_clips_from_rest(body, transition, turns, names, walk, planted_walk, left_out)
+        drafts |= make_clips_from_rest(body, transition, names, walk, planted_walk, left_out)
+        drafts = _keep_within_bounds(body, drafts, left_out)
     for name in names:
         clip = clip_of(name)
         if not isinstance(clip, Difference) or name in left_out:
@@ -152,32 +95,39 @@ def make_drafts(
     return drafts
 
 
+def _keep_within_bounds(body: Body, drafts: Mapping[str, Draft], left_out) -> dict[str, Draft]:
+    """Return the drafts that keep to the bounds of their clips; the reasons of others go to `left_out`."""
+    kept_drafts = {}
+    for name, draft in drafts.items():
+        excess = bounds.find_excess(body, clip_of(name), draft.motion)
+        if excess:
+            left_out[name] = excess
+        else:
+            kept_drafts[name] = draft
+    return kept_drafts
+
+
 # Recordings.
 
 
 def _make_recordings(
     recorder: Recorder, names, progress, left_out
-) -> tuple[dict[str, GaitRecording], TransitionRecording | None, dict[str, TurnRecording]]:
-    """Return recordings of gaits by name, of the stop and the start, and of turns by name.
+) -> tuple[dict[str, GaitRecording], TransitionRecording | None]:
+    """Return recordings of gaits by name, and of the stop and the start.
 
     Reasons of failures go to `left_out`, for all clips that need the recording.
     """
     gaits = {}
     transition = None
-    turns = {}
     for source, dependent_clips in progress(list(recordings_for_clips(names).items())):
         try:
             if source == REST:
                 transition = recorder.record_transition(WALK.command)
-                continue
-            clip = clip_of(source)
-            if isinstance(clip, Turn):
-                turns[source] = recorder.record_turn(math.radians(clip.angle))
             else:
                 gaits[source] = _record_gait(recorder, source)
         except ValueError as error:
             left_out |= dict.fromkeys(dependent_clips, str(error))
-    return gaits, transition, turns
+    return gaits, transition
 
 
 def _record_gait(recorder: Recorder, name: str) -> GaitRecording:
@@ -304,161 +254,3 @@ def _make_difference(draft: Draft, base: Draft, pose: Pose) -> Draft:
         twist=np.zeros(3),
     )
     return draft._replace(motion=difference, cycle=base.cycle, stands=True)
-
-
-# Clips that connect to idle, and some to the walk.
-
-
-def _make_clips_from_rest(
-    body: Body,
-    transition: TransitionRecording,
-    turns: Mapping[str, TurnRecording],
-    names: Sequence[str],
-    walk: Draft | None,
-    planted_walk: Draft | None,
-    left_out,
-) -> dict[str, Draft]:
-    """Return the draft of idle, and those of the named clips that connect to it.
-
-    Args:
-        body: the spec.
-        transition: transition from which rest, stops and starts are taken.
-        turns: recordings by name.
-        names: names of the clips.
-        walk: clip that stops and starts connect to, with feet as in the physics.
-        planted_walk: the same with planted feet; None if feet are not to be planted.
-        left_out: takes the reasons why clips cannot be made.
-    """
-    rest_pose = root_motion.stay_at_start(transition.gait.recording, transition.start, samples=1).pose(0)
-    idle_clip = cast(Acted, clip_of("idle"))
-    idle = _play(body, idle_clip, rest_pose).put_on_ground(body)
-    drafts = {"idle": idle}
-    for name in names:
-        try:
-            match clip_of(name):
-                case Acted() as clip if name != "idle":
-                    drafts[name] = _act(body, clip, rest_pose, idle.start)
-                case Turn() as clip if name in turns:
-                    draft = _make_turn(body, math.radians(clip.angle), turns[name], idle.start)
-                    if planted_walk is not None:
-                        draft = _plant_turn(body, draft, idle.start)
-                    drafts[name] = draft
-                case Passage() as clip:
-                    draft = _make_passage(body, clip, transition, idle.start, walk)
-                    if planted_walk is not None:
-                        draft = _plant_passage(body, clip, draft, idle.start, walk, planted_walk)
-                    drafts[name] = draft
-        except ValueError as error:
-            left_out[name] = str(error)
-    return drafts
-
-
-def _play(body: Body, clip: Acted, rest: Pose) -> Draft:
-    """Return a motion from the pose at rest.
-
-    Raises:
-        ValueError: the clip plays no motion, as one of another package may.
-    """
-    motion = clip.play(body, rest)
-    if not isinstance(motion, ClipMotion):
-        raise ValueError(f"expected a ClipMotion of its play, got {type(motion).__name__}")
-    return Draft(motion, loops=clip.loops, stands=not clip.steps)
-
-
-def _act(body: Body, clip: Acted, rest: Pose, idle: Pose) -> Draft:
-    """Return a motion from the pose at rest, which meets idle; see `Acted`."""
-    draft = _play(body, clip, rest)
-    motion = draft.motion.lower(rest.position[2] - idle.position[2])  # as idle was, for its soles to be on the ground
-    for end in clip.ends:
-        motion = motion.end_with(idle, end, samples=len(motion.joints) // 3)
-    return draft._replace(motion=motion)
-
-
-def _make_turn(body: Body, angle: float, turn: TurnRecording, idle: Pose) -> Draft:
-    """Return a turn from idle to idle by exactly an angle, rad; the root takes up what the recording lacks."""
-    recording = turn.gait.recording
-    cycle_samples = round(turn.gait.cycle / recording.time_step)
-    motion = root_motion.follow_mean_path(recording, turn.first, turn.samples, window=cycle_samples)
-    cycles = round(turn.samples / cycle_samples)
-    draft = Draft(motion, cycles, turn.gait.cycle, loops=False).put_on_ground(body)
-    motion = draft.motion.meet(idle, 0, cycle_samples).meet(idle, -1, cycle_samples)
-    missing_angles = (angle - motion.root[-1, 2]) * np.linspace(0.0, 1.0, len(motion.root))
-    root = motion.root + missing_angles[:, None] * (0.0, 0.0, 1.0)
-    twist = twist_to(root[-1]) / motion.seconds
-    return draft._replace(motion=motion._replace(root=root, twist=twist))
-
-
-def _plant_turn(body: Body, draft: Draft, idle: Pose) -> Draft:
-    """Return a turn with planted feet, which meets idle."""
-    motion = draft.plant_feet(body).motion
-    motion = motion.end_with(idle, 0, draft.cycle_samples)
-    motion = motion.end_with(idle, -1, draft.cycle_samples)
-    return draft._replace(motion=motion)
-
-
-def cut_passage(body: Body, clip: Passage, transition: TransitionRecording) -> Draft:
-    """Return a stop or a start as it was recorded, with soles in stance on the ground."""
-    gait = transition.gait
-    cycle_samples = round(gait.cycle / gait.recording.time_step)
-    samples = clip.cycles * cycle_samples
-    if clip.starts:
-        first = transition.start
-        samples -= transition.delay  # so that it ends at a scheduled touchdown
-    else:
-        first = transition.stop
-    motion = root_motion.follow_mean_path(gait.recording, first, samples, window=cycle_samples)
-    return Draft(motion, clip.cycles, gait.cycle, loops=False).put_on_ground(body)
-
-
-def _make_passage(body: Body, clip: Passage, transition: TransitionRecording, idle: Pose, walk: Draft | None) -> Draft:
-    """Return a stop or a start, which meets idle and the walk.
-
-    Raises:
-        ValueError: there is no walk, or its pose is far from that of the passage.
-    """
-    if walk is None:
-        raise ValueError("there is no walk that it connects to")
-    draft = cut_passage(body, clip, transition)
-    idle_end, walk_end = _ends_of_passage(clip)
-    motion = draft.motion.meet(idle, idle_end, draft.cycle_samples)
-    motion = motion.meet(walk.start, walk_end, draft.cycle_samples)
-    if motion.seam > _MAX_MEETING_SEAM:
-        seam = np.degrees(motion.seam)
-        max_seam = np.degrees(_MAX_MEETING_SEAM)
-        raise ValueError(f"its pose is {seam:.0f} degrees from that of the walk or of idle, more than {max_seam:.0f}")
-    return draft._replace(motion=motion)
-
-
-def _plant_passage(body: Body, clip: Passage, draft: Draft, idle: Pose, walk: Draft, planted_walk: Draft) -> Draft:
-    """Return a stop or a start with planted feet, which meets idle, and the planted walk in pose and velocity.
-
-    The passage is planted together with the walk, so that a foot whose stance goes on in the walk stays in one place.
-
-    Args:
-        body: the spec.
-        clip: the stop or the start.
-        draft: its draft with feet as in the physics, which meets idle and the walk.
-        idle: first pose of idle.
-        walk: with feet as in the physics.
-        planted_walk: the same with planted feet.
-    """
-    samples = len(draft.motion.joints)
-    if clip.starts:
-        motion_with_walk = draft.motion.append(walk.motion)
-        passage_samples = slice(None, samples)
-    else:
-        motion_with_walk = walk.motion.append(draft.motion)
-        passage_samples = slice(-samples, None)
-    planted_with_walk = draft._replace(motion=motion_with_walk).plant_feet(body).motion
-    idle_end, walk_end = _ends_of_passage(clip)
-    motion = draft.motion._replace(joints=planted_with_walk.joints[passage_samples])
-    motion = motion.end_with(idle, idle_end, draft.cycle_samples)
-    motion = motion.end_with(planted_walk.start, walk_end, draft.cycle_samples)
-    return draft._replace(motion=motion)
-
-
-def _ends_of_passage(clip: Passage) -> tuple[int, int]:
-    """Return the end, 0 or -1, at which a passage meets idle, and that at which it meets the walk."""
-    if clip.starts:
-        return 0, -1
-    return -1, 0

@@ -4,38 +4,24 @@ A gesture is a table of tracks. A track has keys of time and value; between keys
 standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.POSE_NAMES`.
 """
 
-import itertools
-import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
-from arc_suite.models import posture, sizing
-from arc_suite.models.kinematics import Legs
+from arc_suite.animation.clips.standing_legs import (
+    HEIGHT,
+    feet_from_torso,
+    follow_with_legs,
+    keep_feet_in_place,
+    pose_motion,
+    sample_times,
+)
+from arc_suite.models import posture
 from arc_suite.robots.spec import Body
 
-_HEIGHT = posture.POSE_NAMES.index("height")
 _LEFT = posture.POSE_NAMES.index("left")
 _ROLL = posture.POSE_NAMES.index("roll")
-
-_SAMPLES_PER_CONTROL_STEP = 4
-_SMOOTHING_ROUNDS = 3  # of a mean over three samples
-
-# Inverse kinematics.
-_STAGES = 8  # in which poses grow from rest, so that no leg folds the other way
-_ITERATIONS_PER_STAGE = 6
-_SOLE_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a sole: legs of two joints slide rather than sink
-
-# A gesture that the legs cannot follow is made smaller. Each size is tried as it is, then with a torso that sinks
-# more, as stretched legs cannot follow a tilt.
-_SIZES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)
-_SINK_FACTORS = (1.0, 1.6)
-_MAX_SINK = 0.01  # h, by which a sole may miss its goal in height
-_MAX_SLIDE = 0.08  # h, by which a sole may miss its goal in x or y
-_MAX_JOINT_SPEED = 7.0  # rad / sqrt(h / g)
 
 # A breath, and weight that shifts to either side once in two breaths.
 _BREATH_DEPTH = 0.012  # h
@@ -93,18 +79,6 @@ _TURN_HOLD_DURATION = 4.0
 # Gestures.
 
 
-def hold_pose(pose: Pose, samples: int, time_step: float) -> ClipMotion:
-    """Return a pose that stays for a number of samples after the first one, with a root that stays."""
-    return ClipMotion(
-        time_step=time_step,
-        root=np.zeros((samples + 1, 3)),
-        positions=np.tile(pose.position, (samples + 1, 1)),
-        quaternions=np.tile(pose.quaternion, (samples + 1, 1)),
-        joints=np.tile(pose.joints, (samples + 1, 1)),
-        twist=np.zeros(3),
-    )
-
-
 def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration: float) -> ClipMotion:
     """Return a torso that moves over standing feet, as far as the legs can follow.
 
@@ -118,8 +92,8 @@ def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    poses = _poses_of_tracks(_sample_times(body, duration), tracks)
-    return _follow_with_legs(body, rest, poses, action="move so")
+    poses = _poses_of_tracks(sample_times(body, duration), tracks)
+    return follow_with_legs(body, rest, poses, action="move so")
 
 
 def idle(body: Body, rest: Pose) -> ClipMotion:
@@ -128,7 +102,7 @@ def idle(body: Body, rest: Pose) -> ClipMotion:
     The torso sinks and rises, and goes to either side, while joints bend so that the soles stay where they are; less
     where legs have too few joints for that.
     """
-    times = _sample_times(body, 2.0 * _BREATH_PERIOD)
+    times = sample_times(body, 2.0 * _BREATH_PERIOD)
     phase = 2.0 * np.pi * times / times[-1]
     sway = np.sin(phase) * np.sin(0.5 * phase) ** 2  # at rest at both ends
     poses = _poses_of_tracks(times, {}) + _breathe(times)
@@ -136,9 +110,9 @@ def idle(body: Body, rest: Pose) -> ClipMotion:
     poses[:, _ROLL] = -_SWAY_ROLL * sway
     _, misses = keep_feet_in_place(body, rest, poses)
     max_miss = _MAX_IDLE_MISS * body.torso.standing_height
-    poses *= min(1.0, max_miss / max(misses.max(), 1e-9))
+    poses *= min(1.0, max_miss / max(abs(misses).max(), 1e-9))
     joints, _ = keep_feet_in_place(body, rest, poses)
-    return _close_loop(_make_motion(body, rest, poses, joints))
+    return _close_loop(pose_motion(body, rest, poses, joints))
 
 
 def glance(body: Body, rest: Pose) -> ClipMotion:
@@ -147,9 +121,9 @@ def glance(body: Body, rest: Pose) -> ClipMotion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times = _sample_times(body, _LOOK_DURATION)
+    times = sample_times(body, _LOOK_DURATION)
     poses = _poses_of_tracks(times, _LOOK_TRACKS) + _breathe(times)
-    return _close_loop(_follow_with_legs(body, rest, poses, action="look around"))
+    return _close_loop(follow_with_legs(body, rest, poses, action="look around"))
 
 
 def settle(body: Body, rest: Pose) -> ClipMotion:
@@ -158,8 +132,8 @@ def settle(body: Body, rest: Pose) -> ClipMotion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times = _sample_times(body, _SETTLE_DURATION)
-    feet = _feet_from_torso(body, rest)
+    times = sample_times(body, _SETTLE_DURATION)
+    feet = feet_from_torso(body, rest)
     poses = _breathe(times)
     lifts = np.zeros((len(times), len(feet), 3))
     first_leg = 0
@@ -171,7 +145,7 @@ def settle(body: Body, rest: Pose) -> ClipMotion:
         poses[:, 1:3] += shift[:, None] * away_from_foot  # forward and left
         poses[:, 3:5] += shift[:, None] * (-left, forward)  # roll and pitch: the torso leans where its weight goes
         lifts[:, leg, 2] = _track_values(times - start, _SETTLE_LIFT_TRACK)
-    return _close_loop(_follow_with_legs(body, rest, poses, action="shift its weight", lifts=lifts))
+    return _close_loop(follow_with_legs(body, rest, poses, action="shift its weight", lifts=lifts))
 
 
 def hit(body: Body, rest: Pose, side: str) -> ClipMotion:
@@ -185,7 +159,7 @@ def hit(body: Body, rest: Pose, side: str) -> ClipMotion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times = _sample_times(body, _HIT_DURATION)
+    times = sample_times(body, _HIT_DURATION)
     forward, left = HIT_DIRECTIONS[side]
 
     def impulse(start):
@@ -198,8 +172,8 @@ def hit(body: Body, rest: Pose, side: str) -> ClipMotion:
     # Height, forward, left, roll, pitch and yaw.
     largest_sway = np.array((0.0, _HIT_PUSH * forward, _HIT_PUSH * left, -_HIT_TILT * left, _HIT_TILT * forward, 0.0))
     poses = sway[:, None] * largest_sway
-    poses[:, _HEIGHT] = -_HIT_SINK * sink
-    return _follow_with_legs(body, rest, poses, action="sway")
+    poses[:, HEIGHT] = -_HIT_SINK * sink
+    return follow_with_legs(body, rest, poses, action="sway")
 
 
 def strike(body: Body, rest: Pose) -> ClipMotion:
@@ -208,14 +182,14 @@ def strike(body: Body, rest: Pose) -> ClipMotion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times = _sample_times(body, _STRIKE_DURATION)
-    feet = _feet_from_torso(body, rest)
+    times = sample_times(body, _STRIKE_DURATION)
+    feet = feet_from_torso(body, rest)
     front_leg = int(feet[:, 0].argmax())
     lifts = np.zeros((len(times), len(feet), 3))
     lifts[:, front_leg, 0] = _track_values(times, _STRIKE_FOOT_FORWARD_TRACK)
     lifts[:, front_leg, 2] = _track_values(times, _STRIKE_FOOT_UP_TRACK)
     poses = _poses_of_tracks(times, _STRIKE_TORSO_TRACKS)
-    return _follow_with_legs(body, rest, poses, action="strike", lifts=lifts)
+    return follow_with_legs(body, rest, poses, action="strike", lifts=lifts)
 
 
 def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> ClipMotion:
@@ -238,129 +212,15 @@ def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> ClipMotion:
     hold_end = _TURN_EASE_DURATION + _TURN_HOLD_DURATION
     duration = hold_end + _TURN_EASE_DURATION
     track = ((0.0, 0.0), (_TURN_EASE_DURATION, turn), (hold_end, turn), (duration, 0.0))
-    poses = _poses_of_tracks(_sample_times(body, duration), {number: track})
-    joints, _ = keep_feet_in_place(body, rest, poses)
-    return _make_motion(body, rest, poses, joints)
+    poses = _poses_of_tracks(sample_times(body, duration), {number: track})
+    return follow_with_legs(body, rest, poses, action=number)
 
 
-# Legs that follow the torso.
-
-
-def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
-    """Return joint angles (samples, joints), rad, that keep soles in place while the torso sinks.
-
-    Args:
-        body: the spec.
-        rest: pose from which it sinks.
-        depths: (samples,) m.
-    """
-    height_only = np.eye(6)[_HEIGHT]
-    poses = -depths[:, None] / body.torso.standing_height * height_only
-    joints, _ = keep_feet_in_place(body, rest, poses)
-    return joints
-
-
-class LegMotion(NamedTuple):
-    """Legs that follow the torso.
-
-    Attributes:
-        joints: (samples, joints) angles, rad.
-        misses: (samples, legs, 3) distances by which feet miss their goals along the root's axes, m; not negative.
-    """
-
-    joints: np.ndarray
-    misses: np.ndarray
-
-
-def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None) -> LegMotion:
-    """Return joint angles that hold feet in place under a torso that moves, and how far feet miss.
-
-    Args:
-        body: the spec.
-        rest: pose from which the torso moves.
-        poses: (samples, 6) poses of the torso from there; see `posture`.
-        lifts: (samples, legs, 3) displacements by which feet leave their positions, standing
-            heights; None for feet that stay.
-    """
-    standing_height = body.torso.standing_height
-    torso_rotation = rotations.matrix(rest.quaternion)
-    to_torso = torso_rotation  # turns rows of points from the root's axes into the torso's at rest
-    to_root = torso_rotation.T
-    legs = _legs_to_foot_centers(body)
-    rest_angles = legs.by_leg(rest.joints)
-    # A joint at rest may be a little beyond its range, as limits are soft.
-    legs = legs._replace(low=np.minimum(legs.low, rest_angles), high=np.maximum(legs.high, rest_angles))
-    rest_feet = legs.soles(rest_angles)[0] @ to_root  # m, from the torso
-    lift_vectors = standing_height * (np.zeros(3) if lifts is None else lifts)  # m
-
-    angles = np.tile(rest_angles, (len(poses), 1, 1))
-    for share in np.linspace(0.0, 1.0, _STAGES + 1)[1:]:
-        goals = posture.move_ground_points(rest_feet + share * lift_vectors, share * poses, standing_height) @ to_torso
-        angles = legs.solve_joint_angles(
-            angles, goals, _SOLE_WEIGHTS, posture.IK_DAMPING * standing_height, _ITERATIONS_PER_STAGE
-        )
-    attitudes = posture.rotation_of(poses[:, 3:])
-    misses = (legs.soles(angles)[0] - goals) @ to_root @ attitudes.swapaxes(-1, -2)
-    return LegMotion(joints=legs.by_joint(angles), misses=abs(misses))
-
-
-def _follow_with_legs(
-    body: Body, rest: Pose, poses: np.ndarray, action: str, lifts: np.ndarray | None = None
-) -> ClipMotion:
-    """Return a gesture that is as large as standing legs can follow.
-
-    Args:
-        body: the spec.
-        rest: pose from which the torso moves.
-        poses: (samples, 6) poses of the torso at full size.
-        action: what an error says that the body has no room to do.
-        lifts: (samples, legs, 3) lifts of the feet at full size, standing heights; None for feet that stay.
-
-    Raises:
-        ValueError: the legs cannot follow the smallest size.
-    """
-    standing_height = body.torso.standing_height
-    if lifts is None:
-        lifts = np.zeros((1, len(body.legs), 3))
-    max_misses = standing_height * _allowed_misses(lifts)
-    max_joint_step = _MAX_JOINT_SPEED * math.sqrt(sizing.GRAVITY / standing_height) * _time_step(body)
-    for size, sink_factor in itertools.product(_SIZES, _SINK_FACTORS):
-        sized_poses = size * poses * (sink_factor, 1.0, 1.0, 1.0, 1.0, 1.0)  # the height comes first
-        joints, misses = keep_feet_in_place(body, rest, sized_poses, size * lifts)
-        joints = _smooth(joints)
-        joint_steps = abs(np.diff(joints, axis=0))
-        if (misses <= max_misses).all() and joint_steps.max() <= max_joint_step:
-            return _make_motion(body, rest, sized_poses, joints)
-    raise ValueError(f"the legs leave the torso no room to {action}")
-
-
-def _allowed_misses(lifts: np.ndarray) -> np.ndarray:
-    """Return by how much feet may miss their goals, (samples, legs, 3) h: infinitely where a foot is in the air."""
-    stays = ~lifts.any(axis=-1, keepdims=True)
-    is_on_ground = lifts[..., 2:] == 0.0
-    is_limited = np.concatenate([stays, stays, is_on_ground], axis=-1)
-    return np.where(is_limited, (_MAX_SLIDE, _MAX_SLIDE, _MAX_SINK), np.inf)
-
-
-def _make_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> ClipMotion:
-    """Return a motion of the torso (samples, 6) from rest, and of joints (samples, joints), rad."""
-    up, forward, left = (poses[:, [column]] for column in range(3))
-    offsets = body.torso.standing_height * np.concatenate([forward, left, up], axis=-1)
-    quaternions = np.broadcast_to(rest.quaternion, (len(poses), 4))
-    half_angles = 0.5 * poses[:, 3:]  # of roll, pitch and yaw
-    for axis in range(3):
-        half_angle = half_angles[:, [axis]]
-        turns = np.concatenate([np.cos(half_angle), np.sin(half_angle) * np.eye(3)[axis]], axis=-1)
-        quaternions = rotations.product(turns, quaternions)
-    motion = hold_pose(rest, len(poses) - 1, _time_step(body))
-    return motion._replace(positions=rest.position + offsets, quaternions=quaternions, joints=joints)
-
-
-def _smooth(joints: np.ndarray) -> np.ndarray:
-    """Return joint angles (samples, joints) without jerks, such as of a leg that stretches; both ends stay."""
-    for _ in range(_SMOOTHING_ROUNDS):
-        joints[1:-1] = 0.25 * (joints[:-2] + 2.0 * joints[1:-1] + joints[2:])
-    return joints
+def _breathe(times: np.ndarray) -> np.ndarray:
+    """Return poses (samples, 6) of a torso that sinks and rises in each breath."""
+    depths = 0.5 - 0.5 * np.cos(2.0 * np.pi * times / _BREATH_PERIOD)
+    height_only = np.eye(6)[HEIGHT]
+    return -_BREATH_DEPTH * depths[:, None] * height_only
 
 
 def _close_loop(motion: ClipMotion) -> ClipMotion:
@@ -368,31 +228,7 @@ def _close_loop(motion: ClipMotion) -> ClipMotion:
     return motion.map_arrays(lambda values: np.concatenate([values[:-1], values[:1]]))
 
 
-def _legs_to_foot_centers(body: Body) -> Legs:
-    """Return the legs with the centers of feet for soles, over which a torso tilts."""
-    legs = Legs.of(body, used=1.0)
-    return legs._replace(radii=np.zeros_like(legs.radii))
-
-
-def _feet_from_torso(body: Body, rest: Pose) -> np.ndarray:
-    """Return the positions (legs, 3) of the feet from the torso, in the root's axes, m."""
-    legs = _legs_to_foot_centers(body)
-    foot_positions, _ = legs.soles(legs.by_leg(rest.joints))
-    return foot_positions @ rotations.matrix(rest.quaternion).T
-
-
-# Times and tracks.
-
-
-def _time_step(body: Body) -> float:
-    """Return the time between two samples, s."""
-    return sizing.control_timestep(body) / _SAMPLES_PER_CONTROL_STEP
-
-
-def _sample_times(body: Body, duration: float) -> np.ndarray:
-    """Return the times (samples,) of a duration, both in sqrt(h / g), both ends included."""
-    time_step = _time_step(body) * math.sqrt(sizing.GRAVITY / body.torso.standing_height)
-    return np.linspace(0.0, duration, 1 + max(2, round(duration / time_step)))
+# Tracks.
 
 
 def _poses_of_tracks(times: np.ndarray, tracks: Mapping[str, tuple]) -> np.ndarray:
@@ -414,10 +250,3 @@ def _track_values(times: np.ndarray, track: tuple) -> np.ndarray:
     previous_values = key_values[previous_keys]
     next_values = key_values[next_keys]
     return next_values + (previous_values - next_values) * fade_out(share)
-
-
-def _breathe(times: np.ndarray) -> np.ndarray:
-    """Return poses (samples, 6) of a torso that sinks and rises in each breath."""
-    depths = 0.5 - 0.5 * np.cos(2.0 * np.pi * times / _BREATH_PERIOD)
-    height_only = np.eye(6)[_HEIGHT]
-    return -_BREATH_DEPTH * depths[:, None] * height_only

@@ -57,7 +57,8 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
     """Return the metadata of a clip.
 
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
-    `slip` is the path of a foot in stance over the ground, m a meter of the root. `additive_to` is the animation whose
+    `slip` is the path of a foot in stance over the ground, m a meter of the root. `slide` is the largest diagonal of
+    the way of a standing foot, m, in a clip in which feet are to stand still. `additive_to` is the animation whose
     first frame is the reference of an additive clip. `additive_over` names the clips that it can be added to: no sole
     then sinks deeper than 0.03 standing heights.
     """
@@ -77,6 +78,8 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
     }
     if clip.slip is not None:
         metadata["slip"] = round(clip.slip, 3)
+    if clip.slide is not None:
+        metadata["slide"] = round(clip.slide, 4)
     is_additive = clip.additive_over is not None
     if is_additive:
         metadata["additive_to"] = "idle_loop"

@@ -1,10 +1,9 @@
-"""Recordings of one body under one policy: walks under commands, a stop and a start, turns, showcases of presets."""
+"""Recordings of one body under one policy: walks under commands, a stop and a start, showcases of presets."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
 from arc_suite.animation.clips import loops
 from arc_suite.animation.clips.recordings import Recording, record
 from arc_suite.cpg.selection import presets_of
@@ -22,8 +21,6 @@ _CYCLES_AT_REST = 5
 _CYCLES_AFTER_START = 4
 _CROUCH_ROOM_SHARE = 0.7  # of the room that legs leave the torso: as deep as a body crouches
 _MIN_CROUCH = 0.05  # standing heights
-_MAX_TURN_TRIES = 3  # recordings of a turn, each corrected by the one before
-_MIN_TURN_SHARE = 0.25  # of the desired angle: a policy that turns less does not turn
 _FIXED_POSE_AND_GAIT = {"poses": 0.0, "gaits": ()}  # settings of a task that else draws commands of pose and gait
 
 
@@ -62,20 +59,6 @@ class TransitionRecording(NamedTuple):
     stop: int
     start: int
     delay: int
-
-
-class TurnRecording(NamedTuple):
-    """A body that stands, turns on the spot, and stands.
-
-    Attributes:
-        gait: the recording.
-        first: sample at which the body begins to turn.
-        samples: until it stands again.
-    """
-
-    gait: GaitRecording
-    first: int
-    samples: int
 
 
 class _Clock(NamedTuple):
@@ -207,40 +190,6 @@ class Recorder:
             start=substeps * (start_step - _SETTLE_STEPS),
             delay=delay,
         )
-
-    def record_turn(self, angle: float) -> TurnRecording:
-        """Return a recording of a turn on the spot by about an angle, rad.
-
-        Raises:
-            ValueError: the episode ends, the task has no command, or the policy does not turn.
-        """
-        clock = self._clock()
-        cycle_steps = round(clock.cycle / clock.control_timestep)
-        rest_steps = round(_CYCLES_AT_REST * clock.cycle / clock.control_timestep)
-        turn_rate = float(np.copysign(self.velocity_units[2], angle))  # rad/s
-        turn_steps = round(angle / turn_rate / clock.control_timestep)
-        begin_step = _SETTLE_STEPS + cycle_steps
-        for _ in range(_MAX_TURN_TRIES):
-            commands = [
-                (0, (0.0, 0.0, 0.0)),
-                (begin_step, (0.0, 0.0, np.sign(angle))),
-                (begin_step + turn_steps, (0.0, 0.0, 0.0)),
-            ]
-            steps = 2 * cycle_steps + turn_steps + rest_steps
-            recording = self._record(self._setup, _SETTLE_STEPS, steps, commands)
-            first = recording.substeps * cycle_steps
-            samples = recording.substeps * (turn_steps + rest_steps)
-            yaw = np.unwrap(rotations.yaw(recording.poses[first : first + samples + 1, 3:7]))
-            reached_angle = abs(yaw[-1] - yaw[0])
-            if reached_angle < _MIN_TURN_SHARE * abs(angle):
-                reached_degrees = np.degrees(reached_angle)
-                min_degrees = np.degrees(_MIN_TURN_SHARE * abs(angle))
-                raise ValueError(f"the policy turns by {reached_degrees:.0f} degrees, less than {min_degrees:.0f}")
-            missing_steps = round((abs(angle) - reached_angle) / abs(turn_rate) / clock.control_timestep)
-            if not missing_steps:
-                break
-            turn_steps += missing_steps
-        return TurnRecording(GaitRecording(recording, clock.cycle), first, samples)
 
     def _setup_with_pose_command(self) -> Setup:
         """Return the setup, or for demonstrators that of the task `directed`, which takes a pose by command."""

@@ -166,21 +166,22 @@ class ClipMotion(NamedTuple):
         motion = motion._replace(root=root, twist=twist_to(root[-1]) / motion.seconds)
         return motion.end_with(pose, end, samples)
 
-    def end_with(self, pose: Pose, end: int, samples: int) -> "ClipMotion":
+    def end_with(self, pose: Pose, end: int, samples: int, held_samples: int = 0) -> "ClipMotion":
         """Return the motion with a pose at one of its ends, on the same path of the root.
 
         Args:
             pose: pose to end with, in the root's frame.
             end: 0 or -1.
-            samples: next to the end, over which the difference of the poses fades.
+            samples: over which the difference of the poses fades.
+            held_samples: samples between these and the end, which take the whole difference.
         """
         difference = pose.relative(self.pose(end))
-        motion = self.add_difference(difference, self._end_weights(end, samples))
+        motion = self.add_difference(difference, self._end_weights(end, samples, held_samples))
         return motion._replace(seam=max(self.seam, seam_size(difference)))
 
-    def _end_weights(self, end: int, samples: int) -> np.ndarray:
-        """Return weights (samples,) that fall from 1 at an end, 0 or -1, to 0 over a number of samples."""
-        weights = fade_out(np.arange(len(self.joints)) / samples)
+    def _end_weights(self, end: int, samples: int, held_samples: int = 0) -> np.ndarray:
+        """Return weights (samples,) that stay 1 next to an end, 0 or -1, then fall to 0 over a number of samples."""
+        weights = fade_out((np.arange(len(self.joints)) - held_samples) / samples)
         if end == 0:
             return weights
         return weights[::-1]
@@ -233,12 +234,23 @@ def stay_at_start(recording: Recording, first: int, samples: int) -> ClipMotion:
     return put_on_root(recording.time_step, poses, root, torso_on_root=relative_pose(torso[0], torso))
 
 
+def stay_at_end(recording: Recording, first: int) -> ClipMotion:
+    """Return a recording from a sample on, whose root stays below the torso of its last sample."""
+    poses = recording.poses[first:]
+    torso = ground_poses(poses)
+    root = np.zeros((len(poses), 3))
+    return put_on_root(recording.time_step, poses, root, torso_on_root=relative_pose(torso[-1], torso))
+
+
 def advance_straight(recording: Recording) -> ClipMotion:
-    """Return a recording whose root goes straight ahead below the torso."""
+    """Return a recording whose root goes below the torso on the line from its first place to its last."""
     torso = ground_poses(recording.poses)
-    root = (torso - torso[0]) * (1.0, 0.0, 0.0)
-    torso_on_root = relative_pose(root, relative_pose(torso[0], torso))
-    motion = put_on_root(recording.time_step, recording.poses, root, torso_on_root)
+    way = relative_pose(torso[0], torso) * (1.0, 1.0, 0.0)
+    course = way[-1] / max(np.linalg.norm(way[-1]), 1e-9)
+    root = (way @ course)[:, None] * course
+    motion = put_on_root(
+        recording.time_step, recording.poses, root, relative_pose(root, relative_pose(torso[0], torso))
+    )
     return motion._replace(twist=twist_to(root[-1]) / motion.seconds)
 
 

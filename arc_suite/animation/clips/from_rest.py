@@ -1,0 +1,193 @@
+"""Clips that connect to idle, and some to the walk: gestures, falls, jumps, turns, starts and stops."""
+
+import functools
+import math
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from arc_suite.animation.clips import bounds, root_motion, turning
+from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, Passage, Turn, clip_of
+from arc_suite.animation.clips.draft import Draft
+from arc_suite.animation.clips.recorder import TransitionRecording
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.models import sizing
+from arc_suite.robots.spec import Body
+
+_MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
+_FLIGHT_HEIGHT = 0.02  # standing heights: while all soles are higher, a body flies
+_FREE_SOLE_DEPTH = 0.025  # standing heights: soles that are deeper in the ground are raised
+_RAISING_DURATION = 0.5  # sqrt(h / g), to either side of a sample in which a body is raised
+
+
+def make_clips_from_rest(
+    body: Body,
+    transition: TransitionRecording,
+    names: Sequence[str],
+    walk: Draft | None,
+    planted_walk: Draft | None,
+    left_out,
+) -> dict[str, Draft]:
+    """Return the draft of idle, and those of the named clips that connect to it.
+
+    Args:
+        body: the spec.
+        transition: transition from which rest, stops and starts are taken.
+        names: names of the clips.
+        walk: clip that stops and starts connect to, with feet as in the physics.
+        planted_walk: the same with planted feet; None if feet are not to be planted.
+        left_out: takes the reasons why clips cannot be made.
+    """
+    rest_pose = root_motion.stay_at_start(transition.gait.recording, transition.start, samples=1).pose(0)
+    idle_clip = cast(Acted, clip_of("idle"))
+    idle = _play(body, idle_clip, rest_pose).put_on_ground(body)
+    drafts = {"idle": idle}
+    for name in names:
+        try:
+            match clip_of(name):
+                case Acted() as clip if name != "idle":
+                    drafts[name] = _act(body, clip, idle.start)
+                case Turn() as clip:
+                    play = functools.partial(turning.turn, angle=math.radians(clip.angle))
+                    drafts[name] = _act(body, Acted(play, BOTH_ENDS, steps=True), idle.start)
+                case Passage() as clip:
+                    draft = _make_passage(body, clip, transition, idle.start, walk)
+                    if planted_walk is not None:
+                        draft = _plant_passage(body, clip, draft, idle.start, walk, planted_walk)
+                    drafts[name] = draft
+        except ValueError as error:
+            left_out[name] = str(error)
+    return drafts
+
+
+def _play(body: Body, clip: Acted, rest: Pose) -> Draft:
+    """Return a motion from the pose at rest.
+
+    Raises:
+        ValueError: the clip plays no motion, as one of another package may.
+    """
+    motion = clip.play(body, rest)
+    if not isinstance(motion, ClipMotion):
+        raise ValueError(f"expected a ClipMotion of its play, got {type(motion).__name__}")
+    return Draft(motion, loops=clip.loops, stands=not clip.steps)
+
+
+def _act(body: Body, clip: Acted, idle: Pose) -> Draft:
+    """Return a motion from the first pose of idle, which meets it at its ends; see `Acted`."""
+    draft = _play(body, clip, idle)
+    motion = draft.motion
+    for end in clip.ends:
+        fading_samples = len(motion.joints) // 3
+        landed_samples = 0
+        if end == -1 and not clip.planted:
+            fading_samples, landed_samples = _find_flight(body, motion) or (fading_samples, 0)
+        motion = motion.end_with(idle, end, fading_samples, landed_samples)
+    if not clip.planted:
+        motion = _raise_out_of_ground(body, motion, clip.ends)
+    return draft._replace(motion=motion)
+
+
+def _raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[int]) -> ClipMotion:
+    """Return a motion whose torso is higher where, drawn, the body is in the ground, and smoothly so before and after.
+
+    Contacts of the physics are soft, and recordings of policies have no contacts of what is drawn around colliders.
+
+    Args:
+        body: the spec.
+        motion: any.
+        fixed_ends: ends whose poses stay: 0, -1 or both.
+    """
+    height = body.torso.standing_height
+    ground = bounds.measure_ground(body, motion)
+    depths = np.maximum(-ground.lowest_part, -ground.soles.min(axis=-1) - _FREE_SOLE_DEPTH * height)
+    if depths.max() <= 0.0:
+        return motion
+    width = round(_RAISING_DURATION * math.sqrt(height / sizing.GRAVITY) / motion.time_step)
+    padded = np.pad(depths.clip(0.0), 2 * width, mode="edge")
+    largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1).max(axis=-1)
+    weights = np.hanning(2 * width + 3)[1:-1]
+    raises = np.convolve(largest, weights / weights.sum(), "valid")
+    for end in fixed_ends:
+        weights = root_motion.fade_out(1.0 - np.arange(len(raises)) / width)
+        raises = raises * (weights if end == 0 else weights[::-1])
+    return motion._replace(positions=motion.positions + raises[:, None] * (0.0, 0.0, 1.0))
+
+
+def _find_flight(body: Body, motion: ClipMotion) -> tuple[int, int] | None:
+    """Return the samples of the last flight, and those after it; None if a foot is always near the ground."""
+    soles = bounds.measure_ground(body, motion).soles
+    in_air = np.flatnonzero((soles > _FLIGHT_HEIGHT * body.torso.standing_height).all(axis=-1))
+    if not len(in_air):
+        return None
+    landing = int(in_air[-1])
+    takeoff = int(in_air[np.flatnonzero(np.diff(in_air, prepend=-2) > 1)[-1]])
+    return landing - takeoff + 1, len(motion.joints) - 1 - landing
+
+
+def cut_passage(body: Body, clip: Passage, transition: TransitionRecording) -> Draft:
+    """Return a stop or a start as it was recorded, with soles in stance on the ground."""
+    gait = transition.gait
+    cycle_samples = round(gait.cycle / gait.recording.time_step)
+    samples = clip.cycles * cycle_samples
+    if clip.starts:
+        first = transition.start
+        samples -= transition.delay  # so that it ends at a scheduled touchdown
+    else:
+        first = transition.stop
+    motion = root_motion.follow_mean_path(gait.recording, first, samples, window=cycle_samples)
+    return Draft(motion, clip.cycles, gait.cycle, loops=False).put_on_ground(body)
+
+
+def _make_passage(body: Body, clip: Passage, transition: TransitionRecording, idle: Pose, walk: Draft | None) -> Draft:
+    """Return a stop or a start, which meets idle and the walk.
+
+    Raises:
+        ValueError: there is no walk, or its pose is far from that of the passage.
+    """
+    if walk is None:
+        raise ValueError("there is no walk that it connects to")
+    draft = cut_passage(body, clip, transition)
+    idle_end, walk_end = _ends_of_passage(clip)
+    motion = draft.motion.meet(idle, idle_end, draft.cycle_samples)
+    motion = motion.meet(walk.start, walk_end, draft.cycle_samples)
+    if motion.seam > _MAX_MEETING_SEAM:
+        seam = np.degrees(motion.seam)
+        max_seam = np.degrees(_MAX_MEETING_SEAM)
+        raise ValueError(f"its pose is {seam:.0f} degrees from that of the walk or of idle, more than {max_seam:.0f}")
+    return draft._replace(motion=_raise_out_of_ground(body, motion, BOTH_ENDS))
+
+
+def _plant_passage(body: Body, clip: Passage, draft: Draft, idle: Pose, walk: Draft, planted_walk: Draft) -> Draft:
+    """Return a stop or a start with planted feet, which meets idle, and the planted walk in pose and velocity.
+
+    The passage is planted together with the walk, so that a foot whose stance goes on in the walk stays in one place.
+
+    Args:
+        body: the spec.
+        clip: the stop or the start.
+        draft: its draft with feet as in the physics, which meets idle and the walk.
+        idle: first pose of idle.
+        walk: with feet as in the physics.
+        planted_walk: the same with planted feet.
+    """
+    samples = len(draft.motion.joints)
+    if clip.starts:
+        motion_with_walk = draft.motion.append(walk.motion)
+        passage_samples = slice(None, samples)
+    else:
+        motion_with_walk = walk.motion.append(draft.motion)
+        passage_samples = slice(-samples, None)
+    planted_with_walk = draft._replace(motion=motion_with_walk).plant_feet(body).motion
+    idle_end, walk_end = _ends_of_passage(clip)
+    motion = draft.motion._replace(joints=planted_with_walk.joints[passage_samples])
+    motion = motion.end_with(idle, idle_end, draft.cycle_samples)
+    motion = motion.end_with(planted_walk.start, walk_end, draft.cycle_samples)
+    return draft._replace(motion=motion)
+
+
+def _ends_of_passage(clip: Passage) -> tuple[int, int]:
+    """Return the end, 0 or -1, at which a passage meets idle, and that at which it meets the walk."""
+    if clip.starts:
+        return 0, -1
+    return -1, 0

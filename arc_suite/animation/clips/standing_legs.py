@@ -1,0 +1,205 @@
+"""Legs under a torso that moves: feet stay, or move as drawn, by inverse kinematics, as far as legs can follow.
+
+Lengths are in standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.POSE_NAMES`.
+"""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.models import posture, sizing
+from arc_suite.models.kinematics import Legs
+from arc_suite.robots.spec import Body
+
+HEIGHT = posture.POSE_NAMES.index("height")
+
+_SAMPLES_PER_CONTROL_STEP = 4
+_SMOOTHING_ROUNDS = 3  # of a mean over three samples
+
+# Inverse kinematics.
+_STAGES = 8  # in which poses grow from rest, so that no leg folds the other way
+_ITERATIONS_PER_STAGE = 6
+_SOLE_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a sole: legs of two joints slide rather than sink
+
+# A motion that the legs cannot follow is made smaller. Each size is tried as it is, then with a torso that sinks
+# more, as stretched legs cannot follow a tilt.
+_SIZES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)
+_SINK_FACTORS = (1.0, 1.6, 2.4)
+
+# What a standing foot may miss, h.
+_MAX_SINK = 0.01
+_MAX_SLIDE = 0.04
+_MAX_SLIDE_OF_FEW_JOINTS = 0.16
+_FREE_JOINTS = 3  # joints of a leg whose foot can stay under a torso that moves in any direction
+
+_MAX_JOINT_SPEED = 7.0  # rad / sqrt(h / g)
+
+
+class LegMotion(NamedTuple):
+    """Legs that follow the torso.
+
+    Attributes:
+        joints: (samples, joints) angles, rad.
+        misses: (samples, legs, 3) distances from feet to their goals along the root's axes, m.
+    """
+
+    joints: np.ndarray
+    misses: np.ndarray
+
+
+def has_free_feet(body: Body) -> bool:
+    """Return whether every foot of a body can stay in place while the torso moves: its leg has three joints or more."""
+    return min(len(leg.joints) for leg in body.legs) >= _FREE_JOINTS
+
+
+def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
+    """Return joint angles (samples, joints), rad, that keep soles in place while the torso sinks.
+
+    Args:
+        body: the spec.
+        rest: pose from which it sinks.
+        depths: (samples,) m.
+    """
+    height_only = np.eye(6)[HEIGHT]
+    poses = -depths[:, None] / body.torso.standing_height * height_only
+    joints, _ = keep_feet_in_place(body, rest, poses)
+    return joints
+
+
+def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None) -> LegMotion:
+    """Return joint angles that hold feet in place under a torso that moves, and how far feet miss.
+
+    Args:
+        body: the spec.
+        rest: pose from which the torso moves.
+        poses: (samples, 6) poses of the torso from there; see `posture`.
+        lifts: (samples, legs, 3) displacements by which feet leave their positions, standing
+            heights; None for feet that stay.
+    """
+    standing_height = body.torso.standing_height
+    torso_rotation = rotations.matrix(rest.quaternion)
+    to_torso = torso_rotation  # turns rows of points from the root's axes into the torso's at rest
+    to_root = torso_rotation.T
+    legs = _legs_to_foot_centers(body)
+    rest_angles = legs.by_leg(rest.joints)
+    # A joint at rest may be a little beyond its range, as limits are soft.
+    legs = legs._replace(low=np.minimum(legs.low, rest_angles), high=np.maximum(legs.high, rest_angles))
+    rest_feet = legs.soles(rest_angles)[0] @ to_root  # m, from the torso
+    lift_vectors = standing_height * (np.zeros(3) if lifts is None else lifts)  # m
+
+    angles = np.tile(rest_angles, (len(poses), 1, 1))
+    for share in np.linspace(0.0, 1.0, _STAGES + 1)[1:]:
+        goals = posture.move_ground_points(rest_feet + share * lift_vectors, share * poses, standing_height) @ to_torso
+        angles = legs.solve_joint_angles(
+            angles, goals, _SOLE_WEIGHTS, posture.IK_DAMPING * standing_height, _ITERATIONS_PER_STAGE
+        )
+    attitudes = posture.rotation_of(poses[:, 3:])
+    misses = (legs.soles(angles)[0] - goals) @ to_root @ attitudes.swapaxes(-1, -2)
+    return LegMotion(joints=legs.by_joint(angles), misses=misses)
+
+
+def follow_with_legs(
+    body: Body, rest: Pose, poses: np.ndarray, action: str, lifts: np.ndarray | None = None
+) -> ClipMotion:
+    """Return a motion of the torso over its feet that is as large as standing legs can follow.
+
+    Args:
+        body: the spec.
+        rest: pose from which the torso moves.
+        poses: (samples, 6) poses of the torso at full size.
+        action: what an error says that the body has no room to do.
+        lifts: (samples, legs, 3) lifts of the feet at full size, standing heights; None for feet that stay.
+
+    Raises:
+        ValueError: the legs cannot follow the smallest size.
+    """
+    if lifts is None:
+        lifts = np.zeros((len(poses), len(body.legs), 3))
+    sink_factors = _SINK_FACTORS if poses[:, HEIGHT].any() else (1.0,)
+    for size, sink_factor in itertools.product(_SIZES, sink_factors):
+        sized_poses = size * poses
+        sized_poses[:, HEIGHT] *= sink_factor
+        motion = follow_exactly(body, rest, sized_poses, size * lifts)
+        if motion is not None:
+            return motion
+    raise ValueError(f"the legs leave the torso no room to {action}")
+
+
+def follow_exactly(
+    body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray, smoothing_rounds: int = _SMOOTHING_ROUNDS
+) -> ClipMotion | None:
+    """Return a motion of torso (samples, 6) and feet (samples, legs, 3) from rest; None if legs cannot follow it."""
+    standing_height = body.torso.standing_height
+    joints, misses = keep_feet_in_place(body, rest, poses, lifts)
+    joints = _smooth(joints, smoothing_rounds)
+    max_joint_step = _MAX_JOINT_SPEED * math.sqrt(sizing.GRAVITY / standing_height) * time_step(body)
+    if abs(np.diff(joints, axis=0)).max() > max_joint_step:
+        return None
+    max_slide = _MAX_SLIDE if has_free_feet(body) else _MAX_SLIDE_OF_FEW_JOINTS
+    standing_misses = np.where(lifts[..., 2:] > _MAX_SINK, 0.0, misses / standing_height)
+    slides = np.linalg.norm(np.ptp(standing_misses[..., :2], axis=0), axis=-1)
+    sinks = abs(standing_misses[..., 2])
+    if slides.max() > max_slide or sinks.max() > _MAX_SINK:
+        return None
+    return pose_motion(body, rest, poses, joints)
+
+
+def pose_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> ClipMotion:
+    """Return a motion of the torso (samples, 6) from rest, and of joints (samples, joints), rad."""
+    up, forward, left = (poses[:, [column]] for column in range(3))
+    offsets = body.torso.standing_height * np.concatenate([forward, left, up], axis=-1)
+    quaternions = np.broadcast_to(rest.quaternion, (len(poses), 4))
+    half_angles = 0.5 * poses[:, 3:]  # of roll, pitch and yaw
+    for axis in range(3):
+        half_angle = half_angles[:, [axis]]
+        turns = np.concatenate([np.cos(half_angle), np.sin(half_angle) * np.eye(3)[axis]], axis=-1)
+        quaternions = rotations.product(turns, quaternions)
+    motion = hold_pose(rest, len(poses) - 1, time_step(body))
+    return motion._replace(positions=rest.position + offsets, quaternions=quaternions, joints=joints)
+
+
+def hold_pose(pose: Pose, samples: int, time_step: float) -> ClipMotion:
+    """Return a pose that stays for a number of samples after the first one, with a root that stays."""
+    return ClipMotion(
+        time_step=time_step,
+        root=np.zeros((samples + 1, 3)),
+        positions=np.tile(pose.position, (samples + 1, 1)),
+        quaternions=np.tile(pose.quaternion, (samples + 1, 1)),
+        joints=np.tile(pose.joints, (samples + 1, 1)),
+        twist=np.zeros(3),
+    )
+
+
+def feet_from_torso(body: Body, rest: Pose) -> np.ndarray:
+    """Return the positions (legs, 3) of the feet from the torso, in the root's axes, m."""
+    legs = _legs_to_foot_centers(body)
+    foot_positions, _ = legs.soles(legs.by_leg(rest.joints))
+    return foot_positions @ rotations.matrix(rest.quaternion).T
+
+
+def time_step(body: Body) -> float:
+    """Return the time between two samples, s."""
+    return sizing.control_timestep(body) / _SAMPLES_PER_CONTROL_STEP
+
+
+def sample_times(body: Body, duration: float) -> np.ndarray:
+    """Return the times (samples,) of a duration, both in sqrt(h / g), both ends included."""
+    step = time_step(body) * math.sqrt(sizing.GRAVITY / body.torso.standing_height)
+    return np.linspace(0.0, duration, 1 + max(2, round(duration / step)))
+
+
+def _smooth(joints: np.ndarray, rounds: int) -> np.ndarray:
+    """Return joint angles (samples, joints) without jerks, such as of a leg that stretches; both ends stay."""
+    for _ in range(rounds):
+        joints[1:-1] = 0.25 * (joints[:-2] + 2.0 * joints[1:-1] + joints[2:])
+    return joints
+
+
+def _legs_to_foot_centers(body: Body) -> Legs:
+    """Return the legs with the centers of feet for soles, over which a torso tilts."""
+    legs = Legs.of(body, used=1.0)
+    return legs._replace(radii=np.zeros_like(legs.radii))
