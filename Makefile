@@ -161,7 +161,7 @@ check-sb3: FIRST = '$(TORCH)'
 check-sb3: EXTRAS := sb3
 check-sb3: PACKAGES := pytest matplotlib sbx-rl==0.28.0 rsl-rl-lib==5.5.1
 check-sb3: RUN = $(VENV)/bin/python tools/check_sb3.py --steps 500 && \
-	$(PYTEST) tests/envs/test_sb3.py tests/policies/test_sb3_file.py tests/examples
+	$(PYTEST) tests/envs/test_sb3.py tests/policies/test_sb3_file.py tests/examples tests/house/test_coming_from.py
 
 check-clients: RUN = $(PYTHON) tools/check_clients.py
 
@@ -230,7 +230,8 @@ check-agents check-agents-release: EXTRAS := dev,learn
 check-agents check-agents-release: PACKAGES := onnxruntime rliable 'pandas<3' optuna==5.0.0
 check-agents check-agents-release: RUN = $(PYTEST) $(PARALLEL) -m "$(MARKS)" tests/learning/agents \
 	tests/learning/studies/test_study.py tests/learning/cli/test_train.py tests/learning/test_onnx_file.py \
-	tests/learning/test_runner.py tests/learning/test_sim_to_sim.py tests/evaluation/test_statistics.py tests/examples/test_trackers.py
+	tests/learning/test_runner.py tests/learning/test_sim_to_sim.py tests/evaluation/test_statistics.py \
+	tests/learning/test_cards.py tests/learning/test_trackers.py tests/examples/test_tracker_scripts.py
 check-agents: MARKS := not long and not release
 check-agents-release: MARKS := long or release
 

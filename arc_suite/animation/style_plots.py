@@ -301,7 +301,6 @@ def _mean_over_a_cycle(track: Track, values):
 def _range_over_a_cycle(track: Track, values):
     """Return the least and the greatest of the values in the cycle about each."""
     reach = round(_steps_in_a_cycle(track) / 2)
-    mode = "reflect" if len(values) > reach else "edge"
-    padded = np.pad(values, reach, mode=mode)
+    padded = np.pad(values, reach, mode="reflect" if len(values) > reach else "edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
     return windows.min(axis=-1), windows.max(axis=-1)

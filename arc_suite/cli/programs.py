@@ -26,6 +26,7 @@ PROGRAMS = {
     "study": "arc_suite.learning.cli",
     "benchmark": "arc_suite.learning.cli",
     "export": "arc_suite.learning.cli",
+    "card": "arc_suite.learning.cli",
     "transfer": "arc_suite.learning.cli",
     "design": "arc_suite.animation.cli",
     "doctor": "arc_suite.cli",

@@ -9,7 +9,7 @@ distance of the feet from their center. The search runs under NumPy alone, and n
 import heapq
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,7 +151,9 @@ def shortest_path(
     costs[_START] = 0.0
     previous_points = np.zeros(len(points), int)
     is_visited = np.zeros(len(points), bool)
-    queue = [(goal_distances[_START], _START)]  # lower bounds of the costs of paths through points, and the points
+    queue: list[tuple[Any, Any]] = [
+        (goal_distances[_START], _START)
+    ]  # lower bounds of the costs of paths through points, and the points
     while queue:
         _, point = heapq.heappop(queue)
         if point == _GOAL:

@@ -269,7 +269,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         self._closed = True
         if self._window is not None:
             self._window.close()
-            self._window: Window | None = None
+            self._window = None
         super().close()
 
     def _privileged_info(self) -> dict[str, np.ndarray]:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.envs.base_vector import BaseVectorEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
@@ -121,7 +120,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 
 
 def episodes_in_batch(
-    environment: BaseVectorEnv,
+    environment,
     policy: Policy,
     seeds: Sequence[int] | None = None,
     watch: Callable[[np.ndarray, np.ndarray], None] | None = None,

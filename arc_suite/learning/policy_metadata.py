@@ -63,7 +63,7 @@ def metadata(network: Network) -> dict:
         values["file_joints"] = list(body.file_joints)
     if "gait_clock" in network.blocks and task.parameters is not None:
         values["gait_clock"] = {"frequency": task.parameters.gait_frequency, "rule": _clock_rule(task)}
-    return values | _timing(task)
+    return values | dict(_timing(task))
 
 
 def _clock_rule(task: Task) -> str:

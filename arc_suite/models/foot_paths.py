@@ -56,7 +56,7 @@ def cycle_angles(
     """
     legs = rest_pose.legs
     joint_angles = rest_pose.joint_angles
-    half_paths = half_path if np.ndim(half_path) else np.tile((half_path, 0.0), (len(offsets), 1))
+    half_paths = half_path if np.ndim(half_path) else np.tile(np.array((half_path, 0.0)), (len(offsets), 1))
     weights = path_weights(half_paths, SLIP_WEIGHT)
     angles_of_steps = []
     for step in range(2 * _STEPS_PER_CYCLE):

@@ -216,7 +216,7 @@ def _weak_motor_flaw(body: Body, torques: np.ndarray, loads: np.ndarray, purpose
     name = body.joint_names[worst]
     if body.source:
         return Flaw(f"{effect}the servo of {name} lacks {shortage}{more_joints}", False)
-    cure = _remove_motors(body, is_weak)
+    cure = _remove_motors(body, is_weak.tolist())
     gear = sizing.size_body(cure).joints[worst].motor.gear
     return Flaw(f"{effect}the motor of {name} lacks {shortage}{more_joints}: gear {gear:.3g} fits", False, cure)
 

@@ -1,7 +1,7 @@
 """The standing pose of a body, all joints at zero; proportions, motors and gait derive from it."""
 
 import functools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -55,7 +55,9 @@ def measure_standing(body: Body) -> PoseMechanics:
 standing = measure_standing  # the former name, which other packages import
 
 
-def pose_mechanics(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None = None) -> PoseMechanics:
+def pose_mechanics(
+    body: Body, angles: np.ndarray | Sequence[float] | None = None, feet: np.ndarray | None = None
+) -> PoseMechanics:
     """Return the mechanics of a pose, as of the standing one.
 
     Args:
@@ -68,7 +70,7 @@ def pose_mechanics(body: Body, angles: np.ndarray | None = None, feet: np.ndarra
 
 
 def mechanics_of_poses(
-    body: Body, poses: Iterable[tuple[np.ndarray | None, np.ndarray | None]]
+    body: Body, poses: Iterable[tuple[np.ndarray | Sequence[float] | None, np.ndarray | None]]
 ) -> Iterator[PoseMechanics]:
     """Yield the mechanics of several poses; MuJoCo's data, which take longer than a pose, are made once.
 

@@ -29,7 +29,7 @@ _MAGIC = b"glTF"
 _JSON_CHUNK = 0x4E4F534A
 _BINARY_CHUNK = 0x004E4942
 _FLOAT = 5126
-_COMPONENTS = {
+_COMPONENTS: dict[int, np.dtype] = {
     5120: np.dtype("i1"),
     5121: np.dtype("u1"),
     5122: np.dtype("<i2"),

@@ -5,7 +5,7 @@ import functools
 import json
 import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -95,7 +95,7 @@ def _map_words(function: Callable[[Any], Any], words: Any) -> Any:
     return [function(word) for word in words] if isinstance(words, list | tuple) else function(words)
 
 
-def _read(fields: dict[str, Any]) -> Motion:
+def _read(fields: Mapping[str, Any]) -> Motion:
     """Return the motion of fields by name; damaged ones raise anything."""
     names = {name: read_names(name, np.array(fields[name], str), 1) for name in NAMES}
     texts = {name: read_names(name, np.array(fields[name], str), 0)[0] for name in TEXTS}
@@ -110,11 +110,7 @@ def _read(fields: dict[str, Any]) -> Motion:
         raise ValueError(f"expected {num_bytes} bytes of numbers, got {len(content)}")
     numbers = np.split(np.frombuffer(content, "<f8").astype(float), np.cumsum(sizes)[:-1])
     arrays = {name: part.reshape(shapes[name]) for name, part in zip(shapes, numbers, strict=True)}
-    motion = Motion(
-        **texts,
-        **names,
-        **{name: checks.number(name, fields[name]) for name in SCALARS},
-        loops=checks.boolean("loops", fields["loops"]),
-        **(arrays | {"planted": arrays["planted"] > 0.5}),
-    )
-    return values.check(motion)
+    motion_fields: dict[str, Any] = {**texts, **names, **arrays, "planted": arrays["planted"] > 0.5}
+    for name in SCALARS:
+        motion_fields[name] = checks.number(name, fields[name])
+    return values.check(Motion(loops=checks.boolean("loops", fields["loops"]), **motion_fields))

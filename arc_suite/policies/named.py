@@ -181,7 +181,7 @@ def acting(source, task: Task, presets: str | Sequence[str] | None = None) -> Po
     """
     body = task.scene.body
     if isinstance(source, str | os.PathLike):
-        return policy(source, body, presets, task=task)
+        return policy(os.fspath(source), body, presets, task=task)
     if hasattr(source, "act"):
         return source
     if callable(source):

@@ -121,7 +121,7 @@ def digest(network: Network) -> str:
     shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
     content_hash = hashlib.sha256(json.dumps([list(network.blocks.items()), nodes, shapes]).encode())
     for array in arrays.values():
-        content_hash.update(array)
+        content_hash.update(array.tobytes())
     return content_hash.hexdigest()
 
 

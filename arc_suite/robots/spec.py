@@ -156,7 +156,7 @@ def _check_texts(value: Any, high: int) -> tuple[str, ...]:
 def _check_torque_table(value: Any) -> tuple[Vector2, ...]:
     if not isinstance(value, (tuple, list)) or not 2 <= len(value) <= _MAX_TABLE:
         raise SpecError(f"expected 2 to {_MAX_TABLE} pairs of speed and torque, got {_preview(value)}")
-    points = [_check_vector(pair, 2, 0.0, _MAX_GEAR) for pair in value]
+    points: list[Any] = [_check_vector(pair, 2, 0.0, _MAX_GEAR) for pair in value]
     for (speed, _), (next_speed, _) in itertools.pairwise(points):
         if not speed < next_speed <= _MAX_SPEED:
             raise SpecError(f"expected rising speeds up to {_MAX_SPEED:g}, got {next_speed:g} after {speed:g}")

@@ -40,7 +40,8 @@ def drop_body(body: Body, seed: int, drops: int) -> np.ndarray:
     poses[:, 3:7] /= np.linalg.norm(poses[:, 3:7], axis=-1, keepdims=True)
     for name in body.joint_names:
         joint = model.joint(name)
-        poses[:, joint.qposadr[0]] = random.uniform(*joint.range, drops)
+        low, high = joint.range
+        poses[:, joint.qposadr[0]] = random.uniform(low, high, drops)
     clearances = height * random.uniform(0.0, _MAX_CLEARANCE, drops)
 
     simulations = Batch(model, drops, fields=("geom_xpos",))

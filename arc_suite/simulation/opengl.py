@@ -329,7 +329,7 @@ def _wrong_device() -> str | None:
     return f"{_DEVICE}: expected {expected}, got {checks.quote(device)!r}; unset it to take any device"
 
 
-def _remedy(cause: Exception) -> str | None:
+def _remedy(cause: BaseException) -> str | None:
     """Return the remedy for the cause of an error; None for one that has nothing to do with the choice of OpenGL."""
     for variable, remedy in _REMEDIES_BY_VARIABLE.items():
         if variable in str(cause):
@@ -339,7 +339,7 @@ def _remedy(cause: Exception) -> str | None:
     return "unset MUJOCO_GL: pictures are drawn by GLFW here" if sys.platform in _WINDOWED else _REMEDY
 
 
-def _lacks_resources(cause: Exception) -> bool:
+def _lacks_resources(cause: BaseException) -> bool:
     """Return whether the machine has no memory, file or thread left."""
     is_system_call = isinstance(cause, OSError) and cause.errno is not None  # a library that is missing has no number
     return isinstance(cause, MemoryError) or is_system_call or "new thread" in str(cause)

@@ -48,7 +48,11 @@ QUALITIES = {
 }
 MAX_SCALE = 2  # of the largest picture
 
-_DEFAULT_OPTIONS = {"width": 640, "height": 480, "camera_id": "tracking"}  # of pictures of environments; pixels
+_DEFAULT_OPTIONS: dict[str, Any] = {
+    "width": 640,
+    "height": 480,
+    "camera_id": "tracking",
+}  # of pictures of environments; pixels
 _FAILED_LEG_COLOR = (0.07, 0.07, 0.08, 1.0)
 
 
@@ -270,7 +274,7 @@ def options(
         ValueError: an argument that has no effect in this mode, no integer, or a picture that is too large.
     """
     size = {"width": width, "height": height}
-    arguments = {**size, "camera_id": camera_id}
+    arguments: dict[str, Any] = {**size, "camera_id": camera_id}
     for name, value in arguments.items():
         if value is not None and render_mode is None:
             raise ValueError(f"{name}={checks.preview(value)}: goes with a render_mode, such as 'rgb_array'")

@@ -228,7 +228,8 @@ class GaitAndPose:
         # Numbers are not at their bounds all at once.
         poses /= abs(poses).sum(axis=-1, keepdims=True).clip(min=1.0)
         indices = (random.uniform(size=COMMANDS) * len(choices.gaits)).astype(int)
-        frequency_factors = random.uniform(*choices.frequency_range, COMMANDS)
+        lowest_factor, highest_factor = choices.frequency_range
+        frequency_factors = random.uniform(lowest_factor, highest_factor, COMMANDS)
         drawn_gaits = choices.gaits[indices]
         drawn_gaits[:, -1] = np.rint(drawn_gaits[:, -1] * frequency_factors)
         zero = np.float64(0.0)

@@ -25,8 +25,9 @@ def draw_pose(body: Body, position: np.ndarray, quaternion: np.ndarray, angles: 
     middle = 0.5 * (low + high)
     half_height = np.array((0.0, 0.0, 0.5 * (high - low)[2]))
     radius = 0.25 * float((high - low)[:2].sum())  # a mean of both half-widths
-    torso_ends = [position + rotation @ (middle + end) for end in (-half_height, half_height)]
-    markers = [Marker("cylinder", *torso_ends, radius, _COLOR)]
+    bottom = position + rotation @ (middle - half_height)
+    top = position + rotation @ (middle + half_height)
+    markers = [Marker("cylinder", bottom, top, radius, _COLOR)]
     legs = Legs.of(body)
     joints, _ = legs.places(legs.by_leg(angles))
     for leg, leg_joints in zip(body.legs, joints, strict=True):

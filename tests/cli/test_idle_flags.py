@@ -30,10 +30,11 @@ ALWAYS = {
     "style": f"{COMMON} compare episodes json output page save".replace(" preset", ""),
     "collect": f"{BODY} {SET} num_envs threads verify",
     "train": f"{BODY} {SET} algorithm hp train_set seed seeds steps prior evaluate_every config modules minutes "
-    "until_score threads tensorboard output",
+    "until_score threads tensorboard wandb output",
     "study": "runs results report",
     "benchmark": "results",
     "export": f"{BODY} {SET} vecnormalize output runner",
+    "card": "modules",
     "transfer": f"{SET} policy families output",
     "design": "goal task around mass span height power map bodies random steps seed processes pages output",
     "doctor": "",

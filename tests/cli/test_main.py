@@ -23,7 +23,7 @@ FIRST_WORDS = [*main.PROGRAMS, *WORDS]
 COMMIT = subprocess.run(
     ["git", "-C", ROOT, "rev-parse", "HEAD"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
 ).stdout
-WITHOUT_TASK = {"import", "motion", "play", "study", "benchmark", "doctor", "completion"}
+WITHOUT_TASK = {"import", "motion", "play", "study", "benchmark", "card", "doctor", "completion"}
 WRITING = (
     "build_model",
     "import",
@@ -217,7 +217,7 @@ def test_help_says_what_each_policy_is():
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    taking = ("check", "import", "motion", "export", "study", "benchmark", "completion")  # an argument
+    taking = ("check", "import", "motion", "export", "card", "study", "benchmark", "completion")  # an argument
     done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
     programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; see --help\n")
 

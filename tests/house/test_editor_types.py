@@ -16,7 +16,15 @@ pytest.importorskip("mypy")
 # Page and number of a block of Python.
 PROGRAMS = (
     *(("README", 0), ("README", 1), ("first_steps", 2), ("first_steps", 3), ("bodies", 0), ("demonstrators", 1)),
-    *(("directed", 0), ("modifiers", 0), ("study", 0), ("pages", 0), ("doors", 6), ("environments", 4)),
+    *(
+        ("directed", 0),
+        ("modifiers", 0),
+        ("study", 0),
+        ("pages", 0),
+        ("doors", 6),
+        ("environments", 1),
+        ("observations", 2),
+    ),
 )
 ARRAY = "numpy.ndarray[tuple[Any, ...], numpy.dtype[Any]]"
 BLOCKS = f"typing.Mapping[str, {ARRAY}]"

@@ -26,7 +26,17 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROO
 
 # Pages whose code needs files or packages of its own; tests of their own run it.
 ELSEWHERE = {"adding_a_robot", "adding_a_task", "adding_an_algorithm", "adding_an_arena", "modifiers"}
-ELSEWHERE |= {"agents", "clients", "doors", "first_steps", "gpu", "imported", "study"}
+ELSEWHERE |= {
+    "agents",
+    "coming_from_gymnasium",
+    "coming_from_dm_control",
+    "clients",
+    "doors",
+    "first_steps",
+    "gpu",
+    "imported",
+    "study",
+}
 BLOCKS = [
     pytest.param(block, id=f"{page.stem}{place}", marks=() if page.stem == "README" else pytest.mark.slow)
     for page in PAGES

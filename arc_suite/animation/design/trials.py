@@ -235,6 +235,6 @@ def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: in
         achieved=achieved,
         tracking=tracking,
         cost_of_transport=progress.get("cost_of_transport", math.nan),
-        power=work.total * GRAVITY / (steps_taken * control_timestep),
+        power=float(work.total * GRAVITY / (steps_taken * control_timestep)),
         falls=fell,
     )

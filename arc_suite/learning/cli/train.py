@@ -1,7 +1,7 @@
 """Train a policy, into a folder that every program takes as `--policy`.
 
 Killed at any moment, the same command resumes, bit-exactly. The folder holds tables of returns and losses, a
-checkpoint, the policy, and a picture of its returns, drawn anew after each evaluation.
+checkpoint, the policy, and a picture of its returns, drawn anew after each evaluation. README.md is a model card.
 
   arc-suite train --robot tick
   arc-suite train --robot queen --task steer --algorithm dagger
@@ -30,7 +30,7 @@ from typing import Any
 
 from absl import flags
 
-from arc_suite import checks, evaluation, files, registry, versions
+from arc_suite import checks, evaluation, files, registry
 from arc_suite.cli.flags import (
     custom_body,
     define_body,
@@ -44,7 +44,7 @@ from arc_suite.cli.interrupts import TERMINATED
 from arc_suite.cli.program import progress, resumable, say, watch_for_termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
-from arc_suite.learning import finals, onnx_file, outcomes, processes
+from arc_suite.learning import cards, finals, onnx_file, outcomes, processes, trackers
 from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import DEVICE_DEFAULTS
@@ -131,6 +131,7 @@ flags.DEFINE_float("until_score", None, "Stop after an evaluation with this scor
 flags.DEFINE_integer("jobs", None, "Runs of several seeds at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_integer("threads", 1, "Threads of the simulation; results do not depend on it.", lower_bound=1)
 flags.DEFINE_bool("tensorboard", False, "Write metrics for TensorBoard too, into the folder of the run.")
+flags.DEFINE_bool("wandb", False, "Hand metrics to Weights & Biases, too; without an account by WANDB_MODE=offline.")
 flags.DEFINE_string(
     "output",
     None,
@@ -187,15 +188,12 @@ def train_run(run: Configuration, threshold: float | None) -> int:
         return None if threshold is None else outcomes.first_step_above(folder, threshold)
 
     with contextlib.ExitStack() as stack:
-        listeners = [functools.partial(plot_returns, run, folder)]
-        if FLAGS.tensorboard:
-            listeners.append(stack.enter_context(open_event_writer(folder)))
+        listen = stack.enter_context(open_listeners(run, folder))
 
         def on_metrics(step, metrics):
             if "return" in metrics:
                 say(f"{folder}: return {metrics['return']:.1f} after {step} steps")
-            for listener in listeners:
-                listener(step, metrics)
+            listen(step, metrics)
 
         def start_progress(*args, **kwargs):
             say(f"{folder}: {run.setup}, {run.algorithm}, {run.steps} steps")
@@ -223,6 +221,7 @@ def train_run(run: Configuration, threshold: float | None) -> int:
     if is_complete:
         with resumable(folder):
             print(f"{folder}: {describe_judging(run, folder, FLAGS.threads)}")
+            cards.write(run, folder)
     if is_complete and FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
         print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
     return TERMINATED if terminated and not is_complete else 0
@@ -274,11 +273,11 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
 
 def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
     """Train runs of several seeds in one program, print their results and their mean, and return the exit status."""
-    refuse_flags(("jobs", "minutes", "until_score", "tensorboard"), "goes without several seeds in one program")
+    refuse_flags(("jobs", "minutes", "until_score"), "goes without several seeds in one program")
     folder = files.folder(FLAGS.output or "runs")
     folders = [folder / run.name for run in runs]
-    listeners = [functools.partial(plot_returns, *pair) for pair in zip(runs, folders, strict=True)]
-    with resumable(folder), watch_for_termination() as is_terminated:
+    with resumable(folder), watch_for_termination() as is_terminated, contextlib.ExitStack() as stack:
+        listeners = [stack.enter_context(open_listeners(*pair)) for pair in zip(runs, folders, strict=True)]
         finished = train_in_one_program(runs, folders, progress, listeners, stop=is_terminated)
         terminated = is_terminated()
     for run, run_folder_path in zip(runs, folders, strict=True):
@@ -287,6 +286,8 @@ def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
         if finished:
             print(f"{run_folder_path}: {describe_judging(run, run_folder_path, threads=None)}")
         save_onnx(run, run_folder_path, finished)
+        if finished:
+            cards.write(run, run_folder_path)
     print(f"{folder}: {outcomes.mean(runs, folder)}")
     return TERMINATED if terminated and not finished else 0
 
@@ -376,6 +377,27 @@ def parse_seeds(texts: Sequence[str]) -> list[int]:
     return seeds
 
 
+@contextlib.contextmanager
+def open_listeners(run: Configuration, folder: Path) -> Iterator[trackers.Listener]:
+    """Yield a function that hands the metrics of a run to its picture of returns, and to the trackers of the flags.
+
+    Raises:
+        ValueError: a package is not installed.
+    """
+    with contextlib.ExitStack() as stack:
+        listeners = [functools.partial(plot_returns, run, folder)]
+        if FLAGS.tensorboard:
+            listeners.append(stack.enter_context(trackers.open_tensorboard(folder)))
+        if FLAGS.wandb:
+            listeners.append(stack.enter_context(trackers.open_wandb(run, folder)))
+
+        def listen(step, metrics):
+            for listener in listeners:
+                listener(step, metrics)
+
+        yield listen
+
+
 def plot_returns(run: Configuration, folder: Path, step: int, metrics: Mapping[str, float]) -> None:
     """Write the picture of a run's returns, if metrics are those of an evaluation."""
     from arc_suite.learning.agents import plots  # needs matplotlib
@@ -390,27 +412,3 @@ def plot_returns(run: Configuration, folder: Path, step: int, metrics: Mapping[s
         figure = plots.plot_run(evaluations, run.algorithm, folder.name, levels, paper_returns)
         with files.writing(folder / "curve.png") as temporary:
             figure.savefig(temporary)
-
-
-@contextlib.contextmanager
-def open_event_writer(folder: Path) -> Iterator[Callable]:
-    """Yield a listener that writes metrics for TensorBoard.
-
-    Raises:
-        ValueError: tensorboardX is not installed.
-    """
-    with versions.require_extra("--tensorboard needs tensorboardX", "learn"):
-        from tensorboardX import SummaryWriter
-    writers = []
-
-    def write(step, metrics):
-        if not writers:  # purges events after the checkpoint that the run resumes from
-            writers.append(SummaryWriter(str(folder / "tensorboard"), purge_step=step))
-        for name, value in metrics.items():
-            writers[0].add_scalar(name, value, step)
-
-    try:
-        yield write
-    finally:
-        for writer in writers:
-            writer.close()

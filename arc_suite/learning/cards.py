@@ -1,0 +1,165 @@
+"""Model cards: README.md in the folder of a run, which model hubs show.
+
+A card says what the policy is, how well it does, and how it was made.
+"""
+
+import contextlib
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from arc_suite import evaluation, files, policies
+from arc_suite.evaluation import anchors, statistics
+from arc_suite.learning import finals
+from arc_suite.learning.agents import run_folder
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.next_commands import next_commands
+from arc_suite.learning.studies.text_tables import table
+from arc_suite.policies import network
+from arc_suite.simulation.opengl import RenderingUnavailable
+
+FILE = "README.md"
+PICTURE = "picture.png"
+_STEPS_OF_PICTURE = 40  # control steps before the picture: the walk has begun
+_SEED_OF_PICTURE = 9000  # of validation
+_SIZE_OF_PICTURE = (360, 480)  # pixels
+
+
+def write(run: Configuration, folder: Path) -> Path:
+    """Write the card of a run, and a picture of its policy where OpenGL is available; return the card's path.
+
+    Args:
+        run: configuration of the run.
+        folder: folder of the run, which has a policy.
+
+    Raises:
+        ValueError: the run has no policy yet, or a file of the folder is damaged.
+        OSError: a file cannot be read or written.
+    """
+    if not run_folder.table(folder, "evaluations"):
+        raise ValueError(f"{folder}: no evaluation yet, so there is no policy to describe")
+    if not run.setup.several:
+        _draw(run, folder)
+    path = folder / FILE
+    files.write(path, text(run, folder))
+    return path
+
+
+def text(run: Configuration, folder: Path) -> str:
+    """Return the card of a run in Markdown."""
+    robot = run.setup.name
+    task = run.setup.kind.name
+    returns, episodes_text = _read_returns(folder)
+    pictures = [f"![{name}]({name})" for name in (PICTURE, "curve.png") if (folder / name).exists()]
+    parts = [
+        _metadata(run, returns.mean()),
+        f"# {folder.resolve().name}",
+        f"A policy of [arc_suite](https://arxiv.org/abs/2605.19503) for `{robot}` in the task `{task}`, learned by "
+        f"`{run.algorithm}`.",
+        table(("what", "value"), _describe(run, folder, returns, episodes_text)),
+        *pictures,
+        "## Use",
+        _code("sh", next_commands(run.policy_setup, folder)),
+        "## How it was made",
+        _code("sh", [_training_command(run)]),
+        "`config.json` has all settings and hyperparameters.",
+        table(("hash or version", "value"), _describe_origin(folder)),
+        "## License",
+        "Apache-2.0, as the suite. The creature and its looks are the suite's; bodies from files of others have "
+        "licenses of their own.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _metadata(run: Configuration, mean_return: float) -> str:
+    """Return what model hubs read at the head of a card: YAML, of values that are JSON."""
+    environment = f"{run.setup.name}-{run.setup.kind.name}"
+    metric = {"type": "mean_reward", "name": "mean return", "value": round(float(mean_return), 1)}
+    result = {
+        "task": {"type": "reinforcement-learning"},
+        "dataset": {"name": environment, "type": environment},
+        "metrics": [metric],
+    }
+    fields = {
+        "license": "apache-2.0",
+        "library_name": "arc_suite",
+        "pipeline_tag": "reinforcement-learning",
+        "tags": ["reinforcement-learning", "legged-locomotion", "mujoco", run.setup.kind.name, run.algorithm],
+        "model-index": [{"name": run.name, "results": [result]}],
+    }
+    lines = [f"{name}: {json.dumps(value)}" for name, value in fields.items()]
+    return "\n".join(["---", *lines, "---"])
+
+
+def _read_returns(folder: Path) -> tuple[np.ndarray, str]:
+    """Return the returns of the episodes that judge the policy, or of the latest evaluation, and what they are."""
+    final_lines = run_folder.lines(folder, finals.TABLE)
+    if final_lines:
+        return np.array([line["return"] for line in final_lines], float), "judging episodes"
+    return run_folder.latest_returns(run_folder.table(folder, "evaluations")), "episodes of the latest evaluation"
+
+
+def _describe(run: Configuration, folder: Path, returns: np.ndarray, episodes_text: str) -> Iterator[tuple[str, str]]:
+    mean, interval = statistics.mean_and_interval([returns.tolist()])
+    scale = anchors.anchors(run.validation)
+    settings = json.dumps(run.setup.task_kwargs) if run.setup.task_kwargs else "defaults"
+    yield "robot", run.setup.name
+    yield "task", run.setup.kind.name
+    yield "settings", f"`{_shorten(settings)}`"
+    if run.training:
+        yield "settings in training alone", f"`{_shorten(json.dumps(dict(run.training)))}`"
+    yield "algorithm, seed", f"{run.algorithm}, {run.seed}"
+    yield "steps", f"{int(run_folder.read_progress(folder)['evaluated']):,} of {run.steps:,}"
+    yield "return", f"{mean:.1f}, 95 % interval {_interval_text(interval, '.1f')}, {returns.size} {episodes_text}"
+    score_ends = scale.score(np.array(interval))
+    if np.isfinite(scale.score(mean)):
+        yield "score", f"{scale.score(mean):.2f}, 95 % interval {_interval_text(score_ends, '.2f')}"
+        yield "score 0, standing still", f"{scale.zero:.1f}"
+        yield "score 1, demonstrator", f"`{scale.preset}`, {scale.demonstrator:.1f}"
+
+
+def _describe_origin(folder: Path) -> Iterator[tuple[str, str]]:
+    record = run_folder.read_config(folder)
+    policy = network.load(folder)
+    yield "policy, sha256", f"`{network.digest(policy)}`"
+    for name, value in record.items():
+        if name.endswith("_sha256") and isinstance(value, str):
+            yield f"{name.removesuffix('_sha256')}, sha256", f"`{value}`"
+    for package, version in record.get("versions", {}).items():
+        if version is not None:
+            yield package, str(version)
+
+
+def _training_command(run: Configuration) -> str:
+    """Return the command that trains a run again; a body of a file is in the run's configuration."""
+    is_body_of_file = run.setup.robot.startswith("{")
+    return "arc-suite train --config config.json -o again" if is_body_of_file else run.command
+
+
+def _draw(run: Configuration, folder: Path) -> None:
+    """Write a picture of the walking policy; none without OpenGL."""
+    import imageio.v3 as imageio  # takes a fifth of a second
+
+    environment = run.policy_setup.load()
+    policy = policies.acting(network.load(folder), environment.task.definition)
+    evaluation.run(environment, policy, _SEED_OF_PICTURE, max_steps=_STEPS_OF_PICTURE)
+    with contextlib.suppress(RenderingUnavailable):
+        picture = environment.physics.render(*_SIZE_OF_PICTURE, camera_id="portrait", quality="still")
+        with files.writing(folder / PICTURE) as temporary:
+            imageio.imwrite(temporary, picture, extension=".png")
+
+
+def _code(kind: str, lines: Sequence[str]) -> str:
+    return "\n".join([f"```{kind}", *lines, "```"])
+
+
+def _interval_text(interval: Sequence[float], form: str) -> str:
+    low, high = interval
+    return f"[{low:{form}}, {high:{form}}]"
+
+
+def _shorten(value: str) -> str:
+    """Return a text of one cell: long values, such as bodies and grounds, are in config.json."""
+    return value if len(value) <= 300 else f"{value[:300]}..."
