@@ -1,0 +1,45 @@
+"""The address of the repository stands in setup.cfg, and pages and notebooks have the same one."""
+
+import json
+import shutil
+
+import package_page
+import pytest
+import write_address
+
+ROOT = write_address.ROOT
+ADDRESS = write_address.read_address()
+NEW = "https://code.example.net/walkers/legs"
+
+
+def test_an_address_is_written_wherever_the_former_one_stands(tmp_path):
+    for name in ("setup.cfg", "README.md", "docs/install.md", "examples/notebooks/first_steps.ipynb"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    (tmp_path / "docs" / "faq.md").write_text("No address.")
+    changed = write_address.write_address(NEW, tmp_path)
+    names = [path.relative_to(tmp_path).as_posix() for path in changed]
+    assert names == ["setup.cfg", "README.md", "docs/install.md", "examples/notebooks/first_steps.ipynb"]
+    assert write_address.read_address(tmp_path) == NEW
+    assert f"git clone {NEW} arc_suite && cd arc_suite" in (tmp_path / "README.md").read_text()
+    assert all(ADDRESS not in path.read_text() for path in changed)
+    json.loads((tmp_path / names[-1]).read_text())
+
+
+@pytest.mark.parametrize(
+    "address", ["", "example.org/a/b", "https://example.org", "https://x.org/a/b.git", "https://x.org/a/"]
+)
+def test_what_is_no_address_is_one_line(address, tmp_path):
+    with pytest.raises(ValueError, match="^address .*: expected https://HOST/PATH"):
+        write_address.write_address(address, tmp_path)
+
+
+def test_the_front_page_and_notebooks_name_the_address():
+    """The text for package indexes has no clone."""
+    for name in ("README.md", "docs/install.md"):
+        assert f"git clone {ADDRESS} arc_suite" in (ROOT / name).read_text(encoding="utf-8")
+    assert ADDRESS not in package_page.PAGE.read_text(encoding="utf-8")
+    for path in (ROOT / "examples" / "notebooks").glob("*.ipynb"):
+        first = next(cell for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "code")
+        source = "".join(first["source"])
+        assert f'@git+{ADDRESS}"' in source and '"-e ../..[' in source
