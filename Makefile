@@ -17,7 +17,7 @@
 #   types, lowest       annotations, by mypy; the environments with the oldest Gymnasium that setup.cfg admits
 #   agents, agents-release, jax, mjx, mjx-release    learners, tasks and worlds on JAX, on a processor
 #   sb3, clients        stable-baselines3 and our scripts for it; the clients of docs/clients.md: gigabytes
-#   first-steps         a newcomer's five first successes, by the commands of the pages; an hour
+#   first-steps         a newcomer's six first successes, by the commands of the pages; an hour
 #   docs, notebooks     links of the site, its front page in Chromium; the notebooks of examples
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them

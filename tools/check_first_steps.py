@@ -1,4 +1,4 @@
-"""Makes a newcomer's five first successes in an empty folder, by what the pages say alone.
+"""Makes a newcomer's six first successes in an empty folder, by what the pages say alone.
 
     python tools/check_first_steps.py
     python tools/check_first_steps.py --short --only "offline data"
@@ -31,6 +31,7 @@ SUCCESSES = {
         *(("engines", "FBX, BVH and Blender"), ("play", "make web"), ("play", "Play")),
     ),
     "site and notebooks": (("reference", "make docs"), ("first_steps", "A notebook")),
+    "a clip learned": (("motions", "Motions"),),
     "offline data": (("datasets", "Datasets"), ("datasets", "Datasets of agents")),
 }
 ELSEWHERE = ("pip install", "python learn.py", "python play.py")  # the last two are of docs/clients.md
