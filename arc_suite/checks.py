@@ -92,14 +92,15 @@ def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
 
 
 def hint(value, valid: Iterable[str]) -> str:
-    """Return the part of an error that suggests a valid name: a synonym of a value, or the most similar one.
+    """Return the part of an error that suggests a valid name; empty if there is none.
 
-    Empty if there is neither.
+    It is a synonym of a value, the same name in other letter case, or the most similar one.
     """
     valid_names = list(valid)
     text = preview(value).strip("'")
     synonyms = [synonym for synonym in SYNONYMS.get(text, ()) if synonym in valid_names]
-    suggestions = synonyms or difflib.get_close_matches(text, valid_names, n=1)
+    same_letters = [name for name in valid_names if str(name).lower() == text.lower()]
+    suggestions = synonyms or same_letters or difflib.get_close_matches(text, valid_names, n=1)
     return f"; did you mean {suggestions[0]!r}?" if suggestions else ""
 
 

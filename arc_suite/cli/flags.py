@@ -382,7 +382,11 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name and equals):
-            raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value")
+            name_before_colon, colon, value_behind = text.rpartition(":")
+            cure = (
+                f"; did you mean {checks.quote(f'{name_before_colon}={value_behind}')}?" if colon and not equals else ""
+            )
+            raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value{cure}")
         if name in values:
             raise ValueError(f"--{flag} {checks.quote(text)}: {checks.quote(name)} has a value already")
         values[name] = _parse_value(value)

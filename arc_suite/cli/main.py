@@ -52,6 +52,8 @@ def _program_of_another_package(name: str) -> ModuleType:
     """Return the module of a program by `module:name`, or by the name of an entry point; exit where there is none."""
     try:
         entry_points = installed_programs()
+        if name.startswith("-"):
+            raise ValueError(f"{name}: expected a program before its flags, such as arc-suite evaluate {name}")
         if name in FORMER_PROGRAMS:
             raise ValueError(f"{name} is no program any more; {FORMER_PROGRAMS[name]}")
         if name in entry_points:

@@ -57,5 +57,5 @@ def test_the_program_draws_the_policy(folder):
 
 def test_what_is_no_run_is_one_line(tmp_path):
     programs.refused(programs.arc_suite("card"), "arc-suite card: expected the folder of a run, such as")
-    line = f"arc-suite card: {tmp_path}: no folder of a run"
+    line = f"arc-suite card: {tmp_path}: no folder of a run\n"
     programs.refused(programs.arc_suite("card", str(tmp_path)), line)

@@ -140,6 +140,8 @@ def read_config(path: str | os.PathLike) -> dict[str, Any]:
     Raises:
         ValueError: no folder of a run.
     """
+    if not (Path(path) / CONFIG).exists():
+        raise ValueError(f"{path}: no folder of a run")
     with parsers.guard(f"{path}: no folder of a run"):
         config = files.read_json(Path(path) / CONFIG)
     if not isinstance(config, dict):

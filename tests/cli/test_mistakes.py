@@ -1,0 +1,63 @@
+"""Forty mistakes at the command line: one line each, with the cure where one is near."""
+
+import programs
+import pytest
+from tiers import tiers
+
+ROBOTS = "(there are: queen, bastion, tick, leaper, "
+# What follows the name of the program; those of the first part have a cure that was missing once.
+CURED = {
+    "--robot tick": "arc-suite: --robot: expected a program before its flags, such as arc-suite evaluate --robot\n",
+    "evaluate --robot=tick --policy=PPO": "unknown policy 'PPO'; did you mean 'ppo'?",
+    "evaluate --robot=tick --set kicks:1.5": "--set kicks:1.5: expected name=value; did you mean kicks=1.5?\n",
+    "card runs/nothing": "runs/nothing: no folder of a run\n",
+    "play --robot tick -o tick": "tick: expected a name that ends in .html\n",
+    "animate --robot tick -o clips": "clips: expected a name that ends in .glb, ",
+}
+OTHERS = {
+    "evaluate --robot Tick": f"unknown robot 'Tick'; did you mean 'tick'? {ROBOTS}",
+    "evaluate --robots tick": "unknown flag 'robots'; did you mean 'robot'?",
+    "evaluate --robot=tick --task=Walk": "unknown task 'Walk'; did you mean 'walk'?",
+    "evaluate --robot=tick --task=walking": "unknown task 'walking'; did you mean 'walk'?",
+    "evaluate --robot=tick --policy=sac": "unknown policy 'sac' (there are: cpg, zero, random, ppo, universal)\n",
+    "evaluate --robot=tick --set kicks": "--set kicks: expected name=value\n",
+    "evaluate --robot=tick --set kick=1.5": "unknown setting of walk 'kick'; did you mean 'kicks'?",
+    "evaluate --robot=tick --set=kicks=high": "kicks: expected a number from 0 to 100, got 'high'",
+    "evaluate --robot=tick --set gait=gallop": "unknown gait 'gallop' (there are: trot, ",
+    "evaluate --robot=tick --json": "Missing value for flag --json\n",
+    "evaluate --robot=tick --seed=-1": "flag --seed=-1: expected a non-negative integer\n",
+    "evaluate --spec=note.txt": "note.txt: expected a body in JSON: ",
+    "evaluate --spec=body.json": "body.json: torso: missing; a Body needs it\n",
+    "evaluate --spec=missing.urdf": "cannot read missing.urdf: no such file or directory\n",
+    "evaluate --legs=100": "flag --legs=100: expected an integer in the range [4, 12]\n",
+    "evaluate --robot=varied": "unknown robot 'varied'; did you mean 'varied:7'?",
+    "evaluate --robot=varied:x": "robot 'varied:x': expected varied:seed or varied:first-last, such as varied:0-9\n",
+    "evaluate --robot=tick --preset=ppo": "unknown preset 'ppo' (there are: slow, medium, fast, ",
+    "render --robot tick --output": "Missing value for flag --output\n",
+    "render --robot tick --output tick.avi": "unknown extension '.avi' (there are: .png, .mp4, .gif, .webp, .html)\n",
+    "render --robot tick -o tick.mp4 --fps=fast": "flag --fps=fast: expected a number in the range [1.0, 1000.0]\n",
+    "render --robot tick -o tick.mp4 --steps=0": "--steps=0: expected 1 or more for a film or a page\n",
+    "animate --robot tick --clips=walk,runn -o a.glb": "unknown clip 'runn'; did you mean 'run'?",
+    "animate --robot tick -o a.fbx": "a.fbx: clips are written as .glb; tools/to_fbx.py makes .fbx of it",
+    "play tick": "unexpected argument 'tick'; did you mean --robot=tick? see --help\n",
+    "build_model --legs=6 --output=/nowhere/a.xml": "cannot write /nowhere/a.xml: no such file or directory\n",
+    "build_model queen": "unexpected argument 'queen'; did you mean --robot=queen? see --help\n",
+    "import go2.urdf": "cannot read go2.urdf: no such file or directory\n",
+    "check spidr": "unknown robot 'spidr'; did you mean 'spider'?",
+    "collect --robot tick --policy cpg --episodes 0": "flag --episodes=0: expected an integer in the range [1, 100000]",
+    "motion a.npz": "cannot read a.npz: no such file or directory\n",
+    "style --robot tick --compare": "Missing value for flag --compare\n",
+    "completion powershell": "unknown shell 'powershell' (there are: bash, zsh, fish)\n",
+    "doctor --fix": "unknown flag 'fix' (there are: help, version)\n",
+}
+LINES = CURED | OTHERS
+
+
+@pytest.mark.parametrize("command", tiers(LINES, CURED.__contains__))
+def test_a_mistake_is_one_line(command, tmp_path):
+    (tmp_path / "note.txt").write_text("hello")
+    (tmp_path / "body.json").write_text('{"name": "x"}')
+    program, *_ = command.split()
+    line = LINES[command] if program.startswith("-") else f"arc-suite {program}: {LINES[command]}"
+    programs.refused(programs.arc_suite(*command.split(), cwd=tmp_path), line)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["body.json", "note.txt"]
