@@ -287,6 +287,20 @@ def task_of(name: str) -> type[Task]:
     return _look_up(name, TASKS, "task")
 
 
+def tasks_of(names: str) -> tuple[type[Task], ...]:
+    """Return the classes of one task or of several, names with commas between.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    return tuple(task_of(name) for name in split_task_names(names))
+
+
+def split_task_names(names: Any) -> list:
+    """Return the names in a text that names tasks; anything else is one name, which `task_of` refuses."""
+    return names.split(",") if isinstance(names, str) else [names]
+
+
 def arena_of(arena: str | Arena, body: Body) -> Arena:
     """Return the arena of a word in a size that suits a body; an `Arena` is returned as it is.
 

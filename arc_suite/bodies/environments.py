@@ -16,8 +16,9 @@ from arc_suite.bodies.tokens import Description, Tokens
 from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepare_task, refuse_arguments
+from arc_suite.envs.setup import pair_with_tasks
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.contract import CURRICULUM
+from arc_suite.tasks.contract import CURRICULUM, Task
 from arc_suite.tasks.readings import torso_qpos
 
 
@@ -25,8 +26,8 @@ class BodiesTask(NamedTuple):
     """The task of environments of different bodies with flat observations, for learners.
 
     Attributes:
-        name: name of the task.
-        step_limit: control steps after which an episode is over, may be infinite.
+        name: name of the task, of several with commas.
+        step_limit: control steps after which every episode is over, may be infinite.
         sizes: sizes of the blocks of an observation by name, in order.
     """
 
@@ -67,6 +68,9 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     layout share a batch in level tasks; others have a batch of their own, to the same effect. The ground is as
     each body's own task makes it, and not observed.
 
+    Environments may have different tasks: `BodiesEnv("walk,steer", ...)`. Each has the rewards, the time limit and the
+    metrics of its own; metrics of others are 0 there, and their masks False.
+
     Autoreset modes, infos, `rest`, `command`, `snapshot`, pickles, copies and threads are as in `VectorEnv`.
 
     Attributes:
@@ -98,13 +102,14 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """Prepare the task of every body and allocate the environments.
 
         Args:
-            task_name: as in `arc_suite.load`.
-            num_envs: number of environments; environment i has body i, and so on from the first after the last.
+            task_name: as in `arc_suite.load`, or several names with commas between.
+            num_envs: number of environments; environment i has body i, and so on from the first after the last. Several
+                tasks take turns, see `envs.setup.pair_with_tasks`.
             bodies: one or several, see `registry.bodies_of`, or a list of them.
             num_threads: as in `VectorEnv`, of each batch.
             autoreset_mode: as in `VectorEnv`.
             max_episode_steps: as in `VectorEnv`.
-            task_kwargs: as in `VectorEnv`, the same for all bodies; without `actions`.
+            task_kwargs: as in `VectorEnv`, the same for all bodies and tasks; without `actions`.
             render_mode: as in `VectorEnv`.
             width: width of a picture, pixels; only with a render mode, as the next two.
             height: height of a picture, pixels.
@@ -125,10 +130,10 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
         if not different_bodies:
             raise ValueError(f"bodies: expected at least one, got {checks.preview(bodies)}")
-        if len(different_bodies) > num_envs:
-            raise ValueError(
-                f"num_envs: expected at least one for each of {len(different_bodies)} bodies, got {num_envs}"
-            )
+        task_names = registry.split_task_names(task_name)
+        for count, noun in ((len(different_bodies), "bodies"), (len(task_names), "tasks")):
+            if count > num_envs:
+                raise ValueError(f"num_envs: expected at least one for each of {count} {noun}, got {num_envs}")
         for body in different_bodies:
             tokens.joint_slots(body)  # refuses too many legs or joints
         settings = {"actions": "position", **checks.mapping("task_kwargs", task_kwargs)}
@@ -145,29 +150,34 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             "camera_id": camera_id,
             "privileged": privileged,
         }
-        member_of_body = {}
-        for body in dict.fromkeys(different_bodies):
-            task, model = prepare_task(body, task_name, _task_settings(settings))
-            member_of_body[body] = Member(task, model)
+        all_pairs = pair_with_tasks(different_bodies, task_names)
+        pairs = [all_pairs[index % len(all_pairs)] for index in range(num_envs)]
+        member_of_pair = {}
+        for body, name in dict.fromkeys(pairs):
+            task, model = prepare_task(body, name, _task_settings(settings))
+            member_of_pair[body, name] = Member(task, model)
 
-        body_of_env = [different_bodies[index % len(different_bodies)] for index in range(num_envs)]
-        members = [member_of_body[body] for body in body_of_env]
+        members = [member_of_pair[pair] for pair in pairs]
         self.num_envs = num_envs
-        self.bodies = tuple(body_of_env)
+        self.bodies = tuple(body for body, _ in pairs)
         self.tasks = tuple(member.task for member in members)
-        self.task = BodiesTask(self.tasks[0].name, self.tasks[0].step_limit)
+        if privileged:
+            _check_same_privileged_blocks(self.tasks)
+        names_of_tasks = dict.fromkeys(task.name for task in self.tasks)  # each once
+        self.task = BodiesTask(",".join(names_of_tasks), max(task.step_limit for task in self.tasks))
         self._tokens = Tokens.of(self.tasks)
         self._flat = has_flat_spaces
         for indices in group_by_batch(members):
-            group = Group([members[index] for index in indices], task_name, **options)
+            _, name = pairs[indices[0]]
+            group = Group([members[index] for index in indices], name, **options)
             self._places.append(Place(group, np.array(indices), self._tokens.select(indices)))
         self.step_limit = float(max(np.max(place.group.step_limit) for place in self._places))
         first_group = self._places[0].group
         self.autoreset_mode = first_group.autoreset_mode
         self.metadata = first_group.metadata
         self.render_mode = render_mode
-        description_of_body = {body: tokens.body_description(member.task) for body, member in member_of_body.items()}
-        columns = zip(*(description_of_body[body] for body in body_of_env), strict=True)
+        description_of_pair = {pair: tokens.body_description(member.task) for pair, member in member_of_pair.items()}
+        columns = zip(*(description_of_pair[pair] for pair in pairs), strict=True)
         self.description = Description(*map(np.stack, columns))
         self.single_observation_space, self.single_action_space = _spaces(has_flat_spaces)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -251,7 +261,8 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """Set a command of the task in some environments; see `VectorEnv.command`."""
         self._check_open("command")
         mask = self._checked_mask(mask, "mask")
-        values = checked_command(self.tasks[0], name, value, (self.num_envs,))
+        for task in {id(self.tasks[index]): self.tasks[index] for index in np.flatnonzero(mask)}.values():
+            values = checked_command(task, name, value, (self.num_envs,))
         if not self._begun:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
         for group, indices, _ in self._places:
@@ -431,6 +442,15 @@ def _find_bodies(bodies: Any) -> list[Body]:
     """Return the bodies of one or several names, specs or ranges; see `registry.bodies_of`."""
     names = bodies if isinstance(bodies, list | tuple) else [bodies]
     return [body for name in names for body in registry.bodies_of(name)]
+
+
+def _check_same_privileged_blocks(tasks: Sequence[Task]) -> None:
+    """Raise ValueError for tasks whose privileged observations differ."""
+    first_task = tasks[0]
+    for task in tasks:
+        if tokens.privileged_sizes(task) != tokens.privileged_sizes(first_task):
+            names = f"{first_task.name} and {task.name}"
+            raise ValueError(f"privileged: expected tasks with the same blocks, got {names}; False leaves them out")
 
 
 def _spaces(flat: bool) -> tuple[gymnasium.Space, gymnasium.Space]:

@@ -263,7 +263,7 @@ class Tokens(NamedTuple):
     Attributes:
         input_indices: (environments, n) in the body's own observation vector: indices of the torso's posture and
             velocity (5 + 6), joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command
-            (6, or 0); any index for legs and joints that the body does not have.
+            (6); any index for legs and joints that the body does not have, and for the command of a task without one.
         mask: (environments, 12, 4) 1 for a joint of the body.
         legs: (environments, 12) 1 for a leg of the body.
         height: (environments,) h, m.
@@ -272,6 +272,7 @@ class Tokens(NamedTuple):
         command_units: (environments, 3) units of the command; see `fitting.velocity_units`.
         turn_scale: (environments,) R / h.
         direction: (environments,) 1 for a walk forward, -1 for one backward.
+        has_command: (environments,) 1 for a task with a command.
         loaded_force: (environments,) upward force from which on a foot is loaded, in units of the block.
         leg_phase: (environments, 12, 2) sine and cosine of the phase of each leg over the clock.
         mid_stance: (environments, 2) sine and cosine of the phase in the middle of stance.
@@ -286,6 +287,7 @@ class Tokens(NamedTuple):
     command_units: np.ndarray
     turn_scale: np.ndarray
     direction: np.ndarray
+    has_command: np.ndarray
     loaded_force: np.ndarray
     leg_phase: np.ndarray
     mid_stance: np.ndarray
@@ -313,7 +315,8 @@ class Tokens(NamedTuple):
         parameters = task.parameters
         pose = measure_standing(body)
         # Forces are in weights where a task has a command, else in N.
-        weight = 1.0 if "command" in task.blocks else pose.mass * GRAVITY
+        has_command = "command" in task.blocks
+        weight = 1.0 if has_command else pose.mass * GRAVITY
         phases = np.zeros(MAX_LEGS)  # rad
         phases[: len(body.legs)] = parameters.phase_offsets
         mid_stance_phase = math.pi * parameters.duty_factor  # rad
@@ -329,6 +332,7 @@ class Tokens(NamedTuple):
             command_units=units,
             turn_scale=units[0] / units[2] / pose.height,
             direction=math.copysign(1.0, parameters.target_velocity),
+            has_command=has_command,
             loaded_force=min(_MIN_CARRIED_SHARE * weight, _MAX_THRESHOLD),
             leg_phase=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
             mid_stance=np.array((math.sin(mid_stance_phase), math.cos(mid_stance_phase))),
@@ -360,7 +364,7 @@ class Tokens(NamedTuple):
             pad_joints(body, joint_velocities).ravel(),
             upward_forces,
             block_indices["gait_clock"],
-            block_indices.get("command", []),
+            block_indices.get("command", np.zeros(COMMAND_SIZE, int)),
         ]
         return np.concatenate(indices).astype(int)
 
@@ -407,16 +411,18 @@ class Tokens(NamedTuple):
         angular_rates = [velocity / self.rate_unit for velocity in angular_velocity]
         torso = np.stack([height / self.height, *up, forward_x, forward_y, *linear_rates, *angular_rates], axis=-1)
 
-        if not command.shape[-1]:  # without a command, along world x, and back into that direction
-            turn = (-sin_heading * self.turn_scale).clip(-1.0, 1.0)
-            desired = [self.direction * cos_heading, -self.direction * sin_heading, turn]
-            forward_unit, left_unit, turn_unit = self.command_units.T
-            motion = [
-                forward_velocity / forward_unit,
-                left_velocity / left_unit,
-                angular_velocity[2] / turn_unit,
-            ]
-            command = np.stack([*desired, *motion], axis=-1)
+        # Without a command, along world x, and back into that direction.
+        turn = (-sin_heading * self.turn_scale).clip(-1.0, 1.0)
+        desired = [self.direction * cos_heading, -self.direction * sin_heading, turn]
+        forward_unit, left_unit, turn_unit = self.command_units.T
+        motion = [
+            forward_velocity / forward_unit,
+            left_velocity / left_unit,
+            angular_velocity[2] / turn_unit,
+        ]
+        straight_ahead = np.stack([*desired, *motion], axis=-1)
+        has_command = self.has_command[:, None]
+        command = has_command * command + (1.0 - has_command) * straight_ahead
         return {"legs": legs, "torso": torso, "command": command}
 
     def _leg_tokens(self, angles, joint_velocities, forces, clock) -> np.ndarray:

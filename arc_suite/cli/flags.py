@@ -296,6 +296,8 @@ def choose_bodies(origin: Setup | None, bodies: dict[str, Body]) -> dict[str, Bo
 def complete_task(origin: Setup | None, task: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return the task and the settings of flags; without --task those of a policy or of tracks, which --set changes.
 
+    Of several tasks of a policy, it is the first.
+
     Args:
         origin: the setup of a policy or of tracks; None without one.
         task: task of `task_from_flags`.
@@ -303,7 +305,7 @@ def complete_task(origin: Setup | None, task: str, settings: dict[str, Any]) -> 
     """
     if origin is None or FLAGS["task"].present:
         return task, settings
-    return origin.task, origin.task_kwargs | settings
+    return origin.tasks[0], origin.task_kwargs | settings
 
 
 def only_setup() -> Setup:
@@ -325,7 +327,7 @@ def task_from_flags() -> tuple[str, dict[str, Any]]:
     Raises:
         ValueError: an unknown task, a setting without a value, or the setting `random`.
     """
-    registry.task_of(FLAGS.task)
+    registry.tasks_of(FLAGS.task)
     settings = named_values("set", FLAGS["set"].value)
     if "random" in settings:
         raise ValueError(

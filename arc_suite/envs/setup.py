@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -28,16 +28,30 @@ ATTRIBUTE = "arc_suite"
 HELD_OUT = 100_000  # first seed of the bodies of a family that serve for validation alone
 
 
+def pair_with_tasks(bodies: Sequence[Body], tasks: Sequence[str]) -> list[tuple[Body, str]]:
+    """Return the bodies with the tasks of their environments, in order; after the last pair comes the first again.
+
+    Among as many environments as there are bodies, each body has one, and the tasks take turns. Every further round of
+    the bodies begins with the next task, so that all pairs follow.
+    """
+    pairs = []
+    for first_task in range(len(tasks)):
+        for index, body in enumerate(bodies):
+            pairs.append((body, tasks[(first_task + index) % len(tasks)]))
+    return pairs
+
+
 @dataclasses.dataclass(frozen=True)
 class Setup:
     """A body or several in a task with settings. `Setup.of` makes one and checks the names.
 
     Setups of equal content are equal, in whatever form their tasks and settings were written. Several bodies share one
-    policy: actions are positions of joints, and environments are those of `arc_suite.bodies`.
+    policy: actions are positions of joints, and environments are those of `arc_suite.bodies`. They may have several
+    tasks, too.
 
     Attributes:
         domain: the body, or the text that names several: `family:first-last`, or names with commas.
-        task: name of the task, `module:name` for one of another package.
+        task: name of the task, `module:name` for one of another package; of several tasks the names with commas.
         settings_json: JSON of the task's settings, keys in order.
     """
 
@@ -54,8 +68,9 @@ class Setup:
 
         Args:
             domain_name: a body, see `registry.body_of`, or a text that names several, see `registry.bodies_of`.
-            task_name: see `registry.task_of`.
-            task_kwargs: settings of the task that JSON can represent, without `random`.
+            task_name: see `registry.task_of`; with several bodies also `registry.tasks_of`.
+            task_kwargs: settings of the task that JSON can represent, without `random`; of several tasks, those that
+                all of them have.
 
         Raises:
             ValueError: an unknown name, a setting that JSON cannot represent, or actions of several bodies other than
@@ -72,7 +87,9 @@ class Setup:
         has_several_bodies = registry.names_several_bodies(domain_name)
         settings = dict(checks.mapping("task_kwargs", task_kwargs))
         domain = domain_name if has_several_bodies else registry.body_of(domain_name)
-        task = registry.task_of(task_name)
+        tasks = registry.tasks_of(task_name)
+        if len(tasks) > 1 and not has_several_bodies:
+            raise ValueError(f"task {checks.preview(task_name)}: expected one with one body, got several")
         if "random" in settings:
             random = checks.preview(settings["random"])
             raise ValueError(f"setting 'random': expected none, as every episode has a seed, got {random}")
@@ -81,11 +98,13 @@ class Setup:
         if isinstance(settings.get("arena"), str):
             settings["arena"] = registry.arena_word(settings["arena"])
             registry.arena_maker(settings["arena"])  # raises an error for an unknown name
-        for name in task.file_settings.keys() & settings.keys():
-            settings[name] = task.file_settings[name].embed(settings[name])
+        for task in tasks:
+            for name in task.file_settings.keys() & settings.keys():
+                settings[name] = task.file_settings[name].embed(settings[name])
         importable_settings = {registry.importable_name("modifier", name): value for name, value in settings.items()}
         settings_json = checks.json_text("task_kwargs", importable_settings)
-        return cls(domain, registry.importable_name("task", task.name), settings_json)
+        importable_names = [registry.importable_name("task", task.name) for task in tasks]
+        return cls(domain, ",".join(importable_names), settings_json)
 
     @property
     def several(self) -> bool:
@@ -142,8 +161,18 @@ class Setup:
 
     @property
     def kind(self) -> type[Task]:
-        """Class of the task, with its name and version."""
-        return registry.task_of(self.task)
+        """Class of the task, with its name and version; of several tasks that of the first."""
+        return registry.task_of(self.tasks[0])
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Names of all tasks, in order."""
+        return tuple(registry.split_task_names(self.task))
+
+    @property
+    def task_label(self) -> str:
+        """Names of the tasks for people and the names of files, without modules."""
+        return "+".join(task.name for task in registry.tasks_of(self.task))
 
     @property
     def env_id(self) -> str:
@@ -152,7 +181,7 @@ class Setup:
 
     @property
     def definition(self) -> Task:
-        """The task, ready to run; of several bodies that of the first body.
+        """The task, ready to run; of several bodies that of the first body, of several tasks the first.
 
         Raises:
             ValueError: a setting that does not fit.
@@ -170,9 +199,13 @@ class Setup:
         return prepare_task(first.domain, first.task, first.task_kwargs)
 
     def members(self) -> tuple["Setup", ...]:
-        """Return the setup of each body; if there are several, with positions as actions."""
+        """Return the setup of each body in each task, in the order of environments; see `pair_with_tasks`.
+
+        If there are several bodies, actions are positions.
+        """
         setup = self.with_settings({"actions": "position"} if self.several else {})
-        return tuple(dataclasses.replace(setup, domain=body) for body in self.bodies)
+        pairs = pair_with_tasks(self.bodies, self.tasks)
+        return tuple(dataclasses.replace(setup, domain=body, task=task) for body, task in pairs)
 
     def with_settings(self, changes: Mapping[str, Any], dropped: Iterable[str] = ()) -> "Setup":
         """Return the setup with some settings changed, and without those that are dropped.
@@ -224,7 +257,7 @@ class Setup:
         """Open a `VectorEnv`; of several bodies a `BodiesEnv` with flat observations.
 
         Args:
-            num_envs: number of environments; environment i has body i modulo the number of bodies.
+            num_envs: number of environments; environment i has the body and the task of member i, see `members`.
             seed: seed of the first environment's stream of episodes; environment i has seed + i. None for random seeds.
             options: see `arc_suite.envs.vector.VectorEnv`.
         """
@@ -271,23 +304,25 @@ class Setup:
             if not isinstance(value, field_type):
                 raise ValueError(f"expected {name} to be a {field_type.__name__}, got {checks.preview(value)}")
         robot = registry.check_stored_robot(fields["robot"])
-        task = registry.refuse_import("task", fields["task"])
+        for name in registry.split_task_names(fields["task"]):
+            registry.refuse_import("task", name)
         settings = fields["task_kwargs"]
         registry.check_stored_settings(settings)
-        return cls._make(robot, task, settings)
+        return cls._make(robot, fields["task"], settings)
 
     def provenance(self) -> dict[str, Any]:
         """Return, JSON-able, everything that results depend on.
 
         It is `to_dict` with the task's version, hashes of bodies and model, and versions of packages. Several bodies
-        have no hash of a model.
+        have no hash of a model, and several tasks a list of versions.
 
         Raises:
             ValueError: a setting that does not fit.
         """
         texts = "".join(map(body_to_json, self.bodies))
         fields = self.to_dict()
-        fields["task_version"] = self.kind.version
+        task_versions = [task.version for task in registry.tasks_of(self.task)]
+        fields["task_version"] = task_versions[0] if len(task_versions) == 1 else task_versions
         fields["body_sha256"] = _sha256(texts.encode())
         if not self.several:
             _, model = self.prepare()
@@ -311,7 +346,7 @@ class Setup:
         for name in self.kind.file_settings.keys() & settings.keys():
             settings[name] = self.kind.file_settings[name].label(settings[name])
         settings_text = f", {json.dumps(settings)}" if settings else ""
-        return f"{self._label}, {self.kind.name}{settings_text}"
+        return f"{self._label}, {self.task_label}{settings_text}"
 
 
 def _sha256(content) -> str:

@@ -161,8 +161,10 @@ def episodes_in_batch(
             watch(is_playing, is_playing & (terminated | has_diverged))
         has_ended = is_playing & (terminated | truncated)
         for index in np.flatnonzero(has_ended):
-            metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}
-            progress[index] = {name.removeprefix(_PROGRESS): float(values[index]) for name, values in metrics.items()}
+            names = [name for name in info if name.startswith(_PROGRESS)]
+            # In several tasks, an episode lacks the metrics of the others.
+            metrics = {name: float(info[name][index]) if info[f"_{name}"][index] else math.nan for name in names}
+            progress[index] = {name.removeprefix(_PROGRESS): metric for name, metric in metrics.items()}
         is_playing &= ~has_ended
         if has_ended.any() and is_playing.any():
             environment.rest(~is_playing)

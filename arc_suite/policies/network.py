@@ -90,7 +90,7 @@ class Network(NamedTuple):
                 cure = f"exclude_blocks={checks.quote(json.dumps(names))} leaves out what it does not read"
             else:
                 cure = "train with this body and task"
-            setup_text = f"{self.setup.name}, {self.setup.kind.name}"
+            setup_text = f"{self.setup.name}, {self.setup.task_label}"
             raise ValueError(
                 f"policy of {setup_text}: observations differ from those in training: {wrong} numbers; {cure}"
             )

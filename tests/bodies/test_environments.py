@@ -14,11 +14,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
 import arc_suite
-from arc_suite import registry
+from arc_suite import evaluation, policies, registry
 from arc_suite.bodies import BodiesEnv, generator, tokens
 from arc_suite.bodies.families import sound_body, varied_body
 from arc_suite.envs import stacked
 from arc_suite.envs.prepare import prepare_task
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import command
@@ -44,13 +45,16 @@ MODES = ("NextStep", "SameStep", "Disabled")
 
 def make(bodies, task="walk", num_envs=None, **kwargs):
     count = len(bodies) if num_envs is None else num_envs
+    if "," in task:
+        return BodiesEnv(task, count, bodies, **kwargs)
     return gymnasium.make_vec(f"arc_suite/bodies-{task}-v0", num_envs=count, bodies=bodies, **kwargs)
 
 
-def alone(env, task, mode="NextStep", task_kwargs=()):
-    """An environment of each body."""
+def alone(env, mode="NextStep", task_kwargs=()):
+    """An environment of each body in its task."""
     settings = {"actions": "position", **dict(task_kwargs)}
-    return [VectorEnv(body, task, 1, 1, mode, task_kwargs=settings) for body in env.bodies]
+    pairs = zip(env.bodies, env.tasks, strict=True)
+    return [VectorEnv(body, task.name, 1, 1, mode, task_kwargs=settings) for body, task in pairs]
 
 
 same = functools.partial(data_equivalence, exact=True)
@@ -94,7 +98,7 @@ def assert_infos_equal(info, expected, index, env):
 
 def assert_environments(bodies, task, mode, threads, settings=SHORT, steps=40):
     env = make(bodies, task, autoreset_mode=mode, num_threads=threads, task_kwargs=settings)
-    singles = alone(env, task, mode, settings)
+    singles = alone(env, mode, settings)
     env.reset(seed=3)
     for index, (single, own) in enumerate(zip(singles, env.own_observations(), strict=True)):
         assert same(own[None], single.reset(seed=3 + index)[0])
@@ -104,6 +108,42 @@ def assert_environments(bodies, task, mode, threads, settings=SHORT, steps=40):
 @pytest.mark.parametrize(("task", "mode"), [("walk", "NextStep"), ("steer", "SameStep")])
 def test_each_is_that_of_its_body_alone(task, mode):
     assert assert_environments(FEW, task, mode, threads=2).sum() > 0
+
+
+@pytest.mark.slow
+def test_each_is_that_of_its_task_alone():
+    """Rewards, limits, metrics and observations of a task."""
+    assert assert_environments(FEW[:3], "walk,steer,rough", "SameStep", 1, {"time_limit": 0.3}, steps=20).sum() > 0
+
+
+def test_bodies_and_tasks_take_turns_until_all_pairs_have_been():
+    env = BodiesEnv("walk,steer", 4, FEW[:2], flat=True, autoreset_mode="Disabled", task_kwargs={"time_limit": 0.1})
+    pairs = [(body.name, task.name) for body, task in zip(env.bodies, env.tasks, strict=True)]
+    first, second = (body.name for body in FEW[:2])
+    assert pairs == [(first, "walk"), (second, "steer"), (first, "steer"), (second, "walk")]
+    assert env.task.name == "walk,steer" and len(env._places) == 2
+    env.reset(seed=0)
+    *_, info = env.step(np.zeros(env.action_space.shape))
+    assert info["_progress_tracking"].tolist() == [False, True, True, False]
+    assert info["progress_tracking"][[0, 3]].tolist() == [0.0, 0.0]
+    totals = evaluation.episodes_in_batch(env, policies.Script(lambda seed: (), *env.action_space.shape))
+    assert [np.isnan(episode.progress["tracking"]) for episode in totals] == [True, False, False, True]
+    with refused("command 'command': task walk has no commands"):
+        env.command("command", (1.0, 0.0, 0.0))
+    env.command("command", (1.0, 0.0, 0.0), np.array([False, True, True, False]))
+    with refused("num_envs: expected at least one for each of 3 tasks, got 2"):
+        BodiesEnv("walk,steer,shoved", 2, FEW[:2])
+
+
+def test_several_tasks_as_a_setup():
+    setup = Setup.of("random:0-1", "walk,steer")
+    assert (setup.tasks, setup.task_label, setup.kind.name) == (("walk", "steer"), "walk+steer", "walk")
+    assert [member.task for member in setup.members()] == ["walk", "steer", "steer", "walk"]
+    assert Setup.from_dict(setup.to_dict()) == setup and str(setup) == "random:0-1, walk+steer"
+    with refused("task 'walk,steer': expected one with one body, got several"):
+        Setup.of("tick", "walk,steer")
+    with refused("unknown task 'ster'; did you mean 'steer'?", begins=True):
+        Setup.of("random:0-1", "walk,ster")
 
 
 @pytest.mark.slow

@@ -207,7 +207,7 @@ class Configuration:
     @property
     def name(self) -> str:
         """Default name of the run's folder."""
-        return f"{self.setup.name}-{self.setup.kind.name}-{self.algorithm}-{self.seed}".replace(":", ".")
+        return f"{self.setup.name}-{self.setup.task_label}-{self.algorithm}-{self.seed}".replace(":", ".")
 
     @property
     def command(self) -> str:
@@ -318,7 +318,7 @@ def _registered_names(fields: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     robot = fields.get("robot")
     body_names = registry.names_in_robot(robot) if isinstance(robot, str) else []
     names = [("robot", name) for name in body_names]
-    names.append(("task", fields.get("task")))
+    names += [("task", name) for name in registry.split_task_names(fields.get("task"))]
     names.append(("algorithm", fields.get("algorithm")))
     for settings_field in ("task_kwargs", "training"):
         settings = checks.mapping(settings_field, fields.get(settings_field))
