@@ -280,7 +280,9 @@ def _load_network(body: Body, name: str, command_task: Task) -> Network:
     if other_libraries.find(name):
         policy = policies.load_network(name)  # the same policy as a network of this package
     if isinstance(policy, Universal):  # acts in the task that it was trained in
-        policy = universal.for_body(policy.network, Setup.of(body, policy.network.setup.task))
+        trained_tasks = policy.network.setup.tasks
+        task = _NETWORK_TASK if _NETWORK_TASK in trained_tasks else trained_tasks[0]
+        policy = universal.for_body(policy.network, Setup.of(body, task))
     if not isinstance(policy, Network):
         raise ValueError(f"policy {name}: a page runs cpg, ppo, universal, or one trained network")
     for block in policy.blocks:

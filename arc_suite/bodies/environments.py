@@ -10,9 +10,10 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks, registry, rotations
-from arc_suite.bodies import tokens
+from arc_suite.bodies import padding, tokens
+from arc_suite.bodies.descriptions import Description, body_description
 from arc_suite.bodies.groups import Group, Member, Place, group_by_batch, scatter
-from arc_suite.bodies.tokens import Description, Tokens
+from arc_suite.bodies.tokens import Tokens
 from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepare_task, refuse_arguments
@@ -50,23 +51,23 @@ class BodiesTask(NamedTuple):
         raise ValueError(f"task {self.name}: different bodies have no common mirror image")
 
     def split(self, observation: np.ndarray) -> dict[str, np.ndarray]:
-        """Return an observation (..., 664) as named blocks, views of it."""
+        """Return an observation (..., 759) as named blocks, views of it."""
         return tokens.split_flat(observation)
 
 
 class BodiesEnv(KnownAttributes, BaseVectorEnv):
     """Environments of different bodies, `gymnasium.make_vec("arc_suite/bodies-<task>-v0", num_envs=n, bodies=...)`.
 
-    Observations are legs (num_envs, 12, 12), torso (num_envs, 12) and command (num_envs, 6), float32 without
+    Observations are legs (num_envs, 12, 19), torso (num_envs, 12) and command (num_envs, 17), float32 without
     dimension and 0 where a body has no leg or joint; see `bodies.tokens.Tokens.make_tokens`. Actions are
     (num_envs, 12, 4) in [-1, 1], positions of joints as with `actions="position"`; entries without a joint are
     ignored. `description` holds what does not change. With `flat=True`, for plain learners, observations are vectors
-    (num_envs, 664) that include legs and torso of the description, and actions are (num_envs, 48).
+    (num_envs, 759) that include legs and torso of the description, and actions are (num_envs, 48).
 
     An environment of seed s is bit-equal to an environment of its body and seed in a `VectorEnv` with
     `actions="position"`: states, rewards, infos, and the tokens of the observation. Bodies whose models have one
     layout share a batch in level tasks; others have a batch of their own, to the same effect. The ground is as
-    each body's own task makes it, and not observed.
+    each body's own task makes it.
 
     Environments may have different tasks: `BodiesEnv("walk,steer", ...)`. Each has the rewards, the time limit and the
     metrics of its own; metrics of others are 0 there, and their masks False.
@@ -78,7 +79,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         tasks: tasks of each environment, for demonstrators.
         task: task of all, for learners.
         step_limit: control steps after which every episode is over, may be infinite.
-        description: description of each environment, (num_envs, ...) float32; see `bodies.tokens.Description`.
+        description: description of each environment, (num_envs, ...) float32; see `bodies.descriptions.Description`.
         autoreset_mode: what happens to an environment whose episode has ended.
     """
 
@@ -135,7 +136,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             if count > num_envs:
                 raise ValueError(f"num_envs: expected at least one for each of {count} {noun}, got {num_envs}")
         for body in different_bodies:
-            tokens.joint_slots(body)  # refuses too many legs or joints
+            padding.joint_slots(body)  # refuses too many legs or joints
         settings = {"actions": "position", **checks.mapping("task_kwargs", task_kwargs)}
         checks.name(settings["actions"], ["position"], "actions of different bodies")
         seed = settings.pop("random", None)
@@ -165,28 +166,40 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             _check_same_privileged_blocks(self.tasks)
         names_of_tasks = dict.fromkeys(task.name for task in self.tasks)  # each once
         self.task = BodiesTask(",".join(names_of_tasks), max(task.step_limit for task in self.tasks))
-        self._tokens = Tokens.of(self.tasks)
         self._flat = has_flat_spaces
+        tokens_of_envs = Tokens.of(self.tasks)
         for indices in group_by_batch(members):
             _, name = pairs[indices[0]]
             group = Group([members[index] for index in indices], name, **options)
-            self._places.append(Place(group, np.array(indices), self._tokens.select(indices)))
+            self._places.append(Place(group, np.array(indices), tokens_of_envs.select(indices)))
         self.step_limit = float(max(np.max(place.group.step_limit) for place in self._places))
         first_group = self._places[0].group
         self.autoreset_mode = first_group.autoreset_mode
         self.metadata = first_group.metadata
         self.render_mode = render_mode
-        description_of_pair = {pair: tokens.body_description(member.task) for pair, member in member_of_pair.items()}
+        description_of_pair = {pair: body_description(member.task) for pair, member in member_of_pair.items()}
         columns = zip(*(description_of_pair[pair] for pair in pairs), strict=True)
         self.description = Description(*map(np.stack, columns))
-        self.single_observation_space, self.single_action_space = _spaces(has_flat_spaces)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._set_observations(tokens_of_envs)
         if seed is not None:
             seeds = self._checked_seeds(seed)
             for group, indices, _ in self._places:
                 group._begin_streams([seeds[index] for index in indices], np.ones(len(indices), bool))
         self._sealed_by = __name__
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        # Pickles of earlier versions have the observations of those.
+        tokens_of_envs = Tokens.of(self.tasks)
+        self._places = [Place(group, indices, tokens_of_envs.select(indices)) for group, indices, _ in self._places]
+        self._set_observations(tokens_of_envs)
+
+    def _set_observations(self, tokens_of_envs: Tokens) -> None:
+        """Set tokens and spaces."""
+        self._tokens = tokens_of_envs
+        self.single_observation_space, self.single_action_space = _spaces(self._flat)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
 
     @one_thread_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
@@ -309,7 +322,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return the state of all environments as arrays by name, from which `restore` goes on.
 
-        They include flat `observation` (num_envs, 664), and `steps` (num_envs,), control steps of the episodes.
+        They include flat `observation` (num_envs, 759), and `steps` (num_envs,), control steps of the episodes.
 
         Raises:
             ResetNeeded: before the first reset.
@@ -448,7 +461,7 @@ def _check_same_privileged_blocks(tasks: Sequence[Task]) -> None:
     """Raise ValueError for tasks whose privileged observations differ."""
     first_task = tasks[0]
     for task in tasks:
-        if tokens.privileged_sizes(task) != tokens.privileged_sizes(first_task):
+        if padding.privileged_sizes(task) != padding.privileged_sizes(first_task):
             names = f"{first_task.name} and {task.name}"
             raise ValueError(f"privileged: expected tasks with the same blocks, got {names}; False leaves them out")
 
@@ -458,17 +471,17 @@ def _spaces(flat: bool) -> tuple[gymnasium.Space, gymnasium.Space]:
     if flat:
         size = sum(tokens.FLAT_SIZES.values())
         observations = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.MAX_LEGS * tokens.MAX_JOINTS,), np.float32)
+        actions = gymnasium.spaces.Box(-1.0, 1.0, (padding.MAX_LEGS * padding.MAX_JOINTS,), np.float32)
         return observations, actions
     shapes = {
-        "legs": (tokens.MAX_LEGS, tokens.LEG_SIZE),
+        "legs": (padding.MAX_LEGS, tokens.LEG_SIZE),
         "torso": (tokens.TORSO_SIZE,),
         "command": (tokens.COMMAND_SIZE,),
     }
     boxes: dict[str, gymnasium.Space] = {
         name: gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32) for name, shape in shapes.items()
     }
-    actions = gymnasium.spaces.Box(-1.0, 1.0, (tokens.MAX_LEGS, tokens.MAX_JOINTS), np.float32)
+    actions = gymnasium.spaces.Box(-1.0, 1.0, (padding.MAX_LEGS, padding.MAX_JOINTS), np.float32)
     return gymnasium.spaces.Dict(boxes), actions
 
 

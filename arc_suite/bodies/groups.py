@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.bodies import tokens
+from arc_suite.bodies import padding
 from arc_suite.bodies.tokens import Tokens
 from arc_suite.envs import stacked
 from arc_suite.envs.vector import VectorEnv
@@ -30,11 +30,11 @@ class Group(VectorEnv):
     def __init__(self, members: Sequence[Member], task_name: str, **options):
         """Allocate an environment for each member; for the options see `VectorEnv`."""
         self._members = members
-        self._padding = tokens.privileged_padding(members[0].task)  # the same for all members, as their layouts are
+        self._padding = padding.privileged_padding(members[0].task)  # the same for all members, as their layouts are
         super().__init__(None, task_name, len(members), **options)
 
     def _privileged_vectors(self) -> np.ndarray:
-        return tokens.spread(self._padding, super()._privileged_vectors())
+        return padding.spread(self._padding, super()._privileged_vectors())
 
     def _prepare_tasks(self):
         tasks = [member.task for member in self._members]

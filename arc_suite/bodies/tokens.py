@@ -4,34 +4,25 @@ Each leg is a token: a vector with the same layout for every body. Tokens are co
 own policy observes. Everything is a product, a sum or a root of numbers, which round alike in batches of any size.
 """
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite.models.sizing import position_gains, size_body
-from arc_suite.models.standing import GRAVITY, PoseMechanics, measure_standing
+from arc_suite.bodies.descriptions import (
+    LEG_DESCRIPTION_SIZE,
+    TORSO_DESCRIPTION_SIZE,
+    Description,  # noqa: F401  pickles of earlier versions have it here
+)
+from arc_suite.bodies.padding import MAX_JOINTS, MAX_LEGS, pad_joints
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks
-from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach, velocity_units
-from arc_suite.tasks.parts import (
-    Joints,
-    Padding,
-    Phase,
-    Quaternion,
-    RigidParts,
-    Scalar,
-    Vector,
-    join_padding,
-    joint_places,
-)
-
-MAX_LEGS = 12  # at most, of a body
-MAX_JOINTS = 4  # at most, of a leg
+from arc_suite.tasks.parts import Joints, Phase, Quaternion, RigidParts, Scalar, Vector
+from arc_suite.tasks.sensors import SCAN
 
 # The blocks that tokens are made from, and the parts that each has to have.
 BLOCKS = {
@@ -42,14 +33,16 @@ BLOCKS = {
 }
 _UPWARD_FORCE = 5  # its index among the torque and force on a rigid part
 
-# Sizes of what changes in every step: of a leg, of the torso and of the command.
-LEG_SIZE = 2 * MAX_JOINTS + 4
-TORSO_SIZE = 12
-COMMAND_SIZE = 6
+# Points about the standing place of a foot, forward and left, R, under which a leg sees the ground.
+_PATCH = np.array([(-0.3, 0.0), (-0.15, 0.0), (0.0, 0.0), (0.15, 0.0), (0.3, 0.0), (0.0, 0.4), (0.0, -0.4)])
+PATCH_SIZE = len(_PATCH)
 
-# Sizes of the description, which stays the same: of a leg and of the torso.
-LEG_DESCRIPTION_SIZE = 9 + 8 * MAX_JOINTS
-TORSO_DESCRIPTION_SIZE = 10
+# Sizes of what changes in every step: of a leg, of the torso and of the command.
+LEG_SIZE = 2 * MAX_JOINTS + 4 + PATCH_SIZE
+TORSO_SIZE = 12
+_VELOCITY_SIZE = 6  # of the block `command`, the desired velocity and the present one
+_POSE_SIZE = 6
+COMMAND_SIZE = _VELOCITY_SIZE + _POSE_SIZE + 5
 
 # Sizes of the blocks of one vector that holds everything.
 FLAT_SIZES = {
@@ -66,83 +59,53 @@ _JOINT_COUNTS = slice(8, 12)  # of a leg's description: the number of joints, as
 
 _MIN_CARRIED_SHARE = 0.05  # of the weight, on a foot that counts as loaded
 _MAX_THRESHOLD = 0.5  # of the force on a loaded foot, as observed forces are clipped to 1
-_MIN_LENGTH = 1e-9  # m, of vectors in divisions
+_MISSING = np.zeros(0)  # of a field that pickles of earlier versions lack
 _MIN_HEADING = np.float32(1e-6)  # length of the forward axis seen from above, in divisions
 
-# Sizes of the parts of what `Tokens.gather_inputs` returns, before the command: posture, velocities, joint angles,
-# joint velocities, forces, clock.
-_INPUT_SIZES = (5, 6, MAX_LEGS * MAX_JOINTS, MAX_LEGS * MAX_JOINTS, MAX_LEGS, 2)
+# Coefficients of the series of sine and cosine, the highest power first: policy files have sums and products alone.
+_SINE_SERIES = [(-1.0) ** k / math.factorial(2 * k + 1) for k in range(5, -1, -1)]
+_COSINE_SERIES = [(-1.0) ** k / math.factorial(2 * k) for k in range(5, -1, -1)]
 
 
-class Description(NamedTuple):
-    """Properties of bodies that stay the same: lengths in h, rates in sqrt(g / h), torques in those of the motors.
+class Inputs(NamedTuple):
+    """The numbers that tokens are made from, or their indices, (environments, size) each, in this order.
+
+    Numbers of legs, joints and blocks that a body or its task lacks are arbitrary.
 
     Attributes:
-        legs: (..., 12, 41) foot and mount from the torso's origin (6), direction of the foot (2), number of joints as
-            one of four (4), Jacobian of the sole (3 x 4), joint ranges, rad (4 x 2), stiffness, action per rad, and
-            damping of position control (4 + 4), duty factor.
-        torso: (..., 10) number of legs by 12, half-extents of the first solid (3), center of mass (3), static
-            stability margin, R, duty factor.
-        mask: (..., 12, 4) whether a leg has a joint.
-        reach: (..., 12, 4) angles that an action of 1 asks for, rad.
+        posture: height and quaternion of the torso (5).
+        velocities: linear and angular velocity of the torso (6).
+        joint_angles: (48)
+        joint_velocities: (48)
+        forces: upward forces on feet (12).
+        clock: sine and cosine of the phase of the gait (2); both are 0 while a body is to stand.
+        velocity_command: the desired velocity and the present one (6).
+        pose: the commanded pose (6).
+        leg_sines, leg_cosines: sine and cosine of the phase of each leg in the commanded gait (12 + 12).
+        gait: duty factor and frequency of that gait (2).
+        ground: heights of the ground about the feet (84).
     """
 
-    legs: np.ndarray
-    torso: np.ndarray
-    mask: np.ndarray
-    reach: np.ndarray
+    posture: np.ndarray
+    velocities: np.ndarray
+    joint_angles: np.ndarray
+    joint_velocities: np.ndarray
+    forces: np.ndarray
+    clock: np.ndarray
+    velocity_command: np.ndarray
+    pose: np.ndarray
+    leg_sines: np.ndarray
+    leg_cosines: np.ndarray
+    gait: np.ndarray
+    ground: np.ndarray
 
 
-def pad_joints(body: Body, values: np.ndarray) -> np.ndarray:
-    """Return values (joints, ...) of a body's joints as (12, 4, ...), 0 where there is none."""
-    padded_values = np.zeros((MAX_LEGS * MAX_JOINTS, *np.shape(values)[1:]))
-    padded_values[joint_slots(body)] = values
-    return padded_values.reshape(MAX_LEGS, MAX_JOINTS, *padded_values.shape[1:])
-
-
-def privileged_sizes(task: Task) -> dict[str, int]:
-    """Return the sizes of the blocks of a task's privileged observation, padded to 12 legs of 4 joints."""
-    return {name: _padding(block).size for name, block in task.privileged_blocks.items()}
-
-
-def pad_privileged_blocks(task: Task, vectors: np.ndarray) -> np.ndarray:
-    """Return privileged observations (environments, size) with 12 legs of 4 joints, 0 where there is none."""
-    return spread(privileged_padding(task), vectors)
-
-
-def privileged_padding(task: Task) -> Padding:
-    """Return the indices of a task's privileged observation in that of a body of 12 legs of 4 joints."""
-    return join_padding([_padding(block) for block in task.privileged_blocks.values()])
-
-
-def spread(padding: Padding, vectors: np.ndarray) -> np.ndarray:
-    """Return vectors (environments, size) of a body as padded ones (environments, padded size), 0 where padded."""
-    padded_vectors = np.zeros((len(vectors), padding.size), vectors.dtype)
-    padded_vectors[:, padding.places] = vectors
-    return padded_vectors
-
-
-def _padding(block: Block) -> Padding:
-    """Return the indices of a block's numbers in the block of a body of 12 legs of 4 joints."""
-    return join_padding([part.padding(MAX_LEGS, MAX_JOINTS) for part in block.parts])
-
-
-def joint_slots(body: Body) -> np.ndarray:
-    """Return the indices (joints,) of a body's joints among the 12 x 4 joints of padded legs.
-
-    Raises:
-        ValueError: the body has more than 12 legs, or a leg more than 4 joints.
-    """
-    return np.array(_cached_slots(body))
-
-
-@functools.lru_cache(maxsize=256)
-def _cached_slots(body: Body) -> tuple[int, ...]:
-    return joint_places(body, MAX_LEGS, MAX_JOINTS)
+_SLOTS = MAX_LEGS * MAX_JOINTS
+_INPUT_SIZES = (5, 6, _SLOTS, _SLOTS, MAX_LEGS, 2, _VELOCITY_SIZE, _POSE_SIZE, MAX_LEGS, MAX_LEGS, 2)  # before `ground`
 
 
 def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) -> np.ndarray:
-    """Return tokens and a description as one vector (environments, 664), blocks as in `FLAT_SIZES`.
+    """Return tokens and a description as one vector (environments, 759), blocks as in `FLAT_SIZES`.
 
     Args:
         tokens: see `Tokens.make_tokens`.
@@ -154,15 +117,15 @@ def flatten_tokens(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np
 
 
 def split_flat(vectors) -> dict[str, Any]:
-    """Return vectors (..., 664) of NumPy or JAX as the blocks of `FLAT_SIZES`, by name."""
+    """Return vectors (..., 759) of NumPy or JAX as the blocks of `FLAT_SIZES`, by name."""
     return {name: vectors[..., part] for name, part in blocks.slices(FLAT_SIZES).items()}
 
 
 def leg_inputs(vectors):
-    """Return the inputs (..., 12, 81) of a network of legs, and whether a leg has a joint (..., 12, 4).
+    """Return the inputs (..., 12, 98) of a network of legs, and whether a leg has a joint (..., 12, 4).
 
     Args:
-        vectors: (..., 664) vectors of `flatten_tokens`, of NumPy or JAX; normalized ones keep the number of joints as
+        vectors: (..., 759) vectors of `flatten_tokens`, of NumPy or JAX; normalized ones keep the number of joints as
             it is.
     """
     xp = vectors.__array_namespace__()
@@ -181,10 +144,10 @@ def leg_inputs(vectors):
 
 
 def repeat_for_legs(values: np.ndarray, counts: float) -> np.ndarray:
-    """Return numbers (81,) for the inputs of one leg as numbers (664,) for the vector of `flatten_tokens`.
+    """Return numbers (98,) for the inputs of one leg as numbers (759,) for the vector of `flatten_tokens`.
 
     Args:
-        values: (81,) in the order of `leg_inputs`.
+        values: (98,) in the order of `leg_inputs`.
         counts: in place of the numbers of joints.
     """
     ends = np.cumsum((LEG_SIZE, LEG_DESCRIPTION_SIZE, TORSO_SIZE, COMMAND_SIZE))
@@ -196,74 +159,11 @@ def repeat_for_legs(values: np.ndarray, counts: float) -> np.ndarray:
     return np.concatenate([legs, torso, command, leg_descriptions, torso_description]).astype(np.float32)
 
 
-def body_description(task: Task) -> Description:
-    """Return the description of the body of a task, in the gait that the task prescribes; no leading axes.
-
-    Raises:
-        ValueError: too many legs or joints, or a task that prescribes no gait.
-    """
-    if task.parameters is None:
-        raise ValueError(f"task {task.name}: expected one that prescribes a gait")
-    body = task.scene.body
-    duty_factor = task.parameters.duty_factor
-    pose = measure_standing(body)
-    height = pose.height  # m, of the torso
-    leg_count = len(body.legs)
-    ranges = np.radians([joint.range_deg for joint in body.joints])
-
-    legs = np.zeros((MAX_LEGS, LEG_DESCRIPTION_SIZE))
-    legs[:leg_count] = _describe_legs(body, pose, ranges, duty_factor)
-    first_solid = body.torso.solids[0]
-    missing_extents = 3 - len(first_solid.size)  # of solids that are round about an axis
-    half_extents = np.array((*first_solid.size, *(first_solid.size[-1],) * missing_extents))
-    lengths = np.array((*half_extents, *pose.center, pose.margin, reach(body))) / height
-    return Description(
-        legs=legs.astype(np.float32),
-        torso=np.array((leg_count / MAX_LEGS, *lengths, duty_factor), np.float32),
-        mask=pad_joints(body, np.ones(len(ranges))).astype(bool),
-        reach=pad_joints(body, abs(ranges).max(axis=-1)).astype(np.float32),
-    )
-
-
-def _describe_legs(body: Body, pose: PoseMechanics, ranges: np.ndarray, duty_factor: float) -> np.ndarray:
-    """Return the descriptions (legs, 41) of a body's legs; see `Description`.
-
-    Args:
-        body: any body.
-        pose: the standing one.
-        ranges: (joints, 2) ranges of the joints, rad.
-        duty_factor: duty factor of the gait.
-    """
-    leg_count = len(body.legs)
-    rate = math.sqrt(GRAVITY / pose.height)  # rad/s
-    feet = np.array([leg.foot_position for leg in body.legs])  # (legs, 3) m
-    mounts = np.array([leg.mount for leg in body.legs])  # (legs, 3) m
-    foot_distances = np.maximum(np.hypot(feet[:, 0], feet[:, 1]), _MIN_LENGTH)  # from the torso, seen from above
-    foot_directions = feet[:, :2] / foot_distances[:, None]
-    joint_counts = np.eye(MAX_JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]
-    jacobians = pad_joints(body, np.concatenate([jacobian.T for jacobian in pose.jacobians]))[:leg_count]
-    stiffness, damping = position_gains(size_body(body), pose.inertias)
-    parts = [
-        feet / pose.height,
-        mounts / pose.height,
-        foot_directions,
-        joint_counts,
-        jacobians.swapaxes(1, 2) / pose.height,
-        pad_joints(body, ranges)[:leg_count],
-        pad_joints(body, stiffness)[:leg_count],
-        pad_joints(body, damping * rate)[:leg_count],
-        np.full((leg_count, 1), duty_factor),
-    ]
-    return np.concatenate([part.reshape(leg_count, -1) for part in parts], axis=-1)
-
-
 class Tokens(NamedTuple):
     """Constants that turn observations of environments into tokens, in float32; the leading axis is for environments.
 
     Attributes:
-        input_indices: (environments, n) in the body's own observation vector: indices of the torso's posture and
-            velocity (5 + 6), joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command
-            (6); any index for legs and joints that the body does not have, and for the command of a task without one.
+        input_indices: (environments, n) indices of `Inputs` in the body's own observation vector.
         mask: (environments, 12, 4) 1 for a joint of the body.
         legs: (environments, 12) 1 for a leg of the body.
         height: (environments,) h, m.
@@ -272,10 +172,13 @@ class Tokens(NamedTuple):
         command_units: (environments, 3) units of the command; see `fitting.velocity_units`.
         turn_scale: (environments,) R / h.
         direction: (environments,) 1 for a walk forward, -1 for one backward.
-        has_command: (environments,) 1 for a task with a command.
         loaded_force: (environments,) upward force from which on a foot is loaded, in units of the block.
         leg_phase: (environments, 12, 2) sine and cosine of the phase of each leg over the clock.
         mid_stance: (environments, 2) sine and cosine of the phase in the middle of stance.
+        has_command, has_pose, has_scan: (environments,) 1 for a task that observes a command, a pose and a gait by
+            command, and the heights of the ground.
+        gait: (environments, 2) duty factor and frequency of the prescribed gait, of which tasks with a gait by command
+            observe another one.
     """
 
     input_indices: np.ndarray
@@ -287,10 +190,13 @@ class Tokens(NamedTuple):
     command_units: np.ndarray
     turn_scale: np.ndarray
     direction: np.ndarray
-    has_command: np.ndarray
     loaded_force: np.ndarray
     leg_phase: np.ndarray
     mid_stance: np.ndarray
+    has_command: np.ndarray = _MISSING
+    has_pose: np.ndarray = _MISSING
+    has_scan: np.ndarray = _MISSING
+    gait: np.ndarray = _MISSING
 
     @classmethod
     def of(cls, tasks: Sequence[Task]) -> Self:
@@ -322,20 +228,24 @@ class Tokens(NamedTuple):
         mid_stance_phase = math.pi * parameters.duty_factor  # rad
         mask = pad_joints(body, np.ones(len(body.joint_names)))
         units = velocity_units(body, parameters.target_velocity)
+        rate_unit = math.sqrt(GRAVITY / pose.height)
         tokens = cls(
             input_indices=cls._find_input_indices(task),
             mask=mask,
             legs=mask.any(axis=-1),
             height=pose.height,
             velocity_unit=math.sqrt(GRAVITY * pose.height),
-            rate_unit=math.sqrt(GRAVITY / pose.height),
+            rate_unit=rate_unit,
             command_units=units,
             turn_scale=units[0] / units[2] / pose.height,
             direction=math.copysign(1.0, parameters.target_velocity),
-            has_command=has_command,
             loaded_force=min(_MIN_CARRIED_SHARE * weight, _MAX_THRESHOLD),
             leg_phase=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
             mid_stance=np.array((math.sin(mid_stance_phase), math.cos(mid_stance_phase))),
+            has_command=has_command,
+            has_pose="pose" in task.blocks,
+            has_scan="scan" in task.blocks,
+            gait=np.array((parameters.duty_factor, parameters.gait_frequency / rate_unit)),
         )
         # Everything except the indices is float32.
         indices, *numbers = tokens
@@ -355,17 +265,21 @@ class Tokens(NamedTuple):
         upward_forces = np.zeros(MAX_LEGS, int)
         for leg, name in enumerate(body.foot_names):
             upward_forces[leg] = forces[rigid_parts.places(name)[_UPWARD_FORCE]]
-        indices = [
-            height,
-            orientation,
-            linear_velocity,
-            angular_velocity,
-            pad_joints(body, angles).ravel(),
-            pad_joints(body, joint_velocities).ravel(),
-            upward_forces,
-            block_indices["gait_clock"],
-            block_indices.get("command", np.zeros(COMMAND_SIZE, int)),
-        ]
+        leg_sines, leg_cosines, gait = _find_gait(block_indices, len(body.legs))
+        indices = Inputs(
+            posture=np.append(height, orientation),
+            velocities=np.append(linear_velocity, angular_velocity),
+            joint_angles=pad_joints(body, angles).ravel(),
+            joint_velocities=pad_joints(body, joint_velocities).ravel(),
+            forces=upward_forces,
+            clock=block_indices["gait_clock"],
+            velocity_command=block_indices.get("command", np.zeros(_VELOCITY_SIZE)),
+            pose=block_indices.get("pose", np.zeros(_POSE_SIZE)),
+            leg_sines=leg_sines,
+            leg_cosines=leg_cosines,
+            gait=gait,
+            ground=_find_ground(body, block_indices),
+        )
         return np.concatenate(indices).astype(int)
 
     def gather_inputs(self, vectors: np.ndarray) -> np.ndarray:
@@ -376,26 +290,24 @@ class Tokens(NamedTuple):
         return np.take_along_axis(vectors, self.input_indices, axis=-1)
 
     @staticmethod
-    def split_inputs(inputs: np.ndarray) -> list[np.ndarray]:
-        """Return gathered numbers (..., n), or their indices, in the parts that `input_indices` names."""
-        return np.split(inputs, np.cumsum(_INPUT_SIZES), axis=-1)
+    def split_inputs(inputs: np.ndarray) -> Inputs:
+        """Return gathered numbers (..., n), or their indices, by name."""
+        return Inputs(*np.split(inputs, np.cumsum(_INPUT_SIZES), axis=-1))
 
     def make_tokens(self, inputs: np.ndarray) -> dict[str, np.ndarray]:
         """Return the tokens of gathered numbers (environments, n).
 
         Returns:
-            legs (environments, 12, 12): joint angles, rad, and velocities (4 + 4), sine and cosine of the leg's phase,
-            whether it is to stand, whether it is loaded; 0 for legs and joints that a body does not have.
+            legs (environments, 12, 19): joint angles, rad, and velocities (4 + 4), sine and cosine of the leg's phase,
+            whether it is to stand, whether it is loaded, heights of the ground about its foot over that under the
+            torso, h (7), 0 where a task observes none; 0 for legs and joints that a body does not have.
             torso (environments, 12): height, up axis (3), forward axis (2), velocity (3), angular velocity (3).
-            command (environments, 6): the desired velocity and the present one, along the torso's heading, in units
-            of the command.
+            command (environments, 17): the desired velocity and the present one, along the torso's heading, in units
+            of the command (6), the commanded pose (6), duty factor and frequency of the gait, and whether the task
+            observes a command, a pose and a gait, and heights of the ground.
         """
-        pose, velocities, angles, joint_velocities, forces, clock, command = self.split_inputs(
-            inputs.astype(np.float32)
-        )
-        legs = self._leg_tokens(angles, joint_velocities, forces, clock)
-
-        height, w, x, y, z = pose.T
+        numbers = self.split_inputs(inputs.astype(np.float32))
+        height, w, x, y, z = numbers.posture.T
         # The world's vertical in the torso's frame.
         up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
         # The torso's forward axis in the world, seen from above.
@@ -404,7 +316,7 @@ class Tokens(NamedTuple):
         length = np.maximum(np.sqrt(forward_x * forward_x + forward_y * forward_y), _MIN_HEADING)
         cos_heading = forward_x / length
         sin_heading = forward_y / length
-        vx, vy, vz, *angular_velocity = velocities.T  # in the world
+        vx, vy, vz, *angular_velocity = numbers.velocities.T  # in the world
         forward_velocity = cos_heading * vx + sin_heading * vy
         left_velocity = cos_heading * vy - sin_heading * vx
         linear_rates = [velocity / self.velocity_unit for velocity in (forward_velocity, left_velocity, vz)]
@@ -422,34 +334,52 @@ class Tokens(NamedTuple):
         ]
         straight_ahead = np.stack([*desired, *motion], axis=-1)
         has_command = self.has_command[:, None]
-        command = has_command * command + (1.0 - has_command) * straight_ahead
-        return {"legs": legs, "torso": torso, "command": command}
+        has_pose = self.has_pose[:, None]
+        command = has_command * numbers.velocity_command + (1.0 - has_command) * straight_ahead
+        gait = has_pose * numbers.gait + (1.0 - has_pose) * self.gait
+        flags = np.stack([self.has_command, self.has_pose, self.has_scan], axis=-1)
+        return {
+            "legs": self._leg_tokens(numbers, gait[:, :1]),
+            "torso": torso,
+            "command": np.concatenate([command, has_pose * numbers.pose, gait, flags], axis=-1),
+        }
 
-    def _leg_tokens(self, angles, joint_velocities, forces, clock) -> np.ndarray:
-        """Return the tokens of legs (environments, 12, 12).
+    def _leg_tokens(self, numbers: Inputs, duty_factor: np.ndarray) -> np.ndarray:
+        """Return the tokens of legs (environments, 12, 19), given the duty factor (environments, 1) of the gait."""
+        masked_angles = numbers.joint_angles.reshape(self.mask.shape) * self.mask
+        masked_velocities = numbers.joint_velocities.reshape(self.mask.shape) * self.mask
+        sine, cosine, is_to_stand = self._leg_phases(numbers, duty_factor)
+        is_loaded = numbers.forces >= self.loaded_force[:, None]
+        phase = np.stack([sine, cosine, is_to_stand, is_loaded], axis=-1) * self.legs[..., None]
 
-        Args:
-            angles: (environments, 48) rad.
-            joint_velocities: (environments, 48) rad/s.
-            forces: (environments, 12) upward on feet.
-            clock: (environments, 2) sine and cosine of the gait's phase; both are 0 while a body is to stand.
-        """
-        masked_angles = angles.reshape(self.mask.shape) * self.mask
-        masked_velocities = joint_velocities.reshape(self.mask.shape) * self.mask
+        torso_height = numbers.posture[:, :1] / self.height[:, None]
+        ground = numbers.ground + torso_height - 1.0  # the block has 0 a standing height under the torso
+        seen_ground = (ground * self.has_scan[:, None]).reshape(*self.legs.shape, PATCH_SIZE) * self.legs[..., None]
+        rates = masked_velocities / self.rate_unit[:, None, None]
+        return np.concatenate([masked_angles, rates, phase, seen_ground], axis=-1)
+
+    def _leg_phases(self, numbers: Inputs, duty_factor: np.ndarray) -> tuple:
+        """Return sine and cosine of the phase of each leg, and whether it is to stand, (environments, 12) each."""
+        clock = numbers.clock
         offset_sine = self.leg_phase[..., 0]
         offset_cosine = self.leg_phase[..., 1]
         # Sine and cosine of each leg's phase: that of the clock plus the leg's offset.
         sine = clock[:, :1] * offset_cosine + clock[:, 1:] * offset_sine
         cosine = clock[:, 1:] * offset_cosine - clock[:, :1] * offset_sine
         has_stopped = clock == 0.0  # in both numbers, for a body that is to stand
+        has_stopped = has_stopped[:, :1] & has_stopped[:, 1:]
+        has_pose = self.has_pose[:, None]
+        walks_in_commanded_gait = has_pose - has_pose * has_stopped
+        sine = (1.0 - has_pose) * sine + walks_in_commanded_gait * numbers.leg_sines
+        cosine = (1.0 - has_pose) * cosine + walks_in_commanded_gait * numbers.leg_cosines
         # A leg stands while its phase is nearer to mid-stance than phase 0 is, the touchdown.
-        middle_sine = self.mid_stance[:, :1]
-        middle_cosine = self.mid_stance[:, 1:]
+        angle = (duty_factor - 0.5) * math.pi  # of the middle of stance, from a quarter of the cycle on
+        angle_squared = angle * angle
+        middle_sine = has_pose * _series(_COSINE_SERIES, angle_squared) + (1.0 - has_pose) * self.mid_stance[:, :1]
+        sine_of_angle = angle * _series(_SINE_SERIES, angle_squared)
+        middle_cosine = (1.0 - has_pose) * self.mid_stance[:, 1:] - has_pose * sine_of_angle
         is_in_stance = sine * middle_sine + cosine * middle_cosine >= middle_cosine
-        is_to_stand = is_in_stance | (has_stopped[:, :1] & has_stopped[:, 1:])
-        is_loaded = forces >= self.loaded_force[:, None]
-        phase = np.stack([sine, cosine, is_to_stand, is_loaded], axis=-1) * self.legs[..., None]
-        return np.concatenate([masked_angles, masked_velocities / self.rate_unit[:, None, None], phase], axis=-1)
+        return sine, cosine, is_in_stance | has_stopped
 
     def select(self, indices) -> Self:
         """Return the tokens of some environments."""
@@ -460,3 +390,35 @@ class Tokens(NamedTuple):
         flat_actions = actions.reshape(len(actions), -1)
         has_joint = self.mask.reshape(flat_actions.shape) > 0.0
         return flat_actions[has_joint].reshape(len(actions), -1)
+
+
+def _find_gait(block_indices: Mapping[str, np.ndarray], leg_count: int) -> tuple:
+    """Return the indices of the sines and cosines (12 + 12) of the legs' phases, and of the gait's numbers (2)."""
+    leg_sines = np.zeros(MAX_LEGS)
+    leg_cosines = np.zeros(MAX_LEGS)
+    if "gait" not in block_indices:
+        return leg_sines, leg_cosines, np.zeros(2)
+    indices = block_indices["gait"]
+    leg_sines[:leg_count] = indices[:leg_count]
+    leg_cosines[:leg_count] = indices[leg_count : 2 * leg_count]
+    return leg_sines, leg_cosines, indices[2 * leg_count :]
+
+
+def _find_ground(body: Body, block_indices: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the indices (84,) of the points of the block `scan` that are nearest to those about each foot."""
+    nearest_points = np.zeros((MAX_LEGS, PATCH_SIZE))
+    if "scan" not in block_indices:
+        return nearest_points.ravel()
+    feet = np.array([leg.foot_position[:2] for leg in body.legs]) / reach(body)
+    points = feet[:, None] + _PATCH  # (legs, 7, 2)
+    distances = np.linalg.norm(points[:, :, None] - SCAN.T, axis=-1)  # to each point of the scan
+    nearest_points[: len(feet)] = block_indices["scan"][distances.argmin(axis=-1)]
+    return nearest_points.ravel()
+
+
+def _series(coefficients: Sequence[float], x):
+    """Return the sum of powers of x with coefficients, the highest power first."""
+    total = coefficients[0]
+    for coefficient in coefficients[1:]:
+        total = total * x + coefficient
+    return total

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite.bodies import tokens
+from arc_suite.bodies.descriptions import body_description
 from arc_suite.bodies.tokens import Tokens
 from arc_suite.cpg.law import Clocked, proprioception, read_blocks, torques
 from arc_suite.envs.setup import Setup
@@ -29,7 +30,7 @@ def load(name: str | os.PathLike, task: Task | None = None) -> Network:
         task: task in which `universal` acts: it follows a command where the task has one. None for walk.
 
     Raises:
-        ValueError: a damaged file, or a policy of one body.
+        ValueError: a damaged file, a policy of one body, or one of other observations.
         OSError: the file cannot be read.
     """
     if name == NAME:
@@ -40,7 +41,15 @@ def load(name: str | os.PathLike, task: Task | None = None) -> Network:
         policy = network.load(name)
     if not policy.setup.several:
         raise ValueError(f"policy {name}: expected one of many bodies, got one of {policy.setup.body.name}")
+    _check_inputs(policy)
     return policy
+
+
+def _check_inputs(trained: Network) -> None:
+    """Raise ValueError for a policy whose observations are those of another version."""
+    size = sum(tokens.FLAT_SIZES.values())
+    if trained.size != size:
+        raise ValueError(f"policy of {trained.setup}: expected {size} observations, got {trained.size}; train it again")
 
 
 class Universal:
@@ -61,11 +70,12 @@ class Universal:
         """Describe the body of a task to a network of many bodies.
 
         Raises:
-            ValueError: a body with more than 12 legs or 4 joints a leg, or a task that prescribes no gait or lacks
-                a block that the network needs.
+            ValueError: a body with more than 12 legs or 4 joints a leg, a task that prescribes no gait or lacks a block
+                that the network needs, or a network of other observations.
         """
+        _check_inputs(trained)
         body = task.scene.body
-        description = tokens.body_description(task)
+        description = body_description(task)
         self.network = trained
         self.task = task
         self.descriptions = (description.legs[None], description.torso[None])
@@ -111,9 +121,8 @@ class Universal:
     def _trace_torques(self, vectors: Any) -> Any:
         """Write the nodes of torques (1, joints) for a traced observation (1, size)."""
         inputs = self.tokens.split_inputs(self.tokens.gather_inputs(vectors))
-        _, _, padded_angles, padded_velocities, _, _, _ = inputs
-        angles = self.tokens.body_actions(padded_angles)
-        velocities = self.tokens.body_actions(padded_velocities)
+        angles = self.tokens.body_actions(inputs.joint_angles)
+        velocities = self.tokens.body_actions(inputs.joint_velocities)
         stiffness, damping = self.gains
         return torques(self.reach * self._trace_positions(vectors), angles, velocities, stiffness, damping)
 

@@ -161,12 +161,18 @@ def episodes_in_batch(
             watch(is_playing, is_playing & (terminated | has_diverged))
         has_ended = is_playing & (terminated | truncated)
         for index in np.flatnonzero(has_ended):
-            names = [name for name in info if name.startswith(_PROGRESS)]
-            # In several tasks, an episode lacks the metrics of the others.
-            metrics = {name: float(info[name][index]) if info[f"_{name}"][index] else math.nan for name in names}
-            progress[index] = {name.removeprefix(_PROGRESS): metric for name, metric in metrics.items()}
+            metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}
+            # Of several tasks, each has its own metrics.
+            progress[index] = {
+                name.removeprefix(_PROGRESS): float(values[index])
+                for name, values in metrics.items()
+                if info[f"_{name}"][index]
+            }
         is_playing &= ~has_ended
         if has_ended.any() and is_playing.any():
             environment.rest(~is_playing)
-    results = zip(totals.tolist(), lengths.tolist(), progress, strict=True)
-    return [EpisodeResult(total, length, metrics) for total, length, metrics in results]
+    names = dict.fromkeys(name for metrics in progress for name in metrics)
+    results = []
+    for total, length, metrics in zip(totals.tolist(), lengths.tolist(), progress, strict=True):
+        results.append(EpisodeResult(total, length, {name: metrics.get(name, math.nan) for name in names}))
+    return results

@@ -22,7 +22,8 @@ from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks import command
+from arc_suite.tasks import command, sensors
+from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.walk import Walk
 
 LAYOUTS = [
@@ -320,19 +321,56 @@ def test_tokens_say_what_a_body_does():
 
 
 @pytest.mark.slow
+def test_tokens_show_pose_and_gait_by_command():
+    """Phases and stance of the present gait, the pose, duty factor and frequency; prescribed ones in other tasks."""
+    env = BodiesEnv("directed,steer", 2, [FEW[3], FEW[4]])
+    env.reset(seed=4)
+    for _ in range(70):  # into the second command
+        observation, *_ = env.step(np.zeros(env.action_space.shape))
+    task, group = env.tasks[0], env._places[0].group
+    blocks = task.split(env.own_observations()[0])
+    phases, duty_factor = (array[0] for array in task.leg_phases(group._memory))
+    count, legs, going = len(phases), observation["legs"][0], blocks["gait_clock"].any()
+    assert_array_equal(legs[:count, 10], (phases < 2.0 * np.pi * duty_factor) | ~going)
+    assert_allclose(legs[:count, 8:10], going * np.stack([np.sin(phases), np.cos(phases)], axis=-1), atol=1e-6)
+    directed, steered = observation["command"]
+    assert going and blocks["pose"].any()
+    assert_array_equal(directed[6:12], blocks["pose"])
+    assert directed[12] == pytest.approx(duty_factor, rel=1e-6)
+    gait = env.tasks[1].parameters
+    rate_unit = (9.81 / FEW[4].torso.standing_height) ** 0.5
+    assert_allclose(steered[6:14], [*np.zeros(6), gait.duty_factor, gait.gait_frequency / rate_unit], rtol=1e-6)
+    assert directed[14:].tolist() == [1.0, 1.0, 0.0] and steered[14:].tolist() == [1.0, 0.0, 0.0]
+
+
+def test_each_leg_sees_the_ground_about_its_foot():
+    env = BodiesEnv("roam,steer,walk", 3, ROBOTS["tick"], task_kwargs={"time_limit": 1.0})
+    observation, _ = env.reset(seed=0)
+    task, legs = env.tasks[0], observation["legs"][:, :6, 12:]
+    scan = task.split(env.own_observations()[0])["scan"].reshape(25, 7)
+    height = task.split(env.own_observations()[0])["posture"][0] / ROBOTS["tick"].torso.standing_height
+    foot = np.array(ROBOTS["tick"].legs[0].foot_position[:2]) / reach(ROBOTS["tick"])
+    row, column = abs(sensors.FORWARD - foot[0]).argmin(), abs(sensors.LEFT - foot[1]).argmin()
+    assert legs[0, 0, 2] == pytest.approx(scan[row, column] + height - 1.0, abs=1e-6)
+    assert abs(legs[0]).max() > 0.01 and not legs[1:].any() and not observation["legs"][:, 6:].any()
+    level = BodiesEnv("steer", 1, ROBOTS["tick"], task_kwargs={"scan": True})
+    observation, _ = level.reset(seed=0)
+    assert_allclose(observation["legs"][0, :, 12:], 0.0, atol=1e-6)  # as where no scan shows it
+
+
 def test_flat_vectors_for_plain_learners():
     env, flat = (make(FEW, autoreset_mode="SameStep", task_kwargs=SHORT, flat=flat) for flat in (False, True))
-    assert flat.single_observation_space.shape == (664,) and flat.single_action_space.shape == (48,)
-    assert_array_equal(flat.reset(seed=0)[0][:, :144], env.reset(seed=0)[0]["legs"].reshape(5, -1))
+    assert flat.single_observation_space.shape == (759,) and flat.single_action_space.shape == (48,)
+    assert_array_equal(flat.reset(seed=0)[0][:, :228], env.reset(seed=0)[0]["legs"].reshape(5, -1))
     ends = 0
     for action in actions_of(env, 25):
         vector, *result, info = flat.step(action.reshape(5, -1))
         observation, *expected, _ = env.step(action)
         assert same(result, expected) and vector in flat.observation_space
-        assert_array_equal(vector[:, 144:156], observation["torso"])
-        assert_array_equal(vector[:, 162:654], env.description.legs.reshape(5, -1))
+        assert_array_equal(vector[:, 228:240], observation["torso"])
+        assert_array_equal(vector[:, 257:749], env.description.legs.reshape(5, -1))
         for last in info.get("final_obs", ()):
-            ends += last is not None and last.shape == (664,)
+            ends += last is not None and last.shape == (759,)
     assert ends >= 3
     with pytest.raises(ValueError, match=r"^action: expected shape \(5, 48\), got \(5, 47\)$"):
         flat.step(np.zeros((5, 47)))

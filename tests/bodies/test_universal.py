@@ -70,8 +70,8 @@ def test_a_damaged_file_is_one_line(tmp_path):
     for operator, place, change, message in (
         ("Linear", 1, lambda array: array[:-1], r"node \d+, Linear: weight .* do not fit"),
         ("Product", 1, lambda array: array[:-1], r"node \d+, Product: weight .* do not fit"),
-        ("Take", 1, lambda array: array + 664 * 12, r"node \d+, Take: IndexError: index \d+ is out of bounds"),
-        ("Take", 1, lambda array: array - 664 * 12, r"array \d+: expected indices, got -\d+"),
+        ("Take", 1, lambda array: array + 759 * 12, r"node \d+, Take: IndexError: index \d+ is out of bounds"),
+        ("Take", 1, lambda array: array - 759 * 12, r"array \d+: expected indices, got -\d+"),
     ):
         name = graph.nodes[at[operator]].inputs[place]
         changed = graph._replace(arrays={**graph.arrays, name: change(graph.arrays[name])})
@@ -79,7 +79,7 @@ def test_a_damaged_file_is_one_line(tmp_path):
         with pytest.raises(ValueError, match=f"no policy, or a damaged one: {message}"):
             network.load(path)
     masked = graph._replace(nodes=tuple(node for node in graph.nodes if node.operator != "Pick"))
-    for change in ({"graph": masked}, {"blocks": {"legs": 663}}):
+    for change in ({"graph": masked}, {"blocks": {"legs": 758}}):
         network.save(path, made._replace(**change))
         with pytest.raises(ValueError, match=r"no policy, or a damaged one: node \d+, "):
             network.load(path)
@@ -109,6 +109,12 @@ def test_what_does_not_fit_is_one_line(trained, tmp_path):
         policies.policy(trained, "tick", task=excluded)
     with pytest.raises(ValueError, match=r"expected one of one body, or --robot; got one of random:0-1$"):
         policies.load_network(trained)
+    graph = traced(lambda x: x.node("Product", np.zeros((664, 48))), 664)  # as it was before pose, gait and ground
+    network.save(tmp_path / "before.npz", network.Network(graph, Setup.of("random:0-1"), {"legs": 664}))
+    line = r"^policy of random:0-1, walk: expected 759 observations, got 664; train it again$"
+    for read in (universal.load, lambda path: policies.policy(path, "tick")):
+        with pytest.raises(ValueError, match=line):
+            read(tmp_path / "before.npz")
     single = Setup.of("leaper").definition
     graph = traced(lambda x: x.node("Product", np.zeros((single.size, 12))), single.size)
     network.save(tmp_path / "one.npz", network.Network(graph, Setup.of("leaper"), dict(single.sizes)))

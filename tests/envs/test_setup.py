@@ -175,6 +175,6 @@ def test_flat_environments_go_on_bit_exactly_with_other_ages():
 
 def test_tasks_of_several_bodies_have_no_mirror_image():
     task = Setup.of("random:0-1").make_vec(2).task
-    assert sum(task.sizes.values()) == 664 and task.definition is task
+    assert sum(task.sizes.values()) == 759 and task.definition is task
     with pytest.raises(ValueError, match="different bodies have no common mirror image"):
         _ = task.symmetry

@@ -7,7 +7,8 @@ import pytest
 from networks import of_many_bodies as drawn
 
 from arc_suite import evaluation
-from arc_suite.bodies import families, generator, tokens
+from arc_suite.bodies import families, generator
+from arc_suite.bodies.descriptions import body_description
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.selection import memoryless_preset
 from arc_suite.envs.setup import Setup
@@ -51,7 +52,7 @@ def test_a_robot_that_is_registered_joins_no_family(monkeypatch):
 
 def seen(body):
     """What a network sees of a body, in units of its size."""
-    description = tokens.body_description(Setup.of(body).definition)
+    description = body_description(Setup.of(body).definition)
     return np.concatenate([description.legs.ravel(), description.torso])
 
 

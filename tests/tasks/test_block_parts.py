@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from arc_suite.bodies import generator, tokens
+from arc_suite.bodies import generator
+from arc_suite.bodies.padding import MAX_JOINTS, MAX_LEGS
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, mirror
 from arc_suite.tasks import TASKS, mirrors
@@ -199,7 +200,7 @@ def test_a_view_of_many_numbers_is_refused_in_one_line():
 def test_every_number_has_a_name_and_a_place(task):
     for name, block in blocks_of(task).items():
         assert len(block.entries()) == block.size, name
-        padding = join_padding([part.padding(tokens.MAX_LEGS, tokens.MAX_JOINTS) for part in block.parts])
+        padding = join_padding([part.padding(MAX_LEGS, MAX_JOINTS) for part in block.parts])
         assert len(set(padding.places)) == block.size <= padding.size, name
         assert padding.places.max() < padding.size, name
 

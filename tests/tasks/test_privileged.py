@@ -8,7 +8,7 @@ from episodes import begun, load
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import rotations
-from arc_suite.bodies import BodiesEnv, tokens
+from arc_suite.bodies import BodiesEnv, padding
 from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
@@ -129,20 +129,22 @@ def test_different_bodies_have_one_padded_layout(mode):
     options = {"autoreset_mode": mode, "task_kwargs": {**settings, "actions": "position"}, "privileged": True}
     alone = [VectorEnv(body, "steer", 1, **options) for body in mixed.bodies]
     infos = mixed.reset(seed=4)[1], [each.reset(seed=4 + index)[1] for index, each in enumerate(alone)]
-    width = sum(tokens.privileged_sizes(mixed.tasks[0]).values())
+    width = sum(padding.privileged_sizes(mixed.tasks[0]).values())
     for _ in range(8):
         together, own = infos
         assert together["privileged"].shape == (3, width) and together["privileged"].dtype == np.float32
         for index, info in enumerate(own):
             task = mixed.tasks[index]
-            assert_array_equal(together["privileged"][index], tokens.pad_privileged_blocks(task, info["privileged"])[0])
-            blocks = privileged.split(tokens.privileged_sizes(task), together["privileged"][index])
+            assert_array_equal(
+                together["privileged"][index], padding.pad_privileged_blocks(task, info["privileged"])[0]
+            )
+            blocks = privileged.split(padding.privileged_sizes(task), together["privileged"][index])
             legs = len(task.scene.body.legs)
             assert blocks["ground"][:legs].all() and not blocks["ground"][legs:].any()
             assert (blocks["strength"] > 0.0).sum() == len(task.scene.body.joint_names)
             if "final_info" in info:
                 last = together["final_info"]["privileged"][index]
-                assert_array_equal(last, tokens.pad_privileged_blocks(task, info["final_info"]["privileged"])[0])
+                assert_array_equal(last, padding.pad_privileged_blocks(task, info["final_info"]["privileged"])[0])
                 assert (last != together["privileged"][index]).any()
                 ends += 1
         infos = (
@@ -174,7 +176,7 @@ def test_a_block_of_another_package_is_padded_by_its_parts(monkeypatch):
     monkeypatch.setitem(TASKS, "loaded", Loaded)
     mixed = BodiesEnv("loaded", 2, ["leaper", "queen"], privileged=True)
     _, info = mixed.reset(seed=0)
-    blocks = privileged.split(tokens.privileged_sizes(mixed.tasks[0]), info["privileged"])
+    blocks = privileged.split(padding.privileged_sizes(mixed.tasks[0]), info["privileged"])
     assert blocks["load"].shape == (2, 12 + 1 + 48)
     for numbers, body in zip(blocks["load"], mixed.bodies, strict=True):
         legs, joints = len(body.legs), len(body.joint_names)

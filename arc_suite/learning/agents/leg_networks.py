@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite.bodies import tokens
-from arc_suite.bodies.tokens import MAX_JOINTS, MAX_LEGS
+from arc_suite.bodies.padding import MAX_JOINTS, MAX_LEGS
 from arc_suite.learning.agents import critic_blocks as blocks_of_critics
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.networks import ACTIVATION
@@ -233,12 +233,12 @@ class AnyLegs(NamedTuple):
         return jnp.where(leg_mask, leg_values, 0.0).sum(axis=-1) / leg_mask.sum(axis=-1)
 
     def moment_vectors(self, observations):
-        """Return the inputs (n, 81) of all legs that bodies have."""
+        """Return the inputs (n, 98) of all legs that bodies have."""
         inputs, joint_mask = tokens.leg_inputs(observations)
         return inputs[joint_mask.any(axis=-1)]
 
     def normalize(self, moments: Moments) -> Normalizer:
-        """Return the normalizer of 664 numbers, the same for every leg; it does not change the number of joints."""
+        """Return the normalizer of 759 numbers, the same for every leg; it does not change the number of joints."""
         mean, factor, limit = moments.normalizer()
         return Normalizer(tokens.repeat_for_legs(mean, 0.0), tokens.repeat_for_legs(factor, 1.0), limit)
 

@@ -9,6 +9,7 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 
 from arc_suite.bodies import tokens
+from arc_suite.bodies.padding import MAX_LEGS
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import architectures
@@ -62,12 +63,12 @@ def test_the_order_of_legs_does_not_matter(vectors):
     random = np.random.default_rng(0)
     of_actions, of_values = architecture.draw_policy(random, 16), architecture.draw_values(random, 16)
     legs = int(tokens.leg_inputs(vectors[:1])[1].any(axis=-1).sum())
-    order = np.arange(tokens.MAX_LEGS)
+    order = np.arange(MAX_LEGS)
     order[:legs] = order[:legs][::-1]
     ends = np.cumsum(list(tokens.FLAT_SIZES.values()))[:-1]
     parts = [part.reshape(-1) for part in np.split(vectors[0], ends)]
     for place in (0, 3):
-        parts[place] = parts[place].reshape(tokens.MAX_LEGS, -1)[order].ravel()
+        parts[place] = parts[place].reshape(MAX_LEGS, -1)[order].ravel()
     other = np.concatenate(parts)
     both = np.stack([vectors[0], other])
     actions, turned = np.asarray(architecture.actions(of_actions, both)).reshape(2, 12, 4)
