@@ -27,7 +27,7 @@ class Charts:
         """Add empty charts."""
         self._gui = gui
         self._reward_charts: dict[tuple[str, ...], viser.GuiUplotHandle] = {}  # by names of the terms
-        self._reward_folder = gui.add_folder("Reward by term")
+        self._reward_folder = gui.add_folder("Reward by term", expand_by_default=False)
         with gui.add_folder("Foot contacts against the gait"):
             self._contacts = gui.add_image(contacts_image(None, ()), format="png")
         with gui.add_folder("Speed, m/s"):

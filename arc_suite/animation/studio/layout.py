@@ -10,8 +10,10 @@ import viser
 
 from arc_suite.animation import player_controls
 from arc_suite.animation.studio import sketch as sketches
+from arc_suite.animation.studio.picture_buttons import PictureButtons
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch
 from arc_suite.animation.studio.states import POSE, VELOCITY, PageState
+from arc_suite.animation.studio.thumbnails import palette_picture
 from arc_suite.arenas import ARENAS
 from arc_suite.bodies import generator
 from arc_suite.cpg.selection import preset_names
@@ -24,7 +26,7 @@ MAX_LINK_SLIDERS = 8
 LENGTH_FACTORS = (0.5, 2.0)  # lowest and highest factor of a length
 LENGTH_FACTOR_STEP = 0.05
 _MAX_KICKS = 3.0  # sqrt(g h)
-_MAX_SEED = 2**32 - 1
+MAX_SEED = 2**32 - 1
 
 
 class _Slider(NamedTuple):
@@ -56,16 +58,17 @@ _PROPORTIONS = (
 
 def add_source(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
     """Add widgets for the source of the body, with the values of a sketch."""
-    sources = list_with(sketch.source, sketches.sources())
+    sources = PictureButtons(gui, "sources", "Body", sketches.sources(), columns=4, height=40)
+    sources.show_choice(sketch.source)
     min_legs, max_legs = generator.LEG_RANGE
     min_links, max_links = generator.LINK_RANGE
     layouts = [DEFAULT_CHOICE, *generator.LAYOUTS]
     return {
-        "source": gui.add_dropdown("Body", sources, initial_value=sketch.source),
+        "source": sources,
         "legs": gui.add_slider("Legs", min=min_legs, max=max_legs, step=1, initial_value=sketch.legs),
         "links": gui.add_slider("Links", min=min_links, max=max_links, step=1, initial_value=sketch.links),
         "layout": gui.add_dropdown("Layout", layouts, initial_value=sketch.layout),
-        "seed": gui.add_number("Seed", sketch.seed, min=0, max=_MAX_SEED, step=1),
+        "seed": gui.add_number("Seed", sketch.seed, min=0, max=MAX_SEED, step=1),
     }
 
 
@@ -75,8 +78,10 @@ def add_shape(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
     for field, label, low, high, step in _PROPORTIONS:
         value = getattr(sketch, field)
         widgets[field] = gui.add_slider(label, min=low, max=high, step=step, initial_value=value)
-    palettes = list_with(sketch.palette, (DEFAULT_CHOICE, *PALETTES))
-    widgets["palette"] = gui.add_dropdown("Palette", palettes, initial_value=sketch.palette)
+    palettes = PictureButtons(gui, "palettes", "Palette", (DEFAULT_CHOICE, *PALETTES), columns=6, height=16)
+    palettes.show_pictures({palette: palette_picture(palette) for palette in PALETTES})
+    palettes.show_choice(sketch.palette)
+    widgets["palette"] = palettes
     return widgets
 
 
@@ -143,6 +148,9 @@ def list_with(choice: str, names: Iterable[str]) -> list[str]:
 
 def set_value(widget: Any, value: Any) -> None:
     """Have a widget show a value, or what is nearest to it among the values that the widget offers."""
+    if isinstance(widget, PictureButtons):
+        widget.show_choice(value)
+        return
     if isinstance(widget, viser.GuiSliderHandle):
         value = min(max(value, widget.min), widget.max)
     elif isinstance(widget, viser.GuiDropdownHandle) and value not in widget.options:

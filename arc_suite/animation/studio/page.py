@@ -7,6 +7,7 @@ import io
 import math
 import random
 import socket
+import threading
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -18,23 +19,24 @@ from arc_suite.animation import player_controls
 from arc_suite.animation.studio import layout, texts
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.charts import Charts
-from arc_suite.animation.studio.creature import Creature
+from arc_suite.animation.studio.creature import Creature, open_creature
 from arc_suite.animation.studio.downloads import Downloads
 from arc_suite.animation.studio.editor import Editor
 from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.gate import Server, offers
 from arc_suite.animation.studio.links import LinkWidgets
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, open_file
+from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, RANDOM, Sketch, open_body, open_file, original_shape
 from arc_suite.animation.studio.states import POSE, PageState, VisitorCommand, from_json, is_state
+from arc_suite.animation.studio.thumbnails import body_picture
 from arc_suite.animation.studio.view import View
 from arc_suite.cpg.selection import presets_of
 from arc_suite.robots import gaits
 from arc_suite.robots.spec_files import MAX_IMPORTED
 
 _REFRESH_INTERVAL = 0.25  # s, between two updates of the status and the charts
-_PANEL_WIDTH = 330  # pixels of the panel with the charts
-_MIN_WIDTH_FOR_CHARTS = 1000  # pixels of a window, in which charts leave room for the picture
+_PANEL_WIDTH = 280  # pixels of the panel with the widgets: a third of a phone's window, held across
+_CHARTS_WIDTH = 330  # pixels of the panel with the charts
 _KEY_CHANGE = 0.25  # share of the body's target speed, by which a key changes the command
 
 
@@ -109,7 +111,9 @@ class Page:
 
         self._gui.configure_theme(show_logo=False, show_share_button=False)
         self._gui.main_panel.dock_right()
+        self._gui.main_panel.set_width(_PANEL_WIDTH)
         self._gui.add_html(texts.style_sheet())
+        self._gui.add_html(texts.watch())
         self._status = self._gui.add_html("")
         self._add_changes()
         sketch = session.creature.sketch
@@ -121,15 +125,16 @@ class Page:
         with tabs.add_tab("Command"):
             self._add_command()
         with tabs.add_tab("Files"):
-            self._downloads = Downloads(self._gui, session, self._editor)
+            self._downloads = Downloads(self._gui, session, self._editor, self._show_state)
         for field, widget in self._widgets.items():
             widget.on_update(functools.partial(self._set_field, field))
         self._panel = self._gui.add_panel()
         with self._panel.add_tab("Measured"):
             self._charts = Charts(self._gui)
         self._panel.dock_left()
-        self._panel.set_width(_PANEL_WIDTH)
-        server.on_client_connect(self._hide_charts_in_narrow_window)
+        self._panel.set_width(_CHARTS_WIDTH)
+        self._panel.visible = False
+        threading.Thread(target=self._draw_sources, daemon=True).start()
 
     def show(self, session: Session) -> None:
         """Send a state to all visitors, in the thread of the session's loop; see `Session.run`."""
@@ -153,10 +158,12 @@ class Page:
                 leg_names = tuple(leg.name for leg in session.creature.setup.body.legs)
                 self._charts.update(session.history, leg_names)
 
-    def _hide_charts_in_narrow_window(self, client: viser.ClientHandle) -> None:
-        """Hide the charts from a visitor who is the only one and has a narrow window."""
-        if len(self._server.get_clients()) == 1 and client.camera.image_width < _MIN_WIDTH_FOR_CHARTS:
-            self._charts_checkbox.value = False
+    def _draw_sources(self) -> None:
+        """Draw the bodies that visitors may begin with, in a thread of its own: it takes seconds."""
+        pictures: dict[str, str] = {}
+        for source in sketches.sources():
+            pictures[source] = body_picture(sketches.source_body(Sketch(source=source)))
+            self._widgets["source"].show_pictures(dict(pictures))
 
     def _add_changes(self) -> None:
         """Add undo, redo and reset, as buttons and as keys, and switches of charts and companion."""
@@ -171,8 +178,8 @@ class Page:
         undo_command.on_trigger(lambda event: self._undo())
         redo_command = self._gui.add_command("Redo", hotkey="Z", modifier="cmd/ctrl+shift")
         redo_command.on_trigger(lambda event: self._redo())
-        self._charts_checkbox = self._gui.add_checkbox("Charts", True)
-        self._charts_checkbox.on_update(self._switch_charts)
+        charts = self._gui.add_checkbox("Charts", False)
+        charts.on_update(self._switch_charts)
         keep = self._gui.add_checkbox("Keep", False, hint="This creature walks next to all later ones")
         keep.on_update(lambda event: self._session.keep(event.target.value))
 
@@ -183,6 +190,7 @@ class Page:
         """Add the widgets for the body, with the values of a sketch."""
         self._check = self._gui.add_folder("Check")
         self._widgets |= layout.add_source(self._gui, sketch)
+        self._gui.add_button("Random body").on_click(lambda event: self._draw_random_body())
         upload = self._gui.add_upload_button("Open a spec or a design", mime_type="application/json")
         upload.on_upload(self._open_upload)
         self._widgets |= layout.add_shape(self._gui, sketch)
@@ -194,6 +202,13 @@ class Page:
             # In the thread of the simulation, between two of its steps.
             switch_dragging=lambda: self._session.do(self._switch_dragging),
         )
+
+    def _draw_random_body(self) -> None:
+        """Take a random body in random colors, in its own proportions."""
+        seed = random.randrange(layout.MAX_SEED)
+        changes = {"source": RANDOM, "seed": seed, "palette": str(seed)}
+        self._editor.edit_sketch(lambda sketch: dataclasses.replace(original_shape(sketch), **changes), "random")
+        self._show_state()
 
     def _add_command(self) -> None:
         """Add the widgets for the commands, as sliders, keys and buttons."""
@@ -270,7 +285,6 @@ class Page:
             creature = self._session.creature
             # Fields without effect now, whose widgets are hidden.
             idle = idle_fields(creature, state.command) | self._fixed_pose_fields
-            self._widgets["source"].options = layout.list_with(state.sketch.source, sketches.sources())
             for field, widget in self._widgets.items():
                 layout.set_value(widget, state.value(field))
                 layout.set_visible(widget, field not in idle)
@@ -325,18 +339,25 @@ class Page:
         self._show_state()
 
     def _open_upload(self, event: viser.GuiEvent) -> None:
-        """Open the spec of a body, or a state of the page, that a visitor uploads."""
+        """Open the spec of a body, or a state of the page, that a visitor uploads; one that makes nothing is refused.
+
+        The visitor reads why, and nothing changes, as widgets could not help: whatever they change, the file stays.
+        """
+        name = event.target.value.name
         first_bytes = event.target.value.content[: MAX_IMPORTED + 1]  # one more than allowed, so that it is refused
         text = first_bytes.decode("utf-8", "replace")
-        if is_state(text):
-            try:
+        try:
+            if is_state(text):
                 state = self._read_state(text)
-            except ValueError as error:
-                self._session.refuse(str(error))
-                return
-            self._editor.edit(lambda present_state: state, "file")
-        else:
-            self._editor.edit_sketch(lambda sketch: open_file(sketch, text), "file")
+            else:
+                present_state = self._editor.state
+                state = present_state._replace(sketch=open_file(present_state.sketch, text))
+            open_creature(state.sketch)
+        except (ValueError, OSError) as error:
+            reason = " ".join(str(error).split())
+            event.client.add_notification("No creature", f"{name}: {reason}", color="red")
+            return
+        self._editor.edit(lambda present_state: state, "file")
         self._show_state()
 
     def _read_state(self, text: str) -> PageState:

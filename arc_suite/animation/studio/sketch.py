@@ -273,10 +273,13 @@ def open_file(sketch: Sketch, text: str) -> Sketch:
         sketch: sketch whose task and policy stay.
         text: text of the spec file.
     """
+    return dataclasses.replace(original_shape(sketch), source=FILE, file=text)
+
+
+def original_shape(sketch: Sketch) -> Sketch:
+    """Return the sketch with the first body in its own proportions; task and policy stay."""
     body_fields: dict[str, Any]
     body_fields = {field.name: field.default for field in dataclasses.fields(Sketch) if field.name not in _TASK_FIELDS}
-    body_fields["source"] = FILE
-    body_fields["file"] = text
     return dataclasses.replace(sketch, **body_fields)
 
 

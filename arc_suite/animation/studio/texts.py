@@ -1,5 +1,7 @@
 """Texts of the page, as HTML: status of the walk, flaws of the body, lines to copy."""
 
+import time
+from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from arc_suite.animation.studio import sketch as sketches
@@ -14,9 +16,13 @@ _BUTTON_STYLE = (  # that of viser's outlined buttons
     "min-height:26px;padding:0 1em;font-size:0.85em;cursor:pointer;background:none;border:1px solid;"
     "color:var(--mantine-primary-color-filled)"
 )
-# viser's sheet of widgets leaves a third of a phone's width, and its controls are 7 to 26 px high.
+# viser's sheet of widgets leaves a third of a phone's width and takes most of its height. Its controls are 7 to 26 px
+# high.
 _STYLE_SHEET = """
-@media (max-width: 36em) { [style*="width: 20em"] { width: 100% !important } }
+@media (max-width: 36em) {
+  [style*="width: 20em"] { width: 100% !important }
+  [style*="max-height: 60%"] { max-height: 34% !important }
+}
 @media (pointer: coarse) {
   button { min-width: 40px !important; min-height: 40px !important }
   input.mantine-Input-input { height: 36px !important; min-height: 36px !important }
@@ -26,6 +32,28 @@ _STYLE_SHEET = """
   .mantine-Slider-trackContainer { margin-block: -12px; height: 36px !important }
   .mantine-Slider-thumb { width: 16px !important; height: 28px !important }
 }
+"""
+_EMPTY_PICTURE = "data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="
+_STOP_NOTE = "The studio has stopped. Start it again, and open the address that it prints."
+_STOP_STYLE = (
+    "position:fixed;inset:0 0 auto 0;z-index:1000;padding:0.8em;background:#b3261e;color:white;text-align:center"
+)
+# The status has another beat each second. A window in the background may look less often.
+_WATCH_SCRIPT = f"""
+window.studioWatch ??= setInterval(() => {{
+  const beat = document.getElementById("status")?.dataset.beat, state = window.studioState ??= {{ note: null }};
+  if (beat && beat !== state.beat) Object.assign(state, {{ beat, time: Date.now() }});
+  const stopped = state.beat && Date.now() - state.time > 8000 && !document.hidden;
+  if (stopped && !state.note) {{
+    state.note = document.createElement("div");
+    Object.assign(state.note, {{ role: "alert", textContent: "{_STOP_NOTE}" }});
+    state.note.style.cssText = "{_STOP_STYLE}";
+    document.body.append(state.note);
+  }} else if (!stopped) {{
+    state.note?.remove();
+    state.note = null;
+  }}
+}}, 1000)
 """
 # Browsers offer a clipboard only to pages of the same machine. On other pages the script just selects the text.
 _COPY_SCRIPT = (
@@ -44,7 +72,8 @@ def status(session: Session) -> str:
     rows["pace"] = _describe_pace(session)
 
     lines = [_element("tr", _element("td", name), _element("td", value)) for name, value in rows.items()]
-    table = _element("table", *lines, id="status")
+    beat = str(round(time.monotonic()))  # by which the page knows that the studio runs
+    table = _element("table", *lines, id="status", **{"data-beat": beat})
     errors = [_element("p", session.error, role="alert", style="color:#b3261e")] if session.error else []
     return _html(_element("div", *errors, table, style=f"{_SMALL_STYLE};padding:0 1em 0.6em"))
 
@@ -86,6 +115,36 @@ def lines_to_copy(sketch: Sketch) -> str:
 def style_sheet() -> str:
     """Return styles for narrow windows and for fingers, as HTML."""
     return _html(_element("style", _STYLE_SHEET))
+
+
+def picture_styles(key: str, pictures: Sequence[str], choice: int | None, columns: int, height: int) -> str:
+    """Return styles that show pictures on the group of buttons that follows, as HTML.
+
+    Args:
+        key: unique in the page.
+        pictures: values of CSS, one for each button.
+        choice: index of the button to mark; None for none.
+        columns: buttons of a row.
+        height: height of a picture, pixels.
+    """
+    group = f"div:has(> #pictures-{key}) + div"
+    rules = [
+        f"{group} > .mantine-Flex-root {{ flex-direction: column; align-items: stretch !important }}",
+        f"{group} button {{ flex: 0 0 calc({100.0 / columns:g}% - 6px) !important; min-width: 0 !important;"
+        f" padding: {height + 3}px 0 0 !important; height: {height + 22}px !important;"
+        f" background: center 3px / auto {height}px no-repeat }}",
+        f"{group} button .mantine-Button-label {{ font-size: 10px; letter-spacing: -0.6px }}",
+    ]
+    for number, image in enumerate(pictures, start=1):
+        rules.append(f"{group} button:nth-child({number}) {{ background-image: {image} }}")
+    if choice is not None:
+        rules.append(f"{group} button:nth-child({choice + 1}) {{ outline: 2px solid }}")
+    return _html(_element("style", "\n".join(rules), id=f"pictures-{key}"))
+
+
+def watch() -> str:
+    """Return a script that tells visitors when the studio has stopped, as HTML."""
+    return _html(_element("img", src=_EMPTY_PICTURE, alt="", onload=_WATCH_SCRIPT, style="display:none"))
 
 
 def paragraph(text: str) -> str:

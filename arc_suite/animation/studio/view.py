@@ -21,7 +21,7 @@ from arc_suite.markers import Marker
 
 _CAMERA_POSITION = (3.4, -4.7, 2.3)  # units
 _CAMERA_TARGET = (0.0, 0.0, 0.25)  # units, from which the arrow of a command is in the picture, too
-_PHONE_TARGET = (0.0, 0.0, -2.3)  # units; a sheet of widgets covers the lower part of a phone's picture
+_PHONE_TARGET = (0.0, 0.0, -1.3)  # units; a sheet of widgets covers the lower part of a phone's picture
 _MAX_PHONE_WIDTH = 500  # pixels of a picture
 _CAMERA_ANGLE = math.radians(35.0)  # over the shorter side of a picture
 _CAMERA_RISE_SHARE = 0.1  # of the difference to the height of the ground, that the camera makes up in each picture
@@ -362,10 +362,20 @@ def _tile_edges(field: dict, tile: float) -> np.ndarray:
 
 def _aim_camera(client: viser.ClientHandle) -> None:
     """Have a visitor's camera suit the shape of the picture, now and later."""
-    if client.camera.image_width < _MAX_PHONE_WIDTH:
-        client.camera.look_at = _PHONE_TARGET
-    _fit_lens(client.camera)
-    client.camera.on_update(_fit_lens)
+    target = _CAMERA_TARGET
+
+    def fit_camera(camera: viser.CameraHandle) -> None:
+        nonlocal target
+        # A browser reports the size of its picture some time after it has connected.
+        is_phone = camera.image_width < _MAX_PHONE_WIDTH and camera.aspect < 1.0
+        suitable_target = _PHONE_TARGET if is_phone else _CAMERA_TARGET
+        if suitable_target != target:
+            target = suitable_target
+            camera.look_at = target
+        _fit_lens(camera)
+
+    fit_camera(client.camera)
+    client.camera.on_update(fit_camera)
 
 
 def _fit_lens(camera: viser.CameraHandle) -> None:

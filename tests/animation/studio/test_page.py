@@ -12,7 +12,7 @@ from arc_suite import rotations
 from arc_suite.animation import player_controls
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import FILE, Sketch
+from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
 from arc_suite.bodies import generator, shaping
 from arc_suite.robots import gaits
 from arc_suite.robots.spec_files import body_from_json, body_to_json
@@ -98,6 +98,10 @@ def choose(tab, label, option):
     tab.get_by_role("option", name=option, exact=True).click()
 
 
+def press_picture(tab, name):
+    tab.get_by_role("button", name=name, exact=True).click()
+
+
 def open_tab(tab, name):
     tab.get_by_role("tab", name=name, exact=True).click()
 
@@ -135,9 +139,9 @@ def test_a_slider_changes_the_creature(served, tab):
     press(tab, "lower", "ArrowRight", 4)
     served.until(lambda: served.session.creature.setup.body.name == "walker_6x2_shaped")
     served.until(lambda: dict(served.session.creature.sketch.lengths)["lower"] == pytest.approx(1.2))
-    choose(tab, "Palette", "moss")
+    press_picture(tab, "moss")
     served.until(lambda: served.session.creature.setup.body.palette == "moss")
-    choose(tab, "Palette", "own")
+    press_picture(tab, "own")
 
 
 def test_a_bad_combination_stands_in_the_page_and_the_creature_walks_on(served, tab):
@@ -250,12 +254,48 @@ def test_the_camera_has_any_creature_of_any_size_in_its_picture(served, tab, sou
     assert 0.3 < abs(shares).max() < 1.0
 
 
-def test_charts_are_hidden(served, tab):
+def test_the_creature_has_two_thirds_of_the_window_until_charts_are_shown(served, tab):
+    picture = tab.locator("canvas").first
+    assert picture.bounding_box()["width"] > 2.0 / 3.0 * 1100
+    assert not tab.get_by_text("Reward by term").is_visible()
+    tab.get_by_role("checkbox", name="Charts").click()
     tab.get_by_text("Reward by term").wait_for()
+    assert not tab.get_by_text("healthy", exact=True).is_visible()
     tab.get_by_role("checkbox", name="Charts").click()
     tab.get_by_text("Reward by term").wait_for(state="hidden")
-    tab.get_by_role("checkbox", name="Charts").click()
-    tab.get_by_text("Reward by term").wait_for()
+
+
+def test_bodies_are_chosen_by_their_pictures(served, tab):
+    open_tab(tab, "Body")
+    tab.get_by_role("button", name="Reset").click()
+    press_picture(tab, "queen")
+    served.until(lambda: served.session.creature.setup.body.name == "queen")
+    for name in ("queen", "starfish", "moss"):  # the last one is a palette
+        button = tab.get_by_role("button", name=name, exact=True)
+        served.until(lambda button=button: button.evaluate("each => getComputedStyle(each).backgroundImage") != "none")
+    press(tab, "Size", "ArrowRight")
+    tab.get_by_role("button", name="Random body").click()
+    served.until(lambda: served.session.creature.sketch.source == RANDOM)
+    sketch = served.session.creature.sketch
+    assert sketch.palette == str(sketch.seed) and sketch.scale == 1.0
+    tab.get_by_role("button", name="Undo").click()
+    served.until(lambda: served.session.creature.setup.body.name == "queen_shaped")
+
+
+def test_a_saved_creature_comes_back(served, tab):
+    open_tab(tab, "Body")
+    tab.get_by_role("button", name="Reset").click()
+    press_picture(tab, "spider")
+    served.until(lambda: served.session.creature.setup.body.name == "spider")
+    name, _ = saved(tab, "Spec")
+    open_tab(tab, "Body")
+    press_picture(tab, "crab")
+    served.until(lambda: served.session.creature.setup.body.name == "crab")
+    saved(tab, "Design")
+    press_picture(tab, f"1 {name}")
+    served.until(lambda: served.session.creature.setup.body.name == "spider")
+    press_picture(tab, "2 crab_design.json")
+    served.until(lambda: served.session.creature.setup.body.name == "crab")
 
 
 def test_one_leg_and_the_leg_across(served, tab):
@@ -412,8 +452,8 @@ def test_another_visitor_sees_the_same_creature(served, tab):
     served.until(lambda: served.session.episodes.steps > steps)
 
 
-def test_a_phone_has_controls_for_fingers_and_no_charts(served, tab):
-    """Of a visitor who is alone: a sheet as wide as the window, and nothing to press that is too small."""
+def test_a_phone_has_controls_for_fingers(served, tab):
+    """A sheet as wide as the window and a third as high, and nothing to press that is too small."""
     page = served.page
     context = tab.context.browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     phone = context.new_page()
@@ -423,11 +463,23 @@ def test_a_phone_has_controls_for_fingers_and_no_charts(served, tab):
     undo.wait_for()
     assert undo.bounding_box()["height"] >= 40.0
     sheet = undo.locator("xpath=ancestor::div[contains(@class, 'Paper-root')][1]").bounding_box()
-    assert sheet["width"] == 390.0
-    assert page._panel.visible  # for the other visitor
+    assert sheet["width"] == 390.0 and sheet["height"] < 0.35 * 844
+    served.until(lambda: any(client.camera.look_at[2] < -1.0 for client in page._server.get_clients().values()))
+    phone.set_viewport_size({"width": 844, "height": 390})  # it is turned
+    served.until(lambda: all(client.camera.look_at[2] > 0.0 for client in page._server.get_clients().values()))
+    served.until(lambda: phone.locator("canvas").first.bounding_box()["width"] > 0.66 * 844)
     context.close()
-    tab.goto("about:blank")
-    served.until(lambda: not page._server.get_clients())
-    tab.set_viewport_size({"width": 820, "height": 1180})
-    tab.goto(served.addresses[0])
-    served.until(lambda: not page._panel.visible)
+
+
+def test_a_page_says_when_the_studio_has_stopped(browser):
+    ending = Served()
+    tab = browser.new_page()
+    tab.goto(ending.addresses[0])
+    tab.wait_for_selector("#status")
+    note = tab.get_by_text("The studio has stopped. Start it again")
+    ending.session.pause(True)
+    time.sleep(10.0)
+    assert not note.is_visible()  # time stands still, and the studio runs
+    ending.close()
+    note.wait_for()
+    tab.close()

@@ -1,0 +1,72 @@
+"""Buttons with pictures, in a grid: each has its picture above its name."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import viser
+
+from arc_suite.animation.studio import texts
+
+
+class PictureButtons:
+    """A group of buttons, one of which may be the present choice.
+
+    Attributes:
+        buttons: the group, whose value is the button that was pressed last.
+    """
+
+    def __init__(self, gui: viser.GuiApi, key: str, label: str, options: Sequence[str], columns: int, height: int):
+        """Add buttons without pictures to the present container of the page.
+
+        Args:
+            gui: gui of the page.
+            key: unique in the page.
+            label: label that visitors see.
+            options: names of the buttons.
+            columns: buttons of a row.
+            height: height of a picture, pixels.
+        """
+        self._key = key
+        self._columns = columns
+        self._height = height
+        self._choice = ""
+        self._pictures: Mapping[str, str] = {}
+        self._style = gui.add_html("")  # right before the buttons, where its rules look for them
+        self.buttons = gui.add_button_group(label, tuple(options))
+        self._update_style()
+
+    @property
+    def visible(self) -> bool:
+        """Whether visitors see the buttons."""
+        return self.buttons.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self.buttons.visible = visible
+
+    def on_update(self, call: Callable[[viser.GuiEvent], Any]) -> None:
+        """Have a function called when a visitor presses a button; see `viser.GuiButtonGroupHandle.on_click`."""
+        self.buttons.on_click(call)
+
+    def offer(self, options: Sequence[str]) -> None:
+        """Offer other buttons."""
+        self.buttons.options = tuple(options)
+        self._update_style()
+
+    def show_pictures(self, pictures: Mapping[str, str]) -> None:
+        """Show pictures, values of CSS, by name of the button."""
+        self._pictures = pictures
+        self._update_style()
+
+    def show_choice(self, choice: str) -> None:
+        """Mark a button as the present choice; a name without a button marks none."""
+        if choice != self._choice:
+            self._choice = choice
+            self._update_style()
+
+    def _update_style(self) -> None:
+        pictures = [self._pictures.get(option, "none") for option in self.buttons.options]
+        choice = None
+        if self._choice in self.buttons.options:
+            choice = self.buttons.options.index(self._choice)
+        self._style.content = texts.picture_styles(self._key, pictures, choice, self._columns, self._height)
