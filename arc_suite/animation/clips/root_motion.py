@@ -245,9 +245,9 @@ def stay_at_end(recording: Recording, first: int) -> ClipMotion:
 def advance_straight(recording: Recording) -> ClipMotion:
     """Return a recording whose root goes below the torso on the line from its first place to its last."""
     torso = ground_poses(recording.poses)
-    way = relative_pose(torso[0], torso) * (1.0, 1.0, 0.0)
-    course = way[-1] / max(np.linalg.norm(way[-1]), 1e-9)
-    root = (way @ course)[:, None] * course
+    displacements = relative_pose(torso[0], torso) * (1.0, 1.0, 0.0)
+    course = displacements[-1] / max(np.linalg.norm(displacements[-1]), 1e-9)
+    root = (displacements @ course)[:, None] * course
     motion = put_on_root(
         recording.time_step, recording.poses, root, relative_pose(root, relative_pose(torso[0], torso))
     )
