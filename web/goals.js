@@ -1,13 +1,15 @@
-// Goals to reach one after another, and the time that it takes.
+// Goals to reach one after another in rounds, and the time that it takes; browsers keep the best one.
 import * as THREE from "three";
 
 const PLACES = [[7, 2], [11, -4], [6, -9], [-1, -6], [0, 0]]; // standing heights from the start
 const COLOR = "#ffd23f";
+const REST = 3; // s between two rounds
 
 export class Goals {
-  // Takes the standing height of a body and how far it reaches, m, and the height of the ground at [x, y].
-  constructor(height, reach, ground) {
-    Object.assign(this, { height, reach, ground, best: Infinity });
+  // Takes the standing height of a body and how far it reaches, m, the height of the ground at [x, y], and a name under
+  // which a browser keeps the best time.
+  constructor(height, reach, ground, name) {
+    Object.assign(this, { height, reach, ground, name, best: kept(name) });
     const look = new THREE.MeshBasicMaterial({ color: COLOR, transparent: true, opacity: 0.75 });
     const faint = new THREE.MeshBasicMaterial({ color: COLOR, transparent: true, opacity: 0.14, depthWrite: false });
     const beam = new THREE.CylinderGeometry(reach, reach, 4 * height, 48, 1, true).rotateX(Math.PI / 2);
@@ -21,8 +23,8 @@ export class Goals {
     this.number = null;
   }
 
-  begin() {
-    Object.assign(this, { number: 0, time: 0 });
+  begin(round = 1) {
+    Object.assign(this, { round, number: 0, time: 0, rest: REST });
   }
 
   get runs() {
@@ -36,11 +38,18 @@ export class Goals {
 
   // Takes seconds of a body on its feet that has come to [x, y].
   advance(seconds, [x, y]) {
-    if (!this.runs) return;
+    if (this.number === null) return;
+    if (!this.runs) {
+      this.rest -= seconds;
+      if (this.rest <= 0) this.begin(this.round + 1);
+      return;
+    }
     this.time += seconds;
     if (Math.hypot(this.place[0] - x, this.place[1] - y) > this.reach) return;
     this.number += 1;
-    if (!this.runs) this.best = Math.min(this.best, this.time);
+    if (this.runs || this.time >= this.best) return;
+    this.best = this.time;
+    keep(this.name, this.best);
   }
 
   // Shows the next goal, and the way to it over a body at [x, y, z].
@@ -55,8 +64,25 @@ export class Goals {
 
   toString() {
     if (this.number === null) return "";
-    const time = `${this.time.toFixed(1)} s`;
-    if (this.runs) return `goal ${this.number + 1} of ${PLACES.length}, ${time}`;
-    return `${PLACES.length} goals in ${time}, best ${this.best.toFixed(1)} s`;
+    const time = `${this.time.toFixed(1)} s`, best = this.best < Infinity ? `best ${this.best.toFixed(1)} s` : "";
+    const now = this.runs ? `goal ${this.number + 1} of ${PLACES.length}, ${time}` : `${PLACES.length} goals in ${time}`;
+    return [`round ${this.round}`, now, best].filter(Boolean).join(", ");
+  }
+}
+
+// The best time that the browser keeps under a name, s; some keep nothing for files.
+function kept(name) {
+  try {
+    return Number(window.localStorage.getItem(name)) || Infinity;
+  } catch {
+    return Infinity;
+  }
+}
+
+function keep(name, time) {
+  try {
+    window.localStorage.setItem(name, time);
+  } catch {
+    // The time holds until the page is closed.
   }
 }

@@ -1,4 +1,5 @@
 // The player's command [forward, left, turning] and pose from keys, a gamepad, and a stick and buttons on the screen.
+import { bounded } from "./command.js";
 import { walks } from "./link.js";
 
 const KEYS = {
@@ -17,20 +18,13 @@ const POSES = {
   KeyT: [0, 0, 0, 0, -1, 0], KeyG: [0, 0, 0, 0, 1, 0],
   KeyZ: [0, 0, 0, 0, 0, 1], KeyX: [0, 0, 0, 0, 0, -1],
 };
-const LEAST = [-0.5, -0.5, -1], MOST = [1, 0.5, 1]; // of a command, as the tasks draw them
+const RUNS = ["ShiftLeft", "ShiftRight"], PAD_RUNS = 10; // keys, and a gamepad's left stick that is pressed
 const SHOWN = [0.8, 0, 0.2]; // a wide circle, where the page's address ends in #walk, until somebody plays
 const BUTTONS = { 0: "kick", 1: "restart", 2: "leap", 9: "pause" }; // of a gamepad
 const CAMERA = [-2.5, 1.2]; // rad/s, by the right stick
 const DEAD = 0.15; // share of a gamepad's stick that counts as nothing
 
 const sum = (vectors, zero) => vectors.reduce((total, vector) => total.map((value, i) => value + vector[i]), zero);
-
-// A command within what tasks ask for: the sum of speed and turning is at most 1.
-export function bounded(command) {
-  const within = command.map((value, i) => Math.min(Math.max(value, LEAST[i]), MOST[i]));
-  const size = Math.hypot(within[0], within[1]) + Math.abs(within[2]);
-  return within.map((value) => value / Math.max(size, 1) + 0);
-}
 
 const live = (value = 0) => (Math.abs(value) > DEAD ? value : 0);
 
@@ -57,8 +51,10 @@ export class Inputs {
     this.stick = [0, 0, 0];
     this.side = [0, 0, 0];
     this.pushed = []; // buttons of a gamepad
+    this.running = false; // by the button of the page
     this.shows = walks();
     window.addEventListener("keydown", (event) => {
+      if (RUNS.includes(event.code)) this.held.add(event.code);
       if (!(event.code in KEYS || event.code in POSES) || event.ctrlKey || event.metaKey || event.altKey) return;
       const keyed = event.code.startsWith("Arrow") ? "select, input" : "select";
       if (event.target.closest(keyed)) return; // whose keys these are
@@ -101,6 +97,17 @@ export class Inputs {
     const before = this.pushed;
     this.pushed = Object.keys(BUTTONS).filter((number) => gamepads().some(({ buttons }) => buttons[number]?.pressed));
     return this.pushed.filter((number) => !before.includes(number)).map((number) => BUTTONS[number]);
+  }
+
+  // Whether a gamepad's button of an action is held.
+  holds(action) {
+    const [number] = Object.keys(BUTTONS).filter((each) => BUTTONS[each] === action);
+    return gamepads().some(({ buttons }) => buttons[number]?.pressed);
+  }
+
+  get runs() {
+    const pressed = gamepads().some(({ buttons }) => buttons[PAD_RUNS]?.pressed);
+    return this.running || pressed || RUNS.some((code) => this.held.has(code));
   }
 
   // Rates at which the camera is to turn and rise, rad/s.

@@ -8,8 +8,10 @@ import { Goals } from "./goals.js";
 import { grounds, triangles } from "./ground.js";
 import { Inputs } from "./inputs.js";
 import { follow, keep } from "./link.js";
+import { Kick } from "./kick.js";
 import { Panel } from "./panel.js";
 import { Figure, materials, quaternion } from "./parts.js";
+import { Ring } from "./ring.js";
 import { Simulation } from "./simulation.js";
 import { Sound } from "./sound.js";
 import { Steps } from "./steps.js";
@@ -19,7 +21,7 @@ import { View } from "./view.js";
 const RESTART = 1.5; // s that a fallen body lies
 const GIVE_UP = 8; // s that a body has for getting up
 const BUSY = 20; // ms of a picture's time for physics: a slower machine shows slow motion
-const KICK = 0.8; // sqrt(g h), the velocity that a kick adds
+const LIFTED = 1.3; // standing heights of a torso, from which the camera follows it up
 const GRAVITY = 9.81; // m/s^2
 
 const TINTS = ["#ffffff", "#5f8dcf"]; // of the player's body and of the other
@@ -34,7 +36,7 @@ function tinted(looks, tint) {
 
 // A body on some ground, as it is simulated and drawn.
 class Play {
-  constructor(mujoco, body, ground, mode, canvas, sound) {
+  constructor(mujoco, body, ground, mode, canvas, sound, name) {
     this.simulation = new Simulation(mujoco, body, ground, mode === "rival" ? 2 : 1);
     const { height } = body, { field } = this.simulation;
     this.body = body;
@@ -49,13 +51,16 @@ class Play {
     this.spheres[0].w = 0.8 * breadth(this.parts[0]);
     this.steps = new Steps(body, this.parts);
     this.traces = new Traces(height, this.simulation.task.ground);
-    this.goals = new Goals(height, body.reach, this.simulation.task.ground);
+    this.goals = new Goals(height, body.reach, this.simulation.task.ground, `best time of ${name}`);
+    const { center, task } = this.simulation;
+    this.ring = mode === "rival" ? new Ring(center, body.reach, height, task.ground) : null;
     if (mode === "goals") this.goals.begin();
     this.sound = sound;
     const rope = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(1, 1, 1)]);
     this.rope = new THREE.Line(rope, new THREE.LineBasicMaterial({ color: "#ffd23f", depthTest: false }));
     this.rope.frustumCulled = false;
     const added = [this.floor, this.rope, this.traces.group, this.goals.group];
+    if (this.ring) added.push(this.ring.group);
     this.view.scene.add(...this.figures.map(({ torso }) => torso), ...added);
     this.debt = 0; // s of simulation that are due
     this.lain = 0; // s since a fall
@@ -73,13 +78,19 @@ class Play {
   }
 
   restart() {
+    if (this.ring) this.ring.score = [0, 0];
+    this.place();
+    if (this.goals.number !== null) this.goals.begin();
+  }
+
+  // Puts all bodies where they started.
+  place() {
     this.simulation.release();
     this.simulation.restart();
     this.lain = this.down = this.debt = 0;
     this.chase.on = true;
     this.steps.begin();
     this.traces.clear();
-    if (this.goals.number !== null) this.goals.begin();
   }
 
   // Steps through some seconds of real time, as far as some milliseconds allow.
@@ -94,12 +105,22 @@ class Play {
     }
     if (this.debt >= body.timestep) this.debt = 0;
     if (seconds > 0) this.pace += 0.05 * (Math.min(stepped / seconds, 1) - this.pace);
-    if (!simulation.pull) this.goals.advance(stepped, simulation.task.place);
+    if (!simulation.pull) {
+      this.goals.advance(stepped, simulation.task.place);
+      if (this.ring?.advance(simulation.minds.map(({ task }) => task.place))) this.place();
+    }
     this.lain = simulation.fell ? this.lain + stepped : 0;
     this.down = simulation.minds[1]?.fell ? this.down + stepped : 0;
     const most = body.recovery ? GIVE_UP : RESTART;
-    if (this.down >= most) simulation.raise();
-    if (this.lain >= most) this.restart();
+    if (this.lain >= most) this.lose(0);
+    else if (this.down >= most) this.lose(1);
+  }
+
+  // Starts anew as a body cannot get up, by number; in a ring the other one scores.
+  lose(number) {
+    if (!this.ring) return this.restart();
+    this.ring.score[1 - number] += 1;
+    this.place();
   }
 
   pose() {
@@ -129,8 +150,9 @@ class Play {
   }
 
   target() {
-    const { x, y } = this.parts[0].position;
-    return new THREE.Vector3(x, y, this.simulation.task.ground(x, y) + 0.45 * this.body.height);
+    const { x, y, z } = this.parts[0].position, { height } = this.body;
+    const ground = this.simulation.task.ground(x, y), lifted = Math.max(z - ground - LIFTED * height, 0);
+    return new THREE.Vector3(x, y, ground + 0.45 * height + lifted);
   }
 
   // Draws some seconds after the last time, with the rates at which the player turns the camera.
@@ -146,10 +168,10 @@ class Play {
     this.view.draw();
   }
 
-  // Kicks the body away from the camera.
-  kick() {
+  // Kicks the body away from the camera, with a strength in sqrt(g h).
+  kick(strength) {
     const way = this.view.target.clone().sub(this.view.camera.position).setZ(0);
-    way.setLength(KICK * Math.sqrt(GRAVITY * this.body.height));
+    way.setLength(strength * Math.sqrt(GRAVITY * this.body.height));
     this.simulation.kick([way.x, way.y]);
   }
 
@@ -201,7 +223,7 @@ function pulls(canvas, current) {
     });
 }
 
-function shown({ simulation, body, pace, goals }, command, gait, playing) {
+function shown({ simulation, body, pace, goals, ring }, command, gait, playing) {
   const { motion } = simulation.task, { units } = body.task;
   const speed = Math.hypot(motion[0] * units[0], motion[1] * units[1]);
   const asked = body.task.headed
@@ -216,7 +238,7 @@ function shown({ simulation, body, pace, goals }, command, gait, playing) {
     [`slow motion, ${pace.toFixed(1)} of real time`]: pace < 0.9,
   };
   const state = Object.keys(states).find((name) => states[name]);
-  return [String(goals), `${speed.toFixed(2)} m/s`, asked, gait, state].filter(Boolean).join(" \u00b7 ");
+  return [String(goals), String(ring ?? ""), `${speed.toFixed(2)} m/s`, asked, gait, state].filter(Boolean).join(" \u00b7 ");
 }
 
 async function main() {
@@ -226,7 +248,7 @@ async function main() {
   ]);
   const mujoco = await loadMujoco({ wasmBinary });
   const inputs = new Inputs(byId("stick"), [byId("left"), byId("right")]);
-  const panel = new Panel(byId("direction")), sound = new Sound();
+  const panel = new Panel(byId("direction")), sound = new Sound(), kick = new Kick();
   const state = { playing: true, play: null, stale: true }; // a page at rest draws only what changes
   const choice = byId("body"), ground = byId("ground"), mode = byId("mode");
   const lists = [choice, ground, mode];
@@ -241,8 +263,9 @@ async function main() {
     const old = document.querySelector("canvas"), canvas = old.cloneNode(); // with a context of its own
     old.replaceWith(canvas);
     const body = bodies[choice.value];
-    state.play = new Play(mujoco, body, body.grounds[ground.value], mode.value, canvas, sound);
-    canvas.setAttribute("aria-label", `${body.name} on ${ground.value} ground`);
+    const name = `${body.name} on ${ground.value} ground`;
+    state.play = new Play(mujoco, body, body.grounds[ground.value], mode.value, canvas, sound, name);
+    canvas.setAttribute("aria-label", name);
     pulls(canvas, () => state.play);
     panel.offer(body.task.direction);
     for (const each of document.querySelectorAll(".directed")) each.hidden = !body.task.direction;
@@ -260,7 +283,11 @@ async function main() {
   };
   const actions = {
     leap: () => state.play.simulation.leap(),
-    kick: () => state.play.kick(),
+    kick: () => kick.begin(), // until it is let go
+    run: () => {
+      inputs.running = !inputs.running;
+      byId("run").setAttribute("aria-pressed", inputs.running);
+    },
     restart: () => (state.play.restart(), (state.stale = true)),
     pause: () => pause(),
     sound: () => {
@@ -268,16 +295,25 @@ async function main() {
       byId("sound").textContent = sound.on ? "mute" : "sound";
     },
   };
-  const { leap, kick, restart, sound: hush } = actions;
-  const keys = { Space: leap, KeyB: kick, KeyR: restart, KeyP: actions.pause, KeyM: hush };
+  const letGo = () => {
+    if (kick.start !== null) state.play.kick(kick.end());
+    byId("kick").style.removeProperty("--share");
+  };
+  const { leap, restart, sound: hush } = actions;
+  const keys = { Space: leap, KeyB: actions.kick, KeyR: restart, KeyP: actions.pause, KeyM: hush };
   Object.assign(keys, { Digit0: () => panel.reset(), Comma: () => panel.quicken(-1), Period: () => panel.quicken(1) });
   for (let number = 1; number < 10; number += 1) keys[`Digit${number}`] = () => panel.choose(number);
   window.addEventListener("resize", () => (state.stale = true));
   for (const [name, act] of Object.entries(actions))
     byId(name).addEventListener("click", (event) => {
-      act();
+      if (name !== "kick" || !event.detail) act(); // pointers hold it
+      if (name === "kick") letGo();
       if (event.detail) event.target.blur(); // by a pointer: keys are the body's
     });
+  byId("kick").addEventListener("pointerdown", actions.kick);
+  for (const end of ["pointerup", "pointerleave", "pointercancel"]) byId("kick").addEventListener(end, letGo);
+  window.addEventListener("keyup", (event) => event.code === "KeyB" && letGo());
+  window.addEventListener("blur", letGo);
   for (const list of lists) {
     follow(list);
     list.addEventListener("change", () => (list.blur(), keep(lists), change()));
@@ -295,8 +331,12 @@ async function main() {
   const frame = (now) => {
     const seconds = last === null ? 0 : Math.min(now - last, 100) / 1000;
     last = now;
-    const asked = panel.asked(inputs.command, inputs.pose);
+    const asked = panel.asked(inputs.command, inputs.pose, inputs.runs);
     for (const name of inputs.pushes()) actions[name]();
+    const holds = inputs.holds("kick");
+    if (state.padHeld && !holds) letGo();
+    state.padHeld = holds;
+    if (kick.start !== null) byId("kick").style.setProperty("--share", kick.share);
     if (state.playing) state.play.advance(seconds, asked);
     panel.tell(asked);
     const { camera } = inputs;
@@ -309,7 +349,7 @@ async function main() {
   };
   requestAnimationFrame(frame);
   document.body.classList.remove("loading");
-  window.play = { state, inputs, panel, pause, sound }; // for tests
+  window.play = { state, inputs, panel, pause, sound, kick }; // for tests
 }
 
 main().catch((error) => (byId("loading").textContent = `This browser cannot play: ${error.message}`));

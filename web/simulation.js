@@ -1,5 +1,5 @@
 // A body on some ground in MuJoCo's simulation, driven by a policy in a task; another one may stand before it.
-import { Mind, doubled, shareOf } from "./mind.js";
+import { Mind, doubled, pushing, shareOf } from "./mind.js";
 
 const STIFFNESS = 4, STRONGEST = 3; // of a pull, in the body's weight for a distance of h, and at most
 const GRAVITY = 9.81; // m/s^2
@@ -100,7 +100,7 @@ export class Simulation {
     const { mujoco, model, data, task, minds: [own, rival], body: { substeps } } = this;
     if (this.count % substeps === 0) {
       own.act(() => this.allowed(asked));
-      rival?.act(() => ({ ...asked, ...STILL }));
+      rival?.act(() => ({ ...asked, ...STILL, command: pushing(rival.task.place, own.task.place) }));
     }
     if (this.pull) this.drag(this.pull);
     mujoco.mj_step(model, data);
@@ -112,22 +112,17 @@ export class Simulation {
     this.landing = Math.max(this.landing - task.constants.step, 0);
   }
 
-  // Sets the other body on its feet where it lies, once there is room.
-  raise() {
-    const [own, rival] = this.minds.map(({ task }) => task.place), share = this.shares[1];
-    if (Math.hypot(own[0] - rival[0], own[1] - rival[1]) < APART * this.body.reach) return;
-    this.put(share(), [rival[0] - this.start[0], rival[1] - this.start[1]]);
-    share().qvel.fill(0);
-    this.mujoco.mj_forward(this.model, this.data);
-    this.minds[1] = this.mind(share);
-  }
-
   // The commands that a body can follow: it leaps upright, and lands on bent legs.
   allowed(asked) {
     if (this.driver.leap) return { ...asked, ...STILL };
     if (!this.landing) return asked;
     const low = this.landing === Infinity ? 0 : CROUCH * (this.body.task.direction?.room[0][0] ?? 0);
     return { ...asked, ...STILL, pose: [low, 0, 0, 0, 0, 0] };
+  }
+
+  // [x, y] between the starts of two bodies, m
+  get center() {
+    return [0.5 * APART * this.body.reach, 0];
   }
 
   // Whether something holds the body up.

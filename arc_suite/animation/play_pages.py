@@ -36,7 +36,8 @@ from arc_suite.tasks import Task, clock, readings
 from arc_suite.tasks.blocks import PAGE_BLOCKS
 from arc_suite.tasks.recover import LEAST_HEIGHT, LEAST_UPRIGHT
 
-GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
+GROUNDS = {"level": "flat", "bumps": "bumps", "slopes": "slopes"}  # arenas by the names that a page shows
+_READ_FROM_MODEL = ("flat", "bumps")  # arenas whose heights a page takes from the model
 
 # Tasks whose command the player gives.
 _DEMONSTRATOR_TASK = "directed"
@@ -138,7 +139,7 @@ def _describe_ground(setup: Setup, arena: str) -> dict[str, Any]:
     mujoco.mj_forward(model, data)
     start_qpos = readings.root_qpos(task.raise_off_ground(task.read(data)), layout)
     ground = {"xml": xml, "start": pages.to_json_values(start_qpos, decimals=None)}
-    if arena in GROUNDS.values():
+    if arena in _READ_FROM_MODEL:
         return ground
     surface = task.scene.arena.surface
     has_plane = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).any()
