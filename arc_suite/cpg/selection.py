@@ -50,6 +50,7 @@ _MEMORYLESS = {
     "braced": "reactive",
     "limping": "reactive",
     "climbing": "surefooted",
+    "crossing": "surefooted",
 }
 _COMMAND_BLOCKS = ("command", "pose", "gait", "goal")  # blocks of the observation that show what a task commands
 

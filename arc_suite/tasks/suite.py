@@ -109,7 +109,7 @@ class Course(CommandTask):
     command = AlongLane()
     ground = Lanes(("rough", "slopes", "stairs", "gaps"), copies=(2, 1))
     from_body = _FROM_BODY
-    demonstrators = ("climbing", "surefooted")
+    demonstrators = ("crossing", "climbing", "surefooted")
 
 
 class Leap(CommandTask):

@@ -27,7 +27,7 @@ TASK_NAMES = f"(there are: {', '.join(TASKS)})"
 DOMAINS = f"(there are: {', '.join(registry.robot_words())})"
 PRESETS = (
     "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, "
-    "sighted, leaping, planned, tracked, rising)"
+    "sighted, leaping, planned, tracked, rising, crossing)"
 )
 CAMERAS, NAMED = "['tracking', 'portrait', 'profile', 'eye']", "(there are: tracking, portrait, profile, eye)"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"

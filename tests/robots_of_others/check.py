@@ -10,13 +10,15 @@ the preset that suits it, its metric, and how many of eight episodes end upright
   - accelerations differ;
   - a robot of MUST_WALK does not walk, or is at its torque limits in 3 % of the samples;
   - fewer than seven tenths of the NEW robots walk;
-  - the preset that suits a task gains .05 less than another that obeys the same commands.
+  - the preset that suits a task gains .05 less than another that obeys the same commands, in 32 episodes on which
+    neither was chosen.
 """
 
 import csv
 import multiprocessing
 import pathlib
 import sys
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -42,6 +44,9 @@ LEAST, MOST, MOST_LIMITED = 0.8, 1.25, 0.03
 MUST_WALK = ("go2_like", "a1_like", "hexapod", "go2", "aliengo", "anymal_b", "a1")
 SHARE = 0.7  # of the NEW robots
 STEPS = 300  # control steps of an episode of each task
+STEPS_OF_LEAP = 1000  # the first trench is 7 to 9 standing heights from the start
+JUDGING_SEEDS = range(508, 540)  # of a preset that eight episodes have found to be better than the default
+MIN_GAIN = 0.2  # of the best preset over standing still, reward of a control step; a task with less is not solved
 
 
 class Walk(NamedTuple):
@@ -139,10 +144,28 @@ def try_tasks(body: Body) -> tuple[TaskTrials, ...]:
     """Try the presets of a body in each task."""
     trials_of_tasks = []
     for task in TASKS:
-        trials = suitability.try_presets(body, task, suitability.SEEDS, STEPS)
-        standing = suitability.stand_still(body, task, suitability.SEEDS, STEPS)
-        trials_of_tasks.append(TaskTrials(tuple(trials), suitability.shortfall(trials, standing)))
+        steps = STEPS_OF_LEAP if task == "leap" else STEPS
+        trials = suitability.try_presets(body, task, suitability.SEEDS, steps)
+        trials_of_tasks.append(TaskTrials(tuple(trials), find_shortfall(body, task, trials, steps)))
     return tuple(trials_of_tasks)
+
+
+def find_shortfall(body: Body, task: str, trials: Sequence[suitability.Trial], steps: int) -> float:
+    """Return how much less the default gains than the best preset, as a share of its gain.
+
+    The best of several presets is partly lucky. A preset that seems better is tried again, beside the default, in
+    episodes on which it was not chosen.
+    """
+    standing = suitability.stand_still(body, task, suitability.SEEDS, steps)
+    best = max(trials, key=lambda trial: trial.mean_return)
+    if best.mean_return - standing.mean_return < MIN_GAIN * steps:
+        return 0.0
+    shortfall = suitability.shortfall(trials, standing)
+    if shortfall <= suitability.MAX_SHORTFALL:
+        return shortfall
+    setup = Setup.of(body, task)
+    rivals = [suitability.try_preset(setup, trial.preset, JUDGING_SEEDS, steps) for trial in (trials[0], best)]
+    return suitability.shortfall(rivals, suitability.stand_still(body, task, JUDGING_SEEDS, steps))
 
 
 def attempt(function, *arguments, **keywords):
