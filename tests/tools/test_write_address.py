@@ -13,15 +13,15 @@ NEW = "https://code.example.net/walkers/legs"
 
 
 def test_an_address_is_written_wherever_the_former_one_stands(tmp_path):
-    for name in ("setup.cfg", "README.md", "docs/install.md", "examples/notebooks/first_steps.ipynb"):
+    for name in ("setup.cfg", "docs/install.md", "examples/notebooks/first_steps.ipynb"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     (tmp_path / "docs" / "faq.md").write_text("No address.")
     changed = write_address.write_address(NEW, tmp_path)
     names = [path.relative_to(tmp_path).as_posix() for path in changed]
-    assert names == ["setup.cfg", "README.md", "docs/install.md", "examples/notebooks/first_steps.ipynb"]
+    assert names == ["setup.cfg", "docs/install.md", "examples/notebooks/first_steps.ipynb"]
     assert write_address.read_address(tmp_path) == NEW
-    assert f"git clone {NEW} arc_suite && cd arc_suite" in (tmp_path / "README.md").read_text()
+    assert f"git clone {NEW} arc_suite && cd arc_suite" in (tmp_path / "docs/install.md").read_text()
     assert all(ADDRESS not in path.read_text() for path in changed)
     json.loads((tmp_path / names[-1]).read_text())
 
@@ -34,10 +34,9 @@ def test_what_is_no_address_is_one_line(address, tmp_path):
         write_address.write_address(address, tmp_path)
 
 
-def test_the_front_page_and_notebooks_name_the_address():
+def test_the_page_on_installing_and_notebooks_name_the_address():
     """The text for package indexes has no clone."""
-    for name in ("README.md", "docs/install.md"):
-        assert f"git clone {ADDRESS} arc_suite" in (ROOT / name).read_text(encoding="utf-8")
+    assert f"git clone {ADDRESS} arc_suite" in (ROOT / "docs/install.md").read_text(encoding="utf-8")
     assert ADDRESS not in package_page.PAGE.read_text(encoding="utf-8")
     for path in (ROOT / "examples" / "notebooks").glob("*.ipynb"):
         first = next(cell for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "code")
