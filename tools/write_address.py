@@ -14,7 +14,7 @@ from arc_suite.cli import program
 ROOT = Path(__file__).resolve().parents[1]
 PATTERNS = ("*.md", "docs/*.md", "examples/**/*.md", "examples/notebooks/*.ipynb", "tools/package.md", "CITATION.cff")
 
-_ADDRESS = re.compile(r"^url = (\S+)$", re.MULTILINE)
+_ADDRESS = re.compile(r"^(?:# )?url = (\S+)$", re.MULTILINE)  # a comment while it is a placeholder
 _VALID = re.compile(r"https://[\w.-]+(/[\w.-]+)+")
 
 
@@ -44,6 +44,7 @@ def write_address(address: str, root: Path = ROOT) -> list[Path]:
     for path in dict.fromkeys(paths):
         text = path.read_text(encoding="utf-8")
         if former_address in text:
+            text = text.replace(f"# url = {former_address}", f"url = {former_address}")
             path.write_text(text.replace(former_address, address), encoding="utf-8")
             changed_paths.append(path)
     return changed_paths

@@ -21,7 +21,7 @@ from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compile_model
-from arc_suite.tasks import readings
+from arc_suite.tasks import fitting, readings
 
 
 class Leap(NamedTuple):
@@ -52,10 +52,13 @@ class Leap(NamedTuple):
 
 
 _JUMP = Leap(back=0.0, forward=0.0, ahead=0.0, sink=4.0)
-_JUMPS = tuple(_JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.35, 0.5) for drive in (0.5, 1.0, 1.5, 2.5))
+_JUMPS = tuple(
+    _JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.2, 0.35, 0.5) for drive in (0.5, 1.0, 1.5, 2.5)
+)
 _JUMP_SLANTS = (0.0, -0.03, 0.03, -0.08, 0.08)  # standing heights ahead: tried in turn for a jump that stays
 MIN_CLEARANCE = 0.1  # standing heights, of feet in a jump
 MIN_DISTANCE = 0.8  # standing heights, of feet in a leap
+_MIN_HEIGHT = fitting.HEALTHY_RANGE[0]  # standing heights; a torso that is lower in a jump has fallen, as in tasks
 MAX_DRIFT = 0.1  # standing heights, between the mean positions of feet before a jump and after it
 
 # Durations of a leap's parts that do not differ between leaps.
@@ -172,6 +175,7 @@ class Flight(NamedTuple):
         torso_distance: distance that the torso moves while no foot is on the ground.
         air_time: time for which no foot is on the ground, s.
         clearance: the largest height of the lowest foot.
+        lowest: the lowest height of the torso.
         rise: rise of the torso.
         landed: whether the torso stays upright, and is high enough at the end.
     """
@@ -181,6 +185,7 @@ class Flight(NamedTuple):
     torso_distance: float
     air_time: float
     clearance: float
+    lowest: float
     rise: float
     landed: bool
 
@@ -277,6 +282,7 @@ def _measure_flight(body: Body, track: _Track, leap: int, crouch_end: int) -> Fl
         torso_distance=float((torso[last_step, 0] - torso[first_step, 0]) / standing_height),
         air_time=control_timestep(body) * steps_in_air,
         clearance=float(sole_heights.min(axis=-1).max() / standing_height),
+        lowest=float(torso[:, 2].min() / standing_height),
         rise=float((torso[:, 2].max() - torso[0, 2]) / standing_height),
         landed=bool(stays_upright and stands),
     )
@@ -342,6 +348,7 @@ def jumps_that_stay(body: Body, rest_angles: tuple[float, ...]) -> Iterator[Leap
             (flight.clearance, jump)
             for jump, flight in zip(jumps, flights, strict=True)
             if flight.landed and flight.clearance >= MIN_CLEARANCE and flight.drift <= MAX_DRIFT
+            if flight.lowest > _MIN_HEIGHT
         ]
         for _, jump in sorted(good_jumps, reverse=True):
             yield jump
@@ -357,6 +364,9 @@ def _why_no_jump(flights: Sequence[Flight]) -> str:
     landed = [flight for flight in flights if flight.landed]
     if not landed:
         return _DOES_NOT_LAND
+    landed = [flight for flight in landed if flight.lowest > _MIN_HEIGHT]
+    if not landed:
+        return f"its torso sinks to {_MIN_HEIGHT} standing heights or less"
     high = [flight for flight in landed if flight.clearance >= MIN_CLEARANCE]
     if not high:
         clearance = max(flight.clearance for flight in landed)

@@ -156,20 +156,23 @@ def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES) -> Re
 def measure_suited_preset(setup: Setup, seeds: Sequence[int]) -> Anchors:
     """Return the anchors of standing still and of the preset that suits task and body, measured in some episodes.
 
+    Where no preset suits them, the anchors have no demonstrator.
+
     Args:
         setup: robot, task and settings.
         seeds: seeds of the episodes.
     """
-    preset = suited_preset(setup.definition)
+    presets = suited_presets(setup.definition)[:1]
     means = {}
-    for name in tqdm((ZERO, preset), desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
+    for name in tqdm((ZERO, *presets), desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
         try:
             means[name] = float(play_returns(setup, name, seeds).mean())
         except ValueError:
             if name == ZERO:
                 raise
             # The demonstrator refuses the body, such as one whose feet hang in the air.
-    return Anchors(means[ZERO], means.get(preset), preset if preset in means else None)
+    preset = next((name for name in presets if name in means), None)
+    return Anchors(means[ZERO], means.get(preset), preset)
 
 
 def play_returns(setup: Setup, name: str, seeds: Sequence[int]) -> np.ndarray:

@@ -161,13 +161,7 @@ def episodes_in_batch(
             watch(is_playing, is_playing & (terminated | has_diverged))
         has_ended = is_playing & (terminated | truncated)
         for index in np.flatnonzero(has_ended):
-            metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}
-            # Of several tasks, each has its own metrics.
-            progress[index] = {
-                name.removeprefix(_PROGRESS): float(values[index])
-                for name, values in metrics.items()
-                if info[f"_{name}"][index]
-            }
+            progress[index] = _read_metrics(info, index)
         is_playing &= ~has_ended
         if has_ended.any() and is_playing.any():
             environment.rest(~is_playing)
@@ -176,3 +170,12 @@ def episodes_in_batch(
     for total, length, metrics in zip(totals.tolist(), lengths.tolist(), progress, strict=True):
         results.append(EpisodeResult(total, length, {name: metrics.get(name, math.nan) for name in names}))
     return results
+
+
+def _read_metrics(info: Mapping[str, np.ndarray], index: int) -> dict[str, float]:
+    """Return the metrics of one environment of a batch; those of other tasks are left out."""
+    metrics = {}
+    for name, values in info.items():
+        if name.startswith(_PROGRESS) and info[f"_{name}"][index]:
+            metrics[name.removeprefix(_PROGRESS)] = float(values[index])
+    return metrics

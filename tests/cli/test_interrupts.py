@@ -117,7 +117,7 @@ def test_interrupts_at_random_moments_of_all_programs(tmp_path):
 
 def test_all_programs_are_interrupted_here():
     """Except those that need a window, a run or a motion, or print alone, or perhaps an extra or `make web`."""
-    assert set(PROGRAMS) - set(COMMANDS) - {"studio", "play"} == {"view", "export", "motion", "completion"}
+    assert set(PROGRAMS) - set(COMMANDS) - {"studio", "play"} == {"view", "export", "motion", "card", "completion"}
 
 
 # What becomes of an interrupt that foreign code receives: name of a function, and the line.

@@ -159,10 +159,11 @@ def test_a_jump_comes_down_where_it_stood():
 
 def test_who_cannot_jump_on_the_spot_says_why(monkeypatch):
     rest = tuple(rest_of(TICK).joints.tolist())
-    flight = leaps.Flight(0.0, 0.3, 0.0, 0.1, 0.2, 0.2, True)
+    flight = leaps.Flight(0.0, 0.3, 0.0, 0.1, 0.2, 0.5, 0.2, True)
     for changes, line in (
         ({}, "its feet come down 0.30 standing heights from where they stood, more than 0.1"),
         ({"clearance": 0.04}, "the clearance of its feet is 0.04 standing heights, less than 0.1"),
+        ({"lowest": 0.38}, "its torso sinks to 0.4 standing heights or less"),
         ({"landed": False}, "it does not land on its feet"),
     ):
         flights = [flight._replace(**changes)] * len(leaps._JUMPS)
