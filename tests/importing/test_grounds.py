@@ -374,6 +374,6 @@ def test_pages_show_the_ground(tmp_path):
         assert shown["planes"] == ([] if name == "hill.png" else [pytest.approx(-0.01 * HEIGHT)])
         assert shown["solids"] == []
         grounds = play_pages.creature(TICK, arena=word)["grounds"]
-        assert list(grounds) == [name.partition(".")[0], "level", "bumps"]
+        assert list(grounds) == [name.partition(".")[0], "level", "bumps", "slopes"]
         surface = next(iter(grounds.values()))["surface"]
         assert_allclose(max(map(max, surface["heights"])), arena.surface.heights.max(), atol=2e-3)
