@@ -1,11 +1,9 @@
 // Keeps a camera behind a creature's heading, until the player turns it.
-import { clamp } from "./legs.js";
+import { clamp, wrapped } from "./legs.js";
 
 const RATE = 2.5; // 1/s, of the camera's way to its place
 const RISES = [0.02, 1.4]; // rad, of the camera over its target
 const TURNED = 1e-3; // rad, by which a player turns it at least: a wheel zooms
-
-const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
 
 export class Chase {
   constructor(view) {

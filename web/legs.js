@@ -1,6 +1,7 @@
 // Kinematics of legs under a torso in a pose, as arc_suite.models.kinematics and posture define them.
 
 export const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+export const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
 const dot = (first, second) => first.reduce((sum, value, index) => sum + value * second[index], 0);
 const plus = (first, second) => first.map((value, index) => value + second[index]);
 const minus = (first, second) => first.map((value, index) => value - second[index]);

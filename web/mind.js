@@ -2,13 +2,12 @@
 import { bounded } from "./command.js";
 import { Graph } from "./graph.js";
 import { Law } from "./law.js";
-import { clamp } from "./legs.js";
+import { clamp, wrapped } from "./legs.js";
 import { Recovery } from "./recovery.js";
 import { Task } from "./task.js";
 
 const SPEED = 0.9, TURNING = 1.5; // of a body that pushes: forward, and turning for each rad that it is off
 const AHEAD = 0.6; // rad, within which it walks ahead
-const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
 
 const POLICIES = { law: Law, graph: Graph };
 

@@ -102,17 +102,18 @@ def describe_body(body: Body) -> tuple[list[Part], dict[str, Material]]:
 
 
 def part_frames(parts: Sequence[Part]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the positions (3,) and rotation matrices (3, 3) of parts in the world, in the standing pose."""
+    """Return the positions (..., 3) and rotation matrices (..., 3, 3) of parts in the world, as they stand."""
     positions = []
     orientations = []
     for part in parts:
-        parent_position = np.zeros(3)
-        parent_orientation = np.eye(3)
+        position = part.place
+        orientation = rotations.matrix(part.quaternion)
         if part.parent is not None:
-            parent_position = positions[part.parent]
             parent_orientation = orientations[part.parent]
-        positions.append(parent_position + parent_orientation @ part.place)
-        orientations.append(parent_orientation @ rotations.matrix(part.quaternion))
+            position = positions[part.parent] + parent_orientation @ position
+            orientation = parent_orientation @ orientation
+        positions.append(position)
+        orientations.append(orientation)
     return positions, orientations
 
 

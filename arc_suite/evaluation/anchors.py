@@ -141,16 +141,7 @@ def committed_returns(setup: Setup) -> Returns | None:
 @functools.lru_cache(maxsize=16)
 def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES) -> Returns:
     """Return the returns of standing still and of all presets that suit the task, from seed 0 on; see `anchors`."""
-    returns_by_policy = {}
-    names = (ZERO, *suited_presets(setup.definition))
-    for name in tqdm(names, desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
-        try:
-            returns_by_policy[name] = play_returns(setup, name, range(episodes))
-        except ValueError:
-            if name == ZERO:
-                raise
-            # Another preset may take a body that one preset refuses, such as one whose feet hang in the air.
-    return returns_by_policy
+    return _measure_presets(setup, suited_presets(setup.definition), range(episodes))
 
 
 def measure_suited_preset(setup: Setup, seeds: Sequence[int]) -> Anchors:
@@ -162,17 +153,20 @@ def measure_suited_preset(setup: Setup, seeds: Sequence[int]) -> Anchors:
         setup: robot, task and settings.
         seeds: seeds of the episodes.
     """
-    presets = suited_presets(setup.definition)[:1]
-    means = {}
+    return of_returns(_measure_presets(setup, suited_presets(setup.definition)[:1], seeds))
+
+
+def _measure_presets(setup: Setup, presets: Sequence[str], seeds: Sequence[int]) -> Returns:
+    """Return the returns of standing still and of presets; those that refuse the body are left out."""
+    returns_by_policy = {}
     for name in tqdm((ZERO, *presets), desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
         try:
-            means[name] = float(play_returns(setup, name, seeds).mean())
+            returns_by_policy[name] = play_returns(setup, name, seeds)
         except ValueError:
             if name == ZERO:
                 raise
-            # The demonstrator refuses the body, such as one whose feet hang in the air.
-    preset = next((name for name in presets if name in means), None)
-    return Anchors(means[ZERO], means.get(preset), preset)
+            # Another preset may take a body that one preset refuses, such as one whose feet hang in the air.
+    return returns_by_policy
 
 
 def play_returns(setup: Setup, name: str, seeds: Sequence[int]) -> np.ndarray:

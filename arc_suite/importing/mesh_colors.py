@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -44,39 +45,72 @@ def find_rgba(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> np.ndarray:
     return np.array(material.rgba)
 
 
-def find_colors(spec: mujoco.MjSpec, file_of_mesh: Mapping[str, Path]) -> list[np.ndarray | None]:
+class Material(NamedTuple):
+    """The material of most faces of an .obj file.
+
+    Attributes:
+        library: file of materials, which may be missing.
+        name: name in this file; None for faces without a material.
+    """
+
+    library: Path
+    name: str | None
+
+
+def find_colors(
+    spec: mujoco.MjSpec, file_of_mesh: Mapping[str, Path], materials: Mapping[Path, Material]
+) -> list[np.ndarray | None]:
     """Return the color (3,) of each geom of a spec; None where neither the geom nor its mesh has one.
 
     Args:
         spec: the spec, whose geoms have colors in place of materials.
         file_of_mesh: files of meshes by name.
+        materials: of these files; see `read_materials`.
     """
-    color_of_file: dict[Path, np.ndarray | None] = {}
+    color_of_file = {path: _find_material_color(material) for path, material in materials.items()}
     colors = []
     for geom in spec.geoms:
         color = None if np.allclose(geom.rgba, _NO_COLOR) else _check_color(geom.rgba)
-        path = file_of_mesh.get(geom.meshname)
-        if color is None and path is not None and path.suffix.lower() == ".obj":
-            if path not in color_of_file:
-                color_of_file[path] = _read_obj_color(path)
-            color = color_of_file[path]
+        if color is None and geom.meshname in file_of_mesh:
+            color = color_of_file.get(file_of_mesh[geom.meshname])
         colors.append(None if color is None else color[:3])
     return colors
 
 
-def find_libraries(paths: Iterable[Path]) -> tuple[Path, ...]:
-    """Return the files of materials that .obj files name, with those that are missing."""
-    libraries = [_find_library(path) for path in paths if path.suffix.lower() == ".obj"]
-    return tuple(dict.fromkeys(library for library in libraries if library is not None))
+def read_materials(paths: Iterable[Path]) -> dict[Path, Material]:
+    """Return the materials of .obj files that name a file of materials."""
+    materials = {}
+    for path in paths:
+        if path.suffix.lower() == ".obj":
+            material = _read_material(path)
+            if material is not None:
+                materials[path] = material
+    return materials
 
 
-def _find_library(path: Path) -> Path | None:
-    """Return the file of materials of an .obj file, which lies in the same folder; None where it names none."""
+def _read_material(path: Path) -> Material | None:
+    """Return the material of most faces of an .obj file; None where it names no file of materials."""
     library = None
+    material = None
+    faces_of_material: Counter[str | None] = Counter()
     for keyword, value in _read_statements(path, _MAX_OBJ_BYTES):
         if keyword == "mtllib":
-            library = path.with_name(Path(value.replace("\\", "/")).name)
-    return library
+            library = path.with_name(Path(value.replace("\\", "/")).name)  # in the same folder alone
+        elif keyword == "usemtl":
+            material = value
+        elif keyword == "f":
+            faces_of_material[material] += 1
+    if library is None:
+        return None
+    most_common = faces_of_material.most_common(1)
+    return Material(library, most_common[0][0] if most_common else None)
+
+
+def _find_material_color(material: Material) -> np.ndarray | None:
+    """Return the color (4,) of a material; None without its file, or where this gives none."""
+    if not material.library.is_file():
+        return None
+    return _read_mtl(material.library).get(material.name)
 
 
 def _read_statements(path: Path, most_bytes: int) -> Iterator[tuple[str, str]]:
@@ -84,21 +118,6 @@ def _read_statements(path: Path, most_bytes: int) -> Iterator[tuple[str, str]]:
     for line in files.read_bytes(path, most_bytes).decode("utf-8", "replace").splitlines():
         keyword, _, value = line.strip().partition(" ")
         yield keyword, value.strip()
-
-
-def _read_obj_color(path: Path) -> np.ndarray | None:
-    """Return the color of the material of most faces of an .obj file; None without a file of materials."""
-    library = _find_library(path)
-    material = None
-    faces_of_material: Counter[str | None] = Counter()
-    for keyword, value in _read_statements(path, _MAX_OBJ_BYTES):
-        if keyword == "usemtl":
-            material = value
-        elif keyword == "f":
-            faces_of_material[material] += 1
-    if library is None or not faces_of_material or not library.is_file():
-        return None
-    return _read_mtl(library).get(faces_of_material.most_common(1)[0][0])
 
 
 def _read_mtl(path: Path) -> dict[str | None, np.ndarray | None]:

@@ -2,7 +2,7 @@
 
 import contextlib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -72,8 +72,10 @@ def read_visuals(
         is_small = sum(file.stat().st_size for file in files) <= _MAX_FILE_BYTES
         if 0 < len(spec.meshes) <= _MAX_MESHES and is_small:
             units.scale_lengths(spec, scale)
-            visuals = _collect_visuals(spec, model, torso, facing, files)
-            return visuals._replace(files=(*files, *mesh_colors.find_libraries(files)))
+            materials = mesh_colors.read_materials(files)
+            visuals = _collect_visuals(spec, model, torso, facing, materials)
+            libraries = dict.fromkeys(material.library for material in materials.values())
+            return visuals._replace(files=(*files, *libraries))
     return Visuals()
 
 
@@ -125,12 +127,17 @@ def _keep_meshes(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def _collect_visuals(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int, facing: Facing, files: tuple[Path, ...]
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    torso: int,
+    facing: Facing,
+    materials: Mapping[Path, mesh_colors.Material],
 ) -> Visuals:
-    """Return the meshes of a spec whose bodies are those of the file's model."""
+    """Return the meshes of a spec whose bodies are those of the file's model, without their files."""
     triangles = {mesh.name: _read_mesh(spec, mesh) for mesh in spec.meshes}
     geoms = [(geom, geom.meshname) for geom in spec.geoms]
-    colors = mesh_colors.find_colors(spec, {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file})
+    file_of_mesh = {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file}
+    colors = mesh_colors.find_colors(spec, file_of_mesh, materials)
     for geom, _ in geoms:  # balls lie where the file puts meshes, and are compiled at once
         geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
         geom.meshname = ""
@@ -153,7 +160,7 @@ def _collect_visuals(
     point_count = sum(len(visual.points) for visual in whole_visuals)
     share = min(1.0, _MAX_POINTS / max(point_count, 1))
     visuals = [_simplify(visual, max(_MIN_POINTS, int(share * len(visual.points)))) for visual in whole_visuals]
-    return Visuals(tuple(visual for visual in visuals if len(visual.faces)), files, point_count)
+    return Visuals(tuple(visual for visual in visuals if len(visual.faces)), point_count=point_count)
 
 
 def _read_mesh(spec: mujoco.MjSpec, mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -48,13 +48,13 @@ def align_bones(parts: Sequence[Part]) -> list[Part]:
 
 
 def pose_parts(parts: Sequence[Part], pose: Pose) -> list[Part]:
-    """Return the parts as they stand in a pose."""
+    """Return the parts as they stand in a pose, or in several ones, whose arrays have leading axes."""
     posed_parts = []
     for part in parts:
         if part.parent is None:
             part = part._replace(place=pose.position, quaternion=pose.quaternion)
         elif part.joint is not None:
-            part = part._replace(quaternion=hinge_orientations(part, pose.joints[part.joint]))
+            part = part._replace(quaternion=hinge_orientations(part, pose.joints[..., part.joint]))
         posed_parts.append(part)
     return posed_parts
 

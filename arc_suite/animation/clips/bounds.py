@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.bones import hinge_orientations
+from arc_suite.animation.clips.bones import pose_parts
 from arc_suite.animation.clips.catalog import Acted, Difference, Kind, Turn
 from arc_suite.animation.clips.meshes import body_meshes
-from arc_suite.animation.clips.root_motion import ClipMotion
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.animation.clips.standing_legs import has_free_feet
-from arc_suite.animation.parts import Part, describe_body
+from arc_suite.animation.parts import Part, describe_body, part_frames
 from arc_suite.robots.spec import Body
 
 _CHECKED_TIME_STEP = 1.0 / 240.0  # s between the samples that are checked
@@ -128,15 +128,12 @@ def measure_ground(body: Body, motion: ClipMotion) -> Ground:
     """
     parts, points_of_parts = _drawn_points(body)
     radius_of_foot = {name: leg.foot.radius for name, leg in zip(body.foot_names, body.legs, strict=True)}
-    positions: list[np.ndarray] = []
-    orientations: list[np.ndarray] = []
+    poses = Pose(motion.positions, motion.quaternions, motion.joints)
+    positions, orientations = part_frames(pose_parts(parts, poses))
     lowest_part = np.full(len(motion.joints), np.inf)
     soles = []
     feet = []
-    for part in parts:
-        position, orientation = _place_part(part, motion, positions, orientations)
-        positions.append(position)
-        orientations.append(orientation)
+    for part, position in zip(parts, positions, strict=True):
         if part.name in radius_of_foot:
             soles.append(position[:, 2] - radius_of_foot[part.name])
             feet.append(position[:, :2])
@@ -164,20 +161,6 @@ def _thin_out(motion: ClipMotion) -> ClipMotion:
     """Return the motion with fewer samples, both ends among them."""
     intervals = max(1, round(motion.seconds / max(_CHECKED_TIME_STEP, motion.time_step)))
     return motion.sample_at(np.linspace(0.0, motion.seconds, intervals + 1))
-
-
-def _place_part(
-    part: Part, motion: ClipMotion, positions: Sequence[np.ndarray], orientations: Sequence[np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the positions (samples, 3), m, and orientations (samples, 3, 3) of a part, given those of the earlier."""
-    if part.parent is None:
-        return motion.positions, rotations.matrix(motion.quaternions)
-    quaternions = part.quaternion
-    if part.joint is not None:
-        quaternions = hinge_orientations(part, motion.joints[:, part.joint])
-    parent_orientation = orientations[part.parent]
-    position = positions[part.parent] + parent_orientation @ part.place
-    return position, parent_orientation @ rotations.matrix(quaternions)
 
 
 @functools.lru_cache(maxsize=8)
