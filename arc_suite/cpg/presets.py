@@ -101,6 +101,10 @@ DEFAULTS_OF_SERVOS = {
 }
 # With a failed leg, generated bodies and those with more legs earn more by `braced`.
 DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS = {**DEFAULTS_OF_SERVOS, "limping": LimpingParameters(_BRACED)}
+# Of bodies with motors weaker than this share of m g h. Over rough ground and slopes they earn up to a fifth more by the
+# lower torso of `sighted`; those with stronger motors fall there.
+WEAK_TORQUE = 0.57
+DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS = {**DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS, "hiking": _SIGHTED_BY_SERVOS}
 
 
 def _paper_presets(common: dict, slow: tuple, medium: tuple, fast: tuple) -> dict:

@@ -14,8 +14,10 @@ from arc_suite.cpg.presets import (
     DEFAULTS,
     DEFAULTS_OF_FOUR_LEGS,
     DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS,
+    DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS,
     DEFAULTS_OF_SERVOS,
     PRESETS,
+    WEAK_TORQUE,
 )
 from arc_suite.cpg.rising import Rising, RisingParameters
 from arc_suite.cpg.sighted import Sighted, SightedParameters
@@ -23,6 +25,7 @@ from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.cpg.straight import Straight, StraightParameters
 from arc_suite.cpg.stride_law import StrideLaw
 from arc_suite.cpg.tracked import Tracked, TrackingParameters
+from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -51,6 +54,7 @@ _MEMORYLESS = {
     "limping": "reactive",
     "climbing": "surefooted",
     "crossing": "surefooted",
+    "hiking": "surefooted",
 }
 _COMMAND_BLOCKS = ("command", "pose", "gait", "goal")  # blocks of the observation that show what a task commands
 
@@ -140,14 +144,23 @@ def _registered_presets() -> dict[str, Any]:
 def _default_presets(body: Body) -> Mapping[str, Any]:
     """Return the presets that suit any body of its kind by name."""
     has_four_legs = len(body.legs) <= 4
-    if body.source:
-        return DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS if has_four_legs else DEFAULTS_OF_SERVOS
-    return DEFAULTS_OF_FOUR_LEGS if has_four_legs else DEFAULTS
+    if not body.source:
+        return DEFAULTS_OF_FOUR_LEGS if has_four_legs else DEFAULTS
+    if not has_four_legs:
+        return DEFAULTS_OF_SERVOS
+    return DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS if _has_weak_motors(body) else DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS
+
+
+def _has_weak_motors(body: Body) -> bool:
+    """Return whether the weakest motor of a body gives less torque than `WEAK_TORQUE`, in m g h."""
+    standing = measure_standing(body)
+    least_torque = min(joint.torque for leg in body.legs for joint in leg.joints)
+    return least_torque < WEAK_TORQUE * standing.mass * GRAVITY * standing.height
 
 
 def preset_names() -> tuple[str, ...]:
     """Return the names of the presets of all robots and laws, including those of other packages."""
-    tables = (*PRESETS.values(), DEFAULTS, DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS, _registered_presets())
+    tables = (*PRESETS.values(), DEFAULTS, DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS, _registered_presets())
     return tuple(dict.fromkeys(name for presets in tables for name in presets))
 
 

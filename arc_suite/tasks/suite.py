@@ -65,7 +65,7 @@ class Rough(CommandTask):
     command = AlongLane()
     ground = Lanes(("rough",))
     from_body = _FROM_BODY
-    demonstrators = ("climbing", "surefooted")
+    demonstrators = ("hiking", "climbing", "surefooted")
 
 
 class Slopes(CommandTask):
@@ -76,7 +76,7 @@ class Slopes(CommandTask):
     command = AlongLane()
     ground = Lanes(("slopes",))
     from_body = _FROM_BODY
-    demonstrators = ("climbing", "surefooted")
+    demonstrators = ("hiking", "climbing", "surefooted")
 
 
 class Stairs(CommandTask):

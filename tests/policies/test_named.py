@@ -16,7 +16,7 @@ from arc_suite.robots import ROBOTS
 
 ALL = (
     "slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, "
-    "planned, tracked, rising, crossing, in_step, posed, balanced, limping"
+    "planned, tracked, rising, crossing, in_step, posed, balanced, limping, hiking"
 )
 GENERAL = (
     "slow, medium, fast, straight, steered, surefooted, climbing, braced, reactive, sighted, leaping, planned, "
