@@ -101,10 +101,20 @@ DEFAULTS_OF_SERVOS = {
 }
 # With a failed leg, generated bodies and those with more legs earn more by `braced`.
 DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS = {**DEFAULTS_OF_SERVOS, "limping": LimpingParameters(_BRACED)}
-# Of bodies with motors weaker than this share of m g h. Over rough ground and slopes they earn up to a fifth more by the
-# lower torso of `sighted`; those with stronger motors fall there.
+# Of bodies whose median motor gives less than this share of m g h. Over rough ground and slopes they earn up to a fifth
+# more by the lower torso of `sighted`; those with stronger motors fall there.
 WEAK_TORQUE = 0.57
 DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS = {**DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS, "hiking": _SIGHTED_BY_SERVOS}
+# Of bodies that stand with more than this share of a motor's torque. In a trot two feet carry twice as much, and bent
+# legs more still, so the torso stays at its height.
+LARGE_LOAD = 0.4
+_SIGHTED_UNDER_LOAD = _SIGHTED_BY_SERVOS._replace(ride=1.0)
+DEFAULTS_OF_FOUR_LEGS_WITH_LOADED_SERVOS = {
+    **DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS,
+    "sighted": _SIGHTED_UNDER_LOAD,
+    "crossing": _SIGHTED_UNDER_LOAD,
+    "leaping": _LEAPING._replace(walk=_SIGHTED_UNDER_LOAD),
+}
 
 
 def _paper_presets(common: dict, slow: tuple, medium: tuple, fast: tuple) -> dict:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
 from arc_suite import checks, registry, robots
 from arc_suite.cpg.climbing import Climbing, ClimbingParameters
 from arc_suite.cpg.leaping import Leaping, LeapingParameters
@@ -13,9 +15,11 @@ from arc_suite.cpg.prescribed import PrescribedLaw, Preset
 from arc_suite.cpg.presets import (
     DEFAULTS,
     DEFAULTS_OF_FOUR_LEGS,
+    DEFAULTS_OF_FOUR_LEGS_WITH_LOADED_SERVOS,
     DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS,
     DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS,
     DEFAULTS_OF_SERVOS,
+    LARGE_LOAD,
     PRESETS,
     WEAK_TORQUE,
 )
@@ -146,16 +150,18 @@ def _default_presets(body: Body) -> Mapping[str, Any]:
     has_four_legs = len(body.legs) <= 4
     if not body.source:
         return DEFAULTS_OF_FOUR_LEGS if has_four_legs else DEFAULTS
-    if not has_four_legs:
-        return DEFAULTS_OF_SERVOS
-    return DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS if _has_weak_motors(body) else DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS
+    return _default_presets_by_motors(body) if has_four_legs else DEFAULTS_OF_SERVOS
 
 
-def _has_weak_motors(body: Body) -> bool:
-    """Return whether the weakest motor of a body gives less torque than `WEAK_TORQUE`, in m g h."""
+def _default_presets_by_motors(body: Body) -> Mapping[str, Any]:
+    """Return the presets that suit any imported body with four legs, by what its motors give and carry."""
     standing = measure_standing(body)
-    least_torque = min(joint.torque for leg in body.legs for joint in leg.joints)
-    return least_torque < WEAK_TORQUE * standing.mass * GRAVITY * standing.height
+    torques = np.array([joint.torque for leg in body.legs for joint in leg.joints])
+    if (abs(standing.loads) > LARGE_LOAD * torques).any():
+        return DEFAULTS_OF_FOUR_LEGS_WITH_LOADED_SERVOS
+    if np.median(torques) < WEAK_TORQUE * standing.mass * GRAVITY * standing.height:
+        return DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS
+    return DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS
 
 
 def preset_names() -> tuple[str, ...]:
