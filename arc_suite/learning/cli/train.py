@@ -7,6 +7,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --robot queen --task steer --algorithm dagger
   arc-suite train --robot tick --algorithm sac_parallel --minutes 5
   arc-suite train --robot tick --seed 0,1,2 --jobs 3 --until_score .9
+  arc-suite train --robot queen --steps 1000000 --best
   arc-suite train --robot queen --seeds 0-15 --hp simulation=warp
   arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
@@ -44,7 +45,7 @@ from arc_suite.cli.interrupts import TERMINATED
 from arc_suite.cli.program import progress, resumable, say, watch_for_termination
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
-from arc_suite.learning import cards, finals, onnx_file, outcomes, processes, trackers
+from arc_suite.learning import best, cards, finals, onnx_file, outcomes, processes, trackers
 from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import DEVICE_DEFAULTS
@@ -128,6 +129,7 @@ flags.DEFINE_float(
     lower_bound=0.0,
 )
 flags.DEFINE_float("until_score", None, "Stop after an evaluation with this score; see docs/benchmark.md.")
+flags.DEFINE_bool("best", False, "Keep the best checkpoint, too: in RUN/best, chosen in 100 episodes of validation.")
 flags.DEFINE_integer("jobs", None, "Runs of several seeds at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_integer("threads", 1, "Threads of the simulation; results do not depend on it.", lower_bound=1)
 flags.DEFINE_bool("tensorboard", False, "Write metrics for TensorBoard too, into the folder of the run.")
@@ -220,17 +222,19 @@ def train_run(run: Configuration, threshold: float | None) -> int:
     say(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
     if is_complete:
         with resumable(folder):
-            print(f"{folder}: {describe_judging(run, folder, FLAGS.threads)}")
+            judge_run(run, folder, FLAGS.threads)
             cards.write(run, folder)
     if is_complete and FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
         print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
     return TERMINATED if terminated and not is_complete else 0
 
 
-def describe_judging(run: Configuration, folder: Path, threads: int | None) -> str:
-    """Play the episodes that judge the final policy of a run, and return their result as text."""
+def judge_run(run: Configuration, folder: Path, threads: int | None) -> None:
+    """Play the episodes that judge the final policy of a run, and print their result; keep the best one if asked to."""
     step = run_folder.read_progress(folder)["evaluated"]
-    return finals.describe(run, finals.play_once(run, folder, step, threads))
+    print(f"{folder}: {finals.describe(run, finals.play_once(run, folder, step, threads))}")
+    if FLAGS.best:
+        print(f"{folder}: {best.describe(*best.keep_best(run, folder, threads))}")
 
 
 def describe_end(folder: Path, step: int | None, finished: bool, terminated: bool) -> str:
@@ -256,7 +260,7 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
         return ["train", *arguments, f"--seed={run.seed}", f"--output={folder / run.name}"]  # the last of a flag holds
 
     def result(name):
-        return processes.last_line(processes.log(folder, name), _LINES_OF_RESULT)
+        return processes.last_line(processes.log(folder, name), _LINES_OF_RESULT + FLAGS.best)
 
     commands = {run.name: functools.partial(command, run) for run in runs}
     with contextlib.ExitStack() as stack, resumable(folder):
@@ -284,7 +288,7 @@ def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
         end = describe_end(run_folder_path, None, finished, terminated)
         print(f"{run_folder_path}: {end}, {outcomes.latest_result(run, run_folder_path)}")
         if finished:
-            print(f"{run_folder_path}: {describe_judging(run, run_folder_path, threads=None)}")
+            judge_run(run, run_folder_path, threads=None)
         save_onnx(run, run_folder_path, finished)
         if finished:
             cards.write(run, run_folder_path)

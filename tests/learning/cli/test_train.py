@@ -1,5 +1,6 @@
 """arc-suite train and export, run as a user runs them."""
 
+import contextlib
 import importlib.util
 import json
 import os
@@ -14,9 +15,10 @@ import time
 import numpy as np
 import programs
 import pytest
+from gymnasium.vector import AutoresetMode
 from refusals import refused
 
-from arc_suite import policies, registry
+from arc_suite import evaluation, policies, registry
 from arc_suite.evaluation import judging
 from arc_suite.learning.agents import configuration, run_folder
 
@@ -204,6 +206,28 @@ class TestRun:
         done = run("train", *TINY, cwd=folder.parents[1])
         assert done.returncode == 0 and FINISHED.search(done.stdout)
         assert (folder / "evaluations.csv").read_bytes() == before
+
+    def test_the_best_checkpoint_is_kept(self, folder):
+        done = run("train", *TINY, "--best", cwd=folder.parents[1])
+        assert done.returncode == 0, done.stderr
+        kept = json.loads((folder / "best" / "agent.json").read_text())
+        checkpoint = folder / "checkpoints" / str(kept["steps"])
+        assert (folder / "best" / "policy.npz").read_bytes() == (checkpoint / "policy.npz").read_bytes()
+        setup = configuration.read(folder / "config.json").validation
+        seeds = range(9_000, 9_100)
+        means = {}
+        for step in (100, 200):
+            policy = policies.policy(
+                str(folder / "checkpoints" / str(step)), setup.body, None, 100, task=setup.definition
+            )
+            with contextlib.closing(setup.make_vec(100, autoreset_mode=AutoresetMode.DISABLED)) as environment:
+                episodes = evaluation.episodes_in_batch(environment, policy, seeds)
+            means[step] = np.mean([episode.total for episode in episodes])
+        assert kept["steps"] == max(means, key=means.get)
+        assert kept["mean_return"] == pytest.approx(means[kept["steps"]])
+        assert re.search(r"/tick-walk-sope_eo-0: .*best.* in 100 episodes of validation", done.stdout)
+        evaluated = run("evaluate", f"--policy={folder / 'best'}", "--episodes=1", "--set=time_limit=2", cwd=folder)
+        assert evaluated.returncode == 0, evaluated.stderr
 
     @pytest.mark.long
     def test_its_configuration_trains_the_same_run(self, folder, tmp_path):
