@@ -17,7 +17,7 @@ from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
 
 FOLDER = "best"
-CANDIDATES = 3  # checkpoints with the largest returns of the curve, beside the latest
+CANDIDATES = 3  # checkpoints with the largest returns of the curve, in addition to the latest
 SEEDS = seed_ranges.VALIDATION[: evaluation.EPISODES]
 
 

@@ -222,14 +222,14 @@ def train_run(run: Configuration, threshold: float | None) -> int:
     say(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
     if is_complete:
         with resumable(folder):
-            judge_run(run, folder, FLAGS.threads)
+            play_final_episodes(run, folder, FLAGS.threads)
             cards.write(run, folder)
     if is_complete and FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
         print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
     return TERMINATED if terminated and not is_complete else 0
 
 
-def judge_run(run: Configuration, folder: Path, threads: int | None) -> None:
+def play_final_episodes(run: Configuration, folder: Path, threads: int | None) -> None:
     """Play the episodes that judge the final policy of a run, and print their result; keep the best one if asked to."""
     step = run_folder.read_progress(folder)["evaluated"]
     print(f"{folder}: {finals.describe(run, finals.play_once(run, folder, step, threads))}")
@@ -288,7 +288,7 @@ def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
         end = describe_end(run_folder_path, None, finished, terminated)
         print(f"{run_folder_path}: {end}, {outcomes.latest_result(run, run_folder_path)}")
         if finished:
-            judge_run(run, run_folder_path, threads=None)
+            play_final_episodes(run, run_folder_path, threads=None)
         save_onnx(run, run_folder_path, finished)
         if finished:
             cards.write(run, run_folder_path)
