@@ -101,6 +101,15 @@ class Row(NamedTuple):
     def strained(self) -> bool:
         return any(one is not None and one.limited >= MOST_LIMITED for one in self.walks.values())
 
+    def gains(self) -> list[str]:
+        """Return a line for each task in which another preset gains more than the default."""
+        lines = []
+        for trials in self.tasks:
+            if trials.shortfall > suitability.MAX_SHORTFALL:
+                default, best = trials.presets[0], max(trials.presets, key=lambda trial: trial.mean_return)
+                lines.append(f"{default.task}: {default.preset} gains {trials.shortfall:.0%} less than {best.preset}")
+        return lines
+
     def faults(self) -> list[str]:
         found = []
         if self.came == (self.robot.refused is not None):
@@ -111,10 +120,7 @@ class Row(NamedTuple):
             found.append(f"same bits in {self.same} of {reference.STATES} states")
         if self.robot.name in MUST_WALK and (not self.walked or self.strained):
             found.append("does not walk within the limits of its motors")
-        for trials in self.tasks:
-            if trials.shortfall > suitability.MAX_SHORTFALL:
-                default, best = trials.presets[0], max(trials.presets, key=lambda trial: trial.mean_return)
-                found.append(f"{default.task}: {default.preset} gains {trials.shortfall:.0%} less than {best.preset}")
+        found += self.gains()
         return [f"{self.robot.name}: {fault}" for fault in found]
 
 
@@ -222,7 +228,7 @@ def cells(row: Row) -> list[str]:
 
 
 def page(rows: list[Row]) -> str:
-    """Return the robots that came in as a table of Markdown."""
+    """Return tables of Markdown: speeds, results of each task, and the tasks in which the default is not the best."""
     found = []
     for one in (one for one in rows if one.walks):
         medium, steered = ("did not run" if each is None else _said(each) for each in one.walks.values())
@@ -234,7 +240,9 @@ def page(rows: list[Row]) -> str:
         if one.tasks:
             texts = {each.presets[0].task: _tried_text(each.presets[0]) for each in one.tasks}
             trials.append(f"| {one.robot.name} | {' | '.join(texts[task] for task in tasks)} |")
-    return "\n".join([*speeds, "", *trials])
+    gains = ["| robot | another preset is better |", "|---|---|"]
+    gains += [f"| {one.robot.name} | {'; '.join(one.gains())} |" for one in rows if one.gains()]
+    return "\n".join([*speeds, "", *trials, "", *gains])
 
 
 def _tried_text(trial: suitability.Trial) -> str:
