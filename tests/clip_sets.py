@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 from tqdm import tqdm
 
-from arc_suite.animation.clips import bounds, clips, planting
+from arc_suite.animation.clips import bounds, clips, planting, weight
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.animation.clips.from_rest import cut_passage
@@ -34,8 +34,9 @@ LOW = 0.01  # of a sole that slips
 
 
 class Kept(Recorder):
-    """A recorder that records each passage once."""
+    """A recorder that records each walk and each passage once."""
 
+    record_walk = functools.cache(Recorder.record_walk)
     record_transition = functools.cache(Recorder.record_transition)
 
 
@@ -77,19 +78,21 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     """Return numbers of the clips of a body by name, and the reasons of those that are left out."""
     recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
     made = make_drafts(recorder, list(CLIPS), iter, left_out)
+    light = make_drafts(recorder, ["walk", "idle"], iter, {}, character=weight.choose_character(0.0))
     loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], WalkLoop)]
     found = {"clips": len(CLIPS) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
     found["broken"] = len(excesses := broken(body, {name: made[name] for name in CLIPS if name not in left_out}))
     left_out |= {name: f"BROKEN: {excess}" for name, excess in excesses.items()}
     found["seam"] = np.degrees(max((draft.motion.seam for draft in loops), default=np.nan))
     if "walk" in made and "idle" in made:
-        walk, transition = made["walk"], recorder.record_transition(CLIPS["walk"].command)
+        walk, transition = light["walk"], recorder.record_transition(CLIPS["walk"].command)
         start, stop = (cut_passage(body, CLIPS[name], transition).motion for name in ("start", "stop"))
         pairs = {"start": (start.pose(-1), walk.start), "stop": (stop.pose(0), walk.start)}
         pairs["idle"] = stop.pose(-1), made["idle"].start
         found |= {name: apart(body, *pair) for name, pair in pairs.items()}
         found["slip"], found["sinks"] = slip(body, walk.motion)
         found["slip planted"], found["sinks planted"] = slip(body, walk.plant_feet(body).motion)
+        found["weight"] = made["walk"].weight
     return found, left_out
 
 

@@ -27,6 +27,27 @@ class Gait(NamedTuple):
     offsets: tuple[float, ...]
 
 
+class Pace(NamedTuple):
+    """How a body goes at a speed, compared with its walk: the faster, the quicker are steps and the shorter stances.
+
+    Attributes:
+        speed: multiple of the speed.
+        tempo: multiple of the frequency of the gait.
+        duty_change: added to the duty factor.
+    """
+
+    speed: float
+    tempo: float
+    duty_change: float
+
+
+PACES = {
+    "slow": Pace(0.6, 0.82, 0.05),
+    "fast": Pace(1.25, 1.15, -0.05),
+    "run": Pace(1.75, 1.35, -0.1),
+}
+
+
 def gait(body: Body, name: str) -> Gait:
     """Return the gait of a body by name.
 

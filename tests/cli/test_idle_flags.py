@@ -21,7 +21,7 @@ ALWAYS = {
     "import": "armature forward output home scale",
     "check": "task tasks walk",
     "render": f"{COMMON} seed steps output".replace(" preset", ""),
-    "animate": f"{COMMON} clips fps straight plant output".replace(" preset", ""),
+    "animate": f"{COMMON} clips fps straight plant weight output".replace(" preset", ""),
     "motion": f"{BODY} of clip loop fps output",
     "play": f"{BODY} arena policy vecnormalize output",
     "view": COMMON.replace(" preset", ""),

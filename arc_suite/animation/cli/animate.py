@@ -21,7 +21,7 @@ import math
 from absl import flags
 
 from arc_suite.animation import clips as catalog
-from arc_suite.animation.clips import clip_files
+from arc_suite.animation.clips import clip_files, weight
 from arc_suite.cli.flags import define_walk, only_setup, policy_name, preset_from_flags
 from arc_suite.cli.program import progress
 
@@ -42,6 +42,12 @@ flags.DEFINE_string(
 )
 flags.DEFINE_bool("straight", False, "Loops that do not turn go exactly where they are to, and do not veer.")
 flags.DEFINE_bool("plant", False, "Feet in stance stay where they are, by inverse kinematics, and do not slide.")
+flags.DEFINE_string(
+    "weight",
+    "1",
+    "How much the torso sinks, rolls and pitches in walks, starts and stops: 0 for not at all, to "
+    f"{weight.MAX_WEIGHT:g}; or {', '.join(weight.CHARACTERS)}.",
+)
 flags.DEFINE_integer(
     "triangles",
     None,
@@ -82,6 +88,7 @@ def main() -> None:
         fps=FLAGS.fps,
         straight=FLAGS.straight,
         plant=FLAGS.plant,
+        weight=_parse_weight(FLAGS.weight),
         progress=progress,
         **options,
     )
@@ -89,6 +96,14 @@ def main() -> None:
         print_table(clips)
     metrics = clip_files.metrics_file(FLAGS.output)
     print(f"wrote {FLAGS.output}" if metrics is None else f"wrote {FLAGS.output} and {metrics}")
+
+
+def _parse_weight(text: str) -> float | str:
+    """Return the number of a text, or the text, which may be a name."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def print_table(clips: list[catalog.Clip]) -> None:

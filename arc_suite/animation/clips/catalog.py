@@ -8,6 +8,7 @@ from typing import NamedTuple, get_args
 from arc_suite import registry
 from arc_suite.animation.clips import acting, gestures
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.robots.gaits import PACES, Pace
 from arc_suite.robots.spec import Body
 
 
@@ -18,11 +19,13 @@ class WalkLoop(NamedTuple):
         command: forward, left and turning, in units of the task, which are speeds that suit the body.
         failing: index of a leg whose motors fail; None for a sound body.
         crouch: distance by which the torso is lowered, standing heights, as far as the legs fold.
+        pace: speed and gait of demonstrators, None for those of the task.
     """
 
     command: tuple[float, float, float]
     failing: int | None = None
     crouch: float = 0.0
+    pace: Pace | None = None
 
 
 class Passage(NamedTuple):
@@ -95,9 +98,7 @@ WALK = WalkLoop((1.0, 0.0, 0.0))
 BOTH_ENDS = (0, -1)  # of `Acted.ends`: the first and the last sample
 CLIPS: dict[str, Kind] = {
     "walk": WALK,
-    "slow": WalkLoop((0.6, 0.0, 0.0)),
-    "fast": WalkLoop((1.25, 0.0, 0.0)),
-    "run": WalkLoop((1.75, 0.0, 0.0)),
+    **{name: WalkLoop((pace.speed, 0.0, 0.0), pace=pace) for name, pace in PACES.items()},
     "turn_left": WalkLoop((0.5, 0.0, 0.5)),
     "turn_right": WalkLoop((0.5, 0.0, -0.5)),
     "forward_left": WalkLoop((0.7, 0.0, 0.3)),

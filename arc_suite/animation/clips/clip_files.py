@@ -62,6 +62,7 @@ def animate(
     fps: float = FPS,
     straight: bool = False,
     plant: bool = False,
+    weight: float | str = 1.0,
     progress: Callable = tqdm,
     **options,
 ) -> list[Clip]:
@@ -76,7 +77,7 @@ def animate(
         path: path of the file.
         clips: names of `CLIPS`, `module:name` of clips of other packages, or files of motions of the body, `.npz`;
             one or several; or "all".
-        policy, preset, fps, straight, plant: see `clips.clips`.
+        policy, preset, fps, straight, plant, weight: see `clips.clips`.
         progress: wraps what takes long, as `tqdm` does.
         options: options of a `.glb`, `rig`, `root_motion`, `triangles`, `uv` and `reduce`, see `creatures.glb`; of
             pictures, `size` in pixels, `transparent`, `turntable` of a film and `directions` of a sheet, see `filming`.
@@ -99,7 +100,9 @@ def animate(
         catalog_names = [name for name in names if not _is_motion(name)]
         made_clips = [clip_of_motion(setup.body, motions.load(name), fps) for name in names if _is_motion(name)]
         if catalog_names or not names:
-            made_clips += make_clips(setup, catalog_names, policy, preset, fps, recording_progress, straight, plant)
+            made_clips += make_clips(
+                setup, catalog_names, policy, preset, fps, recording_progress, straight, plant, weight
+            )
         _check_names(made_clips)
         if extension == GLB_EXTENSION:
             metrics |= _write_glb(temporary, setup.body, made_clips, **options)

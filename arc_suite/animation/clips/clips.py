@@ -8,6 +8,7 @@ import numpy as np
 
 from arc_suite import checks, registry
 from arc_suite.animation.clips import additive, bounds, catalog, planting
+from arc_suite.animation.clips import weight as weights
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
@@ -37,6 +38,7 @@ class Clip(NamedTuple):
         slip: mean path of a foot in stance over the ground, m a meter of the root; None if the root stays.
         slide: largest diagonal of the way of a standing foot, m; None for a clip in which feet are not to stand still.
         additive_over: names of the clips that an additive clip can be added to; None for a clip that is not additive.
+        weight: share of the weight that legs allow; None for a clip without weight. See `weight.add_weight`.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Clip(NamedTuple):
     slip: float | None = None
     slide: float | None = None
     additive_over: tuple[str, ...] | None = None
+    weight: float | None = None
 
     @property
     def times(self) -> np.ndarray:
@@ -69,6 +72,7 @@ def clips(
     progress: Callable[[Iterable[str]], Iterable[str]] = iter,
     straight: bool = False,
     plant: bool = False,
+    weight: float | str = 1.0,
 ) -> list[Clip]:
     """Make clips of a body, all of them by one policy, except the showcases of presets.
 
@@ -94,6 +98,7 @@ def clips(
         straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body
             does.
         plant: whether inverse kinematics keeps feet in stance where they are; without it, they slide as in the physics.
+        weight: multiple of the usual weight, from 0 for none to 2; or one of `weight.CHARACTERS`.
 
     Raises:
         ValueError: no name, an unknown one, a value out of range, a policy that does not fit, or no clip that can be
@@ -103,6 +108,7 @@ def clips(
     checks.number("fps", fps, 1.0, 1000.0)
     checks.boolean("straight", straight)
     checks.boolean("plant", plant)
+    character = weights.choose_character(weight)
     if not names:
         raise ValueError(f"clips: expected one or more of {', '.join(catalog.clip_names())}, got none")
     for name in names:
@@ -116,7 +122,7 @@ def clips(
         preset = next(name for name in _PRESETS if name in presets_of(setup.body))
     recorder = Recorder(setup, policy, preset)
     left_out: dict[str, str] = {}
-    drafts = make_drafts(recorder, names, progress, left_out, straight, plant)
+    drafts = make_drafts(recorder, names, progress, left_out, straight, plant, character)
     _report_left_out(setup.body, names, left_out)
     clip_of_name = {name: _sample_clip(name, setup.body, drafts[name], fps) for name in names if name not in left_out}
     motion_of_clip = {name: clip.motion for name, clip in clip_of_name.items()}
@@ -152,4 +158,6 @@ def _sample_clip(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     slide = None
     if bounds.is_planted(catalog.clip_of(name)):
         slide = bounds.measure(body, motion).slide * body.torso.standing_height
-    return Clip(name, motion, draft.loops, draft.cycles, tuple(contacts), body.foot_names, slip, slide)
+    return Clip(
+        name, motion, draft.loops, draft.cycles, tuple(contacts), body.foot_names, slip, slide, weight=draft.weight
+    )

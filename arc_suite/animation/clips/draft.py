@@ -29,6 +29,7 @@ class Draft(NamedTuple):
         cycle: duration of a gait cycle, s; NaN without a gait.
         loops: whether its last pose is its first one.
         stands: whether all feet stay on the ground, so that there are no foot contact events.
+        weight: share of the weight that legs allow; None for a clip without weight. See `weight.add_weight`.
     """
 
     motion: ClipMotion
@@ -36,6 +37,7 @@ class Draft(NamedTuple):
     cycle: float = math.nan
     loops: bool = True
     stands: bool = False
+    weight: float | None = None
 
     @property
     def start(self) -> Pose:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequenc
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bounds
+from arc_suite.animation.clips import bounds, weight
 from arc_suite.animation.clips.catalog import (
     REST,
     SPEED_RATIOS,
@@ -53,6 +53,7 @@ def make_drafts(
     left_out: MutableMapping[str, str],
     straight: bool = False,
     plant: bool = False,
+    character: weight.Character = weight.USUAL,
 ) -> dict[str, Draft]:
     """Record what clips need, and return their drafts by name, with those of the clips that they connect to.
 
@@ -63,6 +64,7 @@ def make_drafts(
         left_out: takes the reasons why clips cannot be made, by name.
         straight: whether loops that do not turn go exactly where their commands say.
         plant: whether feet in stance do not slide.
+        character: how the body carries its weight.
     """
     body = recorder.body
     gaits, transition = _make_recordings(recorder, names, progress, left_out)
@@ -84,6 +86,7 @@ def make_drafts(
     if transition is not None:
         drafts |= make_clips_from_rest(body, transition, names, walk, planted_walk, left_out)
         drafts = _keep_within_bounds(body, drafts, left_out)
+    drafts = weight.add_weight(body, drafts, character)
     for name in names:
         clip = clip_of(name)
         if not isinstance(clip, Difference) or name in left_out:
@@ -138,7 +141,7 @@ def _record_gait(recorder: Recorder, name: str) -> GaitRecording:
         raise ValueError(f"{name} is no loop that is recorded")  # of a difference of another package
     if name == "walk" and not recorder.has_command:
         return recorder.record_free_walk()
-    return recorder.record_walk(clip.command, clip.failing, clip.crouch)
+    return recorder.record_walk(clip.command, clip.failing, clip.crouch, clip.pace)
 
 
 # Loops.

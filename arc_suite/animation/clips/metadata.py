@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from arc_suite.animation.clips.catalog import WalkLoop, clip_names, clip_of
 from arc_suite.animation.clips.clips import Clip
-from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
+from arc_suite.animation.clips.foot_contacts import LIFT_OFF, TOUCH_DOWN
 from arc_suite.robots.spec import Body
 
 # By the name that users choose: whether the root moves, for each animation of a clip.
@@ -56,9 +56,11 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
 def clip_metadata(clip: Clip) -> dict[str, Any]:
     """Return the metadata of a clip.
 
+    `duty_factor` is the share of a loop in which feet touch the ground.
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
     `slip` is the path of a foot in stance over the ground, m a meter of the root. `slide` is the largest diagonal of
-    the way of a standing foot, m, in a clip in which feet are to stand still. `additive_to` is the animation whose
+    the way of a standing foot, m, in a clip in which feet are to stand still. `weight` is the share of the weight that
+    legs allow. `additive_to` is the animation whose
     first frame is the reference of an additive clip. `additive_over` names the clips that it can be added to: no sole
     then sinks deeper than 0.03 standing heights.
     """
@@ -78,6 +80,8 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
     }
     if clip.slip is not None:
         metadata["slip"] = round(clip.slip, 3)
+    if clip.weight is not None:
+        metadata["weight"] = clip.weight
     if clip.slide is not None:
         metadata["slide"] = round(clip.slide, 4)
     is_additive = clip.additive_over is not None
@@ -86,6 +90,8 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
         metadata["additive_over"] = list(clip.additive_over)
     elif clip.loops:
         metadata["missing_steps"] = missing_steps(clip)
+        if clip.cycles:
+            metadata["duty_factor"] = round(measure_duty_factor(clip), 3)
     return metadata
 
 
@@ -93,6 +99,20 @@ def missing_steps(clip: Clip) -> dict[str, int]:
     """Return the feet of a loop that touch down less often than once a cycle, and how many times less."""
     touchdowns = collections.Counter(contact.foot for contact in clip.foot_contacts if contact.event == TOUCH_DOWN)
     return {foot: clip.cycles - touchdowns[foot] for foot in clip.feet if touchdowns[foot] < clip.cycles}
+
+
+def measure_duty_factor(clip: Clip) -> float:
+    """Return the mean share of a loop in which its feet touch the ground."""
+    shares = []
+    for foot in clip.feet:
+        lift_offs, touch_downs = (
+            [contact.time for contact in clip.foot_contacts if contact.foot == foot and contact.event == event]
+            for event in (LIFT_OFF, TOUCH_DOWN)
+        )
+        # A stance may go on over the seam: the sum is right up to the duration. A foot without events stays down.
+        seconds_down = (sum(lift_offs) - sum(touch_downs)) % clip.motion.seconds
+        shares.append(seconds_down / clip.motion.seconds if lift_offs else 1.0)
+    return sum(shares) / len(shares)
 
 
 def name_animations(clip: Clip, roots_move: Sequence[bool]) -> dict[str, bool]:

@@ -11,6 +11,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.policies import check_preset
 from arc_suite.policies import policy as named_policy
+from arc_suite.robots.gaits import Pace
 from arc_suite.tasks.fitting import velocity_units
 
 _SETTLE_STEPS = 200  # control steps, after which starts and changes of command are forgotten
@@ -109,16 +110,20 @@ class Recorder:
         self.velocity_units = None
         if self.has_command:
             self.velocity_units = velocity_units(self.body, task.parameters.target_velocity)
-            if "gait_frequency" not in setup.task_kwargs:
-                control_timestep = task.scene.control_timestep
-                steps_in_cycle = max(1, round(1.0 / (task.parameters.gait_frequency * control_timestep)))
-                setup = _with_settings(setup, gait_frequency=1.0 / (steps_in_cycle * control_timestep))
+            self._keeps_frequency = "gait_frequency" in setup.task_kwargs
+            self._gait_frequency = task.parameters.gait_frequency  # Hz
+            self._control_timestep = task.scene.control_timestep  # s
+            setup = _with_settings(setup, gait_frequency=self._choose_frequency(tempo=1.0))
         if "pose" in task.commands:
             setup = _with_settings(setup, **_FIXED_POSE_AND_GAIT)
         self._setup = setup
 
     def record_walk(
-        self, command: tuple[float, float, float], failing: int | None = None, crouch: float = 0.0
+        self,
+        command: tuple[float, float, float],
+        failing: int | None = None,
+        crouch: float = 0.0,
+        pace: Pace | None = None,
     ) -> GaitRecording:
         """Return a recording of the policy under a command.
 
@@ -127,6 +132,7 @@ class Recorder:
             failing: index of the leg whose motors fail; None for a sound body.
             crouch: distance by which the torso is lowered, standing heights, as far as the legs fold;
                 demonstrators do so in the task `directed`.
+            pace: speed and gait in which demonstrators go; None for those of the task.
 
         Raises:
             ValueError: the episode ends, the task has no command, or the body or policy cannot crouch.
@@ -135,10 +141,13 @@ class Recorder:
         fixed_commands = {}
         if failing is not None:
             setup = _with_settings(setup, actuator_failure=failing)
+        if pace is not None and self.has_command and self._policy == "cpg":
+            setup = self._setup_at_pace(pace)
+            command = tuple(component / pace.speed for component in command)
         if crouch:
             setup = self._setup_with_pose_command()
             fixed_commands["pose"] = (-self._limit_crouch(crouch), 0.0, 0.0, 0.0, 0.0, 0.0)
-        clock = self._clock()
+        clock = self._clock(setup)
         steps = round(_CYCLES_UNDER_COMMAND * clock.cycle / clock.control_timestep)
         recording = self._record(setup, _SETTLE_STEPS, steps, [(0, command)], **fixed_commands)
         phase = (_SETTLE_STEPS * clock.control_timestep / clock.cycle + clock.offset) % 1.0
@@ -170,7 +179,7 @@ class Recorder:
         Raises:
             ValueError: the episode ends, or the task has no command.
         """
-        clock = self._clock()
+        clock = self._clock(self._setup)
         steps_in_cycle = clock.cycle / clock.control_timestep
 
         def phase_at(step):  # of the first foot, cycles
@@ -207,11 +216,31 @@ class Recorder:
             raise ValueError(f"the legs fold by {room:.2f} of their height; a crouch takes {_MIN_CROUCH:g}")
         return min(depth, room)
 
-    def _clock(self) -> _Clock:
+    def _choose_frequency(self, tempo: float) -> float:
+        """Return a multiple of the frequency of the gait, Hz, at which a cycle is a whole number of control steps.
+
+        A frequency that the caller sets is not rounded.
+        """
+        frequency = tempo * self._gait_frequency
+        if self._keeps_frequency:
+            return frequency
+        return 1.0 / (max(1, round(1.0 / (frequency * self._control_timestep))) * self._control_timestep)
+
+    def _setup_at_pace(self, pace: Pace) -> Setup:
+        """Return the setup with the speed and the gait of a pace, which is what demonstrators are fitted to."""
+        parameters = self._setup.definition.parameters
+        return _with_settings(
+            self._setup,
+            gait_frequency=self._choose_frequency(pace.tempo),
+            duty_factor=parameters.duty_factor + pace.duty_change,
+            target_velocity=parameters.target_velocity * pace.speed,
+        )
+
+    def _clock(self, setup: Setup) -> _Clock:
         """Return the gait clock of the task; a ValueError without a command."""
         if not self.has_command:
-            raise ValueError(f"the task {self._setup.kind.name} has no command")
-        task = self._setup.definition
+            raise ValueError(f"the task {setup.kind.name} has no command")
+        task = setup.definition
         return _Clock(
             cycle=1.0 / task.parameters.gait_frequency,
             offset=task.parameters.phase_offsets[0] / (2.0 * np.pi),

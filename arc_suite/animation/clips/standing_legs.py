@@ -152,14 +152,19 @@ def pose_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -
     """Return a motion of the torso (samples, 6) from rest, and of joints (samples, joints), rad."""
     up, forward, left = (poses[:, [column]] for column in range(3))
     offsets = body.torso.standing_height * np.concatenate([forward, left, up], axis=-1)
-    quaternions = np.broadcast_to(rest.quaternion, (len(poses), 4))
-    half_angles = 0.5 * poses[:, 3:]  # of roll, pitch and yaw
+    quaternions = tilt(np.broadcast_to(rest.quaternion, (len(poses), 4)), poses[:, 3:])
+    motion = hold_pose(rest, len(poses) - 1, time_step(body))
+    return motion._replace(positions=rest.position + offsets, quaternions=quaternions, joints=joints)
+
+
+def tilt(quaternions: np.ndarray, roll_pitch_yaw: np.ndarray) -> np.ndarray:
+    """Return quaternions (samples, 4) turned by roll, pitch and yaw (samples, 3), rad, about fixed axes."""
+    half_angles = 0.5 * roll_pitch_yaw
     for axis in range(3):
         half_angle = half_angles[:, [axis]]
         turns = np.concatenate([np.cos(half_angle), np.sin(half_angle) * np.eye(3)[axis]], axis=-1)
         quaternions = rotations.product(turns, quaternions)
-    motion = hold_pose(rest, len(poses) - 1, time_step(body))
-    return motion._replace(positions=rest.position + offsets, quaternions=quaternions, joints=joints)
+    return quaternions
 
 
 def hold_pose(pose: Pose, samples: int, time_step: float) -> ClipMotion:

@@ -213,7 +213,7 @@ def test_reduced_keys_move_it_the_same():
         sum(len(file.arrays[each["input"]]) for a in file.json["animations"] for each in a["samplers"])
         for file in files
     ]
-    assert counts[1] < 0.5 * counts[0]
+    assert counts[1] < 0.55 * counts[0]
     for clip in ("walk_loop", "stop"):
         times = files[0].arrays[files[0].animation(clip)["samplers"][-1]["input"]]
         one, other = (gltf_reader.played(file, clip, times) for file in files)
@@ -493,7 +493,7 @@ def test_every_clip_can_be_made(robot):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         clips = {clip.name: clip for clip in export.clips(Setup.of(body, "steer"), list(CLIPS))}
-    # Leaper cannot walk faster than it does, jump, leap or sway; the strides of Bastion to a side alternate.
+    # Leaper cannot jump, leap or sway; the strides of Bastion to a side alternate.
     assert len(clips) + len(caught) == len(CLIPS) and len(caught) <= 6
     gltf_reader.read(export.glb(body, list(clips.values())))
     units = arc_suite.load(body, "steer").task.definition.context.units

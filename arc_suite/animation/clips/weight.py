@@ -1,0 +1,353 @@
+"""Weight: the torso of walks, starts and stops moves as on a damped spring, and feet stay where they were.
+
+In a gait the torso sinks after touchdowns, twice a cycle, and rolls towards the feet that stand. It banks in turns, and
+pitches into the acceleration of starts and stops. Legs follow by inverse kinematics about the feet of each sample. What
+they do not allow is made smaller. The sway of a gait is a function of its phase, and all else is 0 at both ends of a
+start or a stop. So loops close and clips connect as without weight.
+
+Lengths are in standing heights h, times in sqrt(h / g).
+"""
+
+import itertools
+import math
+from collections.abc import Mapping
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from arc_suite import checks, rotations
+from arc_suite.animation.clips import bounds, planting
+from arc_suite.animation.clips.catalog import Passage, WalkLoop, clip_of
+from arc_suite.animation.clips.draft import Draft
+from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, find_foot_contacts, sole_heights
+from arc_suite.animation.clips.root_motion import fade_out
+from arc_suite.animation.clips.standing_legs import HEIGHT, has_free_feet, tilt
+from arc_suite.models import posture, sizing
+from arc_suite.models.kinematics import Legs
+from arc_suite.robots.spec import Body
+from arc_suite.simulation.model import compile_model
+
+MAX_WEIGHT = 2.0
+
+_ROLL = posture.POSE_NAMES.index("roll")
+_PITCH = posture.POSE_NAMES.index("pitch")
+
+# The largest sway that legs can follow is taken, and of equal ones that with a torso that sinks least, as stretched
+# legs cannot follow a tilt.
+_SIZES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)
+_SINKS = (0.0, 0.05, 0.1)  # h
+_PITCH_SIZES = (1.0, 0.8, 0.6, 0.4, 0.2)
+_DIPS = (0.0, 0.06)  # h, further, while a body pitches in a start or a stop
+_MAX_TILT = np.radians(8.0)  # rad, of the pitch in starts and stops, and of the bank
+
+_FRONT_SHARE = 0.3  # by which the foremost feet count more for the side that stands, as those of a trot
+_MIN_COHERENCE = 0.2  # of touchdowns in half a cycle: below, the touchdown of the first foot sets the phase
+_MIN_SIDE = 0.001  # of the sum of all distances of feet from the middle: below, the first foot sets the side
+_GROWTH_CYCLES = 1.5  # in which the sway grows in a start, and fades in a stop
+_FADE_CYCLES = 0.5  # at either end, in which the pitch of a start or a stop fades
+
+# Inverse kinematics.
+_SEARCH_STRIDE = 8  # samples, of which one is solved while sizes are tried
+_STAGES = 3
+_ITERATIONS_PER_STAGE = 4
+_FOOT_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a foot: legs of two joints slide rather than sink
+_SWING_HEIGHT = 0.02  # h: a higher sole is in swing
+_MAX_MISS = 0.01  # h, by which a foot in stance may miss its place
+_MAX_MISS_OF_FEW_JOINTS = 0.03  # h
+_MAX_SWING_MISS = 0.08  # h
+_MAX_MORE_SLIP = 0.02  # m a meter, that a loop has more than without weight
+_MAX_SPEED_RATIO = 1.5  # of the fastest joint, with and without weight
+
+
+class Character(NamedTuple):
+    """How a body carries its weight.
+
+    Attributes:
+        bob: range of the torso's height in a gait, h.
+        roll: amplitude of its roll in a gait, rad.
+        pitch: rad, for an acceleration of g.
+        bank: share of the roll at which weight acts along the torso's vertical in a turn.
+        frequency: frequency of the spring, rad / sqrt(h / g).
+        damping: damping ratio of the spring.
+        size: multiple of all offsets of the torso.
+    """
+
+    bob: float
+    roll: float
+    pitch: float
+    bank: float
+    frequency: float
+    damping: float
+    size: float = 1.0
+
+    def response(self, body: Body, frequencies):
+        """Return what a path is multiplied by, at frequencies in rad/s, where the spring follows it; complex."""
+        time_unit = math.sqrt(body.torso.standing_height / sizing.GRAVITY)
+        ratio = frequencies * time_unit / self.frequency
+        return 1.0 / (1.0 - ratio**2 + 2.0j * self.damping * ratio)
+
+    def direction(self, body: Body, frequency: float) -> complex:
+        """Return the response at a frequency, rad/s, without its size: a delay."""
+        response = self.response(body, frequency)
+        return response / abs(response)
+
+    def follow(self, body: Body, path: np.ndarray, time_step: float) -> np.ndarray:
+        """Return how the spring follows a path (samples,) from rest."""
+        padded = 4 * len(path)  # samples, so that the end does not act on the start
+        frequencies = 2.0 * np.pi * np.fft.rfftfreq(padded, time_step)
+        spectrum = np.fft.rfft(path, padded) * self.response(body, frequencies)
+        return np.fft.irfft(spectrum, padded)[: len(path)]
+
+
+USUAL = Character(bob=0.035, roll=0.03, pitch=0.9, bank=1.0, frequency=5.0, damping=0.5)
+CHARACTERS = {
+    "heavy": Character(bob=0.05, roll=0.045, pitch=1.2, bank=0.7, frequency=3.5, damping=0.4),
+    "nervous": Character(bob=0.025, roll=0.02, pitch=1.1, bank=1.5, frequency=9.0, damping=0.3),
+    "old": Character(bob=0.03, roll=0.06, pitch=0.6, bank=0.3, frequency=4.0, damping=0.9),
+}
+
+
+class Sway(NamedTuple):
+    """Offsets of the torso in a gait. Complex numbers are amplitudes over the phase of the gait.
+
+    Attributes:
+        bob: amplitude of the height, twice a cycle, h.
+        roll: amplitude of the roll, once a cycle, rad.
+        bank: roll that stays, rad.
+        sink: height by which the torso is lower, h.
+    """
+
+    bob: complex
+    roll: complex
+    bank: float
+    sink: float = 0.0
+
+    def resize(self, size: float, sink: float) -> Self:
+        """Return a multiple of the sway, of a torso that sinks."""
+        return self._replace(bob=size * self.bob, roll=size * self.roll, bank=size * self.bank, sink=sink)
+
+    def poses(self, phases: np.ndarray) -> np.ndarray:
+        """Return offsets (samples, 6) at phases (samples,), in cycles; see `posture`. The torso is never higher."""
+        turns = np.exp(2.0j * np.pi * phases)
+        poses = np.zeros((len(phases), 6))
+        poses[:, HEIGHT] = (self.bob * turns**2).real - abs(self.bob) - self.sink
+        poses[:, _ROLL] = (self.roll * turns).real + self.bank
+        return poses
+
+
+def choose_character(weight: float | str) -> Character:
+    """Return the character of a name, or a multiple of the usual one.
+
+    Raises:
+        ValueError: neither a name nor a number from 0 to `MAX_WEIGHT`.
+    """
+    if isinstance(weight, str):
+        return CHARACTERS[checks.name(weight, CHARACTERS, "weight")]
+    return USUAL._replace(size=checks.number("weight", weight, 0.0, MAX_WEIGHT))
+
+
+def add_weight(body: Body, drafts: Mapping[str, Draft], character: Character) -> dict[str, Draft]:
+    """Return drafts by name, in which walks, starts and stops have weight as far as legs and bounds allow.
+
+    Args:
+        body: the spec.
+        drafts: drafts that keep to their bounds.
+        character: how the body carries its weight.
+    """
+    weighted_drafts = dict(drafts)
+    if not character.size:
+        return weighted_drafts
+    passages = {name: draft for name, draft in drafts.items() if isinstance(clip_of(name), Passage)}
+    for name, draft in drafts.items():
+        if isinstance(clip_of(name), WalkLoop):
+            connected_passages = passages if name == "walk" else {}
+            weighted_drafts |= _weigh_gait(body, name, draft, connected_passages, character)
+    return weighted_drafts
+
+
+def _weigh_gait(body: Body, name: str, loop: Draft, passages, character: Character) -> dict[str, Draft]:
+    """Return a loop, and the starts and stops that connect to it, with the largest sway that all of them can follow."""
+    full_sway = find_sway(body, loop, character)
+    pitch_of_passage = {
+        passage_name: _follow_acceleration(body, passage_name, passage, character)
+        for passage_name, passage in passages.items()
+    }
+    drafts = {name: loop, **passages}
+    if _plan_gait(body, name, drafts, full_sway, pitch_of_passage, _SIZES[-1]):
+        for share in _SIZES:
+            plan = _plan_gait(body, name, drafts, full_sway, pitch_of_passage, share)
+            weighted_drafts = {
+                clip: _move_torso(body, clip, drafts[clip], movement.poses) for clip, movement in plan.items()
+            }
+            if plan and None not in weighted_drafts.values():
+                return {clip: weighted_drafts[clip]._replace(weight=plan[clip].share) for clip in plan}
+    return {clip: draft._replace(weight=0.0) for clip, draft in drafts.items()}
+
+
+class _Movement(NamedTuple):
+    """Offsets (samples, 6) of the torso in a clip, and the share of the weight that they are."""
+
+    poses: np.ndarray
+    share: float
+
+
+def _plan_gait(
+    body: Body, name: str, drafts: Mapping[str, Draft], full_sway: Sway, pitch_of_passage, share: float
+) -> dict[str, _Movement]:
+    """Return movements of all drafts of a gait with a share of its sway; none if legs cannot follow."""
+    for sink in _SINKS:
+        sway = full_sway.resize(share, sink)
+        loop_poses = sway.poses(_loop_phases(drafts[name]))
+        if not _can_follow(body, name, drafts[name], loop_poses):
+            continue
+        plan = {name: _Movement(loop_poses, share)}
+        for passage_name, pitch in pitch_of_passage.items():
+            movement = _plan_passage(body, passage_name, drafts[passage_name], sway, pitch)
+            if movement is None:
+                break
+            plan[passage_name] = movement
+        else:
+            return plan
+    return {}
+
+
+def _plan_passage(body: Body, name: str, draft: Draft, sway: Sway, pitch: np.ndarray) -> _Movement | None:
+    """Return the movement of a start or a stop with the sway of the walk and the largest pitch that legs can follow.
+
+    Args:
+        body: the spec.
+        name: name of the clip.
+        draft: its draft.
+        sway: sway of the walk.
+        pitch: (samples,) rad, at full size.
+
+    Returns:
+        The movement; None if legs cannot follow the sway.
+    """
+    starts = clip_of(name).starts
+    cycles = _cycles(draft)
+    cycles_from_rest = cycles if starts else cycles[::-1]
+    phases = cycles - cycles[-1] if starts else cycles  # 0 where it meets the walk
+    growth = 1.0 - fade_out(cycles_from_rest / _GROWTH_CYCLES)
+    poses = growth[:, None] * sway.poses(phases)
+    if not _can_follow(body, name, draft, poses):
+        return None
+    dip = abs(pitch) / max(abs(pitch).max(), 1e-9)
+    for share, depth in itertools.product(_PITCH_SIZES, _DIPS):
+        pitched_poses = poses.copy()
+        pitched_poses[:, _PITCH] += share * pitch
+        pitched_poses[:, HEIGHT] -= depth * dip
+        if _can_follow(body, name, draft, pitched_poses):
+            return _Movement(pitched_poses, share)
+    return _Movement(poses, 0.0)
+
+
+def _cycles(draft: Draft) -> np.ndarray:
+    """Return the times (samples,) of a draft, gait cycles."""
+    return np.arange(len(draft.motion.joints)) * draft.motion.time_step / draft.cycle
+
+
+def _loop_phases(loop: Draft) -> np.ndarray:
+    """Return the phases (samples,) of a loop, cycles; that of the last sample is that of the first."""
+    intervals = len(loop.motion.joints) - 1
+    return loop.cycles / intervals * (np.arange(intervals + 1) % intervals)
+
+
+def _follow_acceleration(body: Body, name: str, draft: Draft, character: Character) -> np.ndarray:
+    """Return the pitch (samples,), rad, of a torso that leans into the acceleration of its root; 0 at both ends."""
+    motion = draft.motion
+    velocities = np.gradient(motion.root[:, :2], motion.time_step, axis=0)
+    speed = rotations.to_heading_frame(velocities, motion.root[:, 2])[:, 0]
+    pitch = character.pitch / sizing.GRAVITY * np.gradient(speed, motion.time_step)
+    lowest, highest = (0.0, _MAX_TILT) if clip_of(name).starts else (-_MAX_TILT, 0.0)
+    cycles = _cycles(draft)
+    away_from_ends = (1.0 - fade_out(cycles / _FADE_CYCLES)) * (1.0 - fade_out(cycles[::-1] / _FADE_CYCLES))
+    return character.size * away_from_ends * character.follow(body, pitch.clip(lowest, highest), motion.time_step)
+
+
+def find_sway(body: Body, loop: Draft, character: Character) -> Sway:
+    """Return the offsets with which the torso of a loop moves as its character says.
+
+    The range of the height is that of the character, what the loop has included.
+    """
+    intervals = len(loop.motion.joints) - 1
+    phases = _loop_phases(loop)[:-1]
+    heights = sole_heights(compile_model(body), body, loop.motion.poses())
+    contacts, stance = find_foot_contacts(loop.motion, body, heights, loop.cycle, loops=True)
+    samples = [contact.sample for contact in contacts if contact.event == TOUCH_DOWN]
+    touchdowns = loop.cycles / intervals * np.array(samples)
+    frequency = 2.0 * np.pi / loop.cycle  # rad/s
+
+    fall = _direction(np.exp(-4.0j * np.pi * touchdowns).sum(), _MIN_COHERENCE * len(samples), default=1.0)
+    bob = -0.5 * character.bob * fall * character.direction(body, 2.0 * frequency)
+    present_bob = 2.0 * (loop.motion.positions[:-1, 2] * np.exp(-4.0j * np.pi * phases)).mean()
+    bob -= present_bob / body.torso.standing_height
+
+    x, y = np.array([leg.mount[:2] for leg in body.legs]).T
+    distances = y * (1.0 + _FRONT_SHARE * x / max(abs(x).max(), 1e-9))  # to the left of the middle
+    side = ((stance[:-1] @ distances) * np.exp(-2.0j * np.pi * phases)).mean()
+    side = _direction(side, _MIN_SIDE * abs(distances).sum(), default=float(np.sign(y[0])))
+    roll = -character.roll * side * character.direction(body, frequency)
+
+    forward, _, turning = loop.motion.twist
+    bank = -character.bank * math.atan(forward * turning / sizing.GRAVITY)
+    sway = Sway(bob, roll, float(np.clip(bank, -_MAX_TILT, _MAX_TILT)))
+    return sway.resize(character.size, sink=0.0)
+
+
+def _direction(number: complex, least: float, default: complex) -> complex:
+    """Return a complex number of size 1 in the direction of another; a default where that is small."""
+    return number / abs(number) if abs(number) > least else default
+
+
+def _can_follow(body: Body, name: str, draft: Draft, poses: np.ndarray) -> bool:
+    """Return whether legs follow offsets (samples, 6) of the torso within their bounds, by some of the samples."""
+    intervals = len(poses) - 1
+    samples = np.linspace(0, intervals, intervals // _SEARCH_STRIDE + 1).round().astype(int)
+    motion = draft.motion.map_arrays(lambda values: values[samples])
+    motion = motion._replace(root=motion.root[samples], time_step=draft.motion.seconds / (len(samples) - 1))
+    thin_draft = draft._replace(motion=motion)
+    weighted_draft = _move_torso(body, name, thin_draft, poses[samples])
+    if weighted_draft is None:
+        return False
+    slip = planting.slip(body, motion) if draft.loops else None
+    return slip is None or planting.slip(body, weighted_draft.motion) <= slip + _MAX_MORE_SLIP
+
+
+def _move_torso(body: Body, name: str, draft: Draft, poses: np.ndarray) -> Draft | None:
+    """Return a clip whose torso is moved by offsets (samples, 6) over its feet; None if legs or bounds forbid it."""
+    motion = draft.motion
+    standing_height = body.torso.standing_height
+    legs = Legs.of(body, used=1.0)
+    angles = legs.by_leg(motion.joints)
+    legs = legs._replace(  # with the centers of feet for soles, and ranges that hold all angles, as limits are soft
+        radii=np.zeros_like(legs.radii),
+        low=np.minimum(legs.low, angles.min(axis=0)),
+        high=np.maximum(legs.high, angles.max(axis=0)),
+    )
+    to_torso = rotations.matrix(motion.quaternions)  # turns rows of points from the root's axes into the torso's
+    feet = legs.soles(angles)[0] @ to_torso.swapaxes(-1, -2)  # from the torso
+    moved_angles = angles
+    for share in np.linspace(0.0, 1.0, _STAGES + 1)[1:]:
+        goals = posture.move_ground_points(feet, share * poses, standing_height) @ to_torso
+        moved_angles = legs.solve_joint_angles(
+            moved_angles, goals, _FOOT_WEIGHTS, posture.IK_DAMPING * standing_height, _ITERATIONS_PER_STAGE
+        )
+    misses = np.linalg.norm(legs.soles(moved_angles)[0] - goals, axis=-1) / standing_height
+    foot_radii = [leg.foot.radius for leg in body.legs]
+    max_stance_miss = _MAX_MISS if has_free_feet(body) else _MAX_MISS_OF_FEW_JOINTS
+    soles = motion.positions[:, None, 2] + feet[..., 2] - foot_radii
+    max_misses = np.where(soles > _SWING_HEIGHT * standing_height, _MAX_SWING_MISS, max_stance_miss)
+    joints = legs.by_joint(moved_angles)
+    max_joint_step = _MAX_SPEED_RATIO * abs(np.diff(motion.joints, axis=0)).max()
+    if (misses > max_misses).any() or abs(np.diff(joints, axis=0)).max() > max_joint_step:
+        return None
+    up, forward, left = (poses[:, [column]] for column in range(3))
+    moved_motion = motion._replace(
+        positions=motion.positions + standing_height * np.concatenate([forward, left, up], axis=-1),
+        quaternions=tilt(motion.quaternions, poses[:, 3:]),
+        joints=joints,
+    )
+    if bounds.find_excess(body, clip_of(name), moved_motion):
+        return None
+    return draft._replace(motion=moved_motion)
