@@ -4,6 +4,7 @@ A gesture is a table of tracks. A track has keys of time and value; between keys
 standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.POSE_NAMES`.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -17,7 +18,7 @@ from arc_suite.animation.clips.standing_legs import (
     pose_motion,
     sample_times,
 )
-from arc_suite.models import posture
+from arc_suite.models import posture, sizing
 from arc_suite.robots.spec import Body
 
 _LEFT = posture.POSE_NAMES.index("left")
@@ -60,6 +61,7 @@ _HIT_SINK = 0.1  # h
 
 # A strike: the torso draws back, then leans into it.
 _STRIKE_DURATION = 9.0
+_MAX_STRIKE_SECONDS = 1.49  # s; a longer one is quicker
 _STRIKE_TORSO_TRACKS = {
     "forward": ((0.3, 0.0), (2.2, -0.08), (3.0, -0.08), (3.8, 0.1), (4.6, 0.1), (7.5, 0.0)),
     "pitch": ((0.3, 0.0), (2.2, -0.14), (3.0, -0.15), (3.8, 0.12), (4.6, 0.1), (7.5, 0.0)),
@@ -182,7 +184,9 @@ def strike(body: Body, rest: Pose) -> ClipMotion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    times = sample_times(body, _STRIKE_DURATION)
+    seconds = _STRIKE_DURATION * math.sqrt(body.torso.standing_height / sizing.GRAVITY)
+    haste = max(1.0, seconds / _MAX_STRIKE_SECONDS)
+    times = haste * sample_times(body, _STRIKE_DURATION / haste)  # of the tracks
     feet = feet_from_torso(body, rest)
     front_leg = int(feet[:, 0].argmax())
     lifts = np.zeros((len(times), len(feet), 3))

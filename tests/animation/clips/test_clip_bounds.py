@@ -123,6 +123,14 @@ def test_gestures_of_any_body_keep_to_the_bounds(seed):
 
 
 @pytest.mark.slow
+def test_an_attack_of_a_large_body_is_over_soon():
+    motion = played(QUEEN, "attack")
+    assert 1.4 < motion.seconds < 1.5
+    assert np.ptp(motion.positions[:, 0]) > 0.1 * QUEEN.torso.standing_height
+    assert bounds.find_excess(QUEEN, CLIPS["attack"], motion) == ""
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lean_left", "look_up", "hit_left"])
 def test_gestures_tell_what_inverse_kinematics_misses(name):
     """Leaper leaned with soles 0.15 h in the ground."""

@@ -362,10 +362,10 @@ def test_what_is_played_from_rest_begins_or_ends_with_idle():
         for one, other in zip(clips["turn_180"].motion.pose(end), rest, strict=True):
             np.testing.assert_allclose(one, other, atol=1e-6)
     assert 0.0 < told["walk_loop"]["slip"] < 0.15 and "slip" not in told["idle_loop"]
-    # The failing leg moves less than it does in the walk, so that the difference undoes its steps.
+    # The failing leg moves less than it does in the walk, so that the difference undoes its steps. It follows the sway.
     walk, limp = made("tick")["walk"].motion.joints, clips["limp"].motion.joints
     swing = [np.ptp(joints[:, :3], axis=0).max() for joints in (walk, walk + limp[: len(walk)] - rest.joints)]
-    assert swing[1] < 0.5 * swing[0]
+    assert swing[1] < 0.6 * swing[0]
 
 
 @pytest.mark.slow

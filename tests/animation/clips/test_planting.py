@@ -42,8 +42,9 @@ def test_feet_in_stance_neither_slide_nor_sink():
     assert slip(before) > 0.15 and slip(after) < 0.07
     assert soles(after)[..., 2].min() > -0.003 * HEIGHT
     assert (after.joints[0] == after.joints[-1]).all()
-    for name in ("root", "positions", "quaternions"):
-        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
+    np.testing.assert_array_equal(after.root, before.root)
+    for name in ("positions", "quaternions"):  # weight falls after touchdowns, which planting moves by some samples
+        np.testing.assert_allclose(getattr(after, name), getattr(before, name), atol=0.001)
 
 
 @pytest.mark.long

@@ -1,0 +1,79 @@
+"""What weight and paces change in the clips of bodies.
+
+python tests/clip_weight.py BODY ...
+
+A body is a robot, an example, a file, or random:SEED. Prints for each body the range of the torso's height in the walk,
+standing heights, its roll, degrees, and the slip of its feet, without and with weight; the largest pitch that weight
+adds into the acceleration of a start and a stop, degrees; and for each pace its speed and cadence, as multiples of the
+walk, and its duty factor.
+"""
+
+import functools
+import sys
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.animation.clips import bounds, planting, weight
+from arc_suite.animation.clips.drafts import make_drafts
+from arc_suite.animation.clips.recorder import Recorder
+from arc_suite.bodies.families import sound_body
+from arc_suite.envs.setup import Setup
+
+LOOPS = ["slow", "walk", "fast", "run"]
+LOW = 0.01  # standing heights, of a sole in stance
+
+
+class Kept(Recorder):
+    """A recorder that records each walk and each passage once."""
+
+    record_walk = functools.cache(Recorder.record_walk)
+    record_transition = functools.cache(Recorder.record_transition)
+
+
+def tilts(draft) -> np.ndarray:
+    """Return roll and pitch (samples, 2) of a draft, degrees."""
+    matrices = rotations.matrix(draft.motion.quaternions)
+    roll = np.arctan2(matrices[:, 2, 1], matrices[:, 2, 2])
+    return np.degrees(np.stack([roll, -np.arcsin(matrices[:, 2, 0])], axis=-1))
+
+
+def walk_numbers(body, walk) -> str:
+    """Return range of the height, amplitude of the roll at the frequency of the gait, and slip."""
+    samples = len(walk.motion.joints) - 1
+    turns = np.exp(-2.0j * np.pi * walk.cycles * np.arange(samples) / samples)
+    bob = np.ptp(walk.motion.positions[:, 2]) / body.torso.standing_height
+    roll = 2.0 * abs((tilts(walk)[:-1, 0] * turns).mean())
+    return f"bob {bob:.3f}, roll {roll:.1f}, slip {planting.slip(body, walk.motion):.3f}"
+
+
+def main(*names: str) -> None:
+    """Print the numbers of bodies."""
+    for name in names:
+        _, _, seed = name.partition("random:")
+        body = sound_body(int(seed)) if seed else Setup.of(name, "steer").body
+        recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
+        clips = [*LOOPS, "start", "stop"]
+        light, heavy = (
+            make_drafts(recorder, clips, iter, left_out, character=weight.choose_character(size)) for size in (0.0, 1.0)
+        )
+        lines = [
+            f"without weight: {walk_numbers(body, light['walk'])}",
+            f"with it: {walk_numbers(body, heavy['walk'])}",
+        ]
+        for clip, sign in (("start", 1.0), ("stop", -1.0)):
+            if clip in heavy:
+                lines.append(f"pitch in {clip} {(sign * (tilts(heavy[clip]) - tilts(light[clip]))[:, 1]).max():.1f}")
+        walk = light["walk"]
+        for clip in [clip for clip in LOOPS if clip in light]:
+            draft = light[clip]
+            speed, cadence = draft.motion.twist[0] / walk.motion.twist[0], walk.cycle / draft.cycle
+            soles = bounds.measure_ground(body, draft.motion).soles[:-1]
+            duty = (soles < LOW * body.torso.standing_height).mean()
+            lines.append(f"{clip}: speed {speed:.2f}, cadence {cadence:.2f}, duty factor {duty:.2f}")
+        lines += [f"no {clip}: {reason}" for clip, reason in left_out.items()]
+        print("; ".join([name, *lines]), flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
