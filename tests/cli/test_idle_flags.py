@@ -29,7 +29,7 @@ ALWAYS = {
     "evaluate": f"{COMMON} episodes seed json".replace(" preset", ""),
     "style": f"{COMMON} compare episodes json output page save".replace(" preset", ""),
     "collect": f"{BODY} {SET} num_envs threads verify",
-    "train": f"{BODY} {SET} algorithm hp train_set seed seeds steps prior evaluate_every config modules minutes "
+    "train": f"{BODY} {SET} algorithm hp train_set seed seeds steps prior evaluate_every best config modules minutes "
     "until_score threads tensorboard wandb output",
     "study": "runs results report",
     "benchmark": "results",
