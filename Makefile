@@ -13,11 +13,11 @@
 # make clean    deletes environments and what is built
 # make check-NAME, of the table below; most have an environment of their own, so that heavy packages stay out of .venv:
 #   long, release       tests that take long, and those for a release: half an hour
-#   editor              programs of pages, by mypy: what users' editors show
+#   editor              programs of pages, by mypy and pyright: what users' editors show; needs Node
 #   types, lowest       annotations, by mypy; the environments with the oldest Gymnasium that setup.cfg admits
 #   agents, agents-release, jax, mjx, mjx-release    learners, tasks and worlds on JAX, on a processor
 #   sb3, clients        stable-baselines3 and our scripts for it; the clients of docs/clients.md: gigabytes
-#   first-steps         a newcomer's six first successes, by the commands of the pages; an hour
+#   first-steps         six roads of newcomers, each to its end, by the commands of the pages; two hours
 #   docs, notebooks     links of the site, its front page in Chromium; the notebooks of examples
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them
@@ -146,7 +146,8 @@ check-types: RUN = $(VENV)/bin/mypy
 check-editor: VENV := .venv-editor
 check-editor: EXTRAS := learn,animate
 check-editor: PACKAGES := pytest mypy==2.4.1
-check-editor: RUN = $(PYTEST) tests/house/test_editor_types.py
+check-editor: RUN = npm install --prefix .node-editor --no-audit --no-fund --silent pyright@1.1.414 && \
+	PATH=$(CURDIR)/.node-editor/node_modules/.bin:$$PATH $(PYTEST) tests/house/test_editor_types.py
 
 check-lowest: VENV := .venv-lowest
 check-lowest: PACKAGES := gymnasium==1.2.0
@@ -165,9 +166,10 @@ check-sb3: RUN = $(VENV)/bin/python tools/check_sb3.py --steps 500 && \
 
 check-clients: RUN = $(PYTHON) tools/check_clients.py
 
-# The extras of README's install line.
+# The extras of README's install line, and what runs ONNX.
 check-first-steps: VENV := .venv-first-steps
 check-first-steps: EXTRAS := learn,animate
+check-first-steps: PACKAGES := onnxruntime
 check-first-steps: RUN = $(PYTHON) tools/check_first_steps.py
 
 check-docs: docs

@@ -20,7 +20,7 @@ _HEADER_READERS = {
 }
 
 
-def read(path: str | os.PathLike, max_bytes: int, only: str | None = None) -> dict[str, np.ndarray]:
+def read(path: str | os.PathLike[str], max_bytes: int, only: str | None = None) -> dict[str, np.ndarray]:
     """Return the arrays of an archive by name.
 
     Args:
@@ -42,7 +42,7 @@ def read(path: str | os.PathLike, max_bytes: int, only: str | None = None) -> di
     return arrays
 
 
-def read_member(path: str | os.PathLike, member: str, max_bytes: int) -> str:
+def read_member(path: str | os.PathLike[str], member: str, max_bytes: int) -> str:
     """Return the text of a member of an archive.
 
     Args:
@@ -61,7 +61,7 @@ def read_member(path: str | os.PathLike, member: str, max_bytes: int) -> str:
         return archive.read(entry).decode("utf-8")
 
 
-def digest(path: str | os.PathLike, max_bytes: int) -> str:
+def digest(path: str | os.PathLike[str], max_bytes: int) -> str:
     """Return the sha256 of the members of an archive: their names in order, sizes and bytes.
 
     Times and the compression of members do not count.

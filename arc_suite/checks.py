@@ -132,7 +132,7 @@ def _suggest(text: str) -> str:
     return f"; did you mean {text}?"
 
 
-def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
+def extension(path: str | os.PathLike[str], valid: Iterable[str]) -> str:
     """Return the extension of a file to write, in lower case.
 
     Args:
@@ -323,6 +323,11 @@ def preview(value: Any) -> str:
         return f"a {type(value).__name__} that cannot be shown"
 
 
+def describe_syntax_error(error: SyntaxError) -> str:
+    """Return file, line and reason of a module that is no Python, for errors."""
+    return quote(f"{error.filename}, line {error.lineno}: {error.msg}")
+
+
 def import_object(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:
     """Import the module in `module:name`, and return the object of that name in it.
 
@@ -332,10 +337,12 @@ def import_object(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.
         resolve: function from the path to the object.
 
     Raises:
-        ValueError: the module cannot be imported, or has no such name.
+        ValueError: the module cannot be imported, is no Python, or has no such name.
     """
     try:
         return resolve(path)
+    except SyntaxError as error:
+        raise ValueError(f"{kind} {path[:_MAX_PATH]!r}: {describe_syntax_error(error)}") from None
     except (ImportError, ValueError, AttributeError) as error:
         suggestion = hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
         raise ValueError(f"{kind} {path[:_MAX_PATH]!r}: {quote(error)}{suggestion}") from None

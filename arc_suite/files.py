@@ -1,9 +1,11 @@
 """Files that are written completely or not at all, folders that are made where needed, and locks."""
 
 import contextlib
+import difflib
 import errno
 import glob
 import io
+import itertools
 import json
 import math
 import os
@@ -28,10 +30,12 @@ _STORAGE_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 _LOCKED_BYTE = 1 << 30  # position in the file, on Windows; far behind all content, as others cannot read a locked byte
 _LOCK_RETRY_INTERVAL = 0.1  # s
 _MIN_AGE = 3600.0  # s, of a temporary file of another target
+_MAX_ENTRIES = 1000  # of a folder, among which a similar name is sought
+_LEAST_SIMILARITY = 0.75  # of a name that an error suggests, up to 1
 _MAX_STEM = 32  # characters of a target's name in the names of its temporary files
 
 
-def folder(path: str | os.PathLike) -> Path:
+def folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder if there is none yet, and return its path.
 
     Raises:
@@ -46,7 +50,7 @@ def folder(path: str | os.PathLike) -> Path:
 
 
 @contextlib.contextmanager
-def writing(path: str | os.PathLike) -> Iterator[Path]:
+def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Write a file atomically: `with writing("a.png") as temporary: save(temporary)`.
 
     The temporary file lies in the target's folder and has its extension. When the block ends, the temporary file
@@ -84,7 +88,7 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def naming(path: str | os.PathLike) -> Iterator[None]:
+def naming(path: str | os.PathLike[str]) -> Iterator[None]:
     """Name a file, or another place that is written to, in errors of its disk, which name none.
 
     Raises:
@@ -98,7 +102,7 @@ def naming(path: str | os.PathLike) -> Iterator[None]:
         raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
 
 
-def write(path: str | os.PathLike, text: str) -> None:
+def write(path: str | os.PathLike[str], text: str) -> None:
     """Write a file of text in UTF-8 as `writing` does.
 
     Raises:
@@ -109,7 +113,7 @@ def write(path: str | os.PathLike, text: str) -> None:
 
 
 @contextlib.contextmanager
-def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
+def writing_json(path: str | os.PathLike[str] | None) -> Iterator[dict]:
     """Write a JSON file as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.
 
     Args:
@@ -144,7 +148,7 @@ def _to_json_values(value):
     return value
 
 
-def delete_temporaries(path: str | os.PathLike) -> None:
+def delete_temporaries(path: str | os.PathLike[str]) -> None:
     """Delete all temporary files of `writing` for a target; the caller knows that no process is writing it."""
     target = Path(path)
     for temporary in target.parent.glob(f".{target.stem[:_MAX_STEM]}.*{target.suffix}"):
@@ -196,7 +200,7 @@ def _may_run(process_id: int) -> bool:
 
 
 @contextlib.contextmanager
-def reading(path: str | os.PathLike) -> Iterator[None]:
+def reading(path: str | os.PathLike[str]) -> Iterator[None]:
     """Give errors of reading a file or folder one wording: `with reading("a.md"): text = page.read_text()`.
 
     Raises:
@@ -207,10 +211,30 @@ def reading(path: str | os.PathLike) -> Iterator[None]:
     except UnicodeDecodeError:
         raise OSError(f"cannot read {path}: expected text in UTF-8") from None
     except OSError as error:
-        raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from None
+        cure = suggest_path(path) if isinstance(error, FileNotFoundError) else ""
+        raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}{cure}") from None
 
 
-def read_bytes(path: str | os.PathLike, max_bytes: int) -> bytes:
+def is_folder(text: str) -> bool:
+    """Return whether a text is the path of a folder; many a text is no path."""
+    try:
+        return text != "" and Path(text).is_dir()
+    except (OSError, ValueError):  # it is too long, or has a null character
+        return False
+
+
+def suggest_path(path: str | os.PathLike[str]) -> str:
+    """Return the part of an error on a missing path that suggests one of a similar name; "" for none."""
+    path = Path(path)
+    try:
+        names = [entry.name for entry in itertools.islice(path.parent.iterdir(), _MAX_ENTRIES)]
+    except (OSError, ValueError):  # no folder, or the text is no path
+        return ""
+    matches = difflib.get_close_matches(path.name, names, n=1, cutoff=_LEAST_SIMILARITY)
+    return f"; did you mean {path.parent / matches[0]}?" if matches else ""
+
+
+def read_bytes(path: str | os.PathLike[str], max_bytes: int) -> bytes:
     """Return the bytes of a file that others may have written, at most one more than it may have.
 
     Raises:
@@ -224,7 +248,7 @@ def read_bytes(path: str | os.PathLike, max_bytes: int) -> bytes:
             return file.read(max_bytes + 1)
 
 
-def read_utf8(path: str | os.PathLike, max_bytes: int) -> str:
+def read_utf8(path: str | os.PathLike[str], max_bytes: int) -> str:
     """Return the text of a file that others may have written, with line ends as `open` reads them.
 
     Raises:
@@ -237,7 +261,7 @@ def read_utf8(path: str | os.PathLike, max_bytes: int) -> str:
         return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8").read()
 
 
-def plain(path: str | os.PathLike) -> Path:
+def plain(path: str | os.PathLike[str]) -> Path:
     """Return the path of a plain file, after a check that it is one: reading a pipe, for example, would block.
 
     Raises:
@@ -252,7 +276,7 @@ def plain(path: str | os.PathLike) -> Path:
     return path
 
 
-def read_json(path: str | os.PathLike, max_bytes: int = MAX_JSON) -> Any:
+def read_json(path: str | os.PathLike[str], max_bytes: int = MAX_JSON) -> Any:
     """Return the content of a JSON file that others may have written.
 
     Args:
@@ -290,7 +314,7 @@ def lock(file: IO) -> bool:
 
 
 @contextlib.contextmanager
-def hold_lock(path: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
+def hold_lock(path: str | os.PathLike[str], refusal: str | None = None) -> Iterator[None]:
     """Hold a lock against other processes during the block. The lock is a file that exists while it is held.
 
     Args:

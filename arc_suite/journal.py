@@ -18,7 +18,7 @@ class Journal:
         generations: those in the file, NamedTuples.
     """
 
-    def __init__(self, path: str | os.PathLike, settings: Mapping[str, Any], generation: Callable[..., Any]):
+    def __init__(self, path: str | os.PathLike[str], settings: Mapping[str, Any], generation: Callable[..., Any]):
         """Open the file, or start one.
 
         Args:

@@ -5,6 +5,7 @@ additions: the suite's own entries of these kinds stand in the modules that use 
 """
 
 import collections
+import difflib
 import functools
 import hashlib
 import importlib
@@ -17,7 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from arc_suite import checks
+from arc_suite import checks, files
 from arc_suite.arenas import ARENAS, Arena, ground_text
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -61,6 +62,7 @@ SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")
 
 MAX_BODIES = 1 << 16  # the most bodies that one text may name
 
+_SAME_WORD = 0.8  # least similarity of a misspelled name, up to 1
 _MAX_QUOTE = 80  # characters of a name in an error
 _SEED_OR_RANGE = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")  # "7" or "0-9"
 _GROUND_FILE = re.compile(r"(.*?\.[a-zA-Z]\w{0,4})(?::([\d.][\d.ex+-]{0,100}))?", re.DOTALL)  # a path, and its scale
@@ -89,7 +91,7 @@ def all_tasks() -> tuple[tuple[str, str], ...]:
     return tuple((domain, task) for domain in ROBOTS for task in TASKS)
 
 
-def body_of(robot, suggestions: Iterable[str] = ()) -> Body:
+def body_of(robot: str | os.PathLike[str] | Body, suggestions: Iterable[str] = ()) -> Body:
     """Return the body that a word stands for.
 
     Args:
@@ -209,7 +211,19 @@ def _generate_bodies(robot, suggestions: Iterable[str]) -> Iterator[Body]:
         for seed in _parse_seeds(family, seeds):
             yield _draw_body(family, seed)
     else:
+        _refuse_other_words(text)
         yield _look_up(robot, ROBOTS, "robot", (*EXAMPLES, *_family_words(), *suggestions))
+
+
+def _refuse_other_words(text: str) -> None:
+    """Raise ValueError for a word that names a task or a folder in place of a body."""
+    if text in ROBOTS:
+        return
+    if text in TASKS:
+        raise ValueError(f"robot {text!r}: it is a task; robots are {', '.join(ROBOTS)}")
+    if files.is_folder(text):
+        extensions = ", ".join((".json", *READERS))
+        raise ValueError(f"robot {checks.preview(text)}: it is a folder; expected a name, or a file {extensions}")
 
 
 def _family_words() -> list[str]:
@@ -238,6 +252,8 @@ def _is_path(robot) -> bool:
 
 
 def _read_file(path: Path) -> Body:
+    if path.stem in robot_words() and not path.exists():
+        raise FileNotFoundError(f"cannot read {path}: no such file or directory; did you mean {path.stem}?")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         return load_body(path)
@@ -284,6 +300,8 @@ def task_of(name: str) -> type[Task]:
     Raises:
         ValueError: an unknown name.
     """
+    if isinstance(name, str) and name in robot_words() and name not in TASKS:
+        raise ValueError(f"task {name!r}: it is a robot; tasks are {', '.join(TASKS)}")
     return _look_up(name, TASKS, "task")
 
 
@@ -378,6 +396,21 @@ def task_setting_names() -> set[str]:
         names_of_settings = getattr(task, "names", tuple)  # a method; tasks of other packages may lack it
         names.update(names_of_settings())
     return names
+
+
+def refuse_settings_of_others(task: type[Task], settings: Iterable[str]) -> None:
+    """Raise ValueError for a setting that a task lacks and others have; its class lists what it has in `names`."""
+    names_of_settings = getattr(task, "names", None)  # tasks of other packages may lack it
+    if names_of_settings is None:
+        return
+    own_names = (*names_of_settings(), *SETTINGS_OF_EVERY_TASK)
+    for name in settings:
+        if difflib.get_close_matches(str(name), own_names, n=1, cutoff=_SAME_WORD):  # itself, or a slip of it
+            continue
+        task_names = [key for key, kind in TASKS.items() if name in getattr(kind, "names", tuple)()]
+        if task_names:
+            verb = "has" if len(task_names) == 1 else "have"
+            raise ValueError(f"setting {name!r}: {task.name} has none; {', '.join(task_names)} {verb} it")
 
 
 def check_stored_settings(settings: Mapping[str, Any]) -> None:
@@ -480,6 +513,8 @@ def import_module(module: str, subject: str) -> None:
     """
     try:
         importlib.import_module(module)
+    except SyntaxError as error:
+        raise ValueError(f"{subject}: {checks.describe_syntax_error(error)}") from None
     except ImportError as error:
         shown_module = module[:_MAX_QUOTE]
         message = f"{subject}: cannot import {shown_module}: {checks.quote(error)}"

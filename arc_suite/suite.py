@@ -6,6 +6,7 @@ Attributes:
     TASKS_BY_DOMAIN: tasks by robot.
 """
 
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,4 +26,4 @@ def __getattr__(name: str) -> Any:
             return registry.all_tasks()
         case "TASKS_BY_DOMAIN":
             return registry.tasks_by_domain()
-    raise AttributeError(f"module 'arc_suite' has no attribute {name!r}")
+    raise AttributeError(f"module 'arc_suite' has no attribute {name!r}", name=name, obj=sys.modules["arc_suite"])

@@ -5,16 +5,16 @@ import contextlib
 import dataclasses
 import io
 import itertools
-from collections.abc import Callable
-from typing import Any
+import os
 from xml.etree import ElementTree
 
 from arc_suite import checks, policies, style
 from arc_suite.animation import pages
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
+from arc_suite.envs.task_view import AnyEnvironment
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import Policy
+from arc_suite.policies import Policy, PolicyFunction
 from arc_suite.simulation import films
 
 _PAGE_STEPS = 400  # control steps
@@ -39,8 +39,8 @@ class Inline:
 
 
 def show(
-    environment: Any,
-    policy: str | Policy | Callable = "cpg",
+    environment: AnyEnvironment,
+    policy: str | os.PathLike[str] | Policy | PolicyFunction = "cpg",
     *,
     seed: int = 0,
     steps: int | None = None,

@@ -22,7 +22,7 @@ from arc_suite.tasks import Task
 NAME = "universal"  # of the policies in the package
 
 
-def load(name: str | os.PathLike, task: Task | None = None) -> Network:
+def load(name: str | os.PathLike[str], task: Task | None = None) -> Network:
     """Return a policy of many bodies: `universal`, which comes with the package, a policy file, or that of a run.
 
     Args:

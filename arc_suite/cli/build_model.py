@@ -110,6 +110,8 @@ def _output_from_flags() -> Path | None:
         return path.with_suffix(extension)
     if not FLAGS.json and path.suffix.lower() == ".json":
         raise ValueError(f"--output={path}: a model is .xml; --json writes the spec")
+    if path.suffix:
+        checks.extension(path, [extension])
     return path
 
 

@@ -389,6 +389,10 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
                 f"; did you mean {checks.quote(f'{name_before_colon}={value_behind}')}?" if colon and not equals else ""
             )
             raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value{cure}")
+        mapping, dot, key = name.partition(".")
+        if dot and "." not in key and ":" not in name:
+            cure = checks.quote(f'{mapping}={{"{key}": {value}}}')
+            raise ValueError(f"--{flag} {checks.quote(text)}: expected a name without a dot; did you mean '{cure}'?")
         if name in values:
             raise ValueError(f"--{flag} {checks.quote(text)}: {checks.quote(name)} has a value already")
         values[name] = _parse_value(value)

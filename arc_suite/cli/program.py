@@ -60,7 +60,7 @@ def say(line: str) -> None:
 
 
 @contextlib.contextmanager
-def resumable(folder: str | os.PathLike) -> Iterator[None]:
+def resumable(folder: str | os.PathLike[str]) -> Iterator[None]:
     """Run work in a folder; when Ctrl-C or SIGTERM interrupts it, say that the same command resumes it."""
     try:
         yield
@@ -176,6 +176,10 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
         names = sorted({flag.name for flag in _flags_of(module)})
         _, _, value = error.flagvalue.partition("=")
         _refuse_name_of_value(error.flagname, value, names)
+        if len(error.flagname) == 1:
+            long_names = [f"--{name}" for name in names if name[0] == error.flagname]
+            if long_names:
+                raise ValueError(f"unknown flag '-{error.flagname}'; did you mean {' or '.join(long_names)}?") from None
         checks.name(error.flagname, names, "flag")  # raises a ValueError that suggests a name
         raise
     except flags.IllegalFlagValueError as error:

@@ -1,6 +1,7 @@
 """Demonstrators: policies that walk by a law, fitted to a task."""
 
 import itertools
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,6 +14,7 @@ from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepare_task
+from arc_suite.envs.task_view import AnyEnvironment, TaskView
 from arc_suite.envs.timestep import TimeStep
 from arc_suite.models.soundness import hopeless_flaws
 from arc_suite.robots.spec import Body
@@ -45,7 +47,7 @@ class Demonstrator:
         law: law of the preset, fitted to the task; see `cpg.law`.
     """
 
-    def __init__(self, task: Any, preset: Any = None):
+    def __init__(self, task: AnyEnvironment | TaskView | Task | Body | str | os.PathLike[str], preset: Any = None):
         """Fit a demonstrator.
 
         Args:
@@ -101,7 +103,7 @@ class Demonstrator:
             self._state = restart_where(self._state, self.law.initial(len(mask)), mask)
         self._reset_indices = list(indices)
 
-    def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray | None = None) -> np.ndarray:
         """Return the actions of a control step.
 
         Args:
@@ -151,7 +153,12 @@ class Demonstrator:
 
     def __call__(self, timestep: TimeStep) -> np.ndarray:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
-        if timestep.first():
+        try:
+            is_first = timestep.first()
+        except AttributeError:
+            kind = type(timestep).__name__
+            raise ValueError(f"timestep: expected what reset and step of a dm_env return, got {kind}") from None
+        if is_first:
             self.reset([0])
         return self.act(timestep.observation)
 

@@ -34,7 +34,7 @@ def collect(
     num_envs: int = NUM_ENVS,
     threads: int | None = None,
     overwrite: bool = False,
-    progress: Callable = tqdm,
+    progress: Callable[..., Any] = tqdm,
     author: str | None = None,
     code_permalink: str | None = None,
     wait: bool = False,
@@ -139,7 +139,12 @@ def _with_versions_by_package(provenance: dict) -> dict:
 
 
 def _play(
-    storage: Storage, settings: DatasetSettings, missing: list[int], num_envs: int, threads, progress: Callable
+    storage: Storage,
+    settings: DatasetSettings,
+    missing: list[int],
+    num_envs: int,
+    threads,
+    progress: Callable[..., Any],
 ) -> None:
     """Play the missing episodes into the storage."""
     # So many environments that each plays about the same number of episodes.

@@ -136,7 +136,7 @@ class Storage:
                 temporary.write_bytes(file.id.get_file_image())
         self._stored |= {index: StoredEpisode(path, episode.length) for index, episode in finished.items()}
 
-    def finish(self, progress: Callable) -> None:
+    def finish(self, progress: Callable[..., Any]) -> None:
         """Merge the episodes before the first missing one into the dataset. If none is missing, delete the parts.
 
         Args:

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Callable
+from typing import Any
 
 from tqdm import tqdm
 
@@ -20,7 +21,7 @@ def verify(
     body: Body | None = None,
     num_envs: int = NUM_ENVS,
     threads: int | None = None,
-    progress: Callable = tqdm,
+    progress: Callable[..., Any] = tqdm,
     task: str | None = None,
 ) -> int:
     """Replay every episode of a dataset from its seed and compare all arrays bit by bit.

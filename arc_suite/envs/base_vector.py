@@ -1,6 +1,7 @@
 """What vector environments have in common: calls of every environment, checks of seeds, masks and indices."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -16,7 +17,7 @@ _PER_ENVIRONMENT = ("np_random", "np_random_seed", "render", "positions", "resam
 _SINGLE_ATTRIBUTES = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
 
 
-class BaseVectorEnv(gymnasium.vector.VectorEnv):
+class BaseVectorEnv(gymnasium.vector.VectorEnv[Any, np.ndarray, np.ndarray]):
     """A vector environment with the attributes and methods of each of its environments."""
 
     def call(self, name: str, *args, **kwargs) -> tuple:

@@ -4,7 +4,7 @@ import collections
 import functools
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from dm_control.rl import control
@@ -44,7 +44,7 @@ _REFUSED_SETTINGS = {
 
 
 def load(
-    domain_name: str | os.PathLike | Body,
+    domain_name: str | os.PathLike[str] | Body,
     task_name: str,
     task_kwargs: Mapping[str, Any] | None = None,
     environment_kwargs: Mapping[str, Any] | None = None,
@@ -98,6 +98,10 @@ class Environment(KnownAttributes, control.Environment):
     Attributes:
         task_kwargs: the settings with which `load` opened the task.
     """
+
+    if TYPE_CHECKING:  # dm_control leaves its type open
+
+        def control_timestep(self) -> float: ...
 
     def __init__(self, physics: Physics, run: "TaskRun", task_kwargs: Mapping[str, Any]):
         """Combine a task's run and its simulation; `load` makes both."""

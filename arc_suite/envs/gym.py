@@ -1,5 +1,6 @@
 """The suite as Gymnasium environments: shimmy's adapter for dm_control, with everything else that Gymnasium defines."""
 
+import os
 import sys
 import types
 import weakref
@@ -13,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from arc_suite import checks, versions
 from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
-from arc_suite.envs.dm import load
+from arc_suite.envs.dm import TaskRun, load
 from arc_suite.envs.prepare import checked_limit, refuse_arguments
-from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.window import Window
+from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl, pictures
 
 with versions.explain_import_errors():  # shimmy imports `gym`, and a user's own file may have that name
@@ -48,6 +49,9 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
     # Modes for which `gymnasium.make` may ask; an instance's own metadata has those that work on this machine.
     metadata = {"render_modes": [*_HEADLESS_MODES, "human"], "render_fps": 20}
 
+    observation_space: gymnasium.spaces.Box
+    action_space: gymnasium.spaces.Box
+
     _np_random_seed = -1  # until a seed is given: Gymnasium's sign for a stream of unknown seed
 
     _FORMER_NAMES = {  # in pickles of earlier versions
@@ -58,7 +62,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
     def __init__(
         self,
-        domain_name: str,
+        domain_name: str | os.PathLike[str] | Body,
         task_name: str,
         task_kwargs: Mapping[str, Any] | None = None,
         visualize_reward: bool = False,
@@ -131,7 +135,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         return True
 
     @property
-    def task(self) -> TaskView:
+    def task(self) -> TaskRun:
         """The task; its `split` gives an observation's blocks by name."""
         return self._env.task
 

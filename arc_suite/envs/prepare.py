@@ -3,6 +3,7 @@
 import inspect
 import json
 import math
+import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from arc_suite import checks, registry
 from arc_suite.models.sizing import simulation
 from arc_suite.models.standing import standing_qpos
+from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import modified_task, parameters, readings
 from arc_suite.tasks.contract import STEPS, Task
@@ -23,7 +25,7 @@ _ROUNDING = 1e-6  # control steps, by which a time limit may exceed a number of 
 
 
 def prepare_task(
-    domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None
+    domain_name: str | os.PathLike[str] | Body, task_name: str, task_kwargs: Mapping[str, Any] | None = None
 ) -> tuple[Task, mujoco.MjModel]:
     """Return a task, and the model of its simulation.
 
@@ -45,6 +47,7 @@ def prepare_task(
     if chosen_arena is not None and task_class.own_arena:
         raise ValueError(f"arena: task {task_class.name} has a ground of its own, expected none")
     modifier_settings = {**task_class.modifiers, **_take_modifier_settings(task_settings)}
+    registry.refuse_settings_of_others(task_class, task_settings)
     settings = task_class.settings_for(body, task_settings)
     arena = task_class.arena(body, settings) if chosen_arena is None else registry.arena_of(chosen_arena, body)
 
@@ -213,7 +216,9 @@ def checked_limit(max_episode_steps: Any, task: Task) -> int:
     return limit
 
 
-def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> Symmetry:
+def symmetry(
+    domain_name: str | os.PathLike[str] | Body, task_name: str, task_kwargs: Mapping[str, Any] | None = None
+) -> Symmetry:
     """Return the exact left-right symmetry of a task's observations and actions.
 
     `symmetry(...).observation` maps observation vectors (..., size), `.action` actions (..., joints); see

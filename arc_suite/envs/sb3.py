@@ -5,6 +5,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common import vec_env
@@ -26,7 +27,7 @@ class VecEnv(vec_env.VecEnv):
     an agent contains them, too.
     """
 
-    def __init__(self, environments: VectorEnv):
+    def __init__(self, environments: gymnasium.vector.VectorEnv[Any, Any, Any]):
         """Wrap a vector environment.
 
         Args:

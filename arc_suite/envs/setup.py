@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -60,7 +61,12 @@ class Setup:
     settings_json: str = "{}"
 
     @classmethod
-    def of(cls, domain_name, task_name: str = "walk", task_kwargs: Mapping[str, Any] | None = None) -> "Setup":
+    def of(
+        cls,
+        domain_name: str | os.PathLike[str] | Body,
+        task_name: str = "walk",
+        task_kwargs: Mapping[str, Any] | None = None,
+    ) -> "Setup":
         """Return the setup for arguments of `arc_suite.load`, or for several bodies.
 
         Modules in names are imported. Values of settings are checked later: by `prepare`, or when an environment is
@@ -240,7 +246,7 @@ class Setup:
         """
         return self.with_settings({}, dropped=["exclude_blocks"])
 
-    def load(self, seed: int | None = None, **options) -> dm.Environment:
+    def load(self, seed: int | None = None, **options: Any) -> dm.Environment:
         """Open a dm_env.
 
         Args:
@@ -249,11 +255,11 @@ class Setup:
         """
         return dm.load(self.body, self.task, self._task_kwargs_with(seed), **options)
 
-    def make(self, **options) -> gymnasium.Env:
+    def make(self, **options: Any) -> gymnasium.Env[np.ndarray, np.ndarray]:
         """Open a Gymnasium environment; for the options see `gymnasium.make`."""
         return gymnasium.make(self.spec(), **options)
 
-    def make_vec(self, num_envs: int = 1, *, seed: int | None = None, **options) -> Any:
+    def make_vec(self, num_envs: int = 1, *, seed: int | None = None, **options: Any) -> Any:
         """Open a `VectorEnv`; of several bodies a `BodiesEnv` with flat observations.
 
         Args:

@@ -2,13 +2,18 @@
 
 import collections
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
+import dm_env
+import gymnasium
 import numpy as np
 
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 from arc_suite.tasks.contract import Scene
+
+# An environment of `arc_suite.load`, `gymnasium.make` or `gymnasium.make_vec`, in wrappers or not.
+AnyEnvironment: TypeAlias = dm_env.Environment | gymnasium.Env[Any, Any] | gymnasium.vector.VectorEnv[Any, Any, Any]
 
 
 class TaskView:

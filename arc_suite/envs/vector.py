@@ -108,6 +108,11 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         task: the task of the environments; its `split` returns an observation's blocks by name.
     """
 
+    observation_space: gymnasium.spaces.Box
+    action_space: gymnasium.spaces.Box
+    single_observation_space: gymnasium.spaces.Box
+    single_action_space: gymnasium.spaces.Box
+
     _max_episode_steps: float = math.inf  # in pickles of earlier versions, which have `step_limit` alone
 
     _FORMER_NAMES = {  # in pickles of earlier versions
@@ -120,7 +125,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
     def __init__(
         self,
-        domain_name: str | os.PathLike | Body,
+        domain_name: str | os.PathLike[str] | Body,
         task_name: str,
         num_envs: int = 1,
         num_threads: int | None = None,
@@ -218,8 +223,9 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self._task.size,), np.float32)
         joints = len(self._tasks[0].scene.body.joint_names)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (joints,), np.float32)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        # Batches of a Box are a Box.
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)  # type: ignore[assignment]
+        self.action_space = batch_space(self.single_action_space, self.num_envs)  # type: ignore[assignment]
         self._sealed_by = __name__
 
     @one_thread_at_a_time

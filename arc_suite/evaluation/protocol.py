@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
+from arc_suite.envs.timestep import TimeStep
 from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
 from arc_suite.simulation.episode_loop import play_episode
@@ -66,7 +68,7 @@ def check_ends(limit: float) -> None:
         raise ValueError("time_limit: expected a finite number, as every episode must end, got inf")
 
 
-def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Iterator:
+def rollout(environment: Environment, policy: Policy, seed: int, max_steps: int | None = None) -> Iterator[TimeStep]:
     """Play one episode.
 
     Args:
@@ -87,7 +89,11 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
 
 
 def run(
-    environment, policy: Policy, seed: int, max_steps: int | None = None, watchers: Iterable[Callable] = ()
+    environment: Environment,
+    policy: Policy,
+    seed: int,
+    max_steps: int | None = None,
+    watchers: Iterable[Callable[[TimeStep], Any]] = (),
 ) -> EpisodeResult:
     """Play one episode and return its results.
 
@@ -108,7 +114,7 @@ def run(
     return EpisodeResult(float(sum(rewards)), len(rewards), progress)
 
 
-def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)) -> list[EpisodeResult]:
+def episodes(environment: Environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)) -> list[EpisodeResult]:
     """Run one episode for each seed.
 
     Args:
@@ -160,7 +166,7 @@ def episodes_in_batch(
             has_diverged = info.get("diverged", np.zeros(num_envs, bool))
             watch(is_playing, is_playing & (terminated | has_diverged))
         has_ended = is_playing & (terminated | truncated)
-        for index in np.flatnonzero(has_ended):
+        for index in np.flatnonzero(has_ended).tolist():
             progress[index] = _read_metrics(info, index)
         is_playing &= ~has_ended
         if has_ended.any() and is_playing.any():

@@ -15,7 +15,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, protocol, provenance, statistics
 from arc_suite.evaluation.protocol import CURVE_EPISODES, EPISODES, EpisodeResult
 from arc_suite.evaluation.statistics import Summary
-from arc_suite.policies import Policy
+from arc_suite.policies import Policy, PolicyFunction
 from arc_suite.robots.spec import Body
 
 # Columns that every task has, with their widths; the last one only for the paper's demonstrator.
@@ -117,7 +117,7 @@ class Report(NamedTuple):
 
 
 def evaluate(
-    policy: str | os.PathLike | Policy | Callable = "cpg",
+    policy: str | os.PathLike[str] | Policy | PolicyFunction = "cpg",
     robot: str | Body | None = None,
     task: str | None = None,
     *,
@@ -149,6 +149,7 @@ def evaluate(
     if setup_of_policy is not None:
         setup_of_policy = setup_of_policy.judging()
     if robot is None:
+        policies.refuse_other_words(policy, policies.POLICIES)
         if setup_of_policy is None or setup_of_policy.several:
             raise ValueError("robot: expected a body, as the policy brings none")
         robot = setup_of_policy.body
@@ -161,7 +162,7 @@ def evaluate(
     return report(player(policy, setup, preset), seeds, progress)
 
 
-def player(policy: str | os.PathLike | Policy | Callable, setup: Setup, preset: str | None = None) -> Player:
+def player(policy: str | os.PathLike[str] | Policy | PolicyFunction, setup: Setup, preset: str | None = None) -> Player:
     """Open the environment of a setup and make a policy for it; for the arguments see `evaluate`.
 
     Raises:

@@ -92,7 +92,7 @@ class _StandingRobot(NamedTuple):
 
 
 def import_robot(
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     home: str | None = None,
     feet: Sequence[str] = (),
     armature: float | None = None,
@@ -124,7 +124,7 @@ def import_robot(
     return imported_robot
 
 
-def body_of(path: str | os.PathLike) -> Body:
+def body_of(path: str | os.PathLike[str]) -> Body:
     """Return the body of `import_robot`; the same one as long as all files that were read for it stay as they are.
 
     Raises:

@@ -30,7 +30,7 @@ def train(
     training: Mapping[str, Any] | None = None,
     minutes: float | None = None,
     folder: str | Path | None = None,
-    progress: Callable = tqdm,
+    progress: Callable[..., Any] = tqdm,
     on_metrics: Callable[[int, Mapping[str, float]], None] = lambda step, metrics: None,
 ) -> network.Network:
     """Train a policy, as `arc-suite train` does, and return it; the same call resumes what was interrupted.

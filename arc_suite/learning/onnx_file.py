@@ -23,7 +23,7 @@ OPSET = 17  # the first with LayerNormalization
 IR_VERSION = 8  # the format of the same release, so that older runtimes read it
 
 
-def save(path: str | os.PathLike, network: Network) -> None:
+def save(path: str | os.PathLike[str], network: Network) -> None:
     """Write a policy of one body as ONNX, atomically.
 
     Raises:

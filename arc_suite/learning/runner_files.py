@@ -38,7 +38,7 @@ _ESTIMATED = {"height": "torso's height", "velocity": "torso's velocity", "motio
 _ABSENT = "absent"  # name of a part that is 0
 
 
-def save(folder: str | os.PathLike, network: Network) -> list[str]:
+def save(folder: str | os.PathLike[str], network: Network) -> list[str]:
     """Write the files of a policy of one body into a folder, and return a line for each thing that its user must know.
 
     Raises:

@@ -38,7 +38,7 @@ class _Joint(NamedTuple):
     channels: list[str]
 
 
-def read(path: str | os.PathLike) -> Skeleton:
+def read(path: str | os.PathLike[str]) -> Skeleton:
     """Read a file as a skeleton; y points up in most files.
 
     Raises:

@@ -47,7 +47,7 @@ class _File(NamedTuple):
     buffer: bytes
 
 
-def read(path: str | os.PathLike, clip: str | None = None) -> Skeleton:
+def read(path: str | os.PathLike[str], clip: str | None = None) -> Skeleton:
     """Read an animation of a file as a skeleton, sampled at 60 frames a second.
 
     Args:
@@ -89,6 +89,8 @@ def _open(data: bytes) -> _File:
         chunks.setdefault(kind, data[place : place + length])
         place += length
     text = chunks.get(_JSON_CHUNK, b"")
+    if not text:
+        raise ValueError("expected a binary glTF file, and there is no JSON in it")
     if len(text) > files.MAX_JSON:
         raise ValueError(f"expected at most {files.MAX_JSON} bytes of JSON")
     content = json.loads(text)

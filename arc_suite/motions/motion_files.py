@@ -23,7 +23,7 @@ NAMES = ("joint_names", "leg_names")
 _BOOLEANS = ("planted",)
 
 
-def save(motion: Motion, path: str | os.PathLike) -> None:
+def save(motion: Motion, path: str | os.PathLike[str]) -> None:
     """Write a motion.
 
     Raises:
@@ -35,7 +35,7 @@ def save(motion: Motion, path: str | os.PathLike) -> None:
         np.savez(file, format=FORMAT, **_arrays(motion))
 
 
-def load(path: str | os.PathLike) -> Motion:
+def load(path: str | os.PathLike[str]) -> Motion:
     """Read a motion, bit-equal to the one that was saved.
 
     Raises:

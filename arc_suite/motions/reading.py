@@ -40,7 +40,7 @@ class Options(NamedTuple):
 NO_OPTIONS = Options()
 
 
-def holds_motion(path: str | os.PathLike) -> bool:
+def holds_motion(path: str | os.PathLike[str]) -> bool:
     """Return whether a file is one of `save`, which names its body and takes no options."""
     if Path(path).suffix.lower() != motion_files.EXTENSION:
         return False
@@ -49,7 +49,9 @@ def holds_motion(path: str | os.PathLike) -> bool:
         return "format" in archives.read(path, motion_files.MAX_BYTES, only="format")
 
 
-def read(path: str | os.PathLike, body: Body | None = None, options: Options = NO_OPTIONS) -> tuple[Motion, list[str]]:
+def read(
+    path: str | os.PathLike[str], body: Body | None = None, options: Options = NO_OPTIONS
+) -> tuple[Motion, list[str]]:
     """Read a motion, and return it with a line for each thing that was changed.
 
     Args:
@@ -71,7 +73,7 @@ def read(path: str | os.PathLike, body: Body | None = None, options: Options = N
     return _READERS[extension](path, body, options)
 
 
-def _read_skeleton(path: str | os.PathLike, body: Body, options: Options) -> tuple[Motion, list[str]]:
+def _read_skeleton(path: str | os.PathLike[str], body: Body, options: Options) -> tuple[Motion, list[str]]:
     if Path(path).suffix.lower() == gltf_file.EXTENSION:
         skeleton = gltf_file.read(path, options.clip)
     else:
@@ -82,17 +84,17 @@ def _read_skeleton(path: str | os.PathLike, body: Body, options: Options) -> tup
         return fit_skeleton(body, skeleton)
 
 
-def _read_csv(path: str | os.PathLike, body: Body, options: Options) -> tuple[Motion, list[str]]:
+def _read_csv(path: str | os.PathLike[str], body: Body, options: Options) -> tuple[Motion, list[str]]:
     return tables.read_csv(path, body, options.fps, bool(options.loop)), []
 
 
-def _read_arrays(path: str | os.PathLike, body: Body, options: Options) -> tuple[Motion, list[str]]:
+def _read_arrays(path: str | os.PathLike[str], body: Body, options: Options) -> tuple[Motion, list[str]]:
     with parsers.guard(f"{path}"):
         arrays = archives.read(path, motion_files.MAX_BYTES)
     return tables.read_arrays(path, arrays, body, options.fps, bool(options.loop)), []
 
 
-_READERS: dict[str, Callable[[str | os.PathLike, Body, Options], tuple[Motion, list[str]]]] = {
+_READERS: dict[str, Callable[[str | os.PathLike[str], Body, Options], tuple[Motion, list[str]]]] = {
     motion_files.EXTENSION: _read_arrays,
     gltf_file.EXTENSION: _read_skeleton,
     bvh_file.EXTENSION: _read_skeleton,

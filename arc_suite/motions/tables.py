@@ -31,7 +31,7 @@ _POSITIONS_ARRAY = "body_pos_w"
 _QUATERNIONS_ARRAY = "body_quat_w"
 
 
-def read_csv(path: str | os.PathLike, body: Body, rate: float | None, loops: bool) -> Motion:
+def read_csv(path: str | os.PathLike[str], body: Body, rate: float | None, loops: bool) -> Motion:
     """Read a table of frames.
 
     Columns are `x`, `y`, `z`, `qw`, `qx`, `qy`, `qz` of the root and the joints' names; with `time`, s, also at an
@@ -68,7 +68,7 @@ def read_csv(path: str | os.PathLike, body: Body, rate: float | None, loops: boo
 
 
 def read_arrays(
-    path: str | os.PathLike, arrays: dict[str, np.ndarray], body: Body, rate: float | None, loops: bool
+    path: str | os.PathLike[str], arrays: dict[str, np.ndarray], body: Body, rate: float | None, loops: bool
 ) -> Motion:
     """Return the motion of arrays by name: `fps`, `joint_pos`, `joint_names`, `body_pos_w` and `body_quat_w`.
 
@@ -79,6 +79,8 @@ def read_arrays(
         names = body.joint_names
         if _NAMES_ARRAY in arrays:
             names = tuple([str(name) for name in arrays[_NAMES_ARRAY].ravel()])
+        if _ANGLES_ARRAY not in arrays:
+            raise ValueError(f"expected a motion, or arrays as mjlab has them, and there is no {_ANGLES_ARRAY}")
         angles = _numbers(arrays, _ANGLES_ARRAY, 2)
         if angles.shape[1] != len(names):
             raise ValueError(f"{_ANGLES_ARRAY}: expected {len(names)} joints, got {angles.shape[1]}")
@@ -95,7 +97,7 @@ def read_arrays(
 
 
 def _make(
-    path: str | os.PathLike, body: Body, rate: float | None, loops: bool, columns: dict[str, np.ndarray]
+    path: str | os.PathLike[str], body: Body, rate: float | None, loops: bool, columns: dict[str, np.ndarray]
 ) -> Motion:
     """Return the motion of columns (frames,) by name."""
     expected_names = (*_POSITION, *_QUATERNION, *body.joint_names)

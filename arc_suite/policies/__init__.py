@@ -1,5 +1,6 @@
 """Policies: one protocol of acting, and policies by name."""
 
+from arc_suite.policies.cures import refuse_other_words
 from arc_suite.policies.named import (
     HELP,
     POLICIES,
@@ -16,13 +17,14 @@ from arc_suite.policies.named import (
     setup_of,
     training_seeds,
 )
-from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum, alone
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, PolicyFunction, Script, Sum, alone
 
 __all__ = [
     "is_packaged",
     "policy",
     "POLICIES",
     "preset_names",
+    "refuse_other_words",
     "load_network",
     "setup_of",
     "training_seeds",
@@ -32,6 +34,7 @@ __all__ = [
     "HELP",
     "PRESET_HELP",
     "Policy",
+    "PolicyFunction",
     "Individuals",
     "Mixture",
     "Script",

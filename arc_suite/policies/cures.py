@@ -3,12 +3,14 @@
 import ast
 import inspect
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from arc_suite import checks, files
-from arc_suite.policies import network
+from arc_suite import checks, files, registry
+from arc_suite.cpg.selection import preset_names
+from arc_suite.policies import network, other_libraries
+from arc_suite.tasks import TASKS
 
 _MAX_SIZE = 1 << 20  # bytes of a file of Python whose names an error lists
 _MAX_NAMES = 8  # in an error
@@ -28,7 +30,7 @@ _CURES = {
 }
 
 
-def refuse_other_files(name: str | os.PathLike) -> None:
+def refuse_other_files(name: str | os.PathLike[str]) -> None:
     """Raise ValueError for a file or a folder that is no policy, with what to type instead.
 
     Raises:
@@ -40,8 +42,21 @@ def refuse_other_files(name: str | os.PathLike) -> None:
         _refuse_file_of_python(path)
     elif extension in _CURES:
         raise ValueError(f"policy {checks.preview(os.fspath(name))}: {_CURES[extension]}")
+    elif path.suffix and path.suffix != network.EXTENSION and path.is_file():
+        if other_libraries.find(name) is None:
+            raise ValueError(f"policy {checks.preview(os.fspath(name))}: it is no policy; expected the folder of a run")
     else:
         _refuse_folder_of_runs(path)
+
+
+def refuse_other_words(name: Any, policy_names: Iterable[str]) -> None:
+    """Raise ValueError for a robot, a task or a preset in place of a policy, and for a misspelled folder."""
+    for kind, names in {"robot": registry.robot_words(), "task": TASKS, "preset": preset_names()}.items():
+        if isinstance(name, str) and name in names:
+            raise ValueError(f"policy {name!r}: it is a {kind}; expected as {kind}, next to a policy such as cpg")
+    cure = files.suggest_path(name) if isinstance(name, str) and not checks.hint(name, policy_names) else ""
+    if cure:
+        raise ValueError(f"unknown policy {checks.preview(name)}{cure}")
 
 
 def _refuse_file_of_python(path: Path) -> NoReturn:

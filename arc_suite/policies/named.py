@@ -148,6 +148,7 @@ def policy(
     elif isinstance(name, str) and ":" in name:
         made_policy = _from_path(name, body, num_envs)
     else:
+        cures.refuse_other_words(name, POLICIES)
         make = POLICIES[checks.name(name, POLICIES, "policy")]
         made_policy = make(body, preset_list, num_envs, task)
     return Sum(made_policy, _noise(body, noise, num_envs)) if noise else made_policy
@@ -308,7 +309,7 @@ def _policy_files(path: Path) -> list[Path]:
     return [path / network.FILE if path.is_dir() else path]
 
 
-def load_network(name: str | os.PathLike) -> Network:
+def load_network(name: str | os.PathLike[str]) -> Network:
     """Return the network of a policy file, of a run's folder, or of a zip of stable-baselines3.
 
     Raises:
@@ -329,7 +330,9 @@ def load_network(name: str | os.PathLike) -> Network:
 
 
 def _is_path(name: str) -> bool:
-    return is_file(name) or name.endswith(network.EXTENSION) or (os.sep in name and ":" not in name)
+    if is_file(name) or name.endswith(network.EXTENSION):
+        return True
+    return ":" not in name and (os.sep in name or files.is_folder(name)) and name not in POLICIES
 
 
 def _from_file(path: Path, body: Body, task: Task | None) -> Policy:

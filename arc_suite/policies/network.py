@@ -98,7 +98,7 @@ class Network(NamedTuple):
         return self.actions(flat).astype(float)
 
 
-def save(path: str | os.PathLike, network: Network) -> None:
+def save(path: str | os.PathLike[str], network: Network) -> None:
     """Write a policy file, atomically.
 
     Raises:
@@ -125,7 +125,7 @@ def digest(network: Network) -> str:
     return content_hash.hexdigest()
 
 
-def load(path: str | os.PathLike) -> Network:
+def load(path: str | os.PathLike[str]) -> Network:
     """Read a policy file, or that of a run's folder; nothing that it names is imported.
 
     Raises:

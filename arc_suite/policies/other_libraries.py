@@ -87,7 +87,7 @@ class PolicyFile(NamedTuple):
         return self.reader.load(self.path, self.further)
 
 
-def find(name: str | os.PathLike) -> PolicyFile | None:
+def find(name: str | os.PathLike[str]) -> PolicyFile | None:
     """Return the file of another library that a policy's name gives; None for a name of another kind."""
     text = os.fspath(name)
     for extension in READERS:

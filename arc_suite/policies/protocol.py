@@ -1,13 +1,18 @@
 """The protocol of policies, which act for a batch of environments; one environment is a batch of one."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import dm_env
 import numpy as np
+from numpy.typing import ArrayLike
 
 from arc_suite import checks
 from arc_suite.envs.calls import checked_action
+from arc_suite.envs.timestep import TimeStep
+
+# A policy as a plain function, from a `TimeStep` with named blocks to an action (joints,).
+PolicyFunction: TypeAlias = Callable[[TimeStep], ArrayLike]
 
 
 class Policy(Protocol):
@@ -58,7 +63,7 @@ class Script:
         for index, seed in zip(indices, seeds, strict=True):
             self._scripts[index] = iter(self._script(seed))
 
-    def act(self, observation, rewards) -> np.ndarray:
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the next actions (num_envs, joints)."""
         return np.stack([next(script, self._zero) for script in self._scripts])
 
@@ -75,7 +80,7 @@ class Sum:
         for policy in self._policies:
             policy.reset(indices, seeds)
 
-    def act(self, observation, rewards) -> np.ndarray:
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the sum of the actions (num_envs, joints)."""
         first, second = self._policies
         return first.act(observation, rewards) + second.act(observation, rewards)
@@ -95,7 +100,7 @@ class Mixture:
         for policy in self._policies:
             policy.reset(indices, seeds)
 
-    def act(self, observation, rewards) -> np.ndarray:
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the actions (num_envs, joints)."""
         actions = np.stack([policy.act(observation, rewards) for policy in self._policies])
         environments = np.arange(len(self._policy_indices))
@@ -108,7 +113,7 @@ class Individuals:
     A function gets the observations that an environment of `arc_suite.load` has: blocks by name.
     """
 
-    def __init__(self, make: Callable[[], Callable], num_envs: int, joints: int, name: str = "policy"):
+    def __init__(self, make: Callable[[], PolicyFunction], num_envs: int, joints: int, name: str = "policy"):
         """Set the function that makes the functions of episodes.
 
         Args:
@@ -120,7 +125,7 @@ class Individuals:
         self._make = make
         self._name = name
         self._joints = joints
-        self._functions: list[Callable | None] = [None] * num_envs  # None before the first episode
+        self._functions: list[PolicyFunction | None] = [None] * num_envs  # None before the first episode
         self._seeds = [0] * num_envs
         self._steps = [0] * num_envs  # control steps since the starts of the episodes
 
@@ -131,7 +136,7 @@ class Individuals:
             self._seeds[index] = seed
             self._steps[index] = 0
 
-    def act(self, observation, rewards) -> np.ndarray:
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the actions (num_envs, joints).
 
         Raises:
@@ -155,7 +160,7 @@ class Individuals:
         return actions
 
 
-def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarray]:
+def alone(policy: Policy, seed: int = 0) -> Callable[[TimeStep], np.ndarray]:
     """Return a policy for one environment: a function from a `TimeStep` with named blocks to an action (joints,).
 
     The first `TimeStep` of an episode begins it.
@@ -169,7 +174,7 @@ def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarr
     """
     seed = checks.seed(seed)
 
-    def act(timestep: dm_env.TimeStep) -> np.ndarray:
+    def act(timestep: TimeStep) -> np.ndarray:
         if timestep.first():
             policy.reset([0], [seed])
         blocks = {name: block[None] for name, block in timestep.observation.items()}

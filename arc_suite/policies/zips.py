@@ -27,7 +27,7 @@ def content(path: Path) -> dict[str, Any]:
         OSError: it cannot be read.
     """
     if not path.is_file():
-        raise OSError(f"cannot read {path}: no such file")
+        raise OSError(f"cannot read {path}: no such file{files.suggest_path(path)}")
     with parsers.guard(f"policy {path}: no policy of stable-baselines3"):
         return dict(json.loads(archives.read_member(path, "data", files.MAX_JSON)))
 
@@ -98,7 +98,7 @@ def statistics(path: Path, given: Path | None = None) -> Path | None:
         if data.get("_last_obs") is not None and not is_normalized:
             raise ValueError(f"policy {path}: was trained without VecNormalize: expected no statistics, got {given}")
         if not given.is_file():
-            raise OSError(f"cannot read {given}: no such file")
+            raise OSError(f"cannot read {given}: no such file{files.suggest_path(given)}")
         return given
     if not is_normalized:
         return None

@@ -27,7 +27,7 @@ _MAX_DIGITS = 20  # of an integer that is read as such; longer ones are read as 
 _LIST_OF_NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
-def load_body(path: str | os.PathLike) -> Body:
+def load_body(path: str | os.PathLike[str]) -> Body:
     """Read a body from a file.
 
     Args:
@@ -51,7 +51,7 @@ def load_body(path: str | os.PathLike) -> Body:
         raise SpecError(f"{path}: {error}") from None
 
 
-def save_body(body: Body, path: str | os.PathLike) -> None:
+def save_body(body: Body, path: str | os.PathLike[str]) -> None:
     """Write a body to a file; fields that are None stay None.
 
     Raises:
@@ -76,10 +76,14 @@ def body_from_json(text: str | bytes) -> Body:
         raise SpecError(
             "expected a body in JSON, got XML; the name of an MJCF file ends in .xml, that of a URDF file in .urdf"
         )
+    if not text.strip():
+        raise SpecError("expected a body in JSON, got an empty file")
     try:
         fields = json.loads(text, object_pairs_hook=_object_of_pairs, parse_int=_parse_integer)
     except SpecError:
         raise
+    except UnicodeDecodeError:
+        raise SpecError("expected a body in JSON, got a file that is no text") from None
     except RecursionError:
         raise SpecError("expected a body in JSON, got too many brackets within brackets") from None
     except ValueError as error:

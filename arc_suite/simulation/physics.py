@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -15,6 +16,7 @@ from arc_suite.arenas import FLAT, Arena
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
+from arc_suite.simulation.annotations import Data, Model, Named
 from arc_suite.simulation.model import change_fields, compile_model, field, merge_lasting, shared_model
 from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, check_snapshot, model_fields
 
@@ -47,6 +49,22 @@ class Physics(dm_mujoco.Physics):
     divergence: str | None = None
     _shared = False  # whether another simulation has the same model
 
+    if TYPE_CHECKING:  # dm_control leaves these types open
+
+        @property
+        def data(self) -> Data: ...
+        @property
+        def model(self) -> Model: ...
+        @property
+        def named(self) -> Named: ...
+        def time(self) -> float: ...
+        def timestep(self) -> float: ...
+        def control(self) -> np.ndarray: ...
+        def velocity(self) -> np.ndarray: ...
+        def position(self) -> np.ndarray: ...
+        def get_state(self, sig: int | None = None) -> np.ndarray: ...
+        def set_state(self, physics_state: np.ndarray, sig: int | None = None) -> None: ...
+
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> Physics:
         """Return the simulation of a body in an arena, in its standing pose."""
@@ -70,7 +88,7 @@ class Physics(dm_mujoco.Physics):
         self._forks = forks.count
         self._option = self.model.ptr.opt
 
-    def reset(self, keyframe_id=None) -> None:
+    def reset(self, keyframe_id: int | None = None) -> None:
         """Restart from the default pose, as in dm_control, with the compiled model and its lasting changes."""
         self.check_process()
         self._keep_edits(self._written)
@@ -186,7 +204,9 @@ class Physics(dm_mujoco.Physics):
         if self._forks != forks.count:
             forks.refuse("environment")
 
-    def render(self, height=480, width=640, camera_id="tracking", **kwargs) -> np.ndarray:
+    def render(
+        self, height: int = 480, width: int = 640, camera_id: int | str = "tracking", **kwargs: Any
+    ) -> np.ndarray:
         """Draw the decorated body in its present pose; other arguments as in dm_control.
 
         With `quality="film"` edges of shadows are finer; with "still" all edges are. The default is "fast". Through the

@@ -40,7 +40,7 @@ class _OtherFormat(ValueError):
     """A file of another format."""
 
 
-def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
+def save(path: str | os.PathLike[str], tracks: Sequence[Track]) -> None:
     """Write tracks of one setup.
 
     Raises:
@@ -78,7 +78,7 @@ def _flatten(fields: Mapping, path: str) -> dict:
     return values
 
 
-def load(path: str | os.PathLike) -> list[Track]:
+def load(path: str | os.PathLike[str]) -> list[Track]:
     """Read tracks, bit-equal to those that were saved; nothing that the file names is imported.
 
     Raises:
@@ -96,7 +96,7 @@ def load(path: str | os.PathLike) -> list[Track]:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _read(path: str | os.PathLike) -> list[Track]:
+def _read(path: str | os.PathLike[str]) -> list[Track]:
     """Return the tracks of a file; a damaged one raises anything."""
     arrays = archives.read(path, _MAX_BYTES)
     file_format = str(arrays.get("format", "no tracks"))[:80]

@@ -1,7 +1,7 @@
 """Reports of style: all metrics of a track by name, and their statistics over episodes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def _measurement(track, name, values) -> Measurement:
     return Measurement(value, dict(zip(track.legs, map(float, values), strict=True)))
 
 
-def report(tracks: Sequence[Track]) -> dict:
+def report(tracks: Sequence[Track]) -> dict[str, Any]:
     """Return the metrics of a policy, over tracks of one setup.
 
     Returns:

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import evaluation
+from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
@@ -127,7 +128,7 @@ class Track(NamedTuple):
         return reward(self.terms, self.weights)[1]
 
 
-def record(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Track:
+def record(environment: Environment, policy: Policy, seed: int, max_steps: int | None = None) -> Track:
     """Play one episode of the evaluation protocol and record it.
 
     Foot positions, velocities and contacts are one substep behind the torso, as in the reward.

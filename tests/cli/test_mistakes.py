@@ -1,5 +1,6 @@
-"""Forty mistakes at the command line: one line each, with the cure where one is near."""
+"""Mistakes at the command line: one line each, with the cure where one is near."""
 
+import numpy as np
 import programs
 import pytest
 from tiers import tiers
@@ -50,14 +51,53 @@ OTHERS = {
     "completion powershell": "unknown shell 'powershell' (there are: bash, zsh, fish)\n",
     "doctor --fix": "unknown flag 'fix' (there are: help, version)\n",
 }
-LINES = CURED | OTHERS
+# Files and words in the place of others.
+MISPLACED = {
+    "evaluate --robot=tick --policy=folder": "cannot read folder/policy.npz: no such file; a run writes it",
+    "evaluate --robot=tick --policy=clip.glb": "policy 'clip.glb': it is no policy; expected the folder of a run\n",
+    "evaluate --robot=tick --policy=array.npy": "policy 'array.npy': it is no policy; expected the folder of a run\n",
+    "evaluate --robot=tick --policy=model.onnx": "policy 'model.onnx': it is for other programs; expected the folder",
+    "evaluate --robot=tick --policy=broken.py:make": "policy 'broken.py:make': /",
+    "evaluate --robot=tick --policy=steered": "policy 'steered': it is a preset; expected as preset, next to a policy",
+    "evaluate --robot=tick --policy=tick": "policy 'tick': it is a robot; expected as robot, next to a policy",
+    "evaluate --policy=foldr": "unknown policy 'foldr'; did you mean folder?\n",
+    "evaluate --robot=folder": "robot 'folder': it is a folder; expected a name, or a file .json, .xml, ",
+    "evaluate --spec=clip.glb": "clip.glb: expected a body in JSON, got a file that is no text\n",
+    "evaluate --spec=boddy.json": "cannot read boddy.json: no such file or directory; did you mean body.json?\n",
+    "evaluate --robot=spider.json": "cannot read spider.json: no such file or directory; did you mean spider?\n",
+    "evaluate --robot=tick --task=queen": "task 'queen': it is a robot; tasks are walk, steer, ",
+    "evaluate --robot=walk": "robot 'walk': it is a task; robots are queen, bastion, tick, leaper\n",
+    "evaluate -r tick": "unknown flag '-r'; did you mean --robot?\n",
+    "evaluate -p cpg": "unknown flag '-p'; did you mean --palette or --policy or --preset?\n",
+    "evaluate --robot=tick --set motion=attack.npz": "setting 'motion': walk has none; mimic has it\n",
+    "evaluate --robot=tick --set weights.forward=2": (
+        "--set weights.forward=2: expected a name without a dot; did you mean 'weights={\"forward\": 2}'?\n"
+    ),
+    "check clip.glb": "clip.glb: expected a body in JSON, got a file that is no text\n",
+    "build_model --robot=tick --output=tick.urdf": "unknown extension '.urdf' (there are: .xml)\n",
+    "build_model --robot=tick --json --output=tick.xml": "unknown extension '.xml' (there are: .json)\n",
+    "motion clip.glb --robot=tick -o a.npz": "clip.glb: expected a binary glTF file",
+    "motion arrays.npz --robot=tick -o a.npz": "arrays.npz: expected a motion, or arrays as mjlab has them",
+    "animate --robot=tick --clips=arrays.npz -o a.glb": "arrays.npz: no motion, or a damaged one: ",
+    "render --robot=tick -o folder": "folder: expected a name that ends in .png, .mp4, .gif, .webp, .html\n",
+    "render --robot=tick -o missing/a.png": "cannot write missing/a.png: no such file or directory\n",
+    "collect --robot=tick --policy=refined": "policy 'refined': it is a preset; expected as preset, next to a policy",
+}
+LINES = CURED | OTHERS | MISPLACED
 
 
 @pytest.mark.parametrize("command", tiers(LINES, CURED.__contains__))
 def test_a_mistake_is_one_line(command, tmp_path):
     (tmp_path / "note.txt").write_text("hello")
     (tmp_path / "body.json").write_text('{"name": "x"}')
+    (tmp_path / "clip.glb").write_bytes(b"\x89glTF")
+    (tmp_path / "model.onnx").write_bytes(b"\x08")
+    (tmp_path / "broken.py").write_text("def make(:\n")
+    (tmp_path / "folder").mkdir()
+    np.savez(tmp_path / "arrays.npz", zeros=np.zeros(3))
+    np.save(tmp_path / "array.npy", np.zeros(3))
+    files = sorted(tmp_path.iterdir())
     program, *_ = command.split()
     line = LINES[command] if program.startswith("-") else f"arc-suite {program}: {LINES[command]}"
     programs.refused(programs.arc_suite(*command.split(), cwd=tmp_path), line)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["body.json", "note.txt"]
+    assert sorted(tmp_path.iterdir()) == files

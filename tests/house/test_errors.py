@@ -11,7 +11,7 @@ import pytest
 from refusals import refused
 
 import arc_suite
-from arc_suite import policies, registry
+from arc_suite import evaluation, policies, registry
 from arc_suite.arenas import ARENAS
 from arc_suite.cpg import Demonstrator
 from arc_suite.robots import ROBOTS
@@ -74,7 +74,11 @@ def world(tmp_path_factory):
     folder, before = tmp_path_factory.mktemp("files"), os.getcwd()
     os.chdir(folder)
     pathlib.Path("folder.json").mkdir()
+    pathlib.Path("folder").mkdir()
     pathlib.Path("text.json").write_text("walk")
+    pathlib.Path("blank.json").write_text("\n")
+    np.savez("arrays.npz", zeros=np.zeros(3))
+    pathlib.Path("arrays.npz").rename("arrays.json")
     pathlib.Path("list.json").write_text("[1]")
     pathlib.Path("empty.json").write_text("{}")
     yield World()
@@ -174,6 +178,19 @@ CASES = [
     (load("queen", "json:walk"), f"task 'json:walk': walk {OWN}"),
     (make(domain_name="bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (envs(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
+    # Names in the place of others.
+    (load("walk", "queen"), "robot 'walk': it is a task; robots are queen, bastion, tick, leaper"),
+    (load("queen", "tick"), f"task 'tick': it is a robot; tasks are {', '.join(TASKS)}"),
+    (policy("tick", "queen"), "policy 'tick': it is a robot; expected as robot, next to a policy such as cpg"),
+    (policy("refined", "queen"), "policy 'refined': it is a preset; expected as preset, next to a policy such as cpg"),
+    (lambda w: evaluation.evaluate("queen"), "policy 'queen': it is a robot; expected as robot, next to a policy such"),
+    (walk(motion="a.npz"), "setting 'motion': walk has none; mimic has it"),
+    (
+        walk(terrain_seed=1),
+        "setting 'terrain_seed': walk has none; rough, slopes, stairs, gaps, course, leap, roam",
+    ),
+    (load("queen", "recover", {"both_sides": 1}), "setting 'both_sides': recover has none; mimic has it"),
+    (walk(gaits="trot"), "unknown setting of walk 'gaits'; did you mean 'gait'?"),
     # Cameras and sizes.
     (render(24, 32, -2), f"no camera -2: expected -1 (free) to 3, or one of {CAMERAS}"),
     (render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 3, or one of {CAMERAS}"),
@@ -190,6 +207,8 @@ CASES = [
     (lambda w: Demonstrator("queen", "meduim"), f"unknown preset 'meduim'; did you mean 'medium'? {PRESETS}"),
     (lambda w: Demonstrator("bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (lambda w: w.walker(dm_env.restart(np.zeros(151))), f"{BLOCKS}, got ndarray"),
+    (lambda w: w.walker(None), "timestep: expected what reset and step of a dm_env return, got NoneType"),
+    (lambda w: w.walker({}), "timestep: expected what reset and step of a dm_env return, got dict"),
     (lambda w: w.walker.act({"posture": np.zeros(17)}), f"{BLOCKS}, got dict"),
     (lambda w: w.walker.act(EIGHTEEN), "observation: expected those of 12 joints, got 12 angles and 18 velocities"),
     (lambda w: w.envs.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
@@ -200,6 +219,11 @@ CASES = [
     (load("missing.json", "walk"), "cannot read missing.json: no such file or directory"),
     (load("folder.json", "walk"), "cannot read folder.json: is a directory"),
     (load(pathlib.Path("nothing"), "walk"), "cannot read nothing: no such file or directory"),
+    (load("tick.json", "walk"), "cannot read tick.json: no such file or directory; did you mean tick?"),
+    (load("texts.json", "walk"), "cannot read texts.json: no such file or directory; did you mean text.json?"),
+    (load("folder", "walk"), "robot 'folder': it is a folder; expected a name, or a file .json, .xml, .urdf"),
+    (load("blank.json", "walk"), "blank.json: expected a body in JSON, got an empty file"),
+    (load("arrays.json", "walk"), "arrays.json: expected a body in JSON, got a file that is no text"),
     (load("text.json", "walk"), "text.json: expected a body in JSON: Expecting value: line 1 column 1 (char 0)"),
     (load("list.json", "walk"), "list.json: expected an object with the fields of a Body, got a list"),
     (load("empty.json", "walk"), "empty.json: name: missing; a Body needs it"),
@@ -274,7 +298,8 @@ CASES = [
 def test_bad_input(world, use, message, monkeypatch):
     monkeypatch.setattr("arc_suite.simulation.opengl.has_display", lambda: False)
     before = world.state()
-    lists_arguments = message.startswith(("unknown argument", "argument 'flat"))  # in an order that does not matter
+    starts_only = ("unknown argument", "argument 'flat", "unknown setting", "setting", "policy 'queen'")
+    lists_arguments = message.startswith(starts_only)  # in an order that does not matter
     with refused(message, (ValueError, OSError), begins=lists_arguments):
         use(world)
     assert world.state() == before

@@ -52,7 +52,7 @@ _BLENDER_EXTENSIONS = (".fbx", ".bvh", ".blend")  # of the files that tools/to_f
 
 def animate(
     robot: str | Body,
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     clips: str | Sequence[str] = DEFAULT,
     *,
     task: str = "steer",
@@ -63,8 +63,8 @@ def animate(
     straight: bool = False,
     plant: bool = False,
     weight: float | str = 1.0,
-    progress: Callable = tqdm,
-    **options,
+    progress: Callable[..., Any] = tqdm,
+    **options: Any,
 ) -> list[Clip]:
     """Write animation clips of a body, as `arc-suite animate` does, and return them.
 

@@ -18,6 +18,7 @@ from arc_suite.learning.agents.hyperparameters import (
     ProximalPolicy,
     SoftActorCritic,
 )
+from arc_suite.tasks.modifiers import MODIFIERS
 
 
 class Algorithm(NamedTuple):
@@ -84,6 +85,10 @@ class Algorithm(NamedTuple):
         fields = dataclasses.asdict(self.hyperparameters)
         changed_fields = {}
         for name in changes:
+            if name not in fields and name in registry.task_setting_names() | MODIFIERS.keys():
+                raise ValueError(
+                    f"hyperparameter {name!r}: it is a setting of the task; expected in --set, or task_kwargs"
+                )
             checks.name(name, fields, "hyperparameter")
         for name, value in {**_device_changes(fields, changes), **changes}.items():
             changed_fields[name] = tuple(value) if isinstance(value, list) else value

@@ -180,7 +180,7 @@ class Configuration:
         return algorithms.stays_on_device(self.hyperparameters)
 
     def context(
-        self, folder: str | os.PathLike, threads: int = 1, checkpoint: Mapping[str, np.ndarray] | None = None
+        self, folder: str | os.PathLike[str], threads: int = 1, checkpoint: Mapping[str, np.ndarray] | None = None
     ) -> RunContext:
         """Return the context of the run, which its learner takes.
 
@@ -341,7 +341,7 @@ def _with_modules(hyperparameters):
     return dataclasses.replace(hyperparameters, **changes)
 
 
-def network_hyperparameters(start: str | os.PathLike) -> dict[str, Any]:
+def network_hyperparameters(start: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the hyperparameters of the network of a policy file.
 
     They are empty if there is no file, as a run may resume without the policy that it started from.

@@ -110,7 +110,9 @@ def _cell_text(value) -> str:
 
 
 @contextlib.contextmanager
-def open_run(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence[str] = ()) -> Iterator[RunFolder]:
+def open_run(
+    path: str | os.PathLike[str], config: Mapping[str, Any], growing: Sequence[str] = ()
+) -> Iterator[RunFolder]:
     """Open the folder of a run, or make one, which is deleted if an error comes before the run has begun.
 
     Args:
@@ -134,7 +136,7 @@ def open_run(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequen
         yield run_files
 
 
-def read_config(path: str | os.PathLike) -> dict[str, Any]:
+def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the record of the configuration in a run's folder.
 
     Raises:
@@ -149,7 +151,7 @@ def read_config(path: str | os.PathLike) -> dict[str, Any]:
     return config
 
 
-def read_progress(path: str | os.PathLike) -> dict[str, Any]:
+def read_progress(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the progress of the latest checkpoint; empty without a checkpoint.
 
     Raises:
@@ -159,7 +161,7 @@ def read_progress(path: str | os.PathLike) -> dict[str, Any]:
     return progress
 
 
-def read_arrays(path: str | os.PathLike) -> dict[str, np.ndarray] | None:
+def read_arrays(path: str | os.PathLike[str]) -> dict[str, np.ndarray] | None:
     """Return the arrays of the latest checkpoint; None without a checkpoint.
 
     Raises:
@@ -175,7 +177,7 @@ def latest_returns(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
     return evaluations["return"][evaluations["step"] == latest_step]
 
 
-def check_same_run(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
+def check_same_run(path: str | os.PathLike[str], config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
     """Check that a folder has the record of a configuration.
 
     Args:
@@ -206,7 +208,7 @@ def check_same_run(path: str | os.PathLike, config: Mapping[str, Any], left_out:
             )
 
 
-def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> list[dict[str, str]]:
+def lines(path: str | os.PathLike[str], name: str, columns: Sequence[str] = ()) -> list[dict[str, str]]:
     """Return the lines of a table of a run's folder as text by column; none where there is no table.
 
     A line without an end is left out, as it is still being written.
@@ -231,7 +233,7 @@ def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> li
         return [dict(zip(table_columns, line.split(","), strict=True)) for line in table_lines]
 
 
-def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
+def table(path: str | os.PathLike[str], name: str) -> dict[str, np.ndarray]:
     """Return a table of a run's folder: columns by name, none before the first line; see `lines`.
 
     Raises:
@@ -243,7 +245,7 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
         return {column: np.array([line[column] for line in table_lines], float) for column in columns}
 
 
-def check_latest_evaluation(path: str | os.PathLike, step: int) -> None:
+def check_latest_evaluation(path: str | os.PathLike[str], step: int) -> None:
     """Check that the latest evaluation of a checkpoint is that of the table of evaluations.
 
     Args:
@@ -262,7 +264,7 @@ def check_latest_evaluation(path: str | os.PathLike, step: int) -> None:
         )
 
 
-def is_begun(path: str | os.PathLike) -> bool:
+def is_begun(path: str | os.PathLike[str]) -> bool:
     """Return whether the run of a folder has begun: it has a checkpoint, or a line in a table."""
     if (Path(path) / CHECKPOINT).exists():
         return True

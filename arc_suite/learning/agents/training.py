@@ -30,7 +30,7 @@ def train(
     folder: Path,
     minutes: float | None = None,
     threads: int = 1,
-    progress: Callable = tqdm,
+    progress: Callable[..., Any] = tqdm,
     on_metrics: Callable[[int, Mapping[str, float]], None] = lambda step, metrics: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> bool:
@@ -78,7 +78,7 @@ def train(
 def train_in_one_program(
     configurations: Sequence[Configuration],
     folders: Sequence[Path],
-    progress: Callable = tqdm,
+    progress: Callable[..., Any] = tqdm,
     listeners: Sequence[Callable[[int, Mapping[str, float]], None]] = (),
     stop: Callable[[], bool] = lambda: False,
 ) -> bool:
@@ -194,7 +194,7 @@ class _Recorder:
         """Whether the last policy has been evaluated."""
         return self._progress["evaluated"] >= self.context.steps
 
-    def show_progress(self, progress: Callable):
+    def show_progress(self, progress: Callable[..., Any]):
         """Begin a progress bar, as `tqdm` does, and return it: a context."""
         evaluated_step = self._progress["evaluated"]
         options = {"total": self.context.steps, "initial": evaluated_step, "unit": "step", "unit_scale": True}

@@ -54,6 +54,7 @@ from arc_suite.learning.agents.training import train, train_in_one_program
 from arc_suite.learning.next_commands import next_commands
 from arc_suite.policies import network
 from arc_suite.simulation.cores import prepare_jax, usable_cores
+from arc_suite.tasks.modifiers import MODIFIERS
 
 
 def group_algorithms(value: Callable[[algorithms.Algorithm], Any]) -> dict[Any, list[str]]:
@@ -334,7 +335,9 @@ def configurations_from_flags() -> list[Configuration]:
     hyperparameters = named_values("hp", FLAGS.hp)
     training = named_values("train_set", FLAGS.train_set)
     several_bodies = registry.names_several_bodies(FLAGS.robot) and custom_body() is None
-    setup = Setup.of(FLAGS.robot if several_bodies else only_body(), *task_from_flags())
+    task, settings = task_from_flags()
+    _refuse_hyperparameters(settings)
+    setup = Setup.of(FLAGS.robot if several_bodies else only_body(), task, settings)
     seeds = parse_seeds(FLAGS.seed)
     if len(seeds) > 1:
         hyperparameters = with_worlds_of_seeds(hyperparameters)
@@ -351,6 +354,17 @@ def configurations_from_flags() -> list[Configuration]:
         )
         for seed in seeds
     ]
+
+
+def _refuse_hyperparameters(settings: Mapping[str, Any]) -> None:
+    """Raise ValueError for a setting of the task that is a hyperparameter, by its name or that of another library."""
+    names = dataclasses.asdict(algorithms.algorithm(FLAGS.algorithm).hyperparameters)
+    setting_names = registry.task_setting_names() | MODIFIERS.keys()
+    for name, value in settings.items():
+        meanings = [meaning for meaning in (name, *checks.SYNONYMS.get(name, ())) if meaning in names]
+        if meanings and name not in setting_names:
+            cure = f"; did you mean --hp {meanings[0]}={checks.quote(value)}?"
+            raise ValueError(f"--set {name}={checks.quote(value)}: it is a hyperparameter{cure}")
 
 
 def with_worlds_of_seeds(hyperparameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -69,7 +69,7 @@ class WorldState:
 
 
 def load(
-    domain_name: str | os.PathLike | Body,
+    domain_name: str | os.PathLike[str] | Body,
     task_name: str,
     task_kwargs: Mapping[str, Any] | None = None,
     impl: str | None = None,
