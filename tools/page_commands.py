@@ -20,6 +20,7 @@ SHORTER = {
     "collect": "--episodes=1",
     "style": "--episodes=1",
     "transfer": "--families=varied",
+    "design": "--bodies=24",
 }
 
 

@@ -37,7 +37,7 @@ def read_built_file(name: str) -> bytes:
             remedy = "`make web` builds it"
         else:
             remedy = "install a wheel that `make dist` has built in a clone"
-        raise ValueError(f"no viewer for pages: {remedy}, which needs Node")
+        raise ValueError(f"no viewer for pages: {remedy}, which needs Node, https://nodejs.org")
     return file.read_bytes()
 
 

@@ -162,7 +162,9 @@ def test_marks_end_where_a_replay_differs():
 
 def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_package(tmp_path, monkeypatch):
     monkeypatch.setattr(pages.resources, "files", lambda package: tmp_path)
-    with pytest.raises(ValueError, match="^no viewer for pages: `make web` builds it, which needs Node$"):
+    with pytest.raises(
+        ValueError, match="^no viewer for pages: `make web` builds it, which needs Node, https://nodejs.org$"
+    ):
         pages.viewer_script()
     monkeypatch.setattr(pages.versions, "clone_folder", lambda: None)
     with pytest.raises(ValueError, match="^no viewer for pages: install a wheel that `make dist` has built in a clone"):

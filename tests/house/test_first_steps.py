@@ -1,4 +1,4 @@
-"""A newcomer's first successes and the commands of pages: quick ones run here, others by `make check-first-steps`."""
+"""The roads of newcomers and the commands of pages: quick ones run here, others by `make check-first-steps`."""
 
 import re
 import shlex
@@ -12,9 +12,9 @@ from page_commands import ROOT, page, sections
 MAKEFILE = (ROOT / "Makefile").read_text()
 
 
-@pytest.mark.parametrize("name", check_first_steps.SUCCESSES)
-def test_the_pages_have_what_a_success_takes(name):
-    for stem, what in check_first_steps.SUCCESSES[name]:
+@pytest.mark.parametrize("name", check_first_steps.ROADS)
+def test_the_pages_have_what_a_road_takes(name):
+    for stem, what in check_first_steps.ROADS[name]:
         if what.startswith("make "):
             assert f"`{what}`" in page(stem) and re.search(rf"^{what[5:]}:", MAKEFILE, re.MULTILINE)
         else:

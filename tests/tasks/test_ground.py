@@ -114,7 +114,7 @@ def test_a_rise_in_meters_equals_its_difficulty():
         ("stairs", {"rise": -0.1}, "rise: expected a number from 0 to 100, got -0.1"),
         ("slopes", {"slope": "steep"}, "slope: expected a number from 0 to 1.2, got 'steep'"),
         ("stairs", {"width": 0.01}, "width: expected a finite number of at least 0.02"),
-        ("course", {"rise": 0.1}, "setting 'rise': course has none; stairs"),
+        ("course", {"rise": 0.1}, "setting 'rise': course has none; rough, stairs, leap, roam have it"),
         ("rough", {"difficulty": 1.5}, "difficulty: expected a number from 0 to 1, got 1.5"),
         ("rough", {"curriculum": 1}, "curriculum: expected true or false, got 1"),
         ("rough", {"level": 10}, "level: expected an integer from 0 to 9, got 10"),

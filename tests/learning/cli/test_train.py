@@ -64,7 +64,7 @@ def run(*arguments, cwd):
         (["--robot=tock"], f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? {WORDS}\n"),
         (
             ["--stps=5"],
-            "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, arena, config, ",
+            "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, arena, best, ",
         ),
         (["--steps=abc"], "arc-suite train: flag --steps=abc: expected a positive integer\n"),
         (["--minutes=x"], "arc-suite train: flag --minutes=x: expected a non-negative number\n"),
@@ -72,6 +72,8 @@ def run(*arguments, cwd):
         (["--config=policy.npz"], "arc-suite train: cannot read policy.npz: expected text in UTF-8\n"),
         (["--algorithm=sac", "--hp=batsch=3"], "arc-suite train: unknown hyperparameter 'batsch'; did you mean 'b"),
         (["--hp=batch"], "arc-suite train: --hp batch: expected name=value"),
+        (["--set=lr=0.1"], "arc-suite train: --set lr=0.1: it is a hyperparameter; did you mean --hp policy_rate=0.1"),
+        (["--hp=kicks=1"], "arc-suite train: hyperparameter 'kicks': it is a setting of the task; expected in --set"),
         (["--config=a.json", "--seed=3"], "arc-suite train: --seed: expected none with --config, which has the whole "),
         (["--seed=0,a"], "arc-suite train: --seed=0,a: expected different integers, such as 0,1,2 or 0-15\n"),
         (["--seeds=0-2,1"], "arc-suite train: --seed=0-2,1: expected different integers, such as 0,1,2 or 0-15\n"),
