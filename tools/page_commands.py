@@ -20,7 +20,6 @@ SHORTER = {
     "collect": "--episodes=1",
     "style": "--episodes=1",
     "transfer": "--families=varied",
-    "design": "--bodies=24",
 }
 
 
