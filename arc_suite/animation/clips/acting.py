@@ -1,4 +1,4 @@
-"""Motions simulated from the pose at rest: a rise, jumps, a death."""
+"""Motions that are simulated: rises, jumps, deaths."""
 
 import itertools
 import math
@@ -8,7 +8,8 @@ import numpy as np
 
 from arc_suite import policies, rotations
 from arc_suite.animation.clips import hard_ground, standing_legs
-from arc_suite.animation.clips.recordings import Recording, record
+from arc_suite.animation.clips.blows import Blow
+from arc_suite.animation.clips.recordings import Recording, record, samples_to_rest
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, stay_at_end, stay_at_start
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
@@ -20,14 +21,10 @@ from arc_suite.models.outline import torso_box
 from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import readings
-from arc_suite.tasks.modifiers.drags import have_drags
 
 # Durations are multiples of sqrt(h / g), h being the standing height.
 _SINK_DURATION = 6.0
 _HOLD_DURATION = 2.0
-_COLLAPSE_DURATION = 1.5  # in which legs give way in a death
-_LIMP_DURATION = 6.0
-_STIFFENING_DURATION = 24.0  # after which joints without life have come to rest
 
 _MAX_JUMP_TRIES = 6  # jumps that are simulated from rest, of those that a trial finds
 
@@ -36,12 +33,20 @@ _MAX_ASIDE = 0.3  # of the distance ahead, by which a leap goes aside
 _RECOVERY_TASK = "recover"
 _FALL_SECONDS = 4.0  # of getting up, and of standing after it
 _FALLS = 20  # that are tried, of the judges' table
-_ON_BACK = -0.7  # cosine of the tilt of a torso that lies on its back
+# By what a body lies on: the least and the largest cosine of the tilt of its torso.
+_TILTS = {"belly": (0.7, 1.0), "side": (-0.4, 0.4), "back": (-1.0, -0.7)}
 
-_LIMP_DAMPING_SHARE = 0.05  # of the damping of joints, in joints without life
-_STIFF_FRICTION = 1.0  # of the torques of motors: dry friction of joints that have become stiff
-_REST_SPEED = np.radians(1.0)  # rad/s: slower joints are at rest
-_LYING_HEIGHT = 0.6  # of the torso's height at rest: a lower torso lies
+# A death, by a blow after which motors are limp. Joints then turn freely, and become stiff. The numbers of a joint
+# are those of a body of unit weight and height, by the number of its legs.
+_DEADLY_BLOW = 0.8  # sqrt(g h)
+_DEADLY_LEVER = 0.25  # standing heights
+_FOOT_FRICTION = 0.4  # of feet that slip away
+_LIMP_ARMATURE = 0.002
+_LIMP_DAMPING = 0.02
+_STIFF_FRICTION = 1.0  # dry friction
+_LIMP_DURATION = 6.0
+_STIFFENING_DURATION = 14.0  # after which joints without life have come to rest
+_LYING_HEIGHT = 0.65  # of the torso's height at rest: a lower torso lies
 _LYING_CLEARANCE = 0.1  # of the torso's height at rest: a torso whose lowest point is nearer to the ground lies
 
 
@@ -62,10 +67,15 @@ def rise(body: Body, rest: Pose) -> ClipMotion:
     return stay_at_end(recording, first)
 
 
-def get_up(body: Body, rest: Pose) -> ClipMotion:
-    """Return how a body gets up from its back, by the policy of the package for the task recover.
+def get_up(body: Body, rest: Pose, lies_on: str) -> ClipMotion:
+    """Return how a body gets up from a fall, by the policy of the package for the task recover.
 
     The root stays where the torso is in the end.
+
+    Args:
+        body: the spec.
+        rest: pose that it gets up to.
+        lies_on: belly, side or back.
 
     Raises:
         ValueError: the package has no such policy, or the body does not get up.
@@ -74,14 +84,15 @@ def get_up(body: Body, rest: Pose) -> ClipMotion:
         raise ValueError(f"the package has no policy of {_RECOVERY_TASK} for it")
     setup = Setup.of(body, _RECOVERY_TASK)
     policy = policies.policy("ppo", body, task=setup.definition)
+    least, largest = _TILTS[lies_on]
     for seed in range(_FALLS):
         environment = setup.load(seed)
         recording = record(environment, policy, settle=0, steps=round(_FALL_SECONDS / environment.control_timestep()))
         has_got_up = environment.task.progress["up"]
         environment.close()
-        if has_got_up and rotations.upright(recording.poses[0, 3:7]) < _ON_BACK:
+        if has_got_up and least <= rotations.upright(recording.poses[0, 3:7]) <= largest:
             return stay_at_end(recording, first=0)
-    raise ValueError(f"it does not get up from its back within {_FALL_SECONDS:g} s")
+    raise ValueError(f"it does not get up from its {lies_on} within {_FALL_SECONDS:g} s")
 
 
 def jump(body: Body, rest: Pose) -> ClipMotion:
@@ -116,24 +127,19 @@ def leap(body: Body, rest: Pose) -> ClipMotion:
     return advance_straight(recording)
 
 
-def death(body: Body, rest: Pose) -> ClipMotion:
-    """Return how a body collapses: its legs give way, its joints are limp, then become stiff, until it is at rest.
+def death(body: Body, rest: Pose, side: str) -> ClipMotion:
+    """Return how a body falls under a blow after which its motors are limp, until it is at rest.
 
-    Limp joints have no torque, and hardly any damping.
+    Args:
+        body: the spec.
+        rest: pose from which it falls.
+        side: side from which the blow comes; see `blows.Blow`.
 
     Raises:
-        ValueError: the legs hardly fold.
+        ValueError: the torso does not come to lie on the ground.
     """
-    collapse_steps = _to_steps(body, _COLLAPSE_DURATION)
-    limp_steps = _to_steps(body, _LIMP_DURATION)
-    depth_shares = np.append(_ease_in(collapse_steps), 1.0)  # 1 is reached after the last step
-    joints = standing_legs.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
-    stiffening_steps = _to_steps(body, _STIFFENING_DURATION)
-    no_torque = np.full((limp_steps + stiffening_steps, len(rest.joints)), np.nan)
-    stiffness = np.zeros(len(joints) + len(no_torque))
-    stiffness[-stiffening_steps:] = np.linspace(0.0, 1.0, stiffening_steps) ** 2
-    recording = _simulate(body, rest, np.concatenate([joints, no_torque]), stiffness)
-    samples = _samples_to_rest(recording)
+    recording = _simulate_limp(body, rest, side)
+    samples = samples_to_rest(recording)
     _check_lies(body, rest, recording.poses[samples])
     return stay_at_start(recording, first=0, samples=samples)
 
@@ -156,13 +162,6 @@ def _measure_drift(body: Body, recording: Recording) -> np.ndarray:
     return (feet[1] - feet[0])[:, :2].mean(axis=0) / body.torso.standing_height
 
 
-def _samples_to_rest(recording: Recording) -> int:
-    """Return the samples after which no joint moves any more; all of them if some still do."""
-    speeds = abs(np.diff(recording.poses[:, 7:], axis=0)).max(axis=-1) / recording.time_step
-    moving = np.flatnonzero(speeds > _REST_SPEED)
-    return min(int(moving[-1]) + 2, len(speeds)) if len(moving) else len(speeds)
-
-
 def _belly_height(body: Body, rest: Pose) -> float:
     """Return the height of the torso's lowest point over the ground at rest, m."""
     lowest_corner, _ = torso_box(body)  # in the torso's frame, m
@@ -174,7 +173,8 @@ def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
     rest_height = rest.position[2]
     height = pose[2]
     is_high = height > _LYING_HEIGHT * rest_height
-    lowest_height = _belly_height(body, rest) + (height - rest_height)  # of the torso's lowest point, if it is level
+    corners = np.array(list(itertools.product(*zip(*torso_box(body), strict=True))))  # in the torso's frame, m
+    lowest_height = height + (rotations.matrix(pose[3:7])[2] @ corners.T).min()
     is_clear = lowest_height > _LYING_CLEARANCE * rest_height
     if is_high and is_clear:
         raise ValueError("the legs do not fold far enough to lie down")
@@ -205,15 +205,13 @@ def _loaded_targets(body: Body, rest: Pose) -> np.ndarray:
     return rest.joints + standing_pose.loads / (torque_limits * stiffness)  # loads: N m that hold the pose
 
 
-def _simulate(body: Body, rest: Pose, targets: np.ndarray, stiffness: np.ndarray | None = None) -> Recording:
-    """Simulate a body from rest on hard ground.
+def _simulate(body: Body, rest: Pose, targets: np.ndarray) -> Recording:
+    """Simulate a body from rest on hard ground, under position control.
 
     Args:
         body: the spec.
         rest: first pose.
-        targets: (steps + 1, joints) targets of position control at the start and after each step, rad. A step that
-            begins or ends with NaN has no torque.
-        stiffness: (steps + 1,) of joints without life, from 0 to 1; None for joints with their own damping.
+        targets: (steps + 1, joints) targets at the start and after each step, rad.
 
     Returns:
         A pose for every substep.
@@ -223,31 +221,57 @@ def _simulate(body: Body, rest: Pose, targets: np.ndarray, stiffness: np.ndarray
     control_timestep = sizing.control_timestep(body)
     substeps = sized_body.simulation.substeps
     joint_count = len(body.joint_names)
-    is_imported = bool(body.source)
-    controls = 3 if have_drags(body) else 2  # of a servo; see `models.source`
     model = hard_ground.compile_on_hard_ground(body)
     layout = readings.layout(model, body)
-    if stiffness is None:
-        frictions = np.tile(model.dof_frictionloss, (len(targets), 1))
-    else:
-        model.dof_damping[6:] *= _LIMP_DAMPING_SHARE  # the first six are the torso's
-        torques = np.zeros(model.nv)  # N m
-        torques[layout.joint_velocities] = [joint.torque for joint in sized_body.joints]
-        frictions = _STIFF_FRICTION * stiffness[:, None] * torques
-    data = mujoco.MjData(model)
-    rest_pose = np.concatenate(rest)  # position, quaternion and joint angles
-    data.qpos[:] = readings.positions(rest_pose, layout, standing_qpos(model))
+    data = _start_at(model, layout, rest)
     positions = [data.qpos.copy()]
-    for target, next_target, friction in zip(targets[:-1], targets[1:], frictions[:-1], strict=True):
-        model.dof_frictionloss[:] = friction
+    for target, next_target in itertools.pairwise(targets):
         angles = readings.pose(data.qpos, layout)[7:]
         speeds = data.qvel[layout.joint_velocities]
         target_speeds = (next_target - target) / control_timestep
-        actions = joint_drive.actions(target, target_speeds, angles, speeds)
-        data.ctrl[:joint_count] = np.nan_to_num(actions)
-        if is_imported:  # its joints have servos, and further controls for each, which release the servo
-            data.ctrl[joint_count : controls * joint_count] = np.tile(np.isnan(actions), controls - 1)
+        data.ctrl[:joint_count] = joint_drive.actions(target, target_speeds, angles, speeds)
         for _ in range(substeps):
             mujoco.mj_step(model, data)
             positions.append(data.qpos.copy())
     return Recording(model.opt.timestep, substeps, readings.pose(np.stack(positions), layout))
+
+
+def _simulate_limp(body: Body, rest: Pose, side: str) -> Recording:
+    """Simulate a body from rest on hard ground, under a blow from a side, with limp joints that become stiff.
+
+    Returns:
+        A pose for every substep.
+    """
+    model = hard_ground.compile_on_hard_ground(body)
+    layout = readings.layout(model, body)
+    height = body.torso.standing_height
+    leg_mass = model.body_mass.sum() / len(body.legs)  # kg, that a leg carries
+    leg_load = leg_mass * sizing.GRAVITY * height  # N m
+    time_unit = math.sqrt(height / sizing.GRAVITY)  # s
+    joints = layout.joint_velocities
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    model.dof_armature[joints] = model.dof_armature[joints].clip(max=_LIMP_ARMATURE * leg_mass * height**2)
+    model.dof_damping[joints] = model.dof_damping[joints].clip(max=_LIMP_DAMPING * leg_load * time_unit)
+    data = _start_at(model, layout, rest)
+    mujoco.mj_forward(model, data)
+    blow = Blow(side, _DEADLY_BLOW, _DEADLY_LEVER, _FOOT_FRICTION)
+    blow.set_ground(model)
+    positions = list(blow.strike(body, model, data))
+    limp_substeps = round(_LIMP_DURATION * time_unit / model.opt.timestep)
+    stiffening_substeps = round(_STIFFENING_DURATION * time_unit / model.opt.timestep)
+    stiffness = np.append(np.zeros(limp_substeps), np.linspace(0.0, 1.0, stiffening_substeps) ** 2)
+    positions.append(data.qpos.copy())
+    for share in stiffness:
+        model.dof_frictionloss[joints] = share * _STIFF_FRICTION * leg_load
+        mujoco.mj_step(model, data)
+        positions.append(data.qpos.copy())
+    substeps = sizing.simulation(body).substeps
+    return Recording(model.opt.timestep, substeps, readings.pose(np.stack(positions), layout))
+
+
+def _start_at(model: mujoco.MjModel, layout, rest: Pose) -> mujoco.MjData:
+    """Return the state of a body in the pose at rest."""
+    data = mujoco.MjData(model)
+    rest_pose = np.concatenate(rest)  # position, quaternion and joint angles
+    data.qpos[:] = readings.positions(rest_pose, layout, standing_qpos(model))
+    return data

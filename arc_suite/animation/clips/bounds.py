@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.bones import pose_parts
-from arc_suite.animation.clips.catalog import Acted, Difference, Kind, Turn
+from arc_suite.animation.clips.catalog import Acted, Blow, Difference, Kind, Turn
 from arc_suite.animation.clips.meshes import body_meshes
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.animation.clips.standing_legs import has_free_feet
@@ -77,7 +77,13 @@ def bounds_of(body: Body, clip: Kind) -> tuple[Bound, ...]:
 
 def is_planted(clip: Kind) -> bool:
     """Return whether standing feet are to stay in place in a clip."""
-    return isinstance(clip, Turn) or (isinstance(clip, Acted) and clip.planted)
+    match clip:
+        case Acted():
+            return clip.planted
+        case Blow():
+            return clip.cycles == 0
+        case _:
+            return isinstance(clip, Turn)
 
 
 def find_excess(body: Body, clip: Kind, motion: ClipMotion) -> str:

@@ -7,6 +7,7 @@ from typing import NamedTuple, get_args
 
 from arc_suite import registry
 from arc_suite.animation.clips import acting, gestures
+from arc_suite.animation.clips.blows import DIRECTIONS
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.robots.gaits import PACES, Pace
 from arc_suite.robots.spec import Body
@@ -58,8 +59,9 @@ class Acted(NamedTuple):
         ends: ends at which it has the first pose of idle: the first sample, 0, the last one, -1, or both.
         loops: whether it is a loop.
         steps: whether feet step in it.
-        planted: whether standing feet are to stay where they are; not in falls and jumps, which are simulated.
         additive: whether it is added to other clips, as its difference from the first pose of idle.
+        planted: whether standing feet are to stay where they are; not in falls and jumps, which are simulated.
+        unlike: names of clips whose last pose its own must differ from.
     """
 
     play: Callable[[Body, Pose], ClipMotion]
@@ -68,6 +70,22 @@ class Acted(NamedTuple):
     steps: bool = False
     additive: bool = False
     planted: bool = True
+    unlike: tuple[str, ...] = ()
+
+
+class Blow(NamedTuple):
+    """A blow to a body at rest, which stays on its feet, recorded.
+
+    Attributes:
+        side: side from which the blow comes; see `blows.DIRECTIONS`.
+        max_tilt: degrees, by which the blow tilts the torso at most; it is the strongest that does not tilt it more.
+        cycles: gait cycles in which it steps after the blow; 0 for feet that stay where they are. Without steps the
+            clip is added to others, as its difference from the first pose of idle.
+    """
+
+    side: str
+    max_tilt: float
+    cycles: int = 0
 
 
 class Difference(NamedTuple):
@@ -92,7 +110,13 @@ class Showcase(NamedTuple):
     preset: str
 
 
-Kind = WalkLoop | Passage | Turn | Acted | Difference | Showcase
+Kind = WalkLoop | Passage | Turn | Acted | Blow | Difference | Showcase
+
+
+def _fall(side: str, unlike: tuple[str, ...] = ()) -> Acted:
+    """Return a death by a blow from a side."""
+    return Acted(functools.partial(acting.death, side=side), ends=(0,), planted=False, unlike=unlike)
+
 
 WALK = WalkLoop((1.0, 0.0, 0.0))
 BOTH_ENDS = (0, -1)  # of `Acted.ends`: the first and the last sample
@@ -122,16 +146,18 @@ CLIPS: dict[str, Kind] = {
     "look_down": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=1.0), BOTH_ENDS),
     "limp_walk": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "limp": Difference(loop="limp_walk", base="walk"),
-    "hit_front": Acted(functools.partial(gestures.hit, side="front"), BOTH_ENDS, additive=True),
-    "hit_back": Acted(functools.partial(gestures.hit, side="back"), BOTH_ENDS, additive=True),
-    "hit_left": Acted(functools.partial(gestures.hit, side="left"), BOTH_ENDS, additive=True),
-    "hit_right": Acted(functools.partial(gestures.hit, side="right"), BOTH_ENDS, additive=True),
+    **{f"hit_{side}": Blow(side, max_tilt=10.0) for side in DIRECTIONS},
+    **{f"stagger_{side}": Blow(side, max_tilt=30.0, cycles=2) for side in DIRECTIONS},
     "attack": Acted(gestures.strike, BOTH_ENDS, steps=True),
     "rise": Acted(acting.rise, ends=(-1,), planted=False),
-    "get_up": Acted(acting.get_up, ends=(-1,), planted=False),
+    "get_up": Acted(functools.partial(acting.get_up, lies_on="back"), ends=(-1,), planted=False),
+    "get_up_side": Acted(functools.partial(acting.get_up, lies_on="side"), ends=(-1,), planted=False),
+    "get_up_belly": Acted(functools.partial(acting.get_up, lies_on="belly"), ends=(-1,), planted=False),
     "jump": Acted(acting.jump, BOTH_ENDS, planted=False),
     "leap": Acted(acting.leap, BOTH_ENDS, planted=False),
-    "death": Acted(acting.death, ends=(0,), planted=False),
+    "death": _fall("front"),
+    "death_back": _fall("back", unlike=("death",)),
+    "death_left": _fall("left", unlike=("death", "death_back")),
     "tuned": Showcase("tuned"),
     "refined": Showcase("refined"),
 }
@@ -163,8 +189,13 @@ def clip_of(name: str) -> Kind:
 
 def is_additive(name: str) -> bool:
     """Return whether a clip is added to others, as its difference from the first pose of idle."""
-    clip = clip_of(name)
-    return isinstance(clip, Difference) or (isinstance(clip, Acted) and clip.additive)
+    match clip_of(name):
+        case Acted() as clip:
+            return clip.additive
+        case Blow() as clip:
+            return clip.cycles == 0
+        case clip:
+            return isinstance(clip, Difference)
 
 
 def recordings_for_clips(names: Sequence[str]) -> dict[str, list[str]]:

@@ -84,7 +84,7 @@ def make_drafts(
     walk = unplanted_drafts["walk"] if "walk" in drafts else None
     planted_walk = drafts.get("walk") if plant else None
     if transition is not None:
-        drafts |= make_clips_from_rest(body, transition, names, walk, planted_walk, left_out)
+        drafts |= make_clips_from_rest(recorder, transition, names, walk, planted_walk, left_out)
         drafts = _keep_within_bounds(body, drafts, left_out)
     drafts = weight.add_weight(body, drafts, character)
     for name in names:

@@ -1,16 +1,19 @@
 """Clips that connect to idle, and some to the walk: gestures, falls, jumps, turns, starts and stops."""
 
+import bisect
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import numpy as np
 
-from arc_suite.animation.clips import bounds, root_motion, turning
-from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, Passage, Turn, clip_of
+from arc_suite import rotations
+from arc_suite.animation.clips import bounds, planting, root_motion, standing_legs, turning
+from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, Blow, Passage, Turn, clip_of
 from arc_suite.animation.clips.draft import Draft
-from arc_suite.animation.clips.recorder import TransitionRecording
+from arc_suite.animation.clips.recorder import Recorder, TransitionRecording
+from arc_suite.animation.clips.recordings import samples_to_rest
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.models import sizing
 from arc_suite.robots.spec import Body
@@ -18,11 +21,16 @@ from arc_suite.robots.spec import Body
 _MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
 _FLIGHT_HEIGHT = 0.02  # standing heights: while all soles are higher, a body flies
 _FREE_SOLE_DEPTH = 0.025  # standing heights: soles that are deeper in the ground are raised
+_BLOW_SIZES = tuple(0.15 * 1.4**step for step in range(10))  # that are tried, sqrt(g h): up to 3.1
+_MIN_BLOW_DURATION = 7.0  # sqrt(h / g), of the clip of a blow
+_SINK_BY_TILT = 0.5  # standing heights a rad: how far knees give under a torso that tilts over feet that stay
+_MIN_TILT_APART = math.radians(30.0)  # of the torsos of bodies that lie in different poses
+_MIN_BEND_APART = 0.3  # rad, mean of joints of bodies that lie in different poses
 _RAISING_DURATION = 0.5  # sqrt(h / g), to either side of a sample in which a body is raised
 
 
 def make_clips_from_rest(
-    body: Body,
+    recorder: Recorder,
     transition: TransitionRecording,
     names: Sequence[str],
     walk: Draft | None,
@@ -32,13 +40,14 @@ def make_clips_from_rest(
     """Return the draft of idle, and those of the named clips that connect to it.
 
     Args:
-        body: the spec.
+        recorder: recorder of the body.
         transition: transition from which rest, stops and starts are taken.
         names: names of the clips.
         walk: clip that stops and starts connect to, with feet as in the physics.
         planted_walk: the same with planted feet; None if feet are not to be planted.
         left_out: takes the reasons why clips cannot be made.
     """
+    body = recorder.body
     rest_pose = root_motion.stay_at_start(transition.gait.recording, transition.start, samples=1).pose(0)
     idle_clip = cast(Acted, clip_of("idle"))
     idle = _play(body, idle_clip, rest_pose).put_on_ground(body)
@@ -51,6 +60,8 @@ def make_clips_from_rest(
                 case Turn() as clip:
                     play = functools.partial(turning.turn, angle=math.radians(clip.angle))
                     drafts[name] = _act(body, Acted(play, BOTH_ENDS, steps=True), idle.start)
+                case Blow() as clip:
+                    drafts[name] = _take_blow(recorder, clip, idle.start)
                 case Passage() as clip:
                     draft = _make_passage(body, clip, transition, idle.start, walk)
                     if planted_walk is not None:
@@ -58,6 +69,11 @@ def make_clips_from_rest(
                     drafts[name] = draft
         except ValueError as error:
             left_out[name] = str(error)
+    for name in names:
+        reason = _find_likeness(name, drafts)
+        if reason:
+            left_out[name] = reason
+            del drafts[name]
     return drafts
 
 
@@ -88,6 +104,93 @@ def _act(body: Body, clip: Acted, idle: Pose) -> Draft:
     return draft._replace(motion=motion)
 
 
+def _find_likeness(name: str, drafts: Mapping[str, Draft]) -> str:
+    """Return which clip ends as one does that is to end unlike it; "" if there is none."""
+    clip = clip_of(name)
+    if name not in drafts or not isinstance(clip, Acted):
+        return ""
+    pose = drafts[name].motion.pose(-1)
+    up = rotations.matrix(pose.quaternion)[2]
+    for unlike_name in clip.unlike:
+        if unlike_name in drafts:
+            unlike_pose = drafts[unlike_name].motion.pose(-1)
+            tilt = math.acos(min(1.0, up @ rotations.matrix(unlike_pose.quaternion)[2]))
+            bend = abs(pose.joints - unlike_pose.joints).mean()
+            if tilt < _MIN_TILT_APART and bend < _MIN_BEND_APART:
+                apart = f"{math.degrees(tilt):.0f} degrees of the torso and {bend:.2f} rad of joints apart"
+                return f"it lies as in {unlike_name}: {apart}"
+    return ""
+
+
+def _take_blow(recorder: Recorder, clip: Blow, idle: Pose) -> Draft:
+    """Return how a body takes the strongest blow that suits it, from idle to idle.
+
+    Raises:
+        ValueError: no blow suits it.
+    """
+    drafts = {}
+    reasons = {}
+
+    def is_too_strong(size: float) -> bool:
+        try:
+            drafts[size] = _record_blow(recorder, clip, size, idle)
+        except ValueError as error:
+            reasons[size] = str(error)
+        return size in reasons
+
+    bisect.bisect_left(_BLOW_SIZES, True, key=is_too_strong)
+    if not drafts:
+        size = min(reasons)
+        raise ValueError(f"under a blow of {size:g} sqrt(g h), {reasons[size]}")
+    return drafts[max(drafts)]
+
+
+def _record_blow(recorder: Recorder, clip: Blow, size: float, idle: Pose) -> Draft:
+    """Return how a body takes a blow of a size, from idle to idle.
+
+    Raises:
+        ValueError: the body falls, tilts too far or stands in another pose after it, or a bound breaks.
+    """
+    body = recorder.body
+    recording, cycle, _ = recorder.record_blow(clip.side, size, clip.cycles)
+    tilt = math.degrees(np.arccos(rotations.upright(recording.poses[:, 3:7]).clip(-1.0, 1.0)).max())
+    if tilt > clip.max_tilt:
+        raise ValueError(f"its torso tilts by {tilt:.0f} degrees, more than {clip.max_tilt:.0f}")
+    min_samples = _to_samples(body, _MIN_BLOW_DURATION, recording.time_step)
+    recording = recording._replace(poses=recording.poses[: max(samples_to_rest(recording), min_samples) + 1])
+    fading_samples = len(recording.poses) // 3
+    if clip.cycles:
+        motion = root_motion.advance_straight(recording).meet(idle, -1, fading_samples)
+    else:
+        motion = root_motion.stay_at_start(recording, 0, len(recording.poses) - 1).end_with(idle, -1, fading_samples)
+    motion = motion.end_with(idle, 0, fading_samples)
+    _check_seam(motion, "idle")
+    if clip.cycles:
+        motion = planting.plant_feet(body, _raise_out_of_ground(body, motion, BOTH_ENDS), cycle, loops=False)
+        for end in BOTH_ENDS:
+            motion = motion.end_with(idle, end, fading_samples)
+    else:
+        motion = _stand_on_feet(body, motion, idle)
+    reason = bounds.find_excess(body, clip, motion)
+    if reason:
+        raise ValueError(reason)
+    return Draft(motion, loops=False, stands=not clip.cycles)
+
+
+def _stand_on_feet(body: Body, motion: ClipMotion, idle: Pose) -> ClipMotion:
+    """Return the motion of a torso from idle to idle over feet that stay, as large as legs can follow.
+
+    Raises:
+        ValueError: the legs leave no room for it.
+    """
+    samples = round(motion.seconds / standing_legs.time_step(body))
+    motion = motion.sample_at(np.linspace(0.0, motion.seconds, samples + 1))
+    poses = standing_legs.poses_of_motion(body, idle, motion)
+    poses[:, standing_legs.HEIGHT] -= _SINK_BY_TILT * np.linalg.norm(poses[:, 3:5], axis=-1)  # of roll and pitch
+    standing_motion = standing_legs.follow_with_legs(body, idle, poses, action="sway")
+    return standing_motion._replace(time_step=motion.time_step, seam=motion.seam)
+
+
 def _raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[int]) -> ClipMotion:
     """Return a motion whose torso is higher where, drawn, the body is in the ground, and smoothly so before and after.
 
@@ -103,7 +206,7 @@ def _raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[in
     depths = np.maximum(-ground.lowest_part, -ground.soles.min(axis=-1) - _FREE_SOLE_DEPTH * height)
     if depths.max() <= 0.0:
         return motion
-    width = round(_RAISING_DURATION * math.sqrt(height / sizing.GRAVITY) / motion.time_step)
+    width = _to_samples(body, _RAISING_DURATION, motion.time_step)
     padded = np.pad(depths.clip(0.0), 2 * width, mode="edge")
     largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1).max(axis=-1)
     weights = np.hanning(2 * width + 3)[1:-1]
@@ -112,6 +215,11 @@ def _raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[in
         weights = root_motion.fade_out(1.0 - np.arange(len(raises)) / width)
         raises = raises * (weights if end == 0 else weights[::-1])
     return motion._replace(positions=motion.positions + raises[:, None] * (0.0, 0.0, 1.0))
+
+
+def _to_samples(body: Body, duration: float, time_step: float) -> int:
+    """Return the number of samples in a multiple of sqrt(h / g)."""
+    return round(duration * math.sqrt(body.torso.standing_height / sizing.GRAVITY) / time_step)
 
 
 def _find_flight(body: Body, motion: ClipMotion) -> tuple[int, int] | None:
@@ -151,11 +259,16 @@ def _make_passage(body: Body, clip: Passage, transition: TransitionRecording, id
     idle_end, walk_end = _ends_of_passage(clip)
     motion = draft.motion.meet(idle, idle_end, draft.cycle_samples)
     motion = motion.meet(walk.start, walk_end, draft.cycle_samples)
+    _check_seam(motion, "the walk or of idle")
+    return draft._replace(motion=_raise_out_of_ground(body, motion, BOTH_ENDS))
+
+
+def _check_seam(motion: ClipMotion, name: str) -> None:
+    """Raise a ValueError if a pose that a motion was made to meet, that of a name, is far from its own."""
     if motion.seam > _MAX_MEETING_SEAM:
         seam = np.degrees(motion.seam)
         max_seam = np.degrees(_MAX_MEETING_SEAM)
-        raise ValueError(f"its pose is {seam:.0f} degrees from that of the walk or of idle, more than {max_seam:.0f}")
-    return draft._replace(motion=_raise_out_of_ground(body, motion, BOTH_ENDS))
+        raise ValueError(f"its pose is {seam:.0f} degrees from that of {name}, more than {max_seam:.0f}")
 
 
 def _plant_passage(body: Body, clip: Passage, draft: Draft, idle: Pose, walk: Draft, planted_walk: Draft) -> Draft:

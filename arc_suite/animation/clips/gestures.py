@@ -1,4 +1,4 @@
-"""Motions drawn over standing feet, from the pose at rest: breaths, looks, leans, blows, strikes.
+"""Motions drawn over standing feet, from the pose at rest: breaths, looks, leans, strikes.
 
 A gesture is a table of tracks. A track has keys of time and value; between keys the value is eased. Lengths are in
 standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.POSE_NAMES`.
@@ -44,20 +44,6 @@ _LOOK_TRACKS = {
 _SETTLE_DURATION = 24.0
 _SETTLE_LIFT_TRACK = ((3.0, 0.0), (4.6, 0.16), (5.0, 0.16), (6.6, 0.0))  # of the foot, h
 _SETTLE_SHIFT_TRACK = ((0.5, 0.0), (2.8, 0.06), (6.6, 0.06), (9.0, -0.02), (11.5, 0.0))  # of the torso, h
-
-# A blow.
-HIT_DIRECTIONS = {  # by the side that is hit: forward and left components of the torso's sway
-    "front": (-1.0, 0.0),
-    "back": (1.0, 0.0),
-    "left": (0.0, -1.0),
-    "right": (0.0, 1.0),
-}
-_HIT_DURATION = 7.0
-_HIT_PEAK_TIME = 0.9
-_HIT_REBOUND = 0.3  # of the sway: how far the torso sways back
-_HIT_TILT = 0.2  # rad
-_HIT_PUSH = 0.07  # h
-_HIT_SINK = 0.1  # h
 
 # A strike: the torso draws back, then leans into it.
 _STRIKE_DURATION = 9.0
@@ -148,34 +134,6 @@ def settle(body: Body, rest: Pose) -> ClipMotion:
         poses[:, 3:5] += shift[:, None] * (-left, forward)  # roll and pitch: the torso leans where its weight goes
         lifts[:, leg, 2] = _track_values(times - start, _SETTLE_LIFT_TRACK)
     return _close_loop(follow_with_legs(body, rest, poses, action="shift its weight", lifts=lifts))
-
-
-def hit(body: Body, rest: Pose, side: str) -> ClipMotion:
-    """Return how a body sways under a blow over planted feet: pushed and tilted away from it, while the knees give.
-
-    Args:
-        body: the spec.
-        rest: pose from which it sways.
-        side: side from which the blow comes, of `HIT_DIRECTIONS`.
-
-    Raises:
-        ValueError: the legs leave no room for it.
-    """
-    times = sample_times(body, _HIT_DURATION)
-    forward, left = HIT_DIRECTIONS[side]
-
-    def impulse(start):
-        peak_share = (times - start).clip(0.0) / _HIT_PEAK_TIME
-        return peak_share**2 * np.exp(2.0 - 2.0 * peak_share)  # 1 at the peak
-
-    ending = fade_out(times / _HIT_DURATION * 2.0 - 1.0)  # falls in the second half
-    sway = (impulse(0.0) - _HIT_REBOUND * impulse(2.0 * _HIT_PEAK_TIME)) * ending
-    sink = (impulse(0.2 * _HIT_PEAK_TIME) + 0.3 * impulse(_HIT_PEAK_TIME)) * ending
-    # Height, forward, left, roll, pitch and yaw.
-    largest_sway = np.array((0.0, _HIT_PUSH * forward, _HIT_PUSH * left, -_HIT_TILT * left, _HIT_TILT * forward, 0.0))
-    poses = sway[:, None] * largest_sway
-    poses[:, HEIGHT] = -_HIT_SINK * sink
-    return follow_with_legs(body, rest, poses, action="sway")
 
 
 def strike(body: Body, rest: Pose) -> ClipMotion:

@@ -23,11 +23,16 @@ def compile_on_hard_ground(body: Body) -> mujoco.MjModel:
 @functools.lru_cache(maxsize=8)
 def _shared_model(body: Body) -> mujoco.MjModel:
     model = compile_model(body) if body.source else _compile_with_drawn_shapes(body)
+    harden(model)
+    return model
+
+
+def harden(model: mujoco.MjModel) -> None:
+    """Make the ground of a model hard."""
     model.pair_solref[:] = _TIME_STEPS * model.opt.timestep, 1.0
     model.pair_solimp[:] = _IMPEDANCE
     model.pair_margin[:] = 0.0  # else bodies rest above the ground
     model.pair_gap[:] = 0.0
-    return model
 
 
 def _compile_with_drawn_shapes(body: Body) -> mujoco.MjModel:

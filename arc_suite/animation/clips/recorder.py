@@ -1,10 +1,11 @@
-"""Recordings of one body under one policy: walks under commands, a stop and a start, showcases of presets."""
+"""Recordings of one body under one policy: walks under commands, a stop and a start, blows, showcases of presets."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite.animation.clips import loops
+from arc_suite.animation.clips.blows import Blow
 from arc_suite.animation.clips.recordings import Recording, record
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
@@ -20,6 +21,11 @@ _CYCLES_UNDER_COMMAND = 20  # gait cycles of a recording, to choose loops from
 _CYCLES_BEFORE_STOP = 2  # gait cycles of a recording of a stop and a start
 _CYCLES_AT_REST = 5
 _CYCLES_AFTER_START = 4
+_STANDING_STEPS = 60  # control steps before a blow, at least
+_CYCLES_AFTER_BLOW = 3  # gait cycles in which a body comes to rest after a blow, and after its steps
+_STEPPING_COMMAND = (1e-6, 0.0, 0.0)  # so slow that a body steps on the spot
+_BLOW_LEVER = 0.5  # standing heights
+_BLOW_FRICTION = 4.0  # of feet that do not skid, so that the torso goes over them
 _CROUCH_ROOM_SHARE = 0.7  # of the room that legs leave the torso: as deep as a body crouches
 _MIN_CROUCH = 0.05  # standing heights
 _FIXED_POSE_AND_GAIT = {"poses": 0.0, "gaits": ()}  # settings of a task that else draws commands of pose and gait
@@ -200,6 +206,26 @@ class Recorder:
             delay=delay,
         )
 
+    def record_blow(self, side: str, size: float, cycles: int) -> GaitRecording:
+        """Return a recording of a body that stands, from the blow on until it stands again.
+
+        Args:
+            side: see `blows.Blow`.
+            size: see `blows.Blow`.
+            cycles: gait cycles in which it steps on the spot after the blow; 0 for feet that stay.
+
+        Raises:
+            ValueError: the body falls, or the task has no command.
+        """
+        clock = self._clock(self._setup)
+        steps_in_cycle = clock.cycle / clock.control_timestep
+        standing_steps = round(np.ceil(_STANDING_STEPS / steps_in_cycle) * steps_in_cycle)
+        stop_step = standing_steps + round(cycles * steps_in_cycle)
+        commands = [(0, (0.0, 0.0, 0.0)), (standing_steps, _STEPPING_COMMAND), (stop_step, (0.0, 0.0, 0.0))]
+        steps = round((cycles + _CYCLES_AFTER_BLOW) * steps_in_cycle)
+        blow = Blow(side, size, _BLOW_LEVER, _BLOW_FRICTION)
+        return GaitRecording(self._record(self._setup, standing_steps, steps, commands, blow), clock.cycle)
+
     def _setup_with_pose_command(self) -> Setup:
         """Return the setup, or for demonstrators that of the task `directed`, which takes a pose by command."""
         if "pose" in self._setup.definition.commands:
@@ -247,11 +273,11 @@ class Recorder:
             control_timestep=task.scene.control_timestep,
         )
 
-    def _record(self, setup: Setup, settle: int, steps: int, commands=(), **fixed_commands) -> Recording:
+    def _record(self, setup: Setup, settle: int, steps: int, commands=(), blow=None, **fixed_commands) -> Recording:
         """Return a recording of the policy in a setup; arguments as of `recordings.record`."""
         environment = setup.load(seed=0)
         policy = named_policy(self._policy, self.body, self._preset, task=environment.task.definition)
-        return record(environment, policy, settle, steps, commands, **fixed_commands)
+        return record(environment, policy, settle, steps, commands, blow, **fixed_commands)
 
 
 def _find_gait(recording: Recording) -> GaitRecording:

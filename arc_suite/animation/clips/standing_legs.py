@@ -167,6 +167,16 @@ def tilt(quaternions: np.ndarray, roll_pitch_yaw: np.ndarray) -> np.ndarray:
     return quaternions
 
 
+def poses_of_motion(body: Body, rest: Pose, motion: ClipMotion) -> np.ndarray:
+    """Return the poses (samples, 6) of the torso of a motion from rest; see `pose_motion`."""
+    forward, left, up = ((motion.positions - rest.position) / body.torso.standing_height).T
+    turns = rotations.matrix(motion.quaternions) @ rotations.matrix(rest.quaternion).T
+    roll = np.arctan2(turns[:, 2, 1], turns[:, 2, 2])
+    pitch = -np.arcsin(turns[:, 2, 0].clip(-1.0, 1.0))
+    yaw = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
+    return np.stack([up, forward, left, roll, pitch, yaw], axis=-1)
+
+
 def hold_pose(pose: Pose, samples: int, time_step: float) -> ClipMotion:
     """Return a pose that stays for a number of samples after the first one, with a root that stays."""
     return ClipMotion(

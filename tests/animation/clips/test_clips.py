@@ -17,7 +17,6 @@ from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import acting, foot_contacts, from_rest, loops, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
-from arc_suite.animation.clips.gestures import HIT_DIRECTIONS
 from arc_suite.bodies.generator import random_body
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
@@ -73,10 +72,13 @@ def assert_kinematics(body, file, clips):
 
 @pytest.mark.long
 @pytest.mark.parametrize("robot", ["tick", "leaper"])
-def test_a_robot_gets_up_from_its_back(robot):
-    clips = made(robot, "get_up", "idle")
+def test_a_robot_gets_up_from_back_side_and_belly(robot):
+    names = {"get_up": (-1.0, -0.7), "get_up_side": (-0.4, 0.4), "get_up_belly": (0.7, 1.0)}
+    clips = made(robot, *names, "idle")
+    for name, (least, largest) in names.items():
+        assert least <= rotations.upright(clips[name].motion.quaternions[0]) <= largest + 1e-9
     motion, idle = clips["get_up"].motion, clips["idle"].motion
-    assert rotations.upright(motion.quaternions[0]) < -0.7 < 0.99 < rotations.upright(motion.quaternions[-1])
+    assert rotations.upright(motion.quaternions[-1]) > 0.99
     assert not clips["get_up"].loops and not clips["get_up"].moves
     last, first = motion.pose(-1), idle.pose(0)
     np.testing.assert_allclose(last.position, first.position, atol=1e-6)
@@ -86,7 +88,7 @@ def test_a_robot_gets_up_from_its_back(robot):
 
 def test_without_a_policy_of_the_package_there_is_no_get_up():
     with refused("the package has no policy of recover for it"):
-        acting.get_up(ROBOTS["queen"], rest=None)
+        acting.get_up(ROBOTS["queen"], rest=None, lies_on="back")
 
 
 def test_the_bytes_of_a_walk_hold_its_kinematics():
@@ -403,18 +405,6 @@ def test_idle_breathes_on_its_feet(robot):
     assert 0.001 * height < np.ptp(clip.motion.positions[:, 2]) < 0.013 * height
     ranges = compile_model(body).jnt_range[1:]
     assert (clip.motion.joints >= ranges[:, 0] - 1e-9).all() and (clip.motion.joints <= ranges[:, 1] + 1e-9).all()
-
-
-@pytest.mark.slow
-def test_a_blow_tilts_the_torso_over_planted_feet():
-    body, clips = ROBOTS["tick"], made("tick", "idle", *(f"hit_{side}" for side in HIT_DIRECTIONS))
-    height, rest = body.torso.standing_height, clips["idle"].motion.pose(0)
-    for side, way in HIT_DIRECTIONS.items():
-        motion = clips[f"hit_{side}"].motion
-        tilts = (rotations.matrix(motion.quaternions) - rotations.matrix(rest.quaternion))[:, :2, 2] @ way
-        assert np.degrees(np.arcsin(tilts.max())) == pytest.approx(11.0, abs=1.5)
-        assert np.ptp(motion.positions[:, 2]) > 0.08 * height
-        assert np.ptp(feet_of(body, motion.poses()), axis=0).max() < 0.03 * height
 
 
 @pytest.mark.slow

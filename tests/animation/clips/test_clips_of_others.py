@@ -12,6 +12,7 @@ from arc_suite.animation.clips.catalog import Acted, Difference, Showcase, Turn,
 from arc_suite.envs.setup import Setup
 
 TICK = Setup.of("tick", "steer")
+KINDS = "WalkLoop, Passage, Turn, Acted, Blow, Difference, Showcase"
 
 
 @pytest.fixture(autouse=True)
@@ -62,8 +63,8 @@ def test_a_name_may_have_its_module(monkeypatch, register):
 @pytest.mark.parametrize(
     ("clip", "message"),
     [
-        (3, "clip 'mine': expected one of WalkLoop, Passage, Turn, Acted, Difference, Showcase, got int"),
-        ("math:pi", "clip 'mine': expected one of WalkLoop, Passage, Turn, Acted, Difference, Showcase, got float"),
+        (3, f"clip 'mine': expected one of {KINDS}, got int"),
+        ("math:pi", f"clip 'mine': expected one of {KINDS}, got float"),
         ("math:tau_", "clip 'mine': cannot import math:tau_: module 'math' has no attribute 'tau_'"),
         ("no_such:a", "clip 'mine': cannot import no_such:a: No module named 'no_such'"),
         (Acted(lambda body, rest: None, (0,)), "tick, clip mine: expected a ClipMotion of its play, got NoneType"),
