@@ -101,6 +101,10 @@ DEFAULTS_OF_SERVOS = {
 }
 # With a failed leg, generated bodies and those with more legs earn more by `braced`.
 DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS = {**DEFAULTS_OF_SERVOS, "limping": LimpingParameters(_BRACED)}
+# Of bodies whose soles stand further aside than this, in standing heights, on average: no kick needs them wider, and a
+# torso over the other feet of a failed leg gains nothing.
+WIDE_STANCE = 0.95
+DEFAULTS_OF_WIDE_LEGS_WITH_SERVOS = {**DEFAULTS_OF_SERVOS, "braced": _STEERED}
 # Of bodies whose median motor gives less than this share of m g h. Over rough ground and slopes they earn up to a fifth
 # more by the lower torso of `sighted`; those with stronger motors fall there.
 WEAK_TORQUE = 0.57

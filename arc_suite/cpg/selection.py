@@ -19,9 +19,11 @@ from arc_suite.cpg.presets import (
     DEFAULTS_OF_FOUR_LEGS_WITH_SERVOS,
     DEFAULTS_OF_FOUR_LEGS_WITH_WEAK_SERVOS,
     DEFAULTS_OF_SERVOS,
+    DEFAULTS_OF_WIDE_LEGS_WITH_SERVOS,
     LARGE_LOAD,
     PRESETS,
     WEAK_TORQUE,
+    WIDE_STANCE,
 )
 from arc_suite.cpg.rising import Rising, RisingParameters
 from arc_suite.cpg.sighted import Sighted, SightedParameters
@@ -29,7 +31,7 @@ from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.cpg.straight import Straight, StraightParameters
 from arc_suite.cpg.stride_law import StrideLaw
 from arc_suite.cpg.tracked import Tracked, TrackingParameters
-from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.standing import GRAVITY, PoseMechanics, measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -150,12 +152,14 @@ def _default_presets(body: Body) -> Mapping[str, Any]:
     has_four_legs = len(body.legs) <= 4
     if not body.source:
         return DEFAULTS_OF_FOUR_LEGS if has_four_legs else DEFAULTS
-    return _default_presets_by_motors(body) if has_four_legs else DEFAULTS_OF_SERVOS
-
-
-def _default_presets_by_motors(body: Body) -> Mapping[str, Any]:
-    """Return the presets that suit any imported body with four legs, by what its motors give and carry."""
     standing = measure_standing(body)
+    if abs(standing.soles[:, 1]).mean() > WIDE_STANCE * standing.height:
+        return DEFAULTS_OF_WIDE_LEGS_WITH_SERVOS
+    return _default_presets_by_motors(body, standing) if has_four_legs else DEFAULTS_OF_SERVOS
+
+
+def _default_presets_by_motors(body: Body, standing: PoseMechanics) -> Mapping[str, Any]:
+    """Return the presets that suit any imported body with four legs, by what its motors give and carry."""
     torques = np.array([joint.torque for leg in body.legs for joint in leg.joints])
     if (abs(standing.loads) > LARGE_LOAD * torques).any():
         return DEFAULTS_OF_FOUR_LEGS_WITH_LOADED_SERVOS
