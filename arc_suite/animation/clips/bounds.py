@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.bones import pose_parts
-from arc_suite.animation.clips.catalog import Acted, Blow, Difference, Kind, Turn
+from arc_suite.animation.clips.catalog import Acted, BlowClip, Difference, Kind, Turn
 from arc_suite.animation.clips.meshes import body_meshes
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.animation.clips.standing_legs import has_free_feet
@@ -80,7 +80,7 @@ def is_planted(clip: Kind) -> bool:
     match clip:
         case Acted():
             return clip.planted
-        case Blow():
+        case BlowClip():
             return clip.cycles == 0
         case _:
             return isinstance(clip, Turn)

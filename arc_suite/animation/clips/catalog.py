@@ -73,7 +73,7 @@ class Acted(NamedTuple):
     unlike: tuple[str, ...] = ()
 
 
-class Blow(NamedTuple):
+class BlowClip(NamedTuple):
     """A blow to a body at rest, which stays on its feet, recorded.
 
     Attributes:
@@ -110,7 +110,7 @@ class Showcase(NamedTuple):
     preset: str
 
 
-Kind = WalkLoop | Passage | Turn | Acted | Blow | Difference | Showcase
+Kind = WalkLoop | Passage | Turn | Acted | BlowClip | Difference | Showcase
 
 
 def _fall(side: str, unlike: tuple[str, ...] = ()) -> Acted:
@@ -146,8 +146,8 @@ CLIPS: dict[str, Kind] = {
     "look_down": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=1.0), BOTH_ENDS),
     "limp_walk": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "limp": Difference(loop="limp_walk", base="walk"),
-    **{f"hit_{side}": Blow(side, max_tilt=10.0) for side in DIRECTIONS},
-    **{f"stagger_{side}": Blow(side, max_tilt=30.0, cycles=2) for side in DIRECTIONS},
+    **{f"hit_{side}": BlowClip(side, max_tilt=10.0) for side in DIRECTIONS},
+    **{f"stagger_{side}": BlowClip(side, max_tilt=30.0, cycles=2) for side in DIRECTIONS},
     "attack": Acted(gestures.strike, BOTH_ENDS, steps=True),
     "rise": Acted(acting.rise, ends=(-1,), planted=False),
     "get_up": Acted(functools.partial(acting.get_up, lies_on="back"), ends=(-1,), planted=False),
@@ -192,7 +192,7 @@ def is_additive(name: str) -> bool:
     match clip_of(name):
         case Acted() as clip:
             return clip.additive
-        case Blow() as clip:
+        case BlowClip() as clip:
             return clip.cycles == 0
         case clip:
             return isinstance(clip, Difference)

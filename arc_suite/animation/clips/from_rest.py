@@ -10,7 +10,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips import bounds, planting, root_motion, standing_legs, turning
-from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, Blow, Passage, Turn, clip_of
+from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, BlowClip, Passage, Turn, clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.recorder import Recorder, TransitionRecording
 from arc_suite.animation.clips.recordings import samples_to_rest
@@ -60,7 +60,7 @@ def make_clips_from_rest(
                 case Turn() as clip:
                     play = functools.partial(turning.turn, angle=math.radians(clip.angle))
                     drafts[name] = _act(body, Acted(play, BOTH_ENDS, steps=True), idle.start)
-                case Blow() as clip:
+                case BlowClip() as clip:
                     drafts[name] = _take_blow(recorder, clip, idle.start)
                 case Passage() as clip:
                     draft = _make_passage(body, clip, transition, idle.start, walk)
@@ -122,7 +122,7 @@ def _find_likeness(name: str, drafts: Mapping[str, Draft]) -> str:
     return ""
 
 
-def _take_blow(recorder: Recorder, clip: Blow, idle: Pose) -> Draft:
+def _take_blow(recorder: Recorder, clip: BlowClip, idle: Pose) -> Draft:
     """Return how a body takes the strongest blow that suits it, from idle to idle.
 
     Raises:
@@ -145,7 +145,7 @@ def _take_blow(recorder: Recorder, clip: Blow, idle: Pose) -> Draft:
     return drafts[max(drafts)]
 
 
-def _record_blow(recorder: Recorder, clip: Blow, size: float, idle: Pose) -> Draft:
+def _record_blow(recorder: Recorder, clip: BlowClip, size: float, idle: Pose) -> Draft:
     """Return how a body takes a blow of a size, from idle to idle.
 
     Raises:

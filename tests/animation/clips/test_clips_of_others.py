@@ -12,7 +12,7 @@ from arc_suite.animation.clips.catalog import Acted, Difference, Showcase, Turn,
 from arc_suite.envs.setup import Setup
 
 TICK = Setup.of("tick", "steer")
-KINDS = "WalkLoop, Passage, Turn, Acted, Blow, Difference, Showcase"
+KINDS = "WalkLoop, Passage, Turn, Acted, BlowClip, Difference, Showcase"
 
 
 @pytest.fixture(autouse=True)
