@@ -300,7 +300,7 @@ def task_of(name: str) -> type[Task]:
     Raises:
         ValueError: an unknown name.
     """
-    if isinstance(name, str) and name in robot_words() and name not in TASKS:
+    if isinstance(name, str) and name not in TASKS and name in robot_words():
         raise ValueError(f"task {name!r}: it is a robot; tasks are {', '.join(TASKS)}")
     return _look_up(name, TASKS, "task")
 
@@ -403,8 +403,8 @@ def refuse_settings_of_others(task: type[Task], settings: Iterable[str]) -> None
     names_of_settings = getattr(task, "names", None)  # tasks of other packages may lack it
     if names_of_settings is None:
         return
-    own_names = (*names_of_settings(), *SETTINGS_OF_EVERY_TASK)
     for name in settings:
+        own_names = (*names_of_settings(), *SETTINGS_OF_EVERY_TASK)
         if difflib.get_close_matches(str(name), own_names, n=1, cutoff=_SAME_WORD):  # itself, or a slip of it
             continue
         task_names = [key for key, kind in TASKS.items() if name in getattr(kind, "names", tuple)()]

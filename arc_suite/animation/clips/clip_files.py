@@ -106,13 +106,19 @@ def animate(
         _check_names(made_clips)
         if extension == GLB_EXTENSION:
             metrics |= _write_glb(temporary, setup.body, made_clips, **options)
-        elif extension == motion_files.EXTENSION:
-            motions.save(motion_of_clip(setup.body, made_clips[0]), temporary)
         elif extension == SHEET_EXTENSION:
             metrics |= _write_sheet(temporary, path.name, setup.body, made_clips[0], **options)
         else:
-            _write_film(temporary, extension, setup.body, made_clips[0], progress, **options)
+            _write_motion_or_film(temporary, extension, setup.body, made_clips[0], progress, **options)
     return made_clips
+
+
+def _write_motion_or_film(temporary: Path, extension: str, body: Body, clip: Clip, progress, **options) -> None:
+    """Write a clip as a file that has no metrics."""
+    if extension == motion_files.EXTENSION:
+        motions.save(motion_of_clip(body, clip), temporary)
+    else:
+        _write_film(temporary, extension, body, clip, progress, **options)
 
 
 def _is_motion(name: str) -> bool:
