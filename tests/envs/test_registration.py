@@ -168,18 +168,17 @@ from arc_suite.tasks.fitting import fitted_noise
 assert "base_noise" not in hopper.WALK
 noise = arc_suite.load("hopper", "walk").task.definition.settings.noise
 assert noise._asdict() == fitted_noise(hopper.BODY)
-few = ["--robot=hopper:hopper", "--preset=prowl"]
 for program, *arguments in (
-    ("evaluate", "--episodes=1"),
-    ("style", "--episodes=1", "--save=walk.npz"),
+    ("evaluate", "--episodes=1", "--preset=prowl"),
+    ("style", "--episodes=1", "--preset=prowl", "--save=walk.npz"),
     ("style", "--policy=walk.npz", "--compare=cpg", "--compare_preset=prowl", "--episodes=1"),
     ("collect", "--episodes=2", "--steps=5", "--preset=prowl,slow"),
     ("collect", "--verify=arc_suite/hopper/walk/cpg-prowl-slow-5steps-v0"),
-    ("render", "--steps=2", "--output=hopper.png", "--width=64", "--height=48"),
+    ("render", "--steps=2", "--preset=prowl", "--output=hopper.png", "--width=64", "--height=48"),
     ("evaluate", "--preset=prwl"),
 ):
     done = subprocess.run(
-        [sys.executable, "-m", "arc_suite", program, *few, *arguments], capture_output=True, text=True
+        [sys.executable, "-m", "arc_suite", program, "--robot=hopper:hopper", *arguments], capture_output=True, text=True
     )
     print(program, done.returncode, *done.stderr.splitlines()[-1:])
 """
@@ -190,7 +189,7 @@ for program, *arguments in (
         *(f"{program} 0" for program in ("evaluate", "style", "style", "collect", "collect", "render")),
         "evaluate 1 arc-suite evaluate: unknown preset 'prwl'; did you mean 'prowl'? "
         "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, "
-        "sighted, leaping, planned, tracked, in_step, posed, balanced, limping, prowl)",
+        "sighted, leaping, planned, tracked, rising, crossing, in_step, posed, balanced, prowl, limping, hiking)",
     ]
 
 
