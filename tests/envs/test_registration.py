@@ -177,9 +177,8 @@ for program, *arguments in (
     ("render", "--steps=2", "--preset=prowl", "--output=hopper.png", "--width=64", "--height=48"),
     ("evaluate", "--preset=prwl"),
 ):
-    done = subprocess.run(
-        [sys.executable, "-m", "arc_suite", program, "--robot=hopper:hopper", *arguments], capture_output=True, text=True
-    )
+    command = [sys.executable, "-m", "arc_suite", program, "--robot=hopper:hopper", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True)
     print(program, done.returncode, *done.stderr.splitlines()[-1:])
 """
     lines = package(code)
