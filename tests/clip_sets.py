@@ -18,8 +18,9 @@ import mujoco
 import numpy as np
 from tqdm import tqdm
 
-from arc_suite.animation.clips import bounds, clips, planting, weight
+from arc_suite.animation.clips import bounds, planting, weight
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
+from arc_suite.animation.clips.clips import FPS, sample_clip
 from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.animation.clips.from_rest import cut_passage
 from arc_suite.animation.clips.recorder import Recorder
@@ -68,7 +69,7 @@ def broken(body, made) -> dict[str, str]:
     """Return which bounds are broken in the frames of clips, by name."""
     excesses = {}
     for name, draft in made.items():
-        excess = bounds.find_excess(body, CLIPS[name], clips._sample_clip(name, body, draft, clips.FPS).motion)
+        excess = bounds.find_excess(body, CLIPS[name], sample_clip(name, body, draft, FPS).motion)
         if excess:
             excesses[name] = excess
     return excesses

@@ -46,6 +46,7 @@ _LIMP_DAMPING = 0.02
 _STIFF_FRICTION = 1.0  # dry friction
 _LIMP_DURATION = 6.0
 _STIFFENING_DURATION = 14.0  # after which joints without life have come to rest
+_REST_SECONDS = 0.05  # s at rest in the end, so that the last two frames of a clip show a body at rest
 _LYING_HEIGHT = 0.65  # of the torso's height at rest: a lower torso lies
 _LYING_CLEARANCE = 0.1  # of the torso's height at rest: a torso whose lowest point is nearer to the ground lies
 
@@ -139,7 +140,8 @@ def death(body: Body, rest: Pose, side: str) -> ClipMotion:
         ValueError: the torso does not come to lie on the ground.
     """
     recording = _simulate_limp(body, rest, side)
-    samples = samples_to_rest(recording)
+    rest_samples = math.ceil(_REST_SECONDS / recording.time_step)
+    samples = min(samples_to_rest(recording) + rest_samples, len(recording.poses) - 1)
     _check_lies(body, rest, recording.poses[samples])
     return stay_at_start(recording, first=0, samples=samples)
 

@@ -124,7 +124,7 @@ def clips(
     left_out: dict[str, str] = {}
     drafts = make_drafts(recorder, names, progress, left_out, straight, plant, character)
     _report_left_out(setup.body, names, left_out)
-    clip_of_name = {name: _sample_clip(name, setup.body, drafts[name], fps) for name in names if name not in left_out}
+    clip_of_name = {name: sample_clip(name, setup.body, drafts[name], fps) for name in names if name not in left_out}
     motion_of_clip = {name: clip.motion for name, clip in clip_of_name.items()}
     clip_loops = {name: clip.loops for name, clip in clip_of_name.items()}
     for name, clip in clip_of_name.items():
@@ -143,7 +143,7 @@ def _report_left_out(body: Body, names: Sequence[str], left_out: Mapping[str, st
         warnings.warn(f"{body.name}, clip {name} is left out: {left_out[name]}", stacklevel=3)
 
 
-def _sample_clip(name: str, body: Body, draft: Draft, fps: float) -> Clip:
+def sample_clip(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     """Return a draft as frames; it lasts a whole number of frames at 30 and at 60 a second."""
     draft_seconds = draft.motion.seconds
     if draft.loops and draft.cycles:

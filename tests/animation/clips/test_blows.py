@@ -139,3 +139,11 @@ def test_deaths_by_other_blows_lie_in_other_poses():
         up, other_up = (rotations.matrix(motion.quaternions[-1])[2] for motion in ends)
         bend = abs(ends[0].joints[-1] - ends[1].joints[-1]).mean()
         assert np.degrees(np.arccos(up @ other_up)) > 30.0 or bend > 0.3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fps", [24, 60])
+def test_the_last_frames_of_a_death_show_a_body_at_rest(fps):
+    setup = Setup.of("bastion", "steer")
+    for clip in export.clips(setup, ("death", "death_left"), fps=fps):
+        assert bounds.measure(setup.body, clip.motion).last_speed < 1.0
