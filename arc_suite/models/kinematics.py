@@ -77,6 +77,16 @@ class Legs(NamedTuple):
         mount_rotations = _rotations(np.tile(_VERTICAL, (len(mounts), 1)), yaws)
         return cls(mounts, mount_rotations, axes, ends, radii, joint_indices, has_joint, low, high)
 
+    def to_foot_centers(self) -> Self:
+        """Return the legs with the centers of feet for soles."""
+        return self._replace(radii=np.zeros_like(self.radii))
+
+    def widen_ranges(self, angles: np.ndarray) -> Self:
+        """Return the legs with joint ranges that hold angles (samples, legs, links); limits in the physics are soft."""
+        low = np.minimum(self.low, angles.min(axis=0))
+        high = np.maximum(self.high, angles.max(axis=0))
+        return self._replace(low=low, high=high)
+
     def by_leg(self, values) -> np.ndarray:
         """Return values (..., joints) as (..., legs, links), 0 where a link is fixed."""
         xp = values.__array_namespace__()

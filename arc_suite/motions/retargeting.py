@@ -237,7 +237,7 @@ def _solve(body: Body, paths: Paths, loops: bool = False, follows: bool = True) 
     """
     height = body.torso.standing_height
     legs = Legs.of(body, used=1.0)
-    centers = legs._replace(radii=np.zeros_like(legs.radii))  # of feet
+    centers = legs.to_foot_centers()  # of feet
     goals = paths.soles * height + legs.radii[:, None] * _VERTICAL - paths.positions[:, None] * height
     goals = (rotations.matrix(paths.quaternions).swapaxes(-1, -2)[:, None] @ goals[..., None])[..., 0]
     rest_angles = find_rest_pose(body).joint_angles

@@ -184,7 +184,7 @@ def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
 
 def _to_steps(body: Body, duration: float) -> int:
     """Return the number of control steps in a multiple of sqrt(h / g)."""
-    seconds = duration * math.sqrt(body.torso.standing_height / sizing.GRAVITY)
+    seconds = duration * sizing.time_unit(body)
     return round(seconds / sizing.control_timestep(body))
 
 
@@ -249,7 +249,7 @@ def _simulate_limp(body: Body, rest: Pose, side: str) -> Recording:
     height = body.torso.standing_height
     leg_mass = model.body_mass.sum() / len(body.legs)  # kg, that a leg carries
     leg_load = leg_mass * sizing.GRAVITY * height  # N m
-    time_unit = math.sqrt(height / sizing.GRAVITY)  # s
+    time_unit = sizing.time_unit(body)
     joints = layout.joint_velocities
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     model.dof_armature[joints] = model.dof_armature[joints].clip(max=_LIMP_ARMATURE * leg_mass * height**2)

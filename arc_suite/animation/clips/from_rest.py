@@ -219,7 +219,7 @@ def _raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[in
 
 def _to_samples(body: Body, duration: float, time_step: float) -> int:
     """Return the number of samples in a multiple of sqrt(h / g)."""
-    return round(duration * math.sqrt(body.torso.standing_height / sizing.GRAVITY) / time_step)
+    return round(duration * sizing.time_unit(body) / time_step)
 
 
 def _find_flight(body: Body, motion: ClipMotion) -> tuple[int, int] | None:

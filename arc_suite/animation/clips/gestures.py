@@ -4,7 +4,6 @@ A gesture is a table of tracks. A track has keys of time and value; between keys
 standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.POSE_NAMES`.
 """
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -142,7 +141,7 @@ def strike(body: Body, rest: Pose) -> ClipMotion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    seconds = _STRIKE_DURATION * math.sqrt(body.torso.standing_height / sizing.GRAVITY)
+    seconds = _STRIKE_DURATION * sizing.time_unit(body)
     haste = max(1.0, seconds / _MAX_STRIKE_SECONDS)
     times = haste * sample_times(body, _STRIKE_DURATION / haste)  # of the tracks
     feet = feet_from_torso(body, rest)

@@ -44,7 +44,7 @@ def plant_feet(body: Body, motion: ClipMotion, cycle: float, loops: bool) -> Cli
     cycle_samples = cycle / motion.time_step
     legs = Legs.of(body, used=1.0)
     unplanted_angles = legs.by_leg(motion.joints)
-    legs = _widen_ranges(legs, unplanted_angles)
+    legs = legs.widen_ranges(unplanted_angles)
     stances = _find_stances_of_legs(legs, standing_height, motion, round(_MIN_SWING * cycle_samples), loops)
     max_joint_steps = _MAX_SPEED_RATIO * _largest_joint_steps(unplanted_angles)
     planted_motion = motion
@@ -73,22 +73,12 @@ def slip(body: Body, motion: ClipMotion) -> float | None:
 # Legs and stances.
 
 
-def _widen_ranges(legs: Legs, angles: np.ndarray) -> Legs:
-    """Return the legs with joint ranges that hold angles (samples, legs, links); limits in the physics are soft."""
-    return legs._replace(low=np.minimum(legs.low, angles.min(axis=0)), high=np.maximum(legs.high, angles.max(axis=0)))
-
-
-def _to_foot_centers(legs: Legs) -> Legs:
-    """Return the legs with the centers of feet for soles."""
-    return legs._replace(radii=np.zeros_like(legs.radii))
-
-
 def _foot_positions(legs: Legs, motion: ClipMotion) -> np.ndarray:
     """Return the positions (samples, legs, 3) of the centers of feet in the world, m."""
     poses = motion.poses()
     torso_positions = poses[:, None, :3]
     torso_rotations = rotations.matrix(poses[:, 3:7])[:, None]
-    feet, _ = _to_foot_centers(legs).soles(legs.by_leg(motion.joints))  # in the torso's frame
+    feet, _ = legs.to_foot_centers().soles(legs.by_leg(motion.joints))  # in the torso's frame
     return (torso_rotations @ feet[..., None])[..., 0] + torso_positions
 
 
@@ -195,7 +185,7 @@ def _solve_joint_angles(
     """
     torso_rotations = rotations.matrix(poses[:, 3:7])[:, None]
     torso_positions = poses[:, None, :3]
-    legs_to_centers = _to_foot_centers(legs)
+    legs_to_centers = legs.to_foot_centers()
     start_angles = legs.by_leg(poses[:, 7:])
     angles = start_angles
     is_unsolved = np.ones(len(legs.radii), bool)

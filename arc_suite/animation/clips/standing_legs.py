@@ -84,7 +84,7 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
     torso_rotation = rotations.matrix(rest.quaternion)
     to_torso = torso_rotation  # turns rows of points from the root's axes into the torso's at rest
     to_root = torso_rotation.T
-    legs = _legs_to_foot_centers(body)
+    legs = Legs.of(body, used=1.0).to_foot_centers()
     rest_angles = legs.by_leg(rest.joints)
     # A joint at rest may be a little beyond its range, as limits are soft.
     legs = legs._replace(low=np.minimum(legs.low, rest_angles), high=np.maximum(legs.high, rest_angles))
@@ -191,7 +191,7 @@ def hold_pose(pose: Pose, samples: int, time_step: float) -> ClipMotion:
 
 def feet_from_torso(body: Body, rest: Pose) -> np.ndarray:
     """Return the positions (legs, 3) of the feet from the torso, in the root's axes, m."""
-    legs = _legs_to_foot_centers(body)
+    legs = Legs.of(body, used=1.0).to_foot_centers()
     foot_positions, _ = legs.soles(legs.by_leg(rest.joints))
     return foot_positions @ rotations.matrix(rest.quaternion).T
 
@@ -212,9 +212,3 @@ def _smooth(joints: np.ndarray, rounds: int) -> np.ndarray:
     for _ in range(rounds):
         joints[1:-1] = 0.25 * (joints[:-2] + 2.0 * joints[1:-1] + joints[2:])
     return joints
-
-
-def _legs_to_foot_centers(body: Body) -> Legs:
-    """Return the legs with the centers of feet for soles, over which a torso tilts."""
-    legs = Legs.of(body, used=1.0)
-    return legs._replace(radii=np.zeros_like(legs.radii))

@@ -49,7 +49,7 @@ def turn(body: Body, rest: Pose, angle: float) -> ClipMotion:
 
 def _find_duration(body: Body, angle: float) -> float:
     """Return the duration of a turn, sqrt(h / g)."""
-    time_unit = math.sqrt(body.torso.standing_height / sizing.GRAVITY)  # s
+    time_unit = sizing.time_unit(body)  # s
     half_turns = abs(angle) / math.pi
     max_duration = _MAX_SECONDS_OF_HALF_TURN * max(1.0, half_turns) / time_unit
     return min(_ENDS_DURATION + half_turns * _HALF_TURN_DURATION, max_duration)

@@ -82,8 +82,7 @@ class Character(NamedTuple):
 
     def response(self, body: Body, frequencies):
         """Return what a path is multiplied by, at frequencies in rad/s, where the spring follows it; complex."""
-        time_unit = math.sqrt(body.torso.standing_height / sizing.GRAVITY)
-        ratio = frequencies * time_unit / self.frequency
+        ratio = frequencies * sizing.time_unit(body) / self.frequency
         return 1.0 / (1.0 - ratio**2 + 2.0j * self.damping * ratio)
 
     def direction(self, body: Body, frequency: float) -> complex:
@@ -318,13 +317,9 @@ def _move_torso(body: Body, name: str, draft: Draft, poses: np.ndarray) -> Draft
     """Return a clip whose torso is moved by offsets (samples, 6) over its feet; None if legs or bounds forbid it."""
     motion = draft.motion
     standing_height = body.torso.standing_height
-    legs = Legs.of(body, used=1.0)
+    legs = Legs.of(body, used=1.0).to_foot_centers()
     angles = legs.by_leg(motion.joints)
-    legs = legs._replace(  # with the centers of feet for soles, and ranges that hold all angles, as limits are soft
-        radii=np.zeros_like(legs.radii),
-        low=np.minimum(legs.low, angles.min(axis=0)),
-        high=np.maximum(legs.high, angles.max(axis=0)),
-    )
+    legs = legs.widen_ranges(angles)
     to_torso = rotations.matrix(motion.quaternions)  # turns rows of points from the root's axes into the torso's
     feet = legs.soles(angles)[0] @ to_torso.swapaxes(-1, -2)  # from the torso
     moved_angles = angles
