@@ -398,6 +398,11 @@ def task_setting_names() -> set[str]:
     return names
 
 
+def setting_names() -> set[str]:
+    """Return the names of the settings of all tasks and of modifiers."""
+    return task_setting_names() | MODIFIERS.keys()
+
+
 def refuse_settings_of_others(task: type[Task], settings: Iterable[str]) -> None:
     """Raise ValueError for a setting that a task lacks and others have; its class lists what it has in `names`."""
     names_of_settings = getattr(task, "names", None)  # tasks of other packages may lack it
@@ -405,7 +410,7 @@ def refuse_settings_of_others(task: type[Task], settings: Iterable[str]) -> None
         return
     for name in settings:
         own_names = (*names_of_settings(), *SETTINGS_OF_EVERY_TASK)
-        if difflib.get_close_matches(str(name), own_names, n=1, cutoff=_SAME_WORD):  # itself, or a slip of it
+        if name in own_names or difflib.get_close_matches(str(name), own_names, n=1, cutoff=_SAME_WORD):
             continue
         task_names = [key for key, kind in TASKS.items() if name in getattr(kind, "names", tuple)()]
         if task_names:

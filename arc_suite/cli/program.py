@@ -25,7 +25,6 @@ from arc_suite.cli.programs import docstring_of
 from arc_suite.cli.version import describe_suite
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
-from arc_suite.tasks.modifiers import MODIFIERS
 
 _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
@@ -202,7 +201,7 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
 def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> None:
     """Raise ValueError for a flag that is the name of a setting or of a hyperparameter, with the flag that takes it."""
     words_of_flags = {
-        "set": registry.task_setting_names() | MODIFIERS.keys(),
+        "set": registry.setting_names(),
         "hp": set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flag_names else set(),
     }
     meanings = (name, *checks.SYNONYMS.get(name, ()))

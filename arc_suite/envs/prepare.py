@@ -18,7 +18,6 @@ from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import modified_task, parameters, readings
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.mirrors import Symmetry
-from arc_suite.tasks.modifiers import MODIFIERS
 from arc_suite.tasks.scene import CHANGEABLE, Scene
 
 _ROUNDING = 1e-6  # control steps, by which a time limit may exceed a number of steps without another one
@@ -100,14 +99,14 @@ def refuse_arguments(arguments: Mapping[str, Any], function: Callable) -> None:
         arguments: arguments that no parameter of the function takes, by name.
         function: function that opens an environment.
     """
-    valid_names = [name for name in inspect.signature(function).parameters if name not in ("self", "others")]
-    setting_names = registry.task_setting_names() | MODIFIERS.keys()
     for name, value in arguments.items():
         if name in _CURES:
             raise ValueError(f"argument {name!r}: {_CURES[name]}")
+        setting_names = registry.setting_names()
         if name in setting_names:
             setting = f"{{{name!r}: {checks.preview(value)}}}"
             raise ValueError(f"argument {name!r}: it is a setting of the task; write task_kwargs={setting}")
+        valid_names = [key for key in inspect.signature(function).parameters if key not in ("self", "others")]
         hint = checks.hint(name, [*valid_names, *setting_names])
         arguments_text = ", ".join(valid_names)
         raise ValueError(f"unknown argument {name!r}{hint} (there are: {arguments_text}; task_kwargs has the settings)")

@@ -5,7 +5,7 @@ import interpreters
 import pytest
 
 # To open a generated body, which is drawn again where its legs meet as they step: a third of the calls.
-MOST_CALLS = 8451
+MOST_CALLS = 8400
 
 
 @pytest.mark.parametrize(("task", "most"), [("walk", 52), ("roam", 131)])

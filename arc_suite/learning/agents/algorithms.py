@@ -18,7 +18,6 @@ from arc_suite.learning.agents.hyperparameters import (
     ProximalPolicy,
     SoftActorCritic,
 )
-from arc_suite.tasks.modifiers import MODIFIERS
 
 
 class Algorithm(NamedTuple):
@@ -85,7 +84,7 @@ class Algorithm(NamedTuple):
         fields = dataclasses.asdict(self.hyperparameters)
         changed_fields = {}
         for name in changes:
-            if name not in fields and name in registry.task_setting_names() | MODIFIERS.keys():
+            if name not in fields and name in registry.setting_names():
                 raise ValueError(
                     f"hyperparameter {name!r}: it is a setting of the task; expected in --set, or task_kwargs"
                 )

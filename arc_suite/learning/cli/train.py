@@ -54,7 +54,6 @@ from arc_suite.learning.agents.training import train, train_in_one_program
 from arc_suite.learning.next_commands import next_commands
 from arc_suite.policies import network
 from arc_suite.simulation.cores import prepare_jax, usable_cores
-from arc_suite.tasks.modifiers import MODIFIERS
 
 
 def group_algorithms(value: Callable[[algorithms.Algorithm], Any]) -> dict[Any, list[str]]:
@@ -359,7 +358,7 @@ def configurations_from_flags() -> list[Configuration]:
 def _refuse_hyperparameters(settings: Mapping[str, Any]) -> None:
     """Raise ValueError for a setting of the task that is a hyperparameter, by its name or that of another library."""
     names = dataclasses.asdict(algorithms.algorithm(FLAGS.algorithm).hyperparameters)
-    setting_names = registry.task_setting_names() | MODIFIERS.keys()
+    setting_names = registry.setting_names()
     for name, value in settings.items():
         meanings = [meaning for meaning in (name, *checks.SYNONYMS.get(name, ())) if meaning in names]
         if meanings and name not in setting_names:
