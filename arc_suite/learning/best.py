@@ -9,10 +9,10 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 
 from arc_suite import evaluation, files, seed_ranges
 from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.evaluating import Evaluator
 from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
 
@@ -39,13 +39,12 @@ def keep_best(run: Configuration, folder: Path, threads: int | None = 1) -> tupl
     *earlier, latest = checkpoints.agents(folder / checkpoints.FOLDER)
     by_curve = sorted(earlier, key=lambda agent: agent.mean_return)
     candidates = [latest, *by_curve[-CANDIDATES:]]
-    environment = run.validation.make_vec(len(SEEDS), num_threads=threads, autoreset_mode=AutoresetMode.DISABLED)
     measured_agents = []
-    with contextlib.closing(environment):
+    with contextlib.closing(Evaluator(run, threads, SEEDS)) as evaluator:
         for agent in candidates:
             policy = network.load(checkpoints.at(folder, agent.steps))
-            episodes = evaluation.episodes_in_batch(environment, policy, SEEDS)
-            mean_return = float(np.mean([episode.total for episode in episodes]))
+            lines = evaluator.play(agent.steps, policy)
+            mean_return = float(np.mean([line["return"] for line in lines]))
             measured_agents.append(agent._replace(mean_return=mean_return))
     best = max(measured_agents, key=lambda agent: agent.mean_return)
     best_folder = files.folder(folder / FOLDER)

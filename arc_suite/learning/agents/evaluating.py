@@ -33,7 +33,7 @@ Lines = list[dict[str, Any]]  # of the table of evaluations, one for each episod
 class Evaluator:
     """Evaluates policies in this process, as soon as they are there."""
 
-    def __init__(self, run: Configuration, threads: int, seeds: range = _SEEDS):
+    def __init__(self, run: Configuration, threads: int | None, seeds: range = _SEEDS):
         """Make the environments of evaluation, one for the episode of each seed."""
         self._seeds = seeds
         self._environment = run.validation.make_vec(
