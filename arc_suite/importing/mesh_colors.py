@@ -49,11 +49,11 @@ class Material(NamedTuple):
     """The material of most faces of an .obj file.
 
     Attributes:
-        library: file of materials, which may be missing.
+        path: file of materials, which may be missing.
         name: name in this file; None for faces without a material.
     """
 
-    library: Path
+    path: Path
     name: str | None
 
 
@@ -108,9 +108,9 @@ def _read_material(path: Path) -> Material | None:
 
 def _find_material_color(material: Material) -> np.ndarray | None:
     """Return the color (4,) of a material; None without its file, or where this gives none."""
-    if not material.library.is_file():
+    if not material.path.is_file():
         return None
-    return _read_mtl(material.library).get(material.name)
+    return _read_mtl(material.path).get(material.name)
 
 
 def _read_statements(path: Path, most_bytes: int) -> Iterator[tuple[str, str]]:

@@ -74,7 +74,7 @@ def read_visuals(
             units.scale_lengths(spec, scale)
             materials = mesh_colors.read_materials(files)
             visuals = _collect_visuals(spec, model, torso, facing, materials)
-            libraries = dict.fromkeys(material.library for material in materials.values())
+            libraries = dict.fromkeys(material.path for material in materials.values())
             return visuals._replace(files=(*files, *libraries))
     return Visuals()
 
