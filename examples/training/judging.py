@@ -1,6 +1,6 @@
 """Judge checkpoints with arc-suite evaluate, and plot them over the paper's returns. The training scripts use it.
 
-    python examples/training/judging.py runs/sb3-sac-tick --robot tick
+    python examples/training/judging.py runs/sb3-sac-tick-walk --robot tick
 
 plots the evaluations `<steps>.json` of a folder anew.
 """

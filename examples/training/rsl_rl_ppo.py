@@ -5,12 +5,21 @@
     arc-suite evaluate --robot tick --task steer --policy rsl_rl_ppo:make
 
 The hyperparameters are those of Rudin et al., "Learning to walk in minutes using massively parallel deep reinforcement
-learning", 2021, Table 2, with 64 environments in place of 4096, and observations normalized. `make` is the function
-that makes a policy of the saved network. It reads the file that RSL_RL_POLICY names, rsl_rl_ppo.pt by default.
+learning", 2021, Table 2, with 64 environments in place of 4096. What the paper's environments do, `Environments` does
+here (https://github.com/leggedrobotics/legged_gym, `legged_robot_config.py`):
+
+- Rewards are multiplied by the control step. The library clips the change of a value at 0.2, which is too little for
+  returns in the hundreds.
+- Actions are multiplied by 0.5. Their standard deviation begins at 1 and hardly falls in a million steps; with it,
+  motors that take [-1, 1] would be at their limits.
+
+Observations have scales by hand there; here the library normalizes them.
+
+`make` is the function that makes a policy of the saved network, the .pt of the module's name next to it.
 """
 
 import argparse
-import os
+import functools
 import pathlib
 
 import gymnasium
@@ -24,6 +33,7 @@ import arc_suite  # noqa: F401 (registers the ids)
 
 ENVS = 64
 HORIZON = 24  # control steps of a rollout
+ACTION_SCALE = 0.5
 
 _NETWORK = {
     "class_name": "MLPModel",
@@ -54,6 +64,7 @@ class Environments(VecEnv):
         self.num_actions = self._vector.single_action_space.shape[0]
         self.max_episode_length = int(self._vector.unwrapped.task.definition.step_limit)
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long)
+        self._control_step = self._vector.unwrapped.task.scene.control_timestep  # s
         self.device = "cpu"
         self.cfg = {"env_id": env_id}
 
@@ -63,12 +74,12 @@ class Environments(VecEnv):
 
     def step(self, actions: torch.Tensor):
         """Make a control step; return observations, rewards, ends of episodes, and which of them are time limits."""
-        observations, rewards, terminated, truncated, _ = self._vector.step(actions.numpy())
+        observations, rewards, terminated, truncated, _ = self._vector.step(ACTION_SCALE * actions.numpy())
         has_ended = torch.from_numpy(terminated | truncated)
         self.episode_length_buf = torch.where(has_ended, 0, self.episode_length_buf + 1)
         self._observations = self._to_groups(observations)
         extras = {"time_outs": torch.from_numpy(truncated & ~terminated)}
-        return self._observations, torch.from_numpy(rewards).float(), has_ended, extras
+        return self._observations, torch.from_numpy(rewards * self._control_step).float(), has_ended, extras
 
     def _to_groups(self, observations: np.ndarray) -> TensorDict:
         return TensorDict({"policy": torch.from_numpy(observations)}, batch_size=[len(observations)])
@@ -76,14 +87,19 @@ class Environments(VecEnv):
 
 def make(robot):
     """Return the function from a time step to the deterministic action."""
-    network = torch.jit.load(os.environ.get("RSL_RL_POLICY", "rsl_rl_ppo.pt"))
+    network = _load()
 
     def act(timestep):
         observation = np.concatenate(list(timestep.observation.values()), dtype=np.float32)
         with torch.inference_mode():
-            return network(torch.from_numpy(observation)[None])[0].numpy()
+            return ACTION_SCALE * network(torch.from_numpy(observation)[None])[0].numpy()
 
     return act
+
+
+@functools.cache
+def _load() -> torch.jit.ScriptModule:
+    return torch.jit.load(pathlib.Path(__file__).with_suffix(".pt"))
 
 
 def main():

@@ -1,7 +1,7 @@
 """Train SAC of stable-baselines3 in 32 environments, judge its checkpoints with arc-suite evaluate, and plot them.
 
     python examples/training/sb3_sac.py --robot tick
-    arc-suite render --policy runs/sb3-sac-tick/150048.zip -o tick.mp4
+    arc-suite render --policy runs/sb3-sac-tick-walk/150048.zip -o tick.mp4
 
 The folder holds a zip, its statistics of VecNormalize and the evaluation (.json) of every checkpoint, and curve.png.
 The hyperparameters are those of the suite's own `sac_parallel`, where SAC has them.
@@ -12,7 +12,7 @@ from stable_baselines3 import SAC
 
 ENVS, GAMMA = 32, 0.97
 
-args = sb3_run.parse_arguments(__doc__, steps=150_000, folder="runs/sb3-sac-{robot}")
+args = sb3_run.parse_arguments(__doc__, steps=150_000, folder="runs/sb3-sac-{robot}-{task}")
 environments = sb3_run.make_environments(args, ENVS, gamma=GAMMA)
 agent = SAC(
     "MlpPolicy",

@@ -4,12 +4,13 @@
     python sbx_sac.py --robot tick --steps 100000
     arc-suite evaluate --robot tick --policy sbx_sac:make
 
-A zip of SBX holds networks of JAX, which arc-suite does not read; `make` is the function that makes a policy of it. It
-reads the zip that SBX_POLICY names, sbx_sac.zip by default.
+The file of SBX holds networks of JAX, which arc-suite does not read; `make` is the function that makes a policy of it.
+It reads the .sbx of the module's name next to it. A folder of the benchmark takes each .zip for one of
+stable-baselines3.
 """
 
 import argparse
-import os
+import functools
 import pathlib
 
 import gymnasium
@@ -24,7 +25,7 @@ ENVS = 16
 
 def make(robot):
     """Return the function from a time step to the deterministic action."""
-    agent = SAC.load(os.environ.get("SBX_POLICY", "sbx_sac.zip"))
+    agent = _load()
 
     def act(timestep):
         observation = np.concatenate(list(timestep.observation.values()), dtype=np.float32)
@@ -33,15 +34,21 @@ def make(robot):
     return act
 
 
+@functools.cache
+def _load() -> SAC:
+    return SAC.load(pathlib.Path(__file__).with_suffix(".sbx"))
+
+
 def main():
     """Train and save."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robot", default="tick")
+    parser.add_argument("--task", default="walk")
     parser.add_argument("--steps", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=100_000)
-    parser.add_argument("--output", type=pathlib.Path, default="sbx_sac.zip")
+    parser.add_argument("--seed", type=int, default=100_000, help="evaluation plays seeds below 10,000")
+    parser.add_argument("--output", type=pathlib.Path, default="sbx_sac.sbx")
     args = parser.parse_args()
-    vector = gymnasium.make_vec(f"arc_suite/{args.robot}-walk-v0", num_envs=ENVS, autoreset_mode="SameStep")
+    vector = gymnasium.make_vec(f"arc_suite/{args.robot}-{args.task}-v0", num_envs=ENVS, autoreset_mode="SameStep")
     # As many updates as environment steps, as in the paper's SAC.
     agent = SAC("MlpPolicy", sb3.VecEnv(vector), gradient_steps=ENVS, learning_starts=1000, seed=args.seed)
     agent.learn(args.steps)
