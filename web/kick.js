@@ -1,6 +1,6 @@
 // A kick that grows while its key, its button or a gamepad's is held.
-const LEAST = 0.8, MOST = 2.4; // sqrt(g h), the velocity that a kick adds
-const GROWTH = 1500; // ms to the strongest
+const LEAST = 0.35; // of the largest kick
+const GROWTH = 1500; // ms to the largest
 
 export class Kick {
   constructor() {
@@ -11,15 +11,15 @@ export class Kick {
     this.start ??= performance.now();
   }
 
-  // How much of its strength a kick has that is held, from 0 to 1.
+  // How far a kick that is held has grown, from 0 to 1.
   get share() {
     return this.start === null ? 0 : Math.min((performance.now() - this.start) / GROWTH, 1);
   }
 
-  // Returns the strength of the kick that was held, or 0 without one.
+  // Returns the kick that was held, as a share of the largest one; 0 without one.
   end() {
-    const strength = this.start === null ? 0 : LEAST + this.share * (MOST - LEAST);
+    const size = this.start === null ? 0 : LEAST + this.share * (1 - LEAST);
     this.start = null;
-    return strength;
+    return size;
   }
 }

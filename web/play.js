@@ -22,7 +22,6 @@ const RESTART = 1.5; // s that a fallen body lies
 const GIVE_UP = 8; // s that a body has for getting up
 const BUSY = 20; // ms of a picture's time for physics: a slower machine shows slow motion
 const LIFTED = 1.3; // standing heights of a torso, from which the camera follows it up
-const GRAVITY = 9.81; // m/s^2
 
 const TINTS = ["#ffffff", "#5f8dcf"]; // of the player's body and of the other
 
@@ -168,10 +167,10 @@ class Play {
     this.view.draw();
   }
 
-  // Kicks the body away from the camera, with a strength in sqrt(g h).
-  kick(strength) {
+  // Kicks the body away from the camera, by a share of its largest kick.
+  kick(share) {
     const way = this.view.target.clone().sub(this.view.camera.position).setZ(0);
-    way.setLength(strength * Math.sqrt(GRAVITY * this.body.height));
+    way.setLength(share * this.body.kick);
     this.simulation.kick([way.x, way.y]);
   }
 

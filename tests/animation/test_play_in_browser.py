@@ -87,8 +87,8 @@ def test_keys_kick_restart_and_pause(tab):
     tab.keyboard.press("b")
     after = tab.evaluate("[...play.state.play.simulation.data.qvel]")
     speed = sum((new - old) ** 2 for new, old in zip(after[:2], before[:2], strict=True)) ** 0.5
-    unit = (9.81 * ROBOTS["tick"].torso.standing_height) ** 0.5
-    assert 0.79 * unit < speed < 1.2 * unit
+    tap = 0.35 * tab.evaluate("play.state.play.body.kick")
+    assert 0.99 * tap < speed < 1.5 * tap
     advanced(tab, 0.5)
     tab.keyboard.press("r")
     start = tab.evaluate("play.state.play.simulation.start")
@@ -100,11 +100,11 @@ def test_keys_kick_restart_and_pause(tab):
     tab.keyboard.press("r")
     tab.keyboard.press("Space")
     qvel = tab.evaluate("[...play.state.play.simulation.data.qvel]")
-    assert 0.79 * unit < sum(value**2 for value in qvel) ** 0.5 < 1.2 * unit
+    assert 0.99 * tap < sum(value**2 for value in qvel) ** 0.5 < 1.5 * tap
 
 
 def test_a_kick_grows_while_it_is_held(tab):
-    unit = (9.81 * ROBOTS["tick"].torso.standing_height) ** 0.5
+    largest = tab.evaluate("play.state.play.body.kick")
     button = tab.locator("#kick").bounding_box()
     tab.mouse.move(button["x"] + 5, button["y"] + 5)
     for press, let_go in (
@@ -119,7 +119,7 @@ def test_a_kick_grows_while_it_is_held(tab):
         let_go()
         tab.wait_for_function("play.kick.start === null")
         qvel = tab.evaluate("[...play.state.play.simulation.data.qvel]")
-        assert sum(value**2 for value in qvel[:2]) ** 0.5 == pytest.approx(2.4 * unit)
+        assert sum(value**2 for value in qvel[:2]) ** 0.5 == pytest.approx(largest)
     tab.evaluate("delete navigator.getGamepads")
 
 

@@ -307,6 +307,41 @@ def test_bodies_walk_from_their_start(script, ground):
     assert not any(walked["falls"]) and lain["falls"][-1]
 
 
+@pytest.mark.long
+@nodes.needs_node
+def test_the_largest_kick_fells_queen_in_half_of_the_tries(script):
+    """As it walks, over eight directions and five phases of the gait: it lies until it would get up."""
+    creature = play_pages.creature(ROBOTS["queen"])
+    step = creature["task"]["step"]
+    cycle = 1.0 / (creature["task"]["direction"]["frequency"] * step)  # steps
+    walk = {"creature": creature, "ground": "level", "qvel": [], "desired": [0.0, 0.0, 0.0]}
+    walk["qpos"] = creature["grounds"]["level"]["start"]
+    tries = []
+    for direction in np.arange(8) * math.pi / 4.0:
+        for phase in np.arange(5) / 5.0:
+            asked = [upright(creature, [1.0, 0.0, 0.0]) for _ in range(round(5.0 / step))]
+            kick = creature["kick"] * np.array((math.cos(direction), math.sin(direction)))
+            asked[round(2.0 / step + phase * cycle)]["kick"] = kick.tolist()
+            tries.append(walk | {"asked": asked})
+    lies = [sum(path["falls"]) >= creature["recovery"]["patience"] for path in nodes.run(script, tries)]
+    assert 0.35 <= np.mean(lies) <= 0.65
+
+
+def test_the_largest_kick_follows_from_how_a_body_stands():
+    """Larger bodies of the same form by the square root of their size; a wider one needs more, and all some."""
+    body = generator.generate(6, 3)
+    larger_body = generator.scaled(body, 4.0)
+    assert play_pages.largest_kick(larger_body) == pytest.approx(2.0 * play_pages.largest_kick(body), rel=0.02)
+    heights = {name: kick_in_heights(each) for name, each in ROBOTS.items()}
+    assert heights["queen"] == pytest.approx(1.8, rel=0.02) and heights["tick"] > 1.5 * heights["queen"]
+    assert all(kick_in_heights(each) > 0.5 for each in OTHERS)
+
+
+def kick_in_heights(body):
+    """The largest kick of a body, sqrt(g h)."""
+    return play_pages.largest_kick(body) / (9.81 * body.torso.standing_height) ** 0.5
+
+
 def test_what_a_page_holds_of_a_body(monkeypatch):
     """Names of bodies come from files of others: they are text."""
     monkeypatch.setattr(pages, "read_built_file", lambda name: f"built {name}".encode())

@@ -25,6 +25,7 @@ function path({ creature, ground, qpos, qvel, desired, asked, replayed, rises })
   };
   for (const each of asked) {
     if (each.leaps) simulation.leap();
+    if (each.kick) simulation.kick(each.kick);
     for (let count = 0; count < creature.substeps; count += 1) simulation.substep(each);
     positions.push([...data.qpos]);
     falls.push(task.fell);
