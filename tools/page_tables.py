@@ -14,9 +14,9 @@ from pathlib import Path
 from studies.pages import table_writer
 
 from arc_suite.cli import program
-from arc_suite.learning.studies import benchmark, results
+from arc_suite.learning.studies import benchmark, entries, results
 from arc_suite.learning.studies.divisions import DIVISIONS
-from studies import bodies, catalog, claims, coverage
+from studies import bodies, catalog, claims, coverage, peers
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -36,13 +36,17 @@ def main() -> None:
 
 
 def write_scores() -> None:
-    """Write the scores of the committed studies of the benchmark; those of policies without a study stay."""
+    """Write the scores of the committed studies of the benchmark, and of judged policies of other libraries."""
     for path in sorted(STUDIES.glob(f"*/{results.RUNS}")):
         name = path.parent.name
         division, _, learner = name.partition("-")
         if division in DIVISIONS:
             run_results = results.read_results(catalog.study(name).runs, path.parent)
             benchmark.write(STUDIES, division, learner, benchmark.score_results(run_results))
+    for (division, learner), scores in benchmark.read(STUDIES).items():
+        published = STUDIES / f"{division}-{learner}"
+        if not (published / results.RUNS).exists():
+            benchmark.write(STUDIES, division, learner, entries.score_anew(scores, published))
 
 
 def returns_next_to_the_papers() -> str:
@@ -55,6 +59,7 @@ def returns_next_to_the_papers() -> str:
 TABLES: dict[tuple[str, str], Callable[[], str]] = {
     ("benchmark", "coverage"): coverage.text,
     ("benchmark", "table"): lambda: benchmark.text(STUDIES),
+    ("benchmark", "peers"): lambda: peers.text(STUDIES),
     ("any_body", "table"): lambda: bodies.text(STUDIES / "bodies.csv"),
     ("study", "table"): returns_next_to_the_papers,
 }

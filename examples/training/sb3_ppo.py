@@ -3,7 +3,8 @@
     python examples/training/sb3_ppo.py --robot tick --task steer
     arc-suite render --policy runs/sb3-ppo-tick-steer/1001472.zip -o tick.mp4
 
-The hyperparameters are the library's defaults, with observations and rewards normalized. The folder holds a zip, its
+The hyperparameters are the library's defaults, with one environment and observations and rewards normalized: the set
+of Ant-v4 in https://github.com/DLR-RM/rl-baselines3-zoo/blob/master/hyperparams/ppo.yml. The folder holds a zip, its
 statistics of VecNormalize and the evaluation (.json) of every checkpoint, and curve.png.
 """
 

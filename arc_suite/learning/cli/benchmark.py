@@ -102,7 +102,7 @@ def score_policies(division: str) -> None:
     benchmark.check_name(name)
     judged = entries.score_policies(folder, progress)
     studies = Path(FLAGS.results)
-    lines_by_run = {f"{policy.score.robot}-{policy.score.task}-{policy.score.seed}": policy.lines for policy in judged}
+    lines_by_run = {entries.run_name(policy.score): policy.lines for policy in judged}
     publication.write_finals(studies / f"{division}-{name}", lines_by_run)
     benchmark.write(studies, division, name, [policy.score for policy in judged])
 

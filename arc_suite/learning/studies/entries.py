@@ -4,14 +4,14 @@ import contextlib
 import difflib
 import itertools
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from arc_suite import evaluation, files, policies, style
+from arc_suite import evaluation, files, parsers, policies, style
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, judging, provenance
 from arc_suite.learning import finals
@@ -114,22 +114,54 @@ def _judge_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | N
             style.measure(style.record(environment, policy, episode_seed)) for episode_seed in style_seeds
         ]
 
-    mean_return = float(np.mean([episode.total for episode in episodes]))
-    metrics = {metric: np.array([values[metric].value for values in episode_metrics]) for metric in STYLE}
-    score = RunScore(
-        robot=setup.name,
-        task=setup.kind.name,
-        seed=seed,
-        result=mean_return,
-        score=float(anchors.anchors(setup).score(mean_return)),
-        minutes=np.nan,
-        **style_fields(setup, metrics),
-        policy_sha256=sha256,
-        first_seed=seeds.start,
-        notes=provenance.UNKNOWN if training_seeds is None else "",
-        model_sha256=results.hash_model(place_setup(setup.name, setup.kind.name)),
-    )
-    return Judged(score, finals.to_lines(sha256, seeds, episodes))
+    lines = finals.to_lines(sha256, seeds, episodes)
+    for line, values in zip(lines, episode_metrics, strict=False):  # of the first episodes
+        line |= {results.STYLE + metric: repr(values[metric].value) for metric in STYLE}
+    facts = {
+        "robot": setup.name,
+        "task": setup.kind.name,
+        "seed": seed,
+        "policy_sha256": sha256,
+        "first_seed": seeds.start,
+        "notes": provenance.UNKNOWN if training_seeds is None else "",
+        "model_sha256": results.hash_model(place_setup(setup.name, setup.kind.name)),
+    }
+    return Judged(score_lines(facts, lines), lines)
+
+
+def score_lines(facts: Mapping[str, Any], lines: finals.Lines) -> RunScore:
+    """Return the score of a policy from the lines of its episodes.
+
+    Args:
+        facts: the fields of the score that the episodes do not tell; others do not count.
+        lines: lines of the episodes that judge the policy; the first ones have metrics of style.
+    """
+    setup = place_setup(facts["robot"], facts["task"])
+    mean_return = float(np.mean([float(line["return"]) for line in lines]))
+    scale = anchors.anchors(judging.setup_of(setup, judging.seeds_of(facts["policy_sha256"])))
+    metrics = {}
+    for metric in STYLE:
+        cells = [line[column] for line in lines if (column := results.STYLE + metric) in line]
+        metrics[metric] = np.array(cells, float)
+    values = {"result": mean_return, "score": float(scale.score(mean_return)), "minutes": np.nan}
+    return RunScore(**{**facts, **values, **style_fields(setup, metrics)})
+
+
+def run_name(score: RunScore) -> str:
+    """Return the name under which the episodes of a policy are published."""
+    return f"{score.robot}-{score.task}-{score.seed}"
+
+
+def score_anew(scores: Sequence[RunScore], published: Path) -> list[RunScore]:
+    """Return the scores of policies from their published episodes.
+
+    Raises:
+        ValueError: a damaged table, or one without the episodes of a policy.
+        OSError: the table cannot be read.
+    """
+    lines_by_run = results.read_episodes(published, results.FINALS)
+    with parsers.guard(f"{published / results.FINALS}: damaged"):
+        return [score_lines(score._asdict(), lines_by_run[run_name(score)]) for score in scores]
 
 
 @contextlib.contextmanager

@@ -93,14 +93,13 @@ def _write_episodes(
         episodes: rows by name of the run.
         names: names of runs.
     """
-    last_columns = (*TIMES, *_STYLE_COLUMNS)
+    columns_with_cells = {column for name in names for row in episodes[name] for column in row}
+    last_columns = [column for column in (*TIMES, *_STYLE_COLUMNS) if column in columns_with_cells]
     metrics_by_run = []
-    has_last_columns = False
     for name in names:
         first_row = episodes[name][0]
         metrics_by_run.append([column for column in first_row if column not in {*first_columns, *last_columns}])
-        has_last_columns |= not set(last_columns).isdisjoint(first_row)
-    columns = (*first_columns, *_merge_orders(metrics_by_run), *(last_columns if has_last_columns else ()))
+    columns = (*first_columns, *_merge_orders(metrics_by_run), *last_columns)
     csv_files.write(path, columns, [row for name in names for row in episodes[name]])
 
 
