@@ -11,3 +11,9 @@ export async function bytes(text) {
 export async function unpacked(text) {
   return JSON.parse(new TextDecoder().decode(await bytes(text)));
 }
+
+// Returns a ground of a body, whose heights are numbers of what bodies share.
+export function whole({ xml, surface, ...ground }, shared) {
+  const filled = xml.replace(/elevation="#(\d+)"/g, (_, number) => `elevation="${shared[number]}"`);
+  return { ...ground, xml: filled, ...(surface === undefined ? {} : { surface: shared[surface] }) };
+}

@@ -1,8 +1,8 @@
 // Sliders of a pose and a choice of gait, for bodies that take them by command.
 import { clamp } from "./legs.js";
+import { paceUnder } from "./pace.js";
 
 const STEP = 0.01; // of a slider, standing heights or rad
-const RUN = { speed: 1.75, tempo: 1.3 }; // of a run, times those of the command and the gait
 
 export class Panel {
   // Takes an element with a place for sliders, a list of gaits, a slider of the frequency and a button.
@@ -48,11 +48,11 @@ export class Panel {
     this.tempo.stepUp(sign);
   }
 
-  // The command, the pose of sliders and of keys that are held, shares of the room from -1 to 1, and the gait; a run has
-  // longer and quicker steps ahead.
+  // The command, the pose of sliders and of keys that are held, shares of the room from -1 to 1, and the gait, which
+  // suits the speed; a run is faster ahead.
   asked(command, shares, runs = false) {
     if (!this.direction) return { command };
-    const { room, gaits, frequency } = this.direction;
+    const { room, gaits, frequency, paces, run } = this.direction;
     const sought = room.map(([low, high], i) => {
       const held = shares[i] * (shares[i] < 0 ? -low : high);
       return clamp(Number(this.sliders[i].input.value) + held, low, high);
@@ -60,10 +60,11 @@ export class Panel {
     // Not all numbers at their bounds at once.
     const used = sought.reduce((sum, value, i) => sum + (value && value / room[i][value < 0 ? 0 : 1]), 0);
     const pose = sought.map((value) => value / Math.max(used, 1));
-    const { speed, tempo } = runs && command[0] > 0 ? RUN : { speed: 1, tempo: 1 };
     const [forward, ...others] = command;
-    const gait = [...gaits[this.list.value], frequency * this.tempo.value * tempo];
-    return { command: [speed * forward, ...others], pose, gait };
+    const going = [runs && forward > 0 ? run * forward : forward, ...others];
+    const { tempo, change } = paceUnder(paces, going), [...offsets] = gaits[this.list.value], duty = offsets.pop();
+    const gait = [...offsets, duty + change, frequency * this.tempo.value * tempo];
+    return { command: going, pose, gait };
   }
 
   // Shows the numbers of a pose and a gait.

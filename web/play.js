@@ -2,12 +2,13 @@
 import loadMujoco from "@mujoco/mujoco";
 import * as THREE from "three";
 import { Chase } from "./chase.js";
+import { Choice } from "./choice.js";
 import { breadth, contact } from "./contact.js";
-import { bytes, unpacked } from "./data.js";
+import { bytes, unpacked, whole } from "./data.js";
 import { Goals } from "./goals.js";
 import { grounds, triangles } from "./ground.js";
 import { Inputs } from "./inputs.js";
-import { follow, keep } from "./link.js";
+import { follow, keep, names } from "./link.js";
 import { Kick } from "./kick.js";
 import { Panel } from "./panel.js";
 import { Figure, materials, quaternion } from "./parts.js";
@@ -241,7 +242,7 @@ function shown({ simulation, body, pace, goals, ring }, command, gait, playing) 
 }
 
 async function main() {
-  const [bodies, wasmBinary] = await Promise.all([
+  const [{ bodies, shared }, wasmBinary] = await Promise.all([
     unpacked(byId("data").textContent),
     bytes(byId("engine").textContent),
   ]);
@@ -249,11 +250,10 @@ async function main() {
   const inputs = new Inputs(byId("stick"), [byId("left"), byId("right")]);
   const panel = new Panel(byId("direction")), sound = new Sound(), kick = new Kick();
   const state = { playing: true, play: null, stale: true }; // a page at rest draws only what changes
-  const choice = byId("body"), ground = byId("ground"), mode = byId("mode");
-  const lists = [choice, ground, mode];
-  bodies.forEach(({ name }, index) => choice.append(new Option(name, index)));
+  const [list, legs, links, ground, mode] = ["body", "legs", "links", "ground", "mode"].map(byId);
+  const controls = [list, legs, links, ground, mode];
+  const choice = new Choice(list, [legs, links], bodies);
   Object.keys(bodies[0].grounds).forEach((name) => ground.append(new Option(name)));
-  choice.parentElement.hidden = bodies.length === 1;
   byId("help").open = window.innerWidth > 700 && window.innerHeight > 500;
   panel.element.open = byId("help").open && window.innerWidth > 1000 && !inputs.shows;
 
@@ -261,9 +261,9 @@ async function main() {
     state.play?.free();
     const old = document.querySelector("canvas"), canvas = old.cloneNode(); // with a context of its own
     old.replaceWith(canvas);
-    const body = bodies[choice.value];
+    const { body } = choice;
     const name = `${body.name} on ${ground.value} ground`;
-    state.play = new Play(mujoco, body, body.grounds[ground.value], mode.value, canvas, sound, name);
+    state.play = new Play(mujoco, body, whole(body.grounds[ground.value], shared), mode.value, canvas, sound, name);
     canvas.setAttribute("aria-label", name);
     pulls(canvas, () => state.play);
     panel.offer(body.task.direction);
@@ -313,10 +313,17 @@ async function main() {
   for (const end of ["pointerup", "pointerleave", "pointercancel"]) byId("kick").addEventListener(end, letGo);
   window.addEventListener("keyup", (event) => event.code === "KeyB" && letGo());
   window.addEventListener("blur", letGo);
-  for (const list of lists) {
-    follow(list);
-    list.addEventListener("change", () => (list.blur(), keep(lists), change()));
+  for (const control of controls) {
+    follow(control);
+    control.addEventListener("change", () => {
+      if (control.type !== "range") control.blur();
+      choice.tell();
+      keep(controls);
+      change();
+    });
   }
+  if (names("legs") && !names("body")) choice.count();
+  choice.tell();
   window.addEventListener("keydown", (event) => {
     const act = keys[event.code];
     const used = event.code === "Space" && event.target.closest("button, select, summary"); // pressed by the space bar

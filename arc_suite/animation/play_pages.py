@@ -7,6 +7,9 @@ policies are graphs, which the page runs as they are.
 
 import base64
 import html
+import itertools
+import json
+import re
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
@@ -18,7 +21,7 @@ from arc_suite import models, policies, registry
 from arc_suite.animation import pages, player_controls
 from arc_suite.arenas import ground_text
 from arc_suite.arenas.mapped import sample_surface
-from arc_suite.bodies import universal
+from arc_suite.bodies import generator, universal
 from arc_suite.bodies.universal import Universal
 from arc_suite.cpg import Demonstrator, leaps
 from arc_suite.cpg.limping import Limping
@@ -31,11 +34,14 @@ from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.policies import other_libraries
 from arc_suite.policies.network import Network
+from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock, readings
 from arc_suite.tasks.blocks import PAGE_BLOCKS
 from arc_suite.tasks.recover import LEAST_HEIGHT, LEAST_UPRIGHT
 
+WALKERS = "walkers"  # stands for all bodies of `walkers`
+_MIN_LINKS = 2  # of walkers
 GROUNDS = {"level": "flat", "bumps": "bumps", "slopes": "slopes"}  # arenas by the names that a page shows
 _READ_FROM_MODEL = ("flat", "bumps")  # arenas whose heights a page takes from the model
 
@@ -60,10 +66,43 @@ def page(creatures: Sequence[Mapping[str, Any]]) -> str:
     return pages.template("play.html").substitute(
         title=html.escape(", ".join(creature["name"] for creature in creatures)),
         licenses=licenses(),
-        data=pages.pack(creatures),
+        data=pages.pack(_share_heights(creatures)),
         engine=base64.b64encode(pages.read_built_file("mujoco.wasm.zlib")).decode(),
         script=pages.read_built_file("play.js").decode(),
     )
+
+
+def walkers() -> list[Body]:
+    """Return the bodies made to order that a page offers by sliders: all numbers of legs, by two links and more."""
+    min_legs, max_legs = generator.LEG_RANGE
+    _, max_links = generator.LINK_RANGE
+    legs_and_links = itertools.product(range(min_legs, max_legs + 1), range(_MIN_LINKS, max_links + 1))
+    return [generator.generate(legs, links) for legs, links in legs_and_links]
+
+
+def _share_heights(creatures: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return creatures in whose grounds numbers stand for long lists of heights, and these lists; see web/data.js."""
+    number_of_value: dict[str, int] = {}
+    shared: list[Any] = []
+
+    def share(value: Any) -> int:
+        number = number_of_value.setdefault(json.dumps(value), len(shared))
+        if number == len(shared):
+            shared.append(value)
+        return number
+
+    def share_elevation(match: re.Match) -> str:
+        return f'elevation="#{share(match[1])}"'
+
+    bodies = []
+    for creature_values in creatures:
+        grounds = {}
+        for name, ground in creature_values["grounds"].items():
+            grounds[name] = ground | {"xml": re.sub('elevation="([^"]*)"', share_elevation, ground["xml"])}
+            if "surface" in ground:
+                grounds[name]["surface"] = share(ground["surface"])
+        bodies.append({**creature_values, "grounds": grounds})
+    return {"bodies": bodies, "shared": shared}
 
 
 def licenses() -> str:
@@ -106,6 +145,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
         feet.append({"part": part_index, "radius": leg.foot.radius})
     return pages.body_drawing(body) | {
         "name": body.name,
+        "counts": _count_legs_and_links(body),
         "timestep": scene.control_timestep / scene.substeps,
         "substeps": scene.substeps,
         "feet": feet,
@@ -115,6 +155,18 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
         "policy": pages.to_json_values(driver, decimals=None),
         "recovery": pages.to_json_values(_describe_recovery(body, task), decimals=None),
     }
+
+
+def _count_legs_and_links(body: Body) -> dict[str, int] | None:
+    """Return the numbers of legs and links of a body made to order; None for others."""
+    legs = len(body.legs)
+    links = len(body.legs[0].joints)
+    is_in_range = all(
+        low <= count <= high for count, (low, high) in ((legs, generator.LEG_RANGE), (links, generator.LINK_RANGE))
+    )
+    if not is_in_range or body != generator.generate(legs, links):
+        return None
+    return {"legs": legs, "links": links}
 
 
 def largest_kick(body: Body) -> float:
@@ -213,6 +265,8 @@ def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
         "room": player_controls.pose_room(body),
         "frequency": task.parameters.gait_frequency,
         "gaits": player_controls.gaits_by_name(task),
+        "paces": [list(pace) for pace in gaits.PACES_BY_SPEED],
+        "run": gaits.PACES["run"].speed,
     }
 
 

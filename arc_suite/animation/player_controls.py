@@ -49,8 +49,9 @@ def commands(
         task: task whose other commands are left out.
         desired: (3,) velocity, or None.
         pose: (6,), reduced to the body's room, or None.
-        gait: its name, or None; a gait that does not fit is replaced by the body's own.
-        tempo: multiple of the prescribed frequency of a gait.
+        gait: its name, or None; a gait that does not fit is replaced by the body's own. Its frequency and duty factor
+            suit the speed; see `gaits.PACES`.
+        tempo: multiple of the frequency of the gait.
     """
     value_of_command: dict[str, Any] = {}
     if task.commands.get("command") == 3:
@@ -62,8 +63,10 @@ def commands(
         value_of_command["gait"] = None
         if gait:
             numbers_of_gait = gaits_by_name(task)
-            numbers = numbers_of_gait.get(gait, numbers_of_gait[OWN_GAIT])
-            value_of_command["gait"] = [*numbers, tempo * task.parameters.gait_frequency]
+            *offsets, duty_factor = numbers_of_gait.get(gait, numbers_of_gait[OWN_GAIT])
+            pace = gaits.pace_under_command((1.0, 0.0, 0.0) if desired is None else desired)
+            frequency = tempo * pace.tempo * task.parameters.gait_frequency
+            value_of_command["gait"] = [*offsets, duty_factor + pace.duty_change, frequency]
     return value_of_command
 
 

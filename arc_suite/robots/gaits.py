@@ -4,8 +4,10 @@ A gait is a duty factor, the share of a cycle that a foot spends on the ground, 
 for each leg. A leg with phase offset p is in stance while (t + p) mod 1 < duty factor, with the time t in cycles.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from arc_suite import checks
 from arc_suite.robots.spec import Body
@@ -28,7 +30,7 @@ class Gait(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """How a body goes at a speed, compared with its walk: the faster, the quicker are steps and the shorter stances.
+    """How a body goes at a speed, compared with its walk: faster means quicker steps and shorter stances.
 
     Attributes:
         speed: multiple of the speed.
@@ -46,6 +48,26 @@ PACES = {
     "fast": Pace(1.25, 1.15, -0.05),
     "run": Pace(1.75, 1.35, -0.1),
 }
+_WALK = Pace(1.0, 1.0, 0.0)
+PACES_BY_SPEED = (PACES["slow"], _WALK, PACES["fast"], PACES["run"])
+
+
+def pace_at(speed: float) -> Pace:
+    """Return the pace at a multiple of the walk's speed, between those of the table; beyond its ends their gaits."""
+    speeds, tempos, duty_changes = np.transpose(PACES_BY_SPEED)
+    return Pace(speed, float(np.interp(speed, speeds, tempos)), float(np.interp(speed, speeds, duty_changes)))
+
+
+def pace_under_command(command: Sequence[float]) -> Pace:
+    """Return the pace under a command, which counts ahead and in curves; other ways have the walk's.
+
+    Args:
+        command: forward, left and turning, in units of the body.
+    """
+    forward, left, turn = command
+    if forward <= 0.0:
+        return _WALK
+    return pace_at(float(forward + abs(left) + abs(turn)))
 
 
 def gait(body: Body, name: str) -> Gait:

@@ -125,6 +125,13 @@ def test_a_kick_grows_while_it_is_held(tab):
 
 def test_shift_or_a_button_runs(tab):
     walked = advanced_ahead(tab, ("w",))
+    *offsets, duty, frequency = tab.evaluate(f"{ASKED}.gait")
+    tab.evaluate("play.inputs.running = true")
+    tab.keyboard.down("w")
+    assert tab.evaluate(f"{ASKED}.gait") == pytest.approx([*offsets, duty - 0.1, 1.35 * frequency])
+    tab.keyboard.up("w")
+    assert tab.evaluate(f"{ASKED}.gait") == [*offsets, duty, frequency]  # it stands
+    tab.evaluate("play.inputs.running = false")
     assert advanced_ahead(tab, ("Shift", "w")) > 1.4 * walked
     tab.click("#run")
     assert advanced_ahead(tab, ("w",)) > 1.4 * walked
@@ -413,6 +420,28 @@ def test_an_address_names_body_and_ground(browser, page):
     tab.goto(f"{page.as_uri()}#body=nobody&ground=<b>")
     tab.wait_for_function("window.play")
     assert tab.locator("canvas").get_attribute("aria-label") == "tick on level ground"
+    tab.close()
+
+
+def test_sliders_choose_bodies_by_legs_and_links(browser, tmp_path):
+    """By the address, too; where no body has the numbers, the nearest one comes."""
+    path = tmp_path / "walkers.html"
+    walkers = [play_pages.creature(generator.generate(*counts)) for counts in ((4, 2), (6, 3))]
+    path.write_text(play_pages.page([*walkers, walkers[0] | {"counts": None}]), "utf-8")
+    tab = browser.new_page(viewport={"width": 320, "height": 256})
+    tab.set_default_timeout(tabs.PATIENCE)
+    name = "play.state.play.body.name"
+    tab.goto(f"{path.as_uri()}#legs=6&links=3&ground=bumps")
+    tab.wait_for_function("window.play")
+    tab.evaluate("play.pause(false)")
+    assert tab.evaluate(name) == "walker_6x3" and tab.input_value("#body") == "legs and links"
+    assert tab.evaluate("play.state.play.simulation.field !== null")  # heights are those that bodies share
+    tab.focus("#legs")
+    tab.keyboard.press("Home")
+    assert tab.evaluate(name) == "walker_4x2" and tab.locator("output").first.input_value() == "4 legs"
+    assert tab.evaluate("location.hash") == "#legs=4&links=3&ground=bumps&body=legs+and+links&mode=free"
+    tab.select_option("#body", "2")
+    assert not tab.is_visible("#legs") and "legs=" not in tab.evaluate("location.hash")
     tab.close()
 
 

@@ -348,7 +348,7 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     creature = play_pages.creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
     page = play_pages.page([creature])
     assert "<title>&lt;leaper&gt;</title>" in page
-    assert data_of(page) == [creature]
+    assert creatures_of(page) == [creature]
     assert page == play_pages.page([creature])
     assert all('integrator="Euler"' in ground["xml"] for ground in creature["grounds"].values())
     assert [creature["parts"][foot["part"]]["name"] for foot in creature["feet"]] == list(ROBOTS["leaper"].foot_names)
@@ -357,6 +357,37 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     assert list(choices["gaits"]) == ["own", "trot", "pace", "bound", "walk", "wave"]
     assert list(creature["policy"]["constants"]["leaps"]) == ["jump"]  # it gets too little ahead to leap: no key
     assert play_pages.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
+
+
+def creatures_of(page):
+    """What a page holds of its bodies, with the heights that they share in place."""
+    data = data_of(page)
+    for creature in data["bodies"]:
+        for ground in creature["grounds"].values():
+            numbers = re.findall('elevation="#([0-9]+)"', ground["xml"])
+            for number in numbers:
+                ground["xml"] = ground["xml"].replace(f'"#{number}"', f'"{data["shared"][int(number)]}"')
+            if "surface" in ground:
+                ground["surface"] = data["shared"][ground["surface"]]
+    return data["bodies"]
+
+
+def test_bodies_share_heights(monkeypatch):
+    """Those of bodies of one height are in a page once, so that 27 bodies fit."""
+    monkeypatch.setattr(pages, "read_built_file", lambda name: b"built")
+    monkeypatch.setattr(play_pages, "_describe_leaps", lambda stepping: {})
+    creatures = [play_pages.creature(generator.generate(legs, 2)) for legs in (4, 5)]
+    page = play_pages.page(creatures)
+    assert creatures_of(page) == creatures and len(data_of(page)["shared"]) == 3  # bumps, slopes and their surface
+    assert len(pages.pack(data_of(page))) < 0.6 * len(pages.pack(creatures))
+    assert [creature["counts"] for creature in creatures] == [{"legs": 4, "links": 2}, {"legs": 5, "links": 2}]
+
+
+def test_walkers_are_bodies_by_legs_and_links():
+    counts = [(len(body.legs), len(body.legs[0].links)) for body in play_pages.walkers()]
+    assert counts == [(legs, links) for legs in range(4, 13) for links in (2, 3, 4)]
+    refused = programs.arc_suite("play", "--robot=walkers", "--legs=6", "-o", "a.html")
+    programs.refused(refused, "arc-suite play: --robot=walkers: expected no robot with --spec or --legs\n")
 
 
 def test_a_page_begins_with_the_licenses(monkeypatch):

@@ -36,6 +36,8 @@ def test_what_is_set_of_a_task():
     np.testing.assert_allclose(
         player_controls.commands(task, None, most, None)["pose"], most / 6.0
     )  # together they are less
+    slow = player_controls.commands(task, (0.6, 0.0, 0.0), None, "ripple")["gait"]
+    assert slow[-2:] == pytest.approx([0.8, 0.82 * task.parameters.gait_frequency])
     own = player_controls.commands(task, None, None, "trot")["gait"]  # which does not fit
     assert own == player_controls.commands(task, None, None, player_controls.OWN_GAIT)["gait"]
     assert own[-2] == task.parameters.duty_factor

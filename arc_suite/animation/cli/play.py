@@ -2,6 +2,7 @@
 
   arc-suite play --robot queen -o queen.html
   arc-suite play --robot all -o robots.html
+  arc-suite play --robot walkers -o walkers.html
   arc-suite play --spec spider -o spider.html
   arc-suite play --policy runs/queen-steer-ppo-0 -o trained.html
   arc-suite play --spec spider --policy universal -o universal.html
@@ -9,8 +10,9 @@
 
 The page holds MuJoCo itself and requests nothing: open it from disk, or send it. Arrows or WASD walk and turn, Q and
 E step to a side; dragging the body pulls it, B kicks it and R restarts. Bodies are chosen among those that the
-command names. The demonstrator also takes a pose and a gait, by keys and by sliders. A policy of a task with a command,
-such as steer, is given the keys' command; one of walk keeps walking, and left and right turn its course.
+command names; walkers, of 4 to 12 legs with 2 to 4 links each, by sliders. The demonstrator also takes a pose and a
+gait, by keys and by sliders. A policy of a task with a command, such as steer, is given the keys' command; one of walk
+keeps walking, and left and right turn its course.
 """
 
 from absl import flags
@@ -20,6 +22,7 @@ from arc_suite.animation import play_pages
 from arc_suite.cli.flags import (
     bodies_from_flags,
     choose_bodies,
+    custom_body,
     define_arena,
     define_body,
     define_policy,
@@ -29,9 +32,10 @@ from arc_suite.cli.flags import (
     preset_from_flags,
 )
 from arc_suite.cli.program import progress
+from arc_suite.robots.spec import Body
 
 FLAGS = flags.FLAGS
-define_body(more=", or all of them to choose from")
+define_body(more=f", all of them to choose from, or {play_pages.WALKERS}: 27 bodies by legs and links")
 define_arena()
 define_policy()
 define_preset()
@@ -43,7 +47,7 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
     checks.extension(FLAGS.output, [".html"])
-    bodies = bodies_from_flags()  # first: this imports the modules that flags name
+    bodies = _bodies_from_flags()  # first: this imports the modules that flags name
     bodies = choose_bodies(policy_setup(), bodies)
     policy = policy_name(FLAGS.policy)
     preset = preset_from_flags()
@@ -54,3 +58,10 @@ def main() -> None:
         page = play_pages.page(creatures)
         temporary.write_text(page, encoding="utf-8")
     print(f"wrote {FLAGS.output}, {len(page.encode()) / 1e6:.1f} MB")
+
+
+def _bodies_from_flags() -> dict[str, Body]:
+    """Return the bodies of the page by name."""
+    if FLAGS.robot == play_pages.WALKERS and custom_body() is None:
+        return {body.name: body for body in play_pages.walkers()}
+    return bodies_from_flags(suggestions=("all", play_pages.WALKERS))
