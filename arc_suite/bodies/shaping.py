@@ -1,4 +1,4 @@
-"""Bodies of other proportions: links, torso and heading of the legs by factors and degrees."""
+"""Bodies of other proportions and torsos: links, torso and heading of the legs by factors and degrees."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from arc_suite import checks
 from arc_suite.bodies import generator
+from arc_suite.bodies.torsos import UNCHANGED, replace_torso
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Leg, Solid, Vector
 
 FACTOR_RANGE = (0.1, 10.0)  # bounds of a factor of lengths
@@ -22,6 +23,7 @@ class Shape(NamedTuple):
         scale: factor of all lengths.
         length, width, thickness: factors of the torso along x, y and z, with the mounts of the legs along x and y.
         fan: degrees by which the first legs turn forward and the last ones backward.
+        torso, head, tail: see `torsos.replace_torso`; the torso's form changes before its factors.
         links: factors of the lengths of links, by name of the link.
         ends: ends (3,) of links of single legs in place of the body's own, before all factors, m, by name of the part.
     """
@@ -31,6 +33,9 @@ class Shape(NamedTuple):
     width: float = 1.0
     thickness: float = 1.0
     fan: float = 0.0
+    torso: str = UNCHANGED
+    head: str = UNCHANGED
+    tail: str = UNCHANGED
     links: Mapping[str, float] = {}
     ends: Mapping[str, Sequence[float]] = {}
 
@@ -57,7 +62,8 @@ def shaped(body: Body, **changes) -> Body:
         if nothing changes.
 
     Raises:
-        ValueError: a value or a length out of range, a link that the body does not have, or an imported body.
+        ValueError: a value or a length out of range, a link that the body does not have, an imported body, or as
+            `torsos.replace_torso`.
     """
     shape = Shape(**changes)
     link_factors = {
@@ -79,6 +85,7 @@ def shaped(body: Body, **changes) -> Body:
         return body
     if body.source:
         raise ValueError(f"shape: {body.name} was imported, and keeps the shape of its file")
+    body = replace_torso(body, shape.torso, shape.head, shape.tail)
 
     farthest_mount = max(abs(leg.mount[0]) for leg in body.legs) or 1.0  # m, forward or backward
     legs = []

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import viser
 
-from arc_suite.animation.studio import saving, texts
+from arc_suite.animation.studio import layout, saving, texts
 from arc_suite.animation.studio.editor import Editor
 from arc_suite.animation.studio.picture_buttons import PictureButtons
 from arc_suite.animation.studio.session import Session
@@ -28,6 +28,7 @@ class Downloads:
         self._saved_states: dict[str, PageState] = {}  # by name of their button, the latest last
         self._saved_count = 0
         gui.add_button("Save Design", hint="Body, task and command").on_click(self._save_design)
+        self._weight = layout.add_weight(gui)
         for file in saving.FILES:
             gui.add_button(f"Save {file.label}").on_click(functools.partial(self._save, file))
         self._gallery_folder = gui.add_folder("Saved in this session", visible=False)
@@ -58,7 +59,8 @@ class Downloads:
         notification = client.add_notification(f"Making {file_name}", "", loading=True)
         try:
             qpos = creature.environment.physics.data.qpos.copy()
-            content = file.make(creature, qpos, commands)
+            options = {"weight": self._weight.value} if file.takes_weight else {}
+            content = file.make(creature, qpos, commands, **options)
         except (ValueError, OSError, RenderingUnavailable) as error:
             client.add_notification(f"No {file_name}", " ".join(str(error).split()), color="red")
         else:

@@ -9,13 +9,14 @@ from typing import Any, NamedTuple
 import viser
 
 from arc_suite.animation import player_controls
+from arc_suite.animation.clips.weight import MAX_WEIGHT
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.picture_buttons import PictureButtons
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch
 from arc_suite.animation.studio.states import POSE, VELOCITY, PageState
 from arc_suite.animation.studio.thumbnails import palette_picture
 from arc_suite.arenas import ARENAS
-from arc_suite.bodies import generator
+from arc_suite.bodies import generator, torsos
 from arc_suite.cpg.selection import preset_names
 from arc_suite.policies import POLICIES
 from arc_suite.robots import gaits
@@ -55,6 +56,8 @@ _PROPORTIONS = (
     _Slider("fan", "Fan of the legs", -40.0, 40.0, 1.0),  # degrees
 )
 
+_TORSO_PARTS = {"torso": torsos.TORSOS, "head": torsos.HEADS, "tail": torsos.TAILS}
+
 
 def add_source(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
     """Add widgets for the source of the body, with the values of a sketch."""
@@ -73,8 +76,11 @@ def add_source(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
 
 
 def add_shape(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
-    """Add widgets for the body's proportions and colors, with the values of a sketch."""
+    """Add widgets for the body's torso, proportions and colors, with the values of a sketch."""
     widgets: dict[str, Any] = {}
+    for field, names in _TORSO_PARTS.items():
+        options = (DEFAULT_CHOICE, *names)
+        widgets[field] = gui.add_dropdown(_label(field), options, initial_value=getattr(sketch, field))
     for field, label, low, high, step in _PROPORTIONS:
         value = getattr(sketch, field)
         widgets[field] = gui.add_slider(label, min=low, max=high, step=step, initial_value=value)
@@ -139,6 +145,13 @@ def add_length_factor(gui: viser.GuiApi) -> viser.GuiSliderHandle:
     """Add a slider of the factor of a length, without a label and hidden."""
     lowest, highest = LENGTH_FACTORS
     return gui.add_slider("", min=lowest, max=highest, step=LENGTH_FACTOR_STEP, initial_value=1.0, visible=False)
+
+
+def add_weight(gui: viser.GuiApi) -> viser.GuiSliderHandle:
+    """Add a slider of the weight of clips that are saved, as a multiple of the usual one."""
+    return gui.add_slider(
+        "Weight of clips", min=0.0, max=MAX_WEIGHT, step=0.1, initial_value=1.0, hint="Multiple of the usual one"
+    )
 
 
 def list_with(choice: str, names: Iterable[str]) -> list[str]:

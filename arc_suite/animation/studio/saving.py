@@ -35,11 +35,13 @@ class File(NamedTuple):
         label: label of its button.
         suffix: suffix of its name, after the name of the body.
         make: returns the content for a creature, the positions (nq,) of its pose, and the commands of its task.
+        takes_weight: whether `make` takes `weight`, too; see `clips.clips`.
     """
 
     label: str
     suffix: str
-    make: Callable[[Creature, np.ndarray, Commands], bytes]
+    make: Callable[..., bytes]
+    takes_weight: bool = False
 
 
 def download_name(creature: Creature, file: File) -> str:
@@ -58,15 +60,15 @@ def make_mjcf(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
     return models.text(creature.setup.body, arena).encode()
 
 
-def make_clips(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
-    """Return animation clips as binary glTF; see `animation.clips`.
+def make_clips(creature: Creature, qpos: np.ndarray, commands: Commands, weight: float = 1.0) -> bytes:
+    """Return animation clips as binary glTF, with a multiple of the usual weight; see `animation.clips`.
 
     Raises:
         ValueError: a clip cannot be made.
     """
     sketch = creature.sketch
     preset = sketches.chosen_preset(sketch)
-    default_clips = clips.clips(creature.setup, clips.DEFAULT, sketch.policy, preset)
+    default_clips = clips.clips(creature.setup, clips.DEFAULT, sketch.policy, preset, weight=weight)
     version = versions.version_of("arc_suite") or ""
     return clips.glb(creature.setup.body, default_clips, generator=f"arc_suite {version}".strip())
 
@@ -154,7 +156,7 @@ def _policy_under_commands(environment: Environment, sketch: Sketch, commands: C
 FILES = (
     File("Spec", ".json", make_spec),
     File("MJCF", ".xml", make_mjcf),
-    File("Clips", ".glb", make_clips),
+    File("Clips", ".glb", make_clips, takes_weight=True),
     File("Page", ".html", make_page),
     File("Page to play in", "_play.html", make_playable_page),
     File("Picture", ".png", make_picture),

@@ -11,15 +11,16 @@ from typing import Any
 from arc_suite import checks, registry
 from arc_suite.bodies import families, generator
 from arc_suite.bodies.shaping import Shape, link_ends, link_names, shaped
+from arc_suite.bodies.torsos import UNCHANGED
 from arc_suite.envs.setup import Setup
-from arc_suite.robots import ROBOTS, palettes
+from arc_suite.robots import ROBOTS, gaits, palettes
 from arc_suite.robots.spec import Body, Leg, Vector
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json
 
 LEGS = "legs and links"  # source: a body of the generator
 RANDOM = "random"  # source: a random body
 FILE = "file"  # source: the text of a spec file
-DEFAULT_CHOICE = "own"  # leaves the gait, layout, preset or palette to the body or the task
+DEFAULT_CHOICE = UNCHANGED  # leaves the gait, layout, preset, palette or a part of the torso to the body or the task
 
 # Fields that are not about the body.
 _TASK_FIELDS = ("task", "gait", "speed", "ground", "ground_file", "kicks", "settings", "policy", "preset")
@@ -37,13 +38,13 @@ class Sketch:
         layout: pairs, radial or `DEFAULT_CHOICE`, for the source `LEGS`.
         seed: for the source `RANDOM`.
         file: the text of a spec file, for the source `FILE`.
-        scale, length, width, thickness, fan: see `shaping.Shape`.
+        scale, length, width, thickness, fan, torso, head, tail: see `shaping.Shape`.
         lengths: pairs of a link's name and the factor of its length. Links that the body lacks are ignored.
         ends: pairs of a part's name and the link's end, see `shaping.Shape`. Parts that the body lacks are ignored.
         palette: a name of `spec.PALETTES`, a seed in digits, or `DEFAULT_CHOICE`.
         task: name of the task.
         gait: name of the gait, or `DEFAULT_CHOICE`.
-        speed: target velocity, as a multiple of the body's own.
+        speed: target velocity, as a multiple of the body's own; demonstrators go in a gait that suits it.
         ground: name of an arena, or a file with ground and its scale; ignored by a task that has its own.
         ground_file: ground of the file as text, see `arenas.ground_text`; no file is read.
         kicks: see `modifiers.Kicks`.
@@ -63,6 +64,9 @@ class Sketch:
     width: float = 1.0
     thickness: float = 1.0
     fan: float = 0.0
+    torso: str = DEFAULT_CHOICE
+    head: str = DEFAULT_CHOICE
+    tail: str = DEFAULT_CHOICE
     lengths: tuple[tuple[str, float], ...] = ()
     ends: tuple[tuple[str, Vector], ...] = ()
     palette: str = DEFAULT_CHOICE
@@ -147,7 +151,11 @@ def make_settings(sketch: Sketch, body: Body) -> dict[str, Any]:
         if parameters is None:
             expected = f"expected 1 for the task {sketch.task}, which prescribes none"
             raise ValueError(f"speed: {expected}, got {sketch.speed:g}")
-        settings["target_velocity"] = float(f"{sketch.speed * parameters.target_velocity:.4g}")
+        settings["target_velocity"] = _round(sketch.speed * parameters.target_velocity)
+        if sketch.policy == "cpg":  # a trained policy keeps the gait of its training
+            pace = gaits.pace_at(sketch.speed)
+            settings["gait_frequency"] = _round(pace.tempo * parameters.gait_frequency)
+            settings["duty_factor"] = _round(parameters.duty_factor + pace.duty_change)
     if sketch.ground != "flat" and not task_class.own_arena:
         settings["arena"] = sketch.ground if registry.names_arena(sketch.ground) else sketch.ground_file
     if sketch.kicks:
@@ -155,6 +163,11 @@ def make_settings(sketch: Sketch, body: Body) -> dict[str, Any]:
     settings |= typed_settings
     registry.check_stored_settings(settings)  # a visitor of the page imports nothing
     return settings
+
+
+def _round(number: float) -> float:
+    """Return a number to four digits, which is short in lines to copy."""
+    return float(f"{number:.4g}")
 
 
 def make_setup(sketch: Sketch) -> Setup:

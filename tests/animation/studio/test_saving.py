@@ -80,6 +80,15 @@ def test_a_film(creature, monkeypatch):
     assert film[4:8] == b"ftyp" and len(film) > 1000
 
 
+def test_clips_take_the_weight_of_a_slider(creature, monkeypatch):
+    weights = []
+    monkeypatch.setattr(saving.clips, "clips", lambda *given, weight: weights.append(weight) or [])
+    monkeypatch.setattr(saving.clips, "glb", lambda *given, generator: b"glTF")
+    (file,) = (file for file in saving.FILES if file.takes_weight)
+    assert file.make(creature, None, {}, weight=0.5) == content(creature, "Clips") == b"glTF"
+    assert weights == [0.5, 1.0]
+
+
 @pytest.mark.long
 def test_clips(creature):
     made = content(creature, "Clips")

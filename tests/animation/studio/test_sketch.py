@@ -55,9 +55,13 @@ def test_settings_of_the_task():
     assert sketches.make_setup(SKETCHES["legs"]).task_kwargs == {}
     assert sketches.make_setup(SKETCHES["robot"]).task_kwargs == {"arena": "bumps", "kicks": 0.5}
     assert sketches.make_setup(SKETCHES["layout"]).task_kwargs == {"gait": "wave"}
-    own = sketches.make_setup(dataclasses.replace(SKETCHES["shaped"], speed=1.0)).definition.parameters.target_velocity
-    (speed,) = sketches.make_setup(SKETCHES["shaped"]).task_kwargs.values()
-    assert speed == pytest.approx(0.8 * own, rel=1e-3)
+    own = sketches.make_setup(dataclasses.replace(SKETCHES["shaped"], speed=1.0)).definition.parameters
+    settings = sketches.make_setup(SKETCHES["shaped"]).task_kwargs
+    assert settings["target_velocity"] == pytest.approx(0.8 * own.target_velocity, rel=1e-3)
+    assert settings["gait_frequency"] == pytest.approx(0.91 * own.gait_frequency, rel=1e-3)  # between slow and walk
+    assert settings["duty_factor"] == pytest.approx(own.duty_factor + 0.025, rel=1e-3)
+    trained = dataclasses.replace(SKETCHES["shaped"], policy="zero")
+    assert list(sketches.make_setup(trained).task_kwargs) == ["target_velocity"]
     # A task with a ground of its own ignores the ground; settings of the field come before those of sliders.
     sketch = dataclasses.replace(SKETCHES["example"], ground="bumps")
     assert sketches.make_setup(sketch).task_kwargs == {"difficulty": 0.5}
