@@ -438,7 +438,7 @@ def test_sliders_choose_bodies_by_legs_and_links(browser, tmp_path):
     assert tab.evaluate("play.state.play.simulation.field !== null")  # heights are those that bodies share
     tab.focus("#legs")
     tab.keyboard.press("Home")
-    assert tab.evaluate(name) == "walker_4x2" and tab.locator("output").first.input_value() == "4 legs"
+    assert tab.evaluate(name) == "walker_4x2" and tab.locator("output").first.text_content() == "4 legs"
     assert tab.evaluate("location.hash") == "#legs=4&links=3&ground=bumps&body=legs+and+links&mode=free"
     tab.select_option("#body", "2")
     assert not tab.is_visible("#legs") and "legs=" not in tab.evaluate("location.hash")
