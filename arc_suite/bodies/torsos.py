@@ -8,6 +8,7 @@ from arc_suite.robots.spec import Body, Solid
 UNCHANGED = "own"  # leaves a part as the body has it
 
 _BOX_SHARE = 0.85  # of the extents of a torso, that a box has: its corners stand out
+_HEAD_HEIGHT = 0.8  # half-thicknesses of the torso, above its middle
 _TAIL_RISE = 25.0  # degrees above the horizontal
 
 
@@ -63,16 +64,17 @@ def _capsule(chassis: Solid) -> Solid:
 
 
 def _round_head(chassis: Solid) -> Solid:
-    """Return a ball in front, above the mounts of legs that point forward."""
     half_length, _, half_thickness = chassis.size
     radius = 0.8 * half_thickness
-    return Solid(name="head", shape="sphere", size=(radius,), position=(half_length, 0.0, half_thickness))
+    return Solid(
+        name="head", shape="sphere", size=(radius,), position=(half_length, 0.0, _HEAD_HEIGHT * half_thickness)
+    )
 
 
 def _long_head(chassis: Solid) -> Solid:
     half_length, _, half_thickness = chassis.size
     size = (1.8 * half_thickness, 0.7 * half_thickness, 0.6 * half_thickness)
-    position = (half_length + 0.8 * half_thickness, 0.0, half_thickness)
+    position = (half_length + 0.8 * half_thickness, 0.0, _HEAD_HEIGHT * half_thickness)
     return Solid(name="head", shape="ellipsoid", size=size, position=position)
 
 

@@ -108,7 +108,7 @@ def lines_to_copy(sketch: Sketch) -> str:
     elements = []
     for name, text in texts.items():
         elements.append(_element("button", f"Copy {name}", onclick=_COPY_SCRIPT, style=_BUTTON_STYLE))
-        elements.append(_element("pre", text, style=f"white-space:pre-wrap;{_SMALL_STYLE}"))
+        elements.append(_element("pre", text, style=f"white-space:pre-wrap;overflow-wrap:anywhere;{_SMALL_STYLE}"))
     return _html(_element("div", *elements, style=_INDENT_STYLE))
 
 
