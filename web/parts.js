@@ -1,5 +1,6 @@
 // Parts of a body: shapes and materials in MuJoCo's terms, as three.js draws them.
 import * as THREE from "three";
+import { Swing } from "./swinging.js";
 
 export const quaternion = ([w, x, y, z]) => new THREE.Quaternion(x, y, z, w);
 
@@ -63,6 +64,10 @@ export class Figure {
       if (part.parent !== null) this.parts[part.parent].add(this.parts[index]);
     });
     this.torso = this.parts[0];
+    this.owners = parts.map((part, index) => (part.swing ? part.parent : index)); // parts of the simulation
+    this.swings = parts.flatMap((part, index) =>
+      part.swing ? [{ part: this.parts[index], above: this.parts[part.parent], swing: new Swing(part) }] : [],
+    );
     this.hinges = parts.flatMap(({ joint, axis, quaternion: rest }, index) =>
       joint === null ? [] : [{ part: this.parts[index], joint, axis: new THREE.Vector3(...axis), rest: quaternion(rest) }],
     );
@@ -74,5 +79,13 @@ export class Figure {
     for (const { part, joint, axis, rest } of this.hinges)
       part.quaternion.copy(rest).multiply(turn.setFromAxisAngle(axis, angles[joint]));
     this.torso.updateMatrixWorld(true);
+  }
+
+  // Swings bones of ornaments some seconds on, over ground at a height, m; below 0 seconds they begin at rest.
+  swing(seconds, ground = 0) {
+    for (const { part, above, swing } of this.swings) {
+      part.quaternion.copy(swing.follow(above.matrixWorld, seconds, ground));
+      part.updateMatrixWorld(true);
+    }
   }
 }

@@ -66,6 +66,7 @@ class Play {
     this.lain = 0; // s since a fall
     this.down = 0; // s since that of the other body
     this.pace = 1; // share of real time
+    this.shown = 0; // s of the simulation in the latest picture
     this.pose();
     this.view.place(this.target());
     this.chase = new Chase(this.view);
@@ -124,13 +125,16 @@ class Play {
   }
 
   pose() {
-    const { joints, home } = this.body.task;
+    const { joints, home } = this.body.task, { time } = this.simulation.data;
     this.figures.forEach(({ torso }, number) => {
       const { qpos } = this.simulation.shares[number](), { task } = this.simulation.minds[number];
       torso.position.fromArray(task.torso(qpos, qpos.subarray(3, 7)));
       torso.quaternion.copy(quaternion(qpos.subarray(3, 7)));
       this.figures[number].bend(joints.map((place, joint) => qpos[place] - home[joint]));
+      const { x, y } = torso.position;
+      this.figures[number].swing(time - this.shown, this.simulation.ground(x, y));
     });
+    this.shown = time;
     const { pull } = this.simulation;
     this.rope.visible = pull !== null;
     if (pull) this.rope.geometry.setFromPoints([pull.point, pull.target].map((point) => new THREE.Vector3(...point)));
@@ -182,7 +186,7 @@ class Play {
     aim(place);
     const [hit] = ray.intersectObject(this.figure.torso, true);
     if (!hit) return null;
-    const index = this.parts.indexOf(hit.object.parent);
+    const index = this.figure.owners[this.parts.indexOf(hit.object.parent)];
     const facing = this.view.camera.getWorldDirection(new THREE.Vector3());
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(facing, hit.point);
     this.simulation.grab(index, hit.point.toArray());

@@ -20,6 +20,17 @@ class Creature extends Figure {
     super(walk.parts, materials(walk.materials));
     this.walk = walk;
     this.looks = new Map(this.parts.flatMap(meshesOf).map((mesh) => [mesh, mesh.material]));
+    this.turns = this.swings.length ? walk.positions.map((_, row) => this.turnsAt(row)) : []; // of bones, in each row
+  }
+
+  // Turns of bones that swing in a row of the track, after those of the row before.
+  turnsAt(row) {
+    const { step, positions, quaternions, scenery } = this.walk;
+    this.torso.position.set(...positions[row]);
+    this.torso.quaternion.copy(quaternion(quaternions[row]));
+    this.torso.updateWorldMatrix(false, false);
+    this.swing(row ? step : -1, scenery.level ? 0 : -Infinity);
+    return this.swings.map(({ part }) => part.quaternion.clone());
   }
 
   // Rows of a track stand at the ends of control steps: the first one at `step`.
@@ -36,6 +47,9 @@ class Creature extends Figure {
     const mix = (values, index) => (1 - share) * values[before][index] + share * values[after][index];
     this.torso.position.set(...[0, 1, 2].map((axis) => mix(positions, axis)));
     this.torso.quaternion.copy(quaternion(quaternions[before])).slerp(quaternion(quaternions[after]), share);
+    this.swings.forEach(({ part }, bone) =>
+      part.quaternion.copy(this.turns[before][bone]).slerp(this.turns[after][bone], share),
+    );
     this.bend(joints[before].map((_, joint) => mix(joints, joint)));
     const failed = this.walk.scenery.failed[before] ?? [];
     for (const part of this.parts) {
@@ -48,9 +62,11 @@ class Creature extends Figure {
     return this.parts.filter((part) => meshesOf(part).some((mesh) => mesh.material === DARK)).map((part) => part.name);
   }
 
-  // Places of all parts in the world by name.
+  // Places of all parts in the world by name, and the turns of bones that swing.
   places() {
-    return Object.fromEntries(this.parts.map((part) => [part.name, part.getWorldPosition(new THREE.Vector3()).toArray()]));
+    const turns = this.swings.map(({ part: { quaternion: { w, x, y, z } } }) => [w, x, y, z]);
+    const places = this.parts.map((part) => [part.name, part.getWorldPosition(new THREE.Vector3()).toArray()]);
+    return { turns, ...Object.fromEntries(places) };
   }
 }
 

@@ -102,6 +102,10 @@ class Episodes:
         mujoco.mj_integratePos(model, interpolated_qpos, difference, share)
         return interpolated_qpos
 
+    def seconds(self, share: float) -> float:
+        """Return the time of the present episode at a share, 0 to 1, of the latest control step, s."""
+        return (max(self.steps - 1, 0) + share * min(self.steps, 1)) * self.control_timestep
+
     def markers(self, share: float) -> list[Marker]:
         """Return the task's debug markers at a share, 0 to 1, of the latest control step."""
         previous_looks = [_without_endpoints(marker) for marker in self._previous_markers]

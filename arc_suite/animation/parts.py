@@ -5,15 +5,18 @@ in the standing pose.
 """
 
 import itertools
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite import models, rotations
+from arc_suite import checks, models, rotations
+from arc_suite.models import sizing, visuals
 from arc_suite.models.direct import GEOMS
 from arc_suite.models.standing import standing_qpos
+from arc_suite.models.visuals.springs import SPRINGS
 from arc_suite.robots.spec import Body, Link
 
 KINDS = {int(geom): name for name, geom in GEOMS.items()}  # kinds of shapes by MuJoCo's number
@@ -56,17 +59,39 @@ class Shape(NamedTuple):
     hull: Hull | None = None
 
 
-class Part(NamedTuple):
-    """A rigid body.
+class Swing(NamedTuple):
+    """How a bone of ornaments swings; see `springs.Spring`.
 
     Attributes:
-        name: name of the body in the MJCF.
+        tip: (3,) its tip in its own frame, m.
+        mass: (3,) where its mass is, in the same frame, m.
+        frequency: rad/s.
+        damping: damping ratio.
+        limit: rad.
+        pivot_radius, tip_radius: radii of balls at both ends whose convex hull holds its shapes, m.
+    """
+
+    tip: np.ndarray
+    mass: np.ndarray
+    frequency: float
+    damping: float
+    limit: float
+    pivot_radius: float
+    tip_radius: float
+
+
+class Part(NamedTuple):
+    """A rigid body, or a bone of ornaments.
+
+    Attributes:
+        name: name of the body in the MJCF, or of the bone.
         parent: index of the part above; None for the torso.
         place: (3,) position in the frame of the part above, m; that of the torso is in the world, as the body stands.
         quaternion: (4,) orientation in the same frame, w first.
         joint: index of its joint; None for the torso and for rigid parts.
         axis: (3,) axis of the joint; None without one.
         shapes: shapes that it shows.
+        swing: how it swings; None for a part of the simulation.
     """
 
     name: str
@@ -76,6 +101,7 @@ class Part(NamedTuple):
     joint: int | None
     axis: np.ndarray | None
     shapes: tuple[Shape, ...]
+    swing: Swing | None = None
 
 
 class Material(NamedTuple):
@@ -93,7 +119,10 @@ class Material(NamedTuple):
 
 
 def describe_body(body: Body) -> tuple[list[Part], dict[str, Material]]:
-    """Return the parts of a body in the order of its `part_names`, and the materials of what they show by name."""
+    """Return the parts of a body, and the materials of what they show by name.
+
+    Parts are in the order of its `part_names`, followed by bones of ornaments, which swing on the torso.
+    """
     model = models.model_spec(body, decorated=True).compile()
     is_imported = bool(body.source)
     parts = _sketched_parts(model, body) if is_imported else _model_parts(model, body)
@@ -137,11 +166,42 @@ def simplify_hull(hull: Hull, max_points: int) -> Hull:
 def _model_parts(model: mujoco.MjModel, body: Body) -> list[Part]:
     """Return the parts of a model that was made from a body's spec."""
     body_ids = [model.body(name).id for name in body.part_names]
-    return [_model_part(model, body_id, body_ids) for body_id in body_ids]
+    bone_of_geom = {model.geom(name).id: bone for name, bone in visuals.geoms_of_bones(body).items()}
+    parts = [_model_part(model, body_id, body_ids, swinging_geoms=bone_of_geom.keys()) for body_id in body_ids]
+    for bone in visuals.bones(body):
+        geoms = [geom for geom, bone_name in bone_of_geom.items() if bone_name == bone.name]
+        parts.append(_bone_part(model, body, bone, geoms))
+    return parts
 
 
-def _model_part(model: mujoco.MjModel, body_id: int, body_ids: list[int]) -> Part:
-    """Return one part, given the ids of all of them."""
+def _bone_part(model: mujoco.MjModel, body: Body, bone: visuals.Bone, geoms: list[int]) -> Part:
+    """Return a bone of the torso, whose frame is turned as the torso's, with the shapes of geoms."""
+    pivot = np.array(bone.pivot)
+    tip = np.array(bone.tip) - pivot
+    spring = SPRINGS[checks.name(bone.spring, SPRINGS, "spring")]
+    shapes = [_shape(model, geom) for geom in geoms]
+    return Part(
+        name=bone.name,
+        parent=0,
+        place=pivot,
+        quaternion=_NO_TURN,
+        joint=None,
+        axis=None,
+        shapes=tuple(shape._replace(place=shape.place - pivot) for shape in shapes),
+        swing=Swing(
+            tip=tip,
+            mass=0.5 * tip,
+            frequency=spring.frequency / sizing.time_unit(body),
+            damping=spring.damping,
+            limit=math.radians(spring.limit),
+            pivot_radius=bone.pivot_radius,
+            tip_radius=bone.tip_radius,
+        ),
+    )
+
+
+def _model_part(model: mujoco.MjModel, body_id: int, body_ids: list[int], swinging_geoms: Collection[int]) -> Part:
+    """Return one part, given the ids of all of them, without geoms that swing."""
     parent_id = int(model.body_parentid[body_id])
     is_torso = parent_id == 0  # its parent is the world
     has_hinge = not is_torso and model.body_jntnum[body_id] > 0
@@ -160,7 +220,7 @@ def _model_part(model: mujoco.MjModel, body_id: int, body_ids: list[int]) -> Par
         quaternion=model.body_quat[body_id],
         joint=joint,
         axis=axis,
-        shapes=tuple(_shape(model, geom) for geom in geoms),
+        shapes=tuple(_shape(model, geom) for geom in geoms if geom not in swinging_geoms),
     )
 
 

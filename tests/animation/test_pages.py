@@ -15,7 +15,7 @@ from page_data import data_of
 from PIL import Image
 
 import arc_suite
-from arc_suite.animation import pages, scenery
+from arc_suite.animation import pages, scenery, swinging
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compile_model
@@ -52,7 +52,7 @@ def test_a_page_holds_the_tracks(bundle, tracks):
     track = tracks["tick, tuned"]
     np.testing.assert_allclose(first["positions"], track.positions, atol=1e-6)
     np.testing.assert_allclose(first["joints"], track.joint_angles, atol=1e-6)
-    assert [part["name"] for part in first["parts"]] == list(ROBOTS["tick"].part_names)
+    assert [part["name"] for part in first["parts"]] == [*ROBOTS["tick"].part_names, "antenna", "antenna_right"]
     assert first["stance"] == track.stance.astype(int).tolist() != first["schedule"]
     np.testing.assert_allclose(np.sum(list(first["terms"].values()), axis=0), track.rewards, atol=1e-5)
     assert first["totals"][-1] == pytest.approx(track.rewards.sum(), abs=1e-5)
@@ -221,6 +221,10 @@ def test_the_picture_is_the_track(shown, tracks):
             data.qpos[:] = qpos_of(track)[row]
             mujoco.mj_kinematics(model, data)
             np.testing.assert_allclose([walk[name] for name in body.part_names], data.xpos[parts], atol=1e-4)
+            bones = swinging.Swinging(swinging.list_bones(body))
+            poses = qpos_of(track)[: row + 1, :7]
+            turns = [bones.follow(index * track.time_step, pose, 0.0) for index, pose in enumerate(poses)][-1]
+            np.testing.assert_allclose(np.abs(walk["turns"]), np.abs(turns), atol=1e-3)
     track = tracks["tick, tuned"]
     places = shown.evaluate(f"viewer.seek({track.times[9] + 0.5 * track.time_step}), viewer.places()")
     np.testing.assert_allclose(places[0]["torso"], track.positions[9:11].mean(axis=0), atol=1e-5)

@@ -17,7 +17,8 @@ def align_bones(parts: Sequence[Part]) -> list[Part]:
     """Return the same parts with other frames, in which a joint is one curve, and a bone points along its link.
 
     In glTF's axes, x is the hinge, and y points to the next part as far as it can across x. The bone of a link that
-    lies along its hinge has the hinge as y. A foot has the direction of the link above. The torso keeps its frame.
+    lies along its hinge has the hinge as y. A foot has the direction of the link above, and a bone that swings points
+    to its tip. The torso keeps its frame.
 
     Args:
         parts: parts of a body, those above first.
@@ -31,7 +32,10 @@ def align_bones(parts: Sequence[Part]) -> list[Part]:
         hinge = None
         if part.axis is not None:
             hinge = orientations[index] @ part.axis
-        link = _link_direction(parts, positions, index)
+        if part.swing is not None:
+            link = orientations[index] @ part.swing.tip / np.linalg.norm(part.swing.tip)
+        else:
+            link = _link_direction(parts, positions, index)
         axes_of_bones.append(_bone_axes(hinge, link, parent_axes=axes_of_bones[part.parent]))
 
     bones = []
@@ -122,7 +126,7 @@ def _direction_across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def _turn_frame(part: Part, rotation: np.ndarray) -> Part:
-    """Return a part with its shapes and axis in another frame, given the rotation (3, 3) into that frame."""
+    """Return a part with its shapes, axis and tip in another frame, given the rotation (3, 3) into that frame."""
     quaternion = _to_quaternion(rotation)
     turned_shapes = []
     for shape in part.shapes:
@@ -132,7 +136,10 @@ def _turn_frame(part: Part, rotation: np.ndarray) -> Part:
     axis = None
     if part.axis is not None:
         axis = (rotation @ part.axis).round(12)
-    return part._replace(shapes=tuple(turned_shapes), axis=axis)
+    swing = part.swing
+    if swing is not None:
+        swing = swing._replace(tip=rotation @ swing.tip, mass=rotation @ swing.mass)
+    return part._replace(shapes=tuple(turned_shapes), axis=axis, swing=swing)
 
 
 def _to_quaternion(rotation: np.ndarray) -> np.ndarray:

@@ -144,6 +144,10 @@ def measure_ground(body: Body, motion: ClipMotion) -> Ground:
             soles.append(position[:, 2] - radius_of_foot[part.name])
             feet.append(position[:, :2])
     for index, points in enumerate(points_of_parts):
+        swing = parts[index].swing
+        if swing is not None:  # its tip stays above the ground
+            lowest_part = np.minimum(lowest_part, positions[index][:, 2] - swing.pivot_radius)
+            continue
         if len(points) and parts[index].name not in radius_of_foot:
             heights = positions[index][:, 2] + (orientations[index][:, 2] @ points.T).min(axis=-1)
             lowest_part = np.minimum(lowest_part, heights)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, registry
-from arc_suite.animation.clips import additive, bounds, catalog, planting
+from arc_suite.animation.clips import additive, bounds, catalog, planting, secondary
 from arc_suite.animation.clips import weight as weights
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.drafts import make_drafts
@@ -39,6 +39,7 @@ class Clip(NamedTuple):
         slide: largest diagonal of the way of a standing foot, m; None for a clip in which feet are not to stand still.
         additive_over: names of the clips that an additive clip can be added to; None for a clip that is not additive.
         weight: share of the weight that legs allow; None for a clip without weight. See `weight.add_weight`.
+        swings: (frames, bones, 4) how bones of ornaments are turned in the torso's frame; None for bones at rest.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Clip(NamedTuple):
     slide: float | None = None
     additive_over: tuple[str, ...] | None = None
     weight: float | None = None
+    swings: np.ndarray | None = None
 
     @property
     def times(self) -> np.ndarray:
@@ -125,6 +127,10 @@ def clips(
     drafts = make_drafts(recorder, names, progress, left_out, straight, plant, character)
     _report_left_out(setup.body, names, left_out)
     clip_of_name = {name: sample_clip(name, setup.body, drafts[name], fps) for name in names if name not in left_out}
+    walk = sample_clip("walk", setup.body, drafts["walk"], fps).motion if "walk" in drafts else None
+    for name, clip in clip_of_name.items():
+        swings = secondary.swing(setup.body, catalog.clip_of(name), clip.motion, walk)
+        clip_of_name[name] = clip._replace(swings=swings)
     motion_of_clip = {name: clip.motion for name, clip in clip_of_name.items()}
     clip_loops = {name: clip.loops for name, clip in clip_of_name.items()}
     for name, clip in clip_of_name.items():

@@ -41,10 +41,10 @@ def glb(
     """Return a body and its clips as a binary glTF file.
 
     Its scene has the node `root`, on the ground below the torso, with the parts of the body under it as in the body
-    tree. With a skin, there is also a node with the mesh, and the parts are the bones of its skeleton; see
-    `bones.align_bones`. The body is bound in the first pose of idle. An animation is called after its clip, with
-    `_in_place` where the root stays although the clip moves, and `_loop` at the end where it loops. Its extras are
-    those of the `sidecar`.
+    tree, and bones of ornaments on the torso. With a skin, there is also a node with the mesh, and the parts are the
+    bones of its skeleton; see `bones.align_bones`. The body is bound in the first pose of idle. An animation is called
+    after its clip, with `_in_place` where the root stays although the clip moves, and `_loop` at the end where it
+    loops. Its extras are those of the `sidecar`.
 
     Args:
         body: any body.
@@ -339,6 +339,10 @@ def _add_body_tracks(tracks: _ClipTracks, clip: Clip, parts: Sequence[Part], nod
         elif part.joint is not None:
             orientations = bones.hinge_orientations(part, motion.joints[:, part.joint])
             body_tracks.append(tracks.add(node, "rotation", orientations))
+    swinging_nodes = [(part, node) for part, node in zip(parts, nodes.parts, strict=True) if part.swing is not None]
+    for index, (part, node) in enumerate(swinging_nodes):
+        if clip.swings is not None:
+            body_tracks.append(tracks.add(node, "rotation", rotations.product(clip.swings[:, index], part.quaternion)))
     return body_tracks
 
 

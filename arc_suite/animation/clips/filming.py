@@ -1,13 +1,16 @@
 """Clips in pictures: frames of a loop in place, on a turntable, sheets of sprites in several directions."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from arc_suite import rotations
+from arc_suite.animation import swinging
 from arc_suite.animation.clips.clips import Clip
+from arc_suite.models import visuals
 from arc_suite.models.standing import standing_qpos
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
@@ -42,16 +45,51 @@ class Sheet(NamedTuple):
     ground_line: float
 
 
+class _SwingingGeom(NamedTuple):
+    """A geom that swings with a bone.
+
+    Attributes:
+        number: number of the geom.
+        bone: index of the bone.
+        pivot: (3,) of the bone, m.
+        place, quaternion: of the geom at rest.
+    """
+
+    number: int
+    bone: int
+    pivot: np.ndarray
+    place: np.ndarray
+    quaternion: np.ndarray
+
+
+class _Pose(NamedTuple):
+    """Positions (nq,) of a body, and turns (bones, 4) of its bones of ornaments."""
+
+    qpos: np.ndarray
+    swings: np.ndarray
+
+
 class _Stage(NamedTuple):
     """A model to draw.
 
     Attributes:
         drawing: with the free camera on all of the body.
+        swinging_geoms: geoms that swing.
         ground_line: where the ground below the torso is in a picture, as a share of its height from the top.
     """
 
     drawing: pictures.Decorated
+    swinging_geoms: Sequence[_SwingingGeom]
     ground_line: float
+
+    def pose(self, pose: _Pose) -> None:
+        """Take a pose."""
+        model = self.drawing.model.ptr
+        for geom in self.swinging_geoms:
+            turn = pose.swings[geom.bone]
+            model.geom_pos[geom.number] = geom.pivot + rotations.matrix(turn) @ (geom.place - geom.pivot)
+            model.geom_quat[geom.number] = rotations.product(turn, geom.quaternion)
+        self.drawing.pose(pose.qpos)
 
 
 def film_pictures(
@@ -77,8 +115,8 @@ def film_pictures(
     frames = np.arange(picture_count) % _count_frames(clip)
     turn = 2.0 * np.pi if turntable else 0.0
     headings = heading + np.linspace(0.0, turn, picture_count, endpoint=False)
-    stage, positions = _open_stage(body, clip, frames, headings, transparent)
-    yield from _render(stage, positions, size, transparent)
+    stage, poses = _open_stage(body, clip, frames, headings, transparent)
+    yield from _render(stage, poses, size, transparent)
 
 
 def count_film_pictures(clip: Clip, turntable: bool = False) -> int:
@@ -105,8 +143,8 @@ def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent
     columns = _count_frames(clip)
     frames = np.tile(np.arange(columns), directions)
     headings = np.repeat(2.0 * np.pi * np.arange(directions) / directions, columns)
-    stage, positions = _open_stage(body, clip, frames, headings, transparent)
-    squares = list(_render(stage, positions, size, transparent))
+    stage, poses = _open_stage(body, clip, frames, headings, transparent)
+    squares = list(_render(stage, poses, size, transparent))
     sheet_rows = []
     for first in range(0, len(squares), columns):
         sheet_rows.append(np.concatenate(squares[first : first + columns], axis=1))
@@ -120,35 +158,38 @@ def _count_frames(clip: Clip) -> int:
     return len(clip.times)
 
 
-def _open_stage(body: Body, clip: Clip, frames, headings, transparent: bool) -> tuple[_Stage, np.ndarray]:
-    """Return a stage, and positions (n, nq) for frames (n,) under headings (n,), rad, with the root at 0."""
+def _open_stage(body: Body, clip: Clip, frames, headings, transparent: bool) -> tuple[_Stage, list[_Pose]]:
+    """Return a stage, and poses for frames (n,) under headings (n,), rad, with the root at 0."""
     motion_in_place = clip.motion._replace(root=np.zeros_like(clip.motion.root))
     poses = motion_in_place.poses()[frames]
     poses[:, :2] = rotations.to_heading_frame(poses[:, :2], -headings)
     poses[:, 3:7] = rotations.turn_about_z(poses[:, 3:7], headings)
     model = compile_model(body)
     positions = readings.positions(poses, readings.layout(model, body), standing_qpos(model))
-    framed_positions = positions[: _count_frames(clip)]
-    return opengl.call(lambda: _prepare_stage(body, framed_positions, transparent)), positions
+    swings = swinging.rest_turns(body, len(clip.times)) if clip.swings is None else clip.swings
+    all_poses = [_Pose(qpos, swings[frame]) for qpos, frame in zip(positions, frames, strict=True)]
+    framed_poses = all_poses[: _count_frames(clip)]
+    return opengl.call(lambda: _prepare_stage(body, framed_poses, transparent)), all_poses
 
 
-def _render(stage: _Stage, positions: np.ndarray, size: int, transparent: bool) -> Iterator[np.ndarray]:
-    """Yield pictures (size, size, channels) of positions (n, nq), and free the stage."""
+def _render(stage: _Stage, poses: Sequence[_Pose], size: int, transparent: bool) -> Iterator[np.ndarray]:
+    """Yield pictures (size, size, channels) of poses, and free the stage."""
     try:
-        for qpos in positions:
-            yield opengl.call(lambda qpos=qpos: _render_pose(stage.drawing, qpos, size, transparent))
+        for pose in poses:
+            yield opengl.call(lambda pose=pose: _render_pose(stage, pose, size, transparent))
     finally:
         opengl.call(stage.drawing.free)
 
 
-def _prepare_stage(body: Body, positions: np.ndarray, transparent: bool) -> _Stage:
-    """Return a model to draw, with the free camera on all of the body in all positions (n, nq)."""
+def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _Stage:
+    """Return a model to draw, with the free camera on all of the body in all poses."""
     if transparent:
         drawing = pictures.Decorated.from_body(body, quality=_TRANSPARENT_QUALITY, ground=_NO_GROUND)
     else:
         drawing = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
     model = drawing.model.ptr
-    radius, height = _bounding_cylinder(drawing, positions)
+    stage = _Stage(drawing, _list_swinging_geoms(body, model), ground_line=0.0)
+    radius, height = _bounding_cylinder(stage, poses)
     camera = model.vis.global_
     camera.azimuth = _AZIMUTH
     camera.elevation = _ELEVATION
@@ -160,34 +201,48 @@ def _prepare_stage(body: Body, positions: np.ndarray, transparent: bool) -> _Sta
     # The ground is half a height below the point that the camera looks at.
     depth = distance - 0.5 * height * math.sin(math.radians(_ELEVATION))
     drop = 0.5 * height * math.cos(math.radians(_ELEVATION))
-    return _Stage(drawing, 0.5 + 0.5 * drop / (depth * math.tan(half_view)))
+    return stage._replace(ground_line=0.5 + 0.5 * drop / (depth * math.tan(half_view)))
 
 
-def _bounding_cylinder(stage: pictures.Decorated, positions: np.ndarray) -> tuple[float, float]:
-    """Return radius and height, m, of the cylinder about the vertical axis that holds the body in all positions."""
-    model = stage.model.ptr
+def _list_swinging_geoms(body: Body, model: mujoco.MjModel) -> list[_SwingingGeom]:
+    """Return the geoms of a decorated model that swing."""
+    bones = swinging.list_bones(body)
+    bone_names = [bone.name for bone in bones]
+    geoms = []
+    for geom_name, bone_name in visuals.geoms_of_bones(body).items():
+        geom = model.geom(geom_name)
+        bone = bone_names.index(bone_name)
+        model.geom_sameframe[geom.id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else MuJoCo takes the torso's frame
+        geoms.append(_SwingingGeom(geom.id, bone, bones[bone].place, geom.pos.copy(), geom.quat.copy()))
+    return geoms
+
+
+def _bounding_cylinder(stage: _Stage, poses: Sequence[_Pose]) -> tuple[float, float]:
+    """Return radius and height, m, of the cylinder about the vertical axis that holds the body in all poses."""
+    model = stage.drawing.model.ptr
     is_body_geom = model.geom_bodyid > 0
     geom_radii = model.geom_rbound[is_body_geom]
     radius = 0.0
     height = 0.0
-    for qpos in positions:
-        stage.pose(qpos)
-        centers = stage.data.geom_xpos[is_body_geom]
+    for pose in poses:
+        stage.pose(pose)
+        centers = stage.drawing.data.geom_xpos[is_body_geom]
         radius = max(radius, (np.linalg.norm(centers[:, :2], axis=-1) + geom_radii).max())
         height = max(height, (centers[:, 2] + geom_radii).max())
     return radius, height
 
 
-def _render_pose(stage: pictures.Decorated, qpos: np.ndarray, size: int, transparent: bool) -> np.ndarray:
+def _render_pose(stage: _Stage, pose: _Pose, size: int, transparent: bool) -> np.ndarray:
     """Return a picture (size, size, 3 or 4), drawn larger and reduced."""
-    stage.pose(qpos)
+    stage.pose(pose)
+    drawing = stage.drawing
     quality = _TRANSPARENT_QUALITY if transparent else _OPAQUE_QUALITY
     scale = min(quality.scale, pictures.MAX_SCALE * MAX_HEIGHT // size)  # pixels drawn, for each of the picture
-    colors = stage.render(scale * size, scale * size, _FREE_CAMERA)
+    colors = drawing.render(scale * size, scale * size, _FREE_CAMERA)
     if not transparent:
         return pictures.shrink(colors, scale)
-    geoms = stage.render(scale * size, scale * size, _FREE_CAMERA, segmentation=True)[..., :1]  # -1 where none is
-    shows_body = (geoms >= 0) & (stage.model.ptr.geom_bodyid[geoms] > 0)
+    geoms = drawing.render(scale * size, scale * size, _FREE_CAMERA, segmentation=True)[..., :1]  # -1 where none is
+    shows_body = (geoms >= 0) & (drawing.model.ptr.geom_bodyid[geoms] > 0)
     alpha = pictures.shrink(np.uint8(255) * shows_body, scale)
     premultiplied = pictures.shrink(colors * shows_body, scale)
     straight_colors = premultiplied * (255.0 / np.maximum(alpha, 1))

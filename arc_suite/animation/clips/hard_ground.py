@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import models
+from arc_suite.models import visuals
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model, list_contacts
 
@@ -36,13 +37,14 @@ def harden(model: mujoco.MjModel) -> None:
 
 
 def _compile_with_drawn_shapes(body: Body) -> mujoco.MjModel:
-    """Return a model in which the shapes that are drawn on torso and links touch the ground, too."""
+    """Return a model in which the shapes that are drawn on torso and links touch the ground, too, if they are rigid."""
     spec = models.model_spec(body, decorated=True)
     model = spec.compile()
     list_contacts(spec, model)
     feet = [model.body(name).id for name in body.foot_names]
     touches = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     is_drawn = ~touches & (model.geom_bodyid > 0) & ~np.isin(model.geom_bodyid, feet)
-    for geom in np.flatnonzero(is_drawn).tolist():
-        spec.add_pair(geomname1=_FLOOR, geomname2=model.geom(geom).name)
+    drawn_names = [model.geom(geom).name for geom in np.flatnonzero(is_drawn).tolist()]
+    for name in [name for name in drawn_names if name not in visuals.geoms_of_bones(body)]:
+        spec.add_pair(geomname1=_FLOOR, geomname2=name)
     return spec.compile()

@@ -1,12 +1,15 @@
 """Metadata of clips, JSON-able: speeds, foot contact events, and where clips stand in blend spaces."""
 
 import collections
+import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
+from arc_suite.animation import swinging
 from arc_suite.animation.clips.catalog import WalkLoop, clip_names, clip_of
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import LIFT_OFF, TOUCH_DOWN
+from arc_suite.animation.parts import Part, Swing
 from arc_suite.robots.spec import Body
 
 # By the name that users choose: whether the root moves, for each animation of a clip.
@@ -32,7 +35,7 @@ _BLEND_SPACES = {
 
 
 def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
-    """Return the metadata of clips by name of the animation, and their blend spaces.
+    """Return the metadata of clips by name of the animation, their blend spaces, and the springs of bones that swing.
 
     Args:
         body: body of the clips.
@@ -48,9 +51,17 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
         "body": body.name,
         "units": {"length": "m", "time": "s", "angle": "rad"},
         "axes": {"up": "y", "forward": "z", "left": "x"},
+        "swinging_bones": {bone.name: _spring_metadata(bone) for bone in swinging.list_bones(body)},
         "clips": metadata_of_animation,
         "blend": _make_blend_spaces(clips, roots_move),
     }
+
+
+def _spring_metadata(bone: Part) -> dict[str, float]:
+    """Return the spring of a bone, for engines that simulate it: frequency, Hz, damping ratio, and limit, rad."""
+    swing = cast(Swing, bone.swing)
+    frequency = swing.frequency / (2.0 * math.pi)
+    return {"frequency": round(frequency, 4), "damping": swing.damping, "limit": round(swing.limit, 4)}
 
 
 def clip_metadata(clip: Clip) -> dict[str, Any]:

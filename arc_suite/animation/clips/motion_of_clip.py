@@ -3,6 +3,7 @@
 import numpy as np
 
 from arc_suite import motions
+from arc_suite.animation.clips import secondary
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import (
     LIFT_OFF,
@@ -71,6 +72,7 @@ def clip_of_motion(body: Body, motion: motions.Motion, fps: float) -> Clip:
         foot_contacts=tuple(_find_contacts(body, motion)),
         feet=body.foot_names,
         slip=slip(body, clip_motion) if motion.loops else None,
+        swings=secondary.swing_bones(body, clip_motion, motion.loops),
     )
 
 

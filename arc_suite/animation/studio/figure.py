@@ -10,6 +10,7 @@ from arc_suite import rotations
 from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.parts import Part
 from arc_suite.animation.studio.creature import Creature
+from arc_suite.animation.swinging import Swinging
 from arc_suite.tasks import readings
 
 _HANDLE_SCALE = 1.35  # radius of a handle's ball, in radii of its link
@@ -44,6 +45,10 @@ class Figure:
         self._hinge_joints = [part.joint for part in hinged_parts]  # indices of joints
         self._hinge_axes = np.array([part.axis for part in hinged_parts])  # (hinges, 3)
         self._standing_turns = np.array([part.quaternion for part in hinged_parts])  # (hinges, 4)
+        self._swinging = Swinging([part for part in creature.parts if part.swing is not None])
+        self._swinging_frames = [
+            frame for frame, part in zip(self._frames, creature.parts, strict=True) if part.swing is not None
+        ]
 
     def show_handles(self, on_drag: Callable[[str, np.ndarray], None] | None) -> None:
         """Show a ball at the end of every link, which visitors drag; None hides the balls.
@@ -69,18 +74,19 @@ class Figure:
                 ball.on_drag(functools.partial(self._drag, part_name, on_drag))
                 self._balls.append(ball)
 
-    def pose(self, qpos: np.ndarray, shown_position: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    def pose(self, qpos: np.ndarray, seconds: float, shown_position: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Show a pose.
 
         Args:
             qpos: (nq,) positions.
+            seconds: time of the episode, s.
             shown_position: maps the position (3,) of the torso to the position at which the scene shows it, m.
 
         Returns:
             The position (3,) of the torso, m.
         """
-        layout = self.creature.environment.task.definition.scene.layout
-        pose = readings.pose(qpos, layout)  # (7 + joints,): position and quaternion of the torso, joint angles
+        scene = self.creature.environment.task.definition.scene
+        pose = readings.pose(qpos, scene.layout)  # (7 + joints,): position and quaternion of the torso, joint angles
         torso_position = pose[:3]
         torso_quaternion = pose[3:7]
         hinge_angles = pose[7:][self._hinge_joints]  # (hinges,) rad, from the standing pose
@@ -91,6 +97,10 @@ class Figure:
         torso_frame.position = shown_position(torso_position) / self._unit
         torso_frame.wxyz = torso_quaternion
         for frame, quaternion in zip(self._hinged_frames, quaternions, strict=True):
+            frame.wxyz = quaternion
+        ground = float(scene.arena.height(*torso_position[:2]))
+        swings = self._swinging.follow(seconds, pose[:7], ground)
+        for frame, quaternion in zip(self._swinging_frames, swings, strict=True):
             frame.wxyz = quaternion
         return torso_position
 

@@ -149,8 +149,12 @@ class Page:
         # `share`: of the present control step that has passed; poses between two steps are interpolated.
         qpos = walker.episodes.qpos(walker.share)
         markers = walker.episodes.markers(walker.share)
-        companion_qpos = None if companion is None else companion.episodes.qpos(companion.share)
-        self._view.pose(qpos, markers, companion_qpos)
+        companion_qpos = None
+        companion_seconds = 0.0
+        if companion is not None:
+            companion_qpos = companion.episodes.qpos(companion.share)
+            companion_seconds = companion.episodes.seconds(companion.share)
+        self._view.pose(qpos, markers, companion_qpos, walker.episodes.seconds(walker.share), companion_seconds)
         if time.monotonic() - self._refresh_time > _REFRESH_INTERVAL:
             self._refresh_time = time.monotonic()
             self._status.content = texts.status(session)

@@ -92,18 +92,29 @@ class View:
             self._ground = _Ground(scene, creature, self._unit)
             self._markers = _Markers(scene, self._unit)
 
-    def pose(self, qpos: np.ndarray, markers: list[Marker], companion_qpos: np.ndarray | None = None) -> None:
+    def pose(
+        self,
+        qpos: np.ndarray,
+        markers: list[Marker],
+        companion_qpos: np.ndarray | None = None,
+        seconds: float = 0.0,
+        companion_seconds: float = 0.0,
+    ) -> None:
         """Show a pose.
 
         Args:
             qpos: (nq,) positions of the creature.
             markers: markers of the task.
             companion_qpos: (nq,) positions of the companion; None without one.
+            seconds: time of the creature's episode, by which bones of its ornaments swing, s.
+            companion_seconds: that of the companion.
         """
         with self._server.atomic():
-            torso_position = self._figure.pose(qpos, shown_position=lambda position: position)
+            torso_position = self._figure.pose(qpos, seconds, shown_position=lambda position: position)
             if self._companion is not None:
-                self._companion.pose(companion_qpos, functools.partial(self._place_companion, torso_position))
+                self._companion.pose(
+                    companion_qpos, companion_seconds, functools.partial(self._place_companion, torso_position)
+                )
             self._ground.follow(torso_position)
             floor = self._ground.height(torso_position) / self._unit
             self._shown_floor += _CAMERA_RISE_SHARE * (floor - self._shown_floor)

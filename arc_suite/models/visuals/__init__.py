@@ -1,6 +1,7 @@
 """Visuals of a body: colors and decorations, without mass or contacts."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from dm_control import mjcf
@@ -8,7 +9,7 @@ from dm_control import mjcf
 from arc_suite.models.visuals import bastion, leaper, queen, tick
 from arc_suite.models.visuals.generic import generic_visuals
 from arc_suite.models.visuals.scene import add_scene
-from arc_suite.models.visuals.spec import Ornament, Visuals
+from arc_suite.models.visuals.spec import Bone, Ornament, Visuals
 from arc_suite.robots import palettes
 from arc_suite.robots.spec import Body, Leg, Link
 
@@ -50,12 +51,27 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
     for solid in (*body.torso.solids, *body.ballast):
         root.find("geom", solid.name).material = visuals.solids.get(solid.name, "shell")
     torso = root.find("body", "torso")
-    for ornament in visuals.ornaments:
+    for ornament in _with_twins(visuals.ornaments):
         _add_ornament(torso, ornament)
-        if ornament.paired:
-            _add_ornament(torso, ornament.mirrored())
     for leg in body.legs:
         _decorate_leg(root, leg, visuals)
+
+
+def bones(body: Body) -> list[Bone]:
+    """Return the bones of a body's ornaments; none of an imported body, which has the looks of its file."""
+    return [] if body.source else _with_twins(_visuals(body).bones)
+
+
+def geoms_of_bones(body: Body) -> dict[str, str]:
+    """Return the names of the geoms that swing, each with the name of its bone."""
+    if body.source:
+        return {}
+    return {_geom_name(item.name): item.bone for item in _with_twins(_visuals(body).ornaments) if item.bone}
+
+
+def _with_twins(items: Iterable) -> list:
+    """Return ornaments or bones, those of pairs followed by their twins."""
+    return [twin for item in items for twin in ((item, item.mirrored()) if item.paired else (item,))]
 
 
 def _visuals(body: Body) -> Visuals:
@@ -141,4 +157,9 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 def _add_geom(part, name: str, material: str, shape: str, size, **pose) -> None:
     """Add a geom without mass or contacts to a part."""
-    part.add("geom", name=f"visual-{name}", material=material, type=shape, size=size, **pose, **_INERT)
+    part.add("geom", name=_geom_name(name), material=material, type=shape, size=size, **pose, **_INERT)
+
+
+def _geom_name(name: str) -> str:
+    """Return the name of a geom that visuals add; no part of a spec can have it."""
+    return f"visual-{name}"

@@ -1,6 +1,8 @@
 """Bastion: three overlapping armor shells, a face shield with a cyan eye slit, and a gun."""
 
-from arc_suite.models.visuals.spec import Ornament, Visuals
+from arc_suite.models.visuals.spec import Bone, Ornament, Visuals
+
+_GUN = Bone("gun", "gun", (0.14, 0.0, 0.33), (0.5, 0.0, 0.33), 0.04, 0.05)
 
 VISUALS = Visuals(
     colors={
@@ -20,7 +22,8 @@ VISUALS = Visuals(
         Ornament("brow", "trim", "box", (0.03, 0.15, 0.015), (0.295, 0.0, 0.14), (0, -20, 0)),
         Ornament("slit", "glow", "box", (0.022, 0.10, 0.012), (0.312, 0.0, 0.08), (0, -20, 0)),
         Ornament("mantlet", "frame", "ellipsoid", (0.10, 0.07, 0.06), (0.10, 0.0, 0.31)),
-        Ornament("barrel", "frame", "cylinder", (0.024, 0.20), (0.32, 0.0, 0.33), (0, 90, 0)),
-        Ornament("muzzle", "trim", "cylinder", (0.034, 0.035), (0.50, 0.0, 0.33), (0, 90, 0)),
+        Ornament("barrel", "frame", "cylinder", (0.024, 0.20), (0.32, 0.0, 0.33), (0, 90, 0), bone="gun"),
+        Ornament("muzzle", "trim", "cylinder", (0.034, 0.035), (0.50, 0.0, 0.33), (0, 90, 0), bone="gun"),
     ),
+    bones=(_GUN,),
 )

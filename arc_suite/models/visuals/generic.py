@@ -1,14 +1,21 @@
 """Visuals for any body, scaled to its torso."""
 
+import math
+
 import numpy as np
 
 from arc_suite.models.outline import solid_corners
-from arc_suite.models.visuals.spec import Ornament, Visuals
+from arc_suite.models.visuals.spec import Bone, Ornament, Visuals, whip
 from arc_suite.robots.spec import Body
+
+_PIVOT_SHARE = 0.85  # of half of the length of a torso, from its middle to the pivot of the tail
+_TAIL_LENGTH = 0.6  # of the geometric mean of a torso's length and the height at which it stands
+_TAIL_RISE = math.radians(40.0)  # rad
+_TAIL_WIDTH = 0.16  # radius at the pivot, of the tail's length
 
 
 def generic_visuals(body: Body) -> Visuals:
-    """Return visuals for a body: slate armor, violet joints, and an eye on a snout in front of the torso."""
+    """Return visuals for a body: slate armor, violet joints, an eye on a snout in front, a tail."""
     corners = solid_corners(body.torso.solids[0])
     center = corners.mean(axis=0)
     half_extents = np.ptp(corners, axis=0) / 2.0
@@ -16,6 +23,7 @@ def generic_visuals(body: Body) -> Visuals:
     eye_size = (0.4 * radius, 0.7 * radius, 0.7 * radius)
     x, y, z = center + half_extents * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
     half_length = half_extents[0] / 2.0  # of the snout
+    tail = _tail(body)
     return Visuals(
         colors={
             "shell": (0.62, 0.66, 0.72),
@@ -27,5 +35,19 @@ def generic_visuals(body: Body) -> Visuals:
         ornaments=(
             Ornament("snout", "frame", "cylinder", (radius, half_length), (x - half_length, y, z), (0, 90, 0)),
             Ornament("eye", "glow", "ellipsoid", eye_size, (x, y, z)),
+            *whip(tail, "shell", "glow", "ellipsoid"),
         ),
+        bones=(tail,),
     )
+
+
+def _tail(body: Body) -> Bone:
+    """Return a tail that rises behind the rearmost solid of the torso, above the mounts of legs."""
+    all_corners = [solid_corners(solid) for solid in body.torso.solids]
+    corners = min(all_corners, key=lambda corners: corners[:, 0].min())
+    half_extents = np.ptp(corners, axis=0) / 2.0
+    pivot = corners.mean(axis=0) - half_extents * (_PIVOT_SHARE, 0.0, -_PIVOT_SHARE * math.sqrt(1.0 - _PIVOT_SHARE**2))
+    length = _TAIL_LENGTH * math.sqrt(2.0 * half_extents[0] * body.torso.standing_height)
+    tip = pivot + length * np.array((-math.cos(_TAIL_RISE), 0.0, math.sin(_TAIL_RISE)))
+    radius = _TAIL_WIDTH * length
+    return Bone("tail", "tail", tuple(pivot.tolist()), tuple(tip.tolist()), radius, 0.5 * radius)

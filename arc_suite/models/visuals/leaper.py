@@ -1,6 +1,8 @@
 """Leaper: a white ball with one dark eye ringed in red, thrusters behind, yellow joints."""
 
-from arc_suite.models.visuals.spec import Ornament, Visuals
+from arc_suite.models.visuals.spec import Bone, Ornament, Visuals, whip
+
+_ANTENNA = Bone("antenna", "antenna", (-0.06, 0.0, 0.13), (-0.2, 0.0, 0.42), 0.02, 0.02)
 
 VISUALS = Visuals(
     colors={
@@ -18,5 +20,7 @@ VISUALS = Visuals(
         Ornament("glint", "shell", "sphere", (0.012,), (0.165, -0.02, 0.028)),
         Ornament("thruster", "frame", "cylinder", (0.04, 0.05), (-0.15, 0.07, 0.0), (0, 90, 0), paired=True),
         Ornament("flame", "glow", "cylinder", (0.03, 0.006), (-0.198, 0.07, 0.0), (0, 90, 0), paired=True),
+        *whip(_ANTENNA, "frame", "trim"),
     ),
+    bones=(_ANTENNA,),
 )

@@ -1,6 +1,8 @@
 """Queen: a wide ivory shell that floats above a dark chassis, amber joints, a cyan eye."""
 
-from arc_suite.models.visuals.spec import Ornament, Visuals
+from arc_suite.models.visuals.spec import Bone, Ornament, Visuals, whip
+
+_ANTENNA = Bone("antenna", "antenna", (0.42, 0.18, 0.31), (0.70, 0.30, 0.60), 0.032, 0.03, paired=True)
 
 VISUALS = Visuals(
     colors={
@@ -23,6 +25,8 @@ VISUALS = Visuals(
         Ornament("vent", "frame", "box", (0.05, 0.10, 0.045), (0.40, 0.25, 0.195), (0, 20, 30), paired=True),
         Ornament("vent_upper", "glow", "box", (0.062, 0.08, 0.008), (0.402, 0.251, 0.21), (0, 20, 30), paired=True),
         Ornament("vent_lower", "glow", "box", (0.052, 0.08, 0.008), (0.394, 0.246, 0.18), (0, 20, 30), paired=True),
+        *whip(_ANTENNA, "frame", "glow"),
     ),
+    bones=(_ANTENNA,),
     glowing=("hip", "knee"),
 )

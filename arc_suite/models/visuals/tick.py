@@ -1,6 +1,8 @@
 """Tick: a pale insect with a head, two black eyes under a brow, and an orange glow below."""
 
-from arc_suite.models.visuals.spec import Ornament, Visuals
+from arc_suite.models.visuals.spec import Bone, Ornament, Visuals, whip
+
+_ANTENNA = Bone("antenna", "antenna", (0.24, 0.035, 0.05), (0.325, 0.095, 0.16), 0.011, 0.01, paired=True)
 
 VISUALS = Visuals(
     colors={
@@ -17,6 +19,8 @@ VISUALS = Visuals(
         Ornament("brow", "trim", "ellipsoid", (0.03, 0.07, 0.013), (0.248, 0.0, 0.05), (0, 22, 0)),
         Ornament("belly", "glow", "ellipsoid", (0.155, 0.105, 0.045), (-0.01, 0.0, -0.03)),
         Ornament("back", "trim", "ellipsoid", (0.16, 0.03, 0.05), (-0.03, 0.0, 0.008)),
+        *whip(_ANTENNA, "frame", "glow"),
     ),
+    bones=(_ANTENNA,),
     glowing=(),
 )

@@ -161,7 +161,8 @@ def test_names_and_hierarchy(robot):
     file, body = read(robot), ROBOTS[robot]
     nodes = file.json["nodes"]
     (skin,) = file.json["skins"]
-    assert [nodes[joint]["name"] for joint in skin["joints"]] == ["root", *body.part_names]
+    swinging = export.sidecar(body, list(made(robot).values()))["swinging_bones"]
+    assert [nodes[joint]["name"] for joint in skin["joints"]] == ["root", *body.part_names, *swinging]
     names = [animation["name"] for animation in file.json["animations"]]
     loops = ["walk_loop", "walk_in_place_loop", "turn_left_loop", "turn_left_in_place_loop"]
     assert names == [*loops, "start", "start_in_place", "stop", "stop_in_place", "idle_loop"]
@@ -173,6 +174,8 @@ def test_names_and_hierarchy(robot):
         for part in (*leg.links, leg.foot):
             assert file.node(leg.full_name(part)) in nodes[file.node(above)]["children"]
             above = leg.full_name(part)
+    for bone in swinging:
+        assert file.node(bone) in nodes[file.node("torso")]["children"]
     for animation in file.json["animations"]:
         way = gltf_reader.played(file, animation["name"], [0.0, 0.5])["root"][:, :3, 3]
         assert (way[1] != way[0]).any() == (not animation["name"].endswith(("in_place", "in_place_loop", "idle_loop")))
@@ -204,6 +207,43 @@ def test_a_loop_closes_in_the_bytes(robot):
         for channel in file.animation(name)["channels"]:
             values = file.arrays[file.animation(name)["samplers"][channel["sampler"]]["output"]]
             assert (values[0] == values[-1]).all()
+
+
+@pytest.mark.parametrize("robot", EACH)
+def test_bones_of_ornaments_swing_and_are_as_in_the_next_clip_at_ends(robot):
+    file, clips = read(robot), list(made(robot).values())
+    springs = export.sidecar(ROBOTS[robot], clips)["swinging_bones"]
+    assert springs
+    for bone, spring in springs.items():
+        assert 0.0 < spring["damping"] < 1.0 and 0.0 < spring["frequency"] < 10.0
+        turns = {
+            name: in_torso(file, name, bone) for name in ("walk_loop", "turn_left_loop", "start", "stop", "idle_loop")
+        }
+        rest, walking = turns["idle_loop"][0], turns["walk_loop"][0]
+        assert 1.0 < max(degrees_between(turn, walking) for turn in turns["walk_loop"]) < 45.0
+        assert max(degrees_between(turn, rest) for turn in turns["start"]) > 3.0
+        for name in ("walk_loop", "turn_left_loop", "idle_loop"):
+            np.testing.assert_allclose(turns[name][0], turns[name][-1], atol=1e-12)
+            steps = [degrees_between(one, other) for one, other in itertools.pairwise(turns[name])]
+            assert steps[-1] < 1.5 * max(steps[:-1]) + 0.1  # it goes on over the seam
+        for name, end, neighbor in (
+            ("start", 0, rest),
+            ("start", -1, walking),
+            ("stop", 0, walking),
+            ("stop", -1, rest),
+        ):
+            np.testing.assert_allclose(turns[name][end], neighbor, atol=1e-6)
+
+
+def in_torso(file, name, bone):
+    """Matrices of a bone in the torso's frame, in each frame of an animation."""
+    world = gltf_reader.played(file, name)
+    torso, turns = np.broadcast_arrays(world["torso"][:, :3, :3], world[bone][:, :3, :3])
+    return torso.swapaxes(-1, -2) @ turns
+
+
+def degrees_between(one, other):
+    return float(np.degrees(np.arccos(((one * other).sum() - 1.0).clip(-2.0, 2.0) / 2.0)))
 
 
 @pytest.mark.slow
