@@ -28,6 +28,7 @@ Vector = tuple[float, float, float]
 
 DENSITY = 10.0  # kg/m^3, of the published robots
 PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colors`
+MAX_PALETTE_SEED = 2**31 - 1  # of colors that are drawn
 
 MAX_LENGTH = 100.0  # m; far above any creature, far below lengths at which MuJoCo becomes unstable
 MAX_DISTANCE = 1e4  # m, of a camera; more than enough to see any body
@@ -120,10 +121,11 @@ def _check_choice(value: Any, choices: Iterable[str]) -> str:
 
 
 def _check_palette(value: Any) -> str | int:
-    is_seed = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**31
+    is_seed = isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MAX_PALETTE_SEED
     is_palette = isinstance(value, str) and value in PALETTES
     if not is_seed and not is_palette:
-        raise SpecError(f"expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got {_preview(value)}")
+        choices = f"{', '.join(PALETTES)}, or a seed from 0 to {MAX_PALETTE_SEED}"
+        raise SpecError(f"expected one of {choices}, got {_preview(value)}")
     return value
 
 

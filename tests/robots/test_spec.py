@@ -8,7 +8,9 @@ import sys
 import pytest
 from refusals import refused
 
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import (
+    MAX_PALETTE_SEED,
     Ballast,
     Body,
     Foot,
@@ -189,3 +191,12 @@ def test_spec_needs_the_standard_library_alone():
     code = "import sys, importlib.util as u; s = u.spec_from_file_location('spec', sys.argv[1]);"
     code += "m = sys.modules['spec'] = u.module_from_spec(s); s.loader.exec_module(m)"
     subprocess.run([sys.executable, "-I", "-S", "-c", code, sys.modules[Body.__module__].__file__], check=True)
+
+
+def test_palettes_are_names_and_seeds():
+    tick = ROBOTS["tick"]
+    assert tick.replace(palette=MAX_PALETTE_SEED).palette == 2**31 - 1
+    names = "moss, rust, bone, coral, night"
+    text = f"Body(tick).palette: expected one of {names}, or a seed from 0 to 2147483647, got 2147483648"
+    with refused(text):
+        tick.replace(palette=2**31)

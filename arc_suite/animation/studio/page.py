@@ -32,6 +32,7 @@ from arc_suite.animation.studio.thumbnails import body_picture
 from arc_suite.animation.studio.view import View
 from arc_suite.cpg.selection import presets_of
 from arc_suite.robots import gaits
+from arc_suite.robots.spec import MAX_PALETTE_SEED
 from arc_suite.robots.spec_files import MAX_IMPORTED
 
 _REFRESH_INTERVAL = 0.25  # s, between two updates of the status and the charts
@@ -209,7 +210,7 @@ class Page:
 
     def _draw_random_body(self) -> None:
         """Take a random body in random colors, in its own proportions."""
-        seed = random.randrange(layout.MAX_SEED)
+        seed = random.randint(0, MAX_PALETTE_SEED)
         changes = {"source": RANDOM, "seed": seed, "palette": str(seed)}
         self._editor.edit_sketch(lambda sketch: dataclasses.replace(original_shape(sketch), **changes), "random")
         self._show_state()

@@ -195,8 +195,8 @@ def test_undo_redo_and_reset(served, tab):
     """By keys and by buttons, over changes of body, task and command."""
     open_tab(tab, "Body")
     before = served.session.creature.sketch
-    press(tab, "Fan of the legs", "ArrowRight", 5)
-    served.until(lambda: served.session.creature.sketch.fan == 5.0)
+    press(tab, "Fan of the legs", "End")
+    served.until(lambda: served.session.creature.sketch.fan == 40.0)
     open_tab(tab, "Command")
     press(tab, "Left", "End")
     served.until(lambda: served.session.velocity[1] == 1.0)
@@ -207,7 +207,7 @@ def test_undo_redo_and_reset(served, tab):
     tab.keyboard.press("Control+z")
     served.until(lambda: served.session.creature.sketch == before)
     tab.keyboard.press("Control+Shift+Z")
-    served.until(lambda: served.session.creature.sketch.fan == 5.0)
+    served.until(lambda: served.session.creature.sketch.fan == 40.0)
     tab.get_by_role("button", name="Undo").click()
     served.until(lambda: served.session.creature.sketch == before)
     tab.get_by_role("button", name="Redo").click()
@@ -265,7 +265,7 @@ def test_the_creature_has_two_thirds_of_the_window_until_charts_are_shown(served
     tab.get_by_text("Reward by term").wait_for(state="hidden")
 
 
-def test_bodies_are_chosen_by_their_pictures(served, tab):
+def test_bodies_are_chosen_by_their_pictures(served, tab, monkeypatch):
     open_tab(tab, "Body")
     tab.get_by_role("button", name="Reset").click()
     press_picture(tab, "queen")
@@ -274,6 +274,7 @@ def test_bodies_are_chosen_by_their_pictures(served, tab):
         button = tab.get_by_role("button", name=name, exact=True)
         served.until(lambda button=button: button.evaluate("each => getComputedStyle(each).backgroundImage") != "none")
     press(tab, "Size", "ArrowRight")
+    monkeypatch.setattr(pages.random, "randint", lambda low, high: high)  # which colors can be drawn of, too
     tab.get_by_role("button", name="Random body").click()
     served.until(lambda: served.session.creature.sketch.source == RANDOM)
     sketch = served.session.creature.sketch
