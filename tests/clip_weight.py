@@ -4,8 +4,9 @@ python tests/clip_weight.py BODY ...
 
 A body is a robot, an example, a file, or random:SEED. Prints for each body the range of the torso's height in the walk,
 standing heights, its roll, degrees, and the slip of its feet, without and with weight; the largest pitch that weight
-adds into the acceleration of a start and a stop, degrees; and for each pace its speed and cadence, as multiples of the
-walk, and its duty factor.
+adds into the acceleration of a start and a stop, degrees; how far it moves the torso back, down and ahead in starts,
+stops, strikes and jumps, standing heights, with the share that legs allow; and for each pace its speed and cadence, as
+multiples of the walk, and its duty factor.
 """
 
 import functools
@@ -21,6 +22,7 @@ from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
 
 LOOPS = ["slow", "walk", "fast", "run"]
+ACTIONS = ["attack", "jump"]
 LOW = 0.01  # standing heights, of a sole in stance
 
 
@@ -53,7 +55,7 @@ def main(*names: str) -> None:
         _, _, seed = name.partition("random:")
         body = sound_body(int(seed)) if seed else Setup.of(name, "steer").body
         recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
-        clips = [*LOOPS, "start", "stop"]
+        clips = [*LOOPS, "start", "stop", *ACTIONS]
         light, heavy = (
             make_drafts(recorder, clips, iter, left_out, character=weight.choose_character(size)) for size in (0.0, 1.0)
         )
@@ -64,6 +66,11 @@ def main(*names: str) -> None:
         for clip, sign in (("start", 1.0), ("stop", -1.0)):
             if clip in heavy:
                 lines.append(f"pitch in {clip} {(sign * (tilts(heavy[clip]) - tilts(light[clip]))[:, 1]).max():.1f}")
+        for clip in [clip for clip in ("start", "stop", *ACTIONS) if clip in heavy]:
+            changes = (heavy[clip].motion.positions - light[clip].motion.positions) / body.torso.standing_height
+            back, _, down = changes.min(axis=0)
+            ahead = changes[:, 0].max()
+            lines.append(f"{clip}: back {-back:.3f}, down {-down:.3f}, ahead {ahead:.3f}, weight {heavy[clip].weight}")
         walk = light["walk"]
         for clip in [clip for clip in LOOPS if clip in light]:
             draft = light[clip]

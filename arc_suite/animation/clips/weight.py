@@ -1,9 +1,10 @@
 """Weight: the torso of walks, starts and stops moves as on a damped spring, and feet stay where they were.
 
 In a gait the torso sinks after touchdowns, twice a cycle, and rolls towards the feet that stand. It banks in turns, and
-pitches into the acceleration of starts and stops. Legs follow by inverse kinematics about the feet of each sample. What
-they do not allow is made smaller. The sway of a gait is a function of its phase, and all else is 0 at both ends of a
-start or a stop. So loops close and clips connect as without weight.
+pitches into the acceleration of starts and stops. It moves back before a start, a jump and a strike, and swings on
+after a stop, a landing and a strike; see `transients`. Legs follow by inverse kinematics about the feet of each sample.
+What they do not allow is made smaller. The sway of a gait is a function of its phase, and all else is 0 at both ends of
+a clip. So loops close and clips connect as without weight.
 
 Lengths are in standing heights h, times in sqrt(h / g).
 """
@@ -11,13 +12,13 @@ Lengths are in standing heights h, times in sqrt(h / g).
 import itertools
 import math
 from collections.abc import Mapping
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, cast
 
 import numpy as np
 
 from arc_suite import checks, rotations
-from arc_suite.animation.clips import bounds, planting
-from arc_suite.animation.clips.catalog import Passage, WalkLoop, clip_of
+from arc_suite.animation.clips import bounds, planting, transients
+from arc_suite.animation.clips.catalog import Acted, Passage, WalkLoop, clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, find_foot_contacts, sole_heights
 from arc_suite.animation.clips.root_motion import fade_out
@@ -158,23 +159,38 @@ def add_weight(body: Body, drafts: Mapping[str, Draft], character: Character) ->
         return weighted_drafts
     passages = {name: draft for name, draft in drafts.items() if isinstance(clip_of(name), Passage)}
     for name, draft in drafts.items():
+        if isinstance(clip_of(name), Acted):
+            weighted_drafts[name] = _weigh_action(body, name, draft, character)
         if isinstance(clip_of(name), WalkLoop):
             connected_passages = passages if name == "walk" else {}
             weighted_drafts |= _weigh_gait(body, name, draft, connected_passages, character)
     return weighted_drafts
 
 
+def _weigh_action(body: Body, name: str, draft: Draft, character: Character) -> Draft:
+    """Return a jump or a strike, with the largest anticipation and follow-through that legs can follow."""
+    transient = transients.make_action_offsets(body, name, draft, character.frequency, character.damping)
+    if transient is None:
+        return draft
+    for share in _SIZES:
+        poses = share * character.size * transient
+        weighted_draft = _move_torso(body, name, draft, poses) if _can_follow(body, name, draft, poses) else None
+        if weighted_draft is not None:
+            return weighted_draft._replace(weight=share)
+    return draft._replace(weight=0.0)
+
+
 def _weigh_gait(body: Body, name: str, loop: Draft, passages, character: Character) -> dict[str, Draft]:
     """Return a loop, and the starts and stops that connect to it, with the largest sway that all of them can follow."""
     full_sway = find_sway(body, loop, character)
-    pitch_of_passage = {
-        passage_name: _follow_acceleration(body, passage_name, passage, character)
+    transient_of_passage = {
+        passage_name: _plan_transient(body, passage_name, passage, character)
         for passage_name, passage in passages.items()
     }
     drafts = {name: loop, **passages}
-    if _plan_gait(body, name, drafts, full_sway, pitch_of_passage, _SIZES[-1]):
+    if _plan_gait(body, name, drafts, full_sway, transient_of_passage, _SIZES[-1]):
         for share in _SIZES:
-            plan = _plan_gait(body, name, drafts, full_sway, pitch_of_passage, share)
+            plan = _plan_gait(body, name, drafts, full_sway, transient_of_passage, share)
             weighted_drafts = {
                 clip: _move_torso(body, clip, drafts[clip], movement.poses) for clip, movement in plan.items()
             }
@@ -191,7 +207,7 @@ class _Movement(NamedTuple):
 
 
 def _plan_gait(
-    body: Body, name: str, drafts: Mapping[str, Draft], full_sway: Sway, pitch_of_passage, share: float
+    body: Body, name: str, drafts: Mapping[str, Draft], full_sway: Sway, transient_of_passage, share: float
 ) -> dict[str, _Movement]:
     """Return movements of all drafts of a gait with a share of its sway; none if legs cannot follow."""
     for sink in _SINKS:
@@ -200,8 +216,8 @@ def _plan_gait(
         if not _can_follow(body, name, drafts[name], loop_poses):
             continue
         plan = {name: _Movement(loop_poses, share)}
-        for passage_name, pitch in pitch_of_passage.items():
-            movement = _plan_passage(body, passage_name, drafts[passage_name], sway, pitch)
+        for passage_name, transient in transient_of_passage.items():
+            movement = _plan_passage(body, passage_name, drafts[passage_name], sway, transient)
             if movement is None:
                 break
             plan[passage_name] = movement
@@ -210,20 +226,20 @@ def _plan_gait(
     return {}
 
 
-def _plan_passage(body: Body, name: str, draft: Draft, sway: Sway, pitch: np.ndarray) -> _Movement | None:
-    """Return the movement of a start or a stop with the sway of the walk and the largest pitch that legs can follow.
+def _plan_passage(body: Body, name: str, draft: Draft, sway: Sway, transient: np.ndarray) -> _Movement | None:
+    """Return the movement of a start or a stop with the walk's sway and the largest transient that legs can follow.
 
     Args:
         body: the spec.
         name: name of the clip.
         draft: its draft.
         sway: sway of the walk.
-        pitch: (samples,) rad, at full size.
+        transient: (samples, 6) offsets of the torso that are 0 at both ends, at full size.
 
     Returns:
         The movement; None if legs cannot follow the sway.
     """
-    starts = clip_of(name).starts
+    starts = cast(Passage, clip_of(name)).starts
     cycles = _cycles(draft)
     cycles_from_rest = cycles if starts else cycles[::-1]
     phases = cycles - cycles[-1] if starts else cycles  # 0 where it meets the walk
@@ -231,12 +247,13 @@ def _plan_passage(body: Body, name: str, draft: Draft, sway: Sway, pitch: np.nda
     poses = growth[:, None] * sway.poses(phases)
     if not _can_follow(body, name, draft, poses):
         return None
-    dip = abs(pitch) / max(abs(pitch).max(), 1e-9)
+    dip = abs(transient[:, _PITCH]) / max(abs(transient[:, _PITCH]).max(), 1e-9)
     for share, depth in itertools.product(_PITCH_SIZES, _DIPS):
-        pitched_poses = poses.copy()
-        pitched_poses[:, _PITCH] += share * pitch
+        pitched_poses = poses + share * transient
         pitched_poses[:, HEIGHT] -= depth * dip
-        if _can_follow(body, name, draft, pitched_poses):
+        if not _can_follow(body, name, draft, pitched_poses):
+            continue
+        if _move_torso(body, name, draft, pitched_poses) is not None:  # by all samples
             return _Movement(pitched_poses, share)
     return _Movement(poses, 0.0)
 
@@ -252,13 +269,21 @@ def _loop_phases(loop: Draft) -> np.ndarray:
     return loop.cycles / intervals * (np.arange(intervals + 1) % intervals)
 
 
-def _follow_acceleration(body: Body, name: str, draft: Draft, character: Character) -> np.ndarray:
+def _plan_transient(body: Body, name: str, draft: Draft, character: Character) -> np.ndarray:
+    """Return offsets (samples, 6) of the torso in a start or a stop, without those of the gait; 0 at both ends."""
+    clip = cast(Passage, clip_of(name))
+    poses = character.size * transients.make_passage_offsets(body, clip, draft, character.frequency, character.damping)
+    poses[:, _PITCH] += _follow_acceleration(body, clip, draft, character)
+    return poses
+
+
+def _follow_acceleration(body: Body, clip: Passage, draft: Draft, character: Character) -> np.ndarray:
     """Return the pitch (samples,), rad, of a torso that leans into the acceleration of its root; 0 at both ends."""
     motion = draft.motion
     velocities = np.gradient(motion.root[:, :2], motion.time_step, axis=0)
     speed = rotations.to_heading_frame(velocities, motion.root[:, 2])[:, 0]
     pitch = character.pitch / sizing.GRAVITY * np.gradient(speed, motion.time_step)
-    lowest, highest = (0.0, _MAX_TILT) if clip_of(name).starts else (-_MAX_TILT, 0.0)
+    lowest, highest = (0.0, _MAX_TILT) if clip.starts else (-_MAX_TILT, 0.0)
     cycles = _cycles(draft)
     away_from_ends = (1.0 - fade_out(cycles / _FADE_CYCLES)) * (1.0 - fade_out(cycles[::-1] / _FADE_CYCLES))
     return character.size * away_from_ends * character.follow(body, pitch.clip(lowest, highest), motion.time_step)

@@ -1,4 +1,4 @@
-"""Weight of walks, starts and stops: how the torso moves, and that feet, seams and joins stay as they are."""
+"""Weight of walks, starts, stops and actions: how the torso moves, and that feet, seams and joins stay as they are."""
 
 import functools
 
@@ -7,15 +7,18 @@ import pytest
 from refusals import refused
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bounds, planting, weight
+from arc_suite.animation.clips import bounds, planting, standing_legs, transients, weight
 from arc_suite.animation.clips.catalog import clip_of
+from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.animation.clips.recorder import Recorder
+from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.envs.setup import Setup
+from arc_suite.models import posture
 from arc_suite.robots import ROBOTS
 
 TICK = ROBOTS["tick"]
-NAMES = ["walk", "turn_left", "start", "stop", "idle"]
+NAMES = ["walk", "turn_left", "start", "stop", "idle", "attack", "jump"]
 
 
 @functools.cache
@@ -61,6 +64,34 @@ def test_a_start_and_a_stop_pitch_into_the_acceleration():
     assert abs(changes["walk"]).max() < 0.1
 
 
+def moved(name):
+    """How far weight moves the torso ahead and up (samples, 2), standing heights."""
+    changes = drafts_of(1.0)[name].motion.positions - drafts_of(0.0)[name].motion.positions
+    return changes[:, [0, 2]] / TICK.torso.standing_height
+
+
+@pytest.mark.long
+def test_the_torso_draws_back_before_an_action_and_swings_on_after_it():
+    height = TICK.torso.standing_height
+    start, stop, attack, jump = map(moved, ("start", "stop", "attack", "jump"))
+    early = len(start) // 5
+    assert start[:early, 0].min() < -0.02 and start[:early, 1].min() < -0.015
+    assert stop[:, 0].max() > 0.01 and stop[-1, 0] == pytest.approx(0.0, abs=1e-9)
+    soles = bounds.measure_ground(TICK, drafts_of(0.0)["attack"].motion).soles
+    strike = np.flatnonzero((soles > 0.3 * height).any(axis=-1))[-1]
+    assert attack[:strike, 0].min() < -0.02 and attack[strike:, 0].max() > 0.004
+    soles = bounds.measure_ground(TICK, drafts_of(0.0)["jump"].motion).soles
+    flight = np.flatnonzero((soles > 0.02 * height).all(axis=-1))
+    assert not jump[: flight[-1]].any()
+    assert -0.06 < jump[flight[-1] :, 1].min() < -0.02
+    assert drafts_of(1.0)["attack"].motion.seconds <= 1.5
+    for name in ("attack", "jump"):
+        assert drafts_of(1.0)[name].weight == 1.0
+        for end in (0, -1):
+            for one, other in zip(drafts_of(1.0)[name].motion.pose(end), drafts_of(0.0)["idle"].start, strict=True):
+                np.testing.assert_allclose(one, other, atol=1e-9)
+
+
 @pytest.mark.long
 def test_feet_seams_and_joins_stay():
     light, heavy = drafts_of(0.0), drafts_of(1.0)
@@ -88,6 +119,20 @@ def test_a_spring_settles_where_its_path_ends():
     followed = weight.USUAL.follow(TICK, path, time_step=0.002)
     assert abs(followed[0]) < 0.01 < 1.05 < followed.max() < 1.3
     np.testing.assert_allclose(followed[1000:1500], 1.0, atol=0.01)
+
+
+def test_offsets_around_an_action_are_0_at_both_ends():
+    still = standing_legs.hold_pose(Pose(np.zeros(3), np.array((1.0, 0.0, 0.0, 0.0)), np.zeros(18)), 600, 0.002)
+    for transient in (transients._START, transients._STOP, transients._ATTACK, transients._JUMP):
+        poses = transients._make_poses(TICK, Draft(still), transient, 200, 300, frequency=5.0, damping=0.5)
+        assert not poses[[0, -1]].any()
+        assert not poses[200:300].any()
+        for name, size in transient.before.items():
+            column = posture.POSE_NAMES.index(name)
+            assert abs(poses[:200, column]).max() == pytest.approx(abs(size), rel=1e-3)
+        for name, size in transient.after.items():
+            swing = poses[300:, posture.POSE_NAMES.index(name)] / size
+            assert 0.3 < swing.max() < 1.0 and swing.min() < -0.02  # it swings back
 
 
 def test_a_sway_only_lowers_the_torso():
