@@ -10,8 +10,9 @@ here (https://github.com/leggedrobotics/legged_gym, `legged_robot_config.py`):
 
 - Rewards are multiplied by the control step. The library clips the change of a value at 0.2, which is too little for
   returns in the hundreds.
-- Actions are multiplied by 0.5. Their standard deviation begins at 1 and hardly falls in a million steps; with it,
-  motors that take [-1, 1] would be at their limits.
+- Actions are multiplied by 0.5. Their standard deviation begins at 1. In the first 250,000 steps it falls by less than
+  1 %, as the learning rate soon has its lowest value. Without the factor, more than a third of the actions are beyond
+  the limits of motors, [-1, 1]: a run of a million steps scored -0.03 on `walk`, in five episodes.
 
 Observations have scales by hand there; here the library normalizes them.
 
