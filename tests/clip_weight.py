@@ -6,7 +6,7 @@ A body is a robot, an example, a file, or random:SEED. Prints for each body the 
 standing heights, its roll, degrees, and the slip of its feet, without and with weight; the largest pitch that weight
 adds into the acceleration of a start and a stop, degrees; how far it moves the torso back, down and ahead in starts,
 stops, strikes and jumps, standing heights, with the share that legs allow; and for each pace its speed and cadence, as
-multiples of the walk, and its duty factor.
+multiples of the walk, its duty factor, and the height of its steps, standing heights.
 """
 
 import functools
@@ -77,7 +77,10 @@ def main(*names: str) -> None:
             speed, cadence = draft.motion.twist[0] / walk.motion.twist[0], walk.cycle / draft.cycle
             soles = bounds.measure_ground(body, draft.motion).soles[:-1]
             duty = (soles < LOW * body.torso.standing_height).mean()
-            lines.append(f"{clip}: speed {speed:.2f}, cadence {cadence:.2f}, duty factor {duty:.2f}")
+            lift = soles.max(axis=0).mean() / body.torso.standing_height
+            lines.append(
+                f"{clip}: speed {speed:.2f}, cadence {cadence:.2f}, duty factor {duty:.2f}, height of steps {lift:.2f}"
+            )
         lines += [f"no {clip}: {reason}" for clip, reason in left_out.items()]
         print("; ".join([name, *lines]), flush=True)
 

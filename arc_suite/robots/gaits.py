@@ -30,32 +30,34 @@ class Gait(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """How a body goes at a speed, compared with its walk: faster means quicker steps and shorter stances.
+    """How a body goes at a speed, compared with its walk: faster means quicker and higher steps, shorter stances.
 
     Attributes:
         speed: multiple of the speed.
         tempo: multiple of the frequency of the gait.
         duty_change: added to the duty factor.
+        height: multiple of the height of feet in mid-swing.
     """
 
     speed: float
     tempo: float
     duty_change: float
+    height: float
 
 
 PACES = {
-    "slow": Pace(0.6, 0.82, 0.05),
-    "fast": Pace(1.25, 1.15, -0.05),
-    "run": Pace(1.75, 1.35, -0.1),
+    "slow": Pace(0.6, 0.82, 0.05, 0.85),
+    "fast": Pace(1.25, 1.15, -0.05, 1.1),
+    "run": Pace(1.75, 1.35, -0.1, 1.3),
 }
-_WALK = Pace(1.0, 1.0, 0.0)
+_WALK = Pace(1.0, 1.0, 0.0, 1.0)
 PACES_BY_SPEED = (PACES["slow"], _WALK, PACES["fast"], PACES["run"])
 
 
 def pace_at(speed: float) -> Pace:
     """Return the pace at a multiple of the walk's speed, between those of the table; beyond its ends their gaits."""
-    speeds, tempos, duty_changes = np.transpose(PACES_BY_SPEED)
-    return Pace(speed, float(np.interp(speed, speeds, tempos)), float(np.interp(speed, speeds, duty_changes)))
+    speeds, *gaits = np.transpose(PACES_BY_SPEED)
+    return Pace(speed, *(float(np.interp(speed, speeds, numbers)) for numbers in gaits))
 
 
 def pace_under_command(command: Sequence[float]) -> Pace:

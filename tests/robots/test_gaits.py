@@ -112,10 +112,10 @@ def test_a_body_walks_in_the_gait_that_is_asked_for():
 
 
 def test_paces_lie_between_those_of_the_table():
-    assert gaits.pace_at(1.0) == gaits.pace_under_command((0.0, 0.5, 0.0)) == (1.0, 1.0, 0.0)
+    assert gaits.pace_at(1.0) == gaits.pace_under_command((0.0, 0.5, 0.0)) == (1.0, 1.0, 0.0, 1.0)
     for pace in gaits.PACES.values():
         assert gaits.pace_at(pace.speed) == pace
-    assert gaits.pace_at(0.8) == pytest.approx((0.8, 0.91, 0.025))
+    assert gaits.pace_at(0.8) == pytest.approx((0.8, 0.91, 0.025, 0.925))
     assert gaits.pace_at(0.1)[1:] == gaits.PACES["slow"][1:] and gaits.pace_at(3.0)[1:] == gaits.PACES["run"][1:]
     assert gaits.pace_under_command((0.5, 0.0, -0.5)) == gaits.pace_at(1.0)  # a curve
     assert gaits.pace_under_command((-0.5, 0.0, 0.0)) == gaits.pace_at(1.0)

@@ -7,7 +7,10 @@ import numpy as np
 from arc_suite.animation.clips import loops
 from arc_suite.animation.clips.blows import Blow
 from arc_suite.animation.clips.recordings import Recording, record
-from arc_suite.cpg.selection import presets_of
+from arc_suite.animation.clips.standing_legs import has_free_feet
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.selection import preset_of, presets_of, suited_preset
+from arc_suite.cpg.stepping import SteppingParameters
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.policies import check_preset
@@ -145,17 +148,21 @@ class Recorder:
         """
         setup = self._setup
         fixed_commands = {}
+        lift = 1.0
         if failing is not None:
             setup = _with_settings(setup, actuator_failure=failing)
         if pace is not None and self.has_command and self._policy == "cpg":
             setup = self._setup_at_pace(pace)
             command = tuple(component / pace.speed for component in command)
+            lift = pace.height if has_free_feet(self.body) else 1.0  # others become slower by higher steps
         if crouch:
             setup = self._setup_with_pose_command()
             fixed_commands["pose"] = (-self._limit_crouch(crouch), 0.0, 0.0, 0.0, 0.0, 0.0)
         clock = self._clock(setup)
         steps = round(_CYCLES_UNDER_COMMAND * clock.cycle / clock.control_timestep)
-        recording = self._record(setup, _SETTLE_STEPS, steps, [(0, command)], **fixed_commands)
+        recording = self._record(setup, _SETTLE_STEPS, steps, [(0, command)], lift=lift, **fixed_commands)
+        if lift != 1.0 and loops.find_closings(recording, clock.cycle, most_cycles=1)[1].seam > loops.MAX_SEAM:
+            recording = self._record(setup, _SETTLE_STEPS, steps, [(0, command)], **fixed_commands)
         phase = (_SETTLE_STEPS * clock.control_timestep / clock.cycle + clock.offset) % 1.0
         return GaitRecording(recording, clock.cycle, phase)
 
@@ -273,10 +280,22 @@ class Recorder:
             control_timestep=task.scene.control_timestep,
         )
 
-    def _record(self, setup: Setup, settle: int, steps: int, commands=(), blow=None, **fixed_commands) -> Recording:
-        """Return a recording of the policy in a setup; arguments as of `recordings.record`."""
+    def _record(
+        self, setup: Setup, settle: int, steps: int, commands=(), blow=None, lift: float = 1.0, **fixed_commands
+    ) -> Recording:
+        """Return a recording of the policy in a setup; other arguments as of `recordings.record`.
+
+        Args:
+            setup, settle, steps, commands, blow, **fixed_commands: see there.
+            lift: multiple of the height of a demonstrator's feet in mid-swing, where its law has one.
+        """
         environment = setup.load(seed=0)
-        policy = named_policy(self._policy, self.body, self._preset, task=environment.task.definition)
+        task = environment.task.definition
+        policy = named_policy(self._policy, self.body, self._preset, task=task)
+        if lift != 1.0:
+            preset = preset_of(self.body, self._preset or suited_preset(task))
+            if isinstance(preset, SteppingParameters):
+                policy = Demonstrator(task, preset._replace(lift=lift * preset.lift))
         return record(environment, policy, settle, steps, commands, blow, **fixed_commands)
 
 

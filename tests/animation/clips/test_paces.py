@@ -64,3 +64,5 @@ def test_a_run_is_no_walk_that_is_played_faster():
     soles = {name: measure_ground(TICK, draft.motion).soles for name, draft in drafts.items()}
     duty = {name: (heights < 0.01 * TICK.torso.standing_height).mean() for name, heights in soles.items()}
     assert duty["run"] < 0.5 < duty["walk"] < duty["slow"]
+    lifts = {name: heights.max(axis=0).mean() for name, heights in soles.items()}
+    assert lifts["run"] > 1.2 * lifts["walk"] > 1.2 * 1.05 * lifts["slow"]
