@@ -4,7 +4,9 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
+from arc_suite import seed_ranges
 from arc_suite.learning.agents import architectures, critic_blocks, learner, motion_style, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
@@ -12,6 +14,9 @@ from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, Diverged, RunContext, generator
 from arc_suite.learning.agents.motion_style import MotionStyle, StyleState, pair_poses
 from arc_suite.learning.agents.normalizer import Normalizer
+from arc_suite.learning.agents.start_replay import StartReplay
+
+_REPLAY_PREFIX = "replay/"  # of the names of its arrays in a checkpoint
 
 # Names of the arrays of a rollout.
 ROLLOUT_ARRAYS = ("observations", "actions", "means", "rewards", "terminated", "ended", "next_observations")
@@ -27,6 +32,7 @@ class EnvironmentRollouts:
         observation: (num_envs, ...) before the next step, as networks view it.
         style: the motion whose style the policy learns; None for none.
         style_state: what it has learned; None for none.
+        replay: seeds of the episodes; None where they are continued streams, without start replay.
     """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
@@ -35,7 +41,9 @@ class EnvironmentRollouts:
         self._seed = context.seed
         self._folder = context.folder
         self._has_privileged = bool(hp.critic_blocks)
-        self.environment = context.environment(hp.num_envs, privileged=self._has_privileged)
+        self.environment = context.environment(
+            hp.num_envs, privileged=self._has_privileged, autoreset_mode=AutoresetMode.DISABLED
+        )
         self.task = self.environment.task.definition
         self._columns = critic_blocks.privileged_columns(self.task, hp.critic_blocks)
         self.architecture = architectures.of_environment(
@@ -46,6 +54,10 @@ class EnvironmentRollouts:
         if hp.style:
             self.style = MotionStyle.of(self.task, hp.style, hp.style_share, both_sides=hp.symmetry_augmentation)
             self.style_state = self.style.begin(generator(context.seed, "discriminator", 0))
+        self._run_seeds = seed_ranges.of_run(context.seed)
+        self.replay: StartReplay | None = None
+        if hp.start_replay:
+            self.replay = StartReplay.begin(self._run_seeds, hp.num_envs)
         observation, info = self.environment.reset()
         self._poses = self._read_poses(observation)
         self.observation = self._view(observation, info)
@@ -82,20 +94,11 @@ class EnvironmentRollouts:
             view = self._view(observation, info)
             has_ended = terminated | truncated
             has_new_command = self.environment.resampled()
-
             next_view = view.copy()
             next_view[has_new_command] = self.observation[has_new_command]
-            for index in np.flatnonzero(has_ended):
-                final_observation = info["final_obs"][index]
-                next_view[index] = self._view(final_observation, info["final_info"], index)
-
+            poses = self._read_poses(observation)
             if self.style is not None:
-                poses = self._read_poses(observation)
-                poses_after = poses.copy()
-                for index in np.flatnonzero(has_ended):
-                    poses_after[index] = self._read_poses(info["final_obs"][index])
-                rollout["poses"].append(pair_poses(self._poses, poses_after))
-                self._poses = poses
+                rollout["poses"].append(pair_poses(self._poses, poses))
 
             rollout["observations"].append(self.observation)
             rollout["actions"].append(actions)
@@ -105,7 +108,24 @@ class EnvironmentRollouts:
             rollout["ended"].append(has_ended | has_new_command)
             rollout["next_observations"].append(next_view)
             self.observation = view
+            self._poses = poses
+            self._begin_episodes(has_ended, terminated, random)
         return {name: np.stack(arrays) for name, arrays in rollout.items()}
+
+    def _begin_episodes(self, ended: np.ndarray, fell: np.ndarray, random: np.random.Generator) -> None:
+        """Begin episodes in the environments (num_envs,) whose episodes have ended; some of them by a fall."""
+        if self.replay is not None:
+            self.replay = self.replay._replace(steps=self.replay.steps + 1)
+        if not ended.any():
+            return
+        seeds = None
+        if self.replay is not None:
+            replay = self.replay.end_episodes(ended, fell)
+            self.replay = replay.begin_episodes(ended, self._hp.start_replay, self._run_seeds, random)
+            seeds = self.replay.present.tolist()
+        observation, info = self.environment.reset(seed=seeds, options={"reset_mask": ended})
+        self.observation[ended] = self._view(observation, info)[ended]
+        self._poses = self._read_poses(observation)
 
     def reward_style(self, rollout: dict[str, np.ndarray], iteration: int) -> dict[str, float]:
         """Add the share of the style to the rewards of a rollout, learn from its poses, and return metrics.
@@ -132,6 +152,8 @@ class EnvironmentRollouts:
         if self.style is not None:
             arrays[f"{ENVIRONMENT_PREFIX}poses"] = self._poses
             arrays |= motion_style.arrays(self.style_state)
+        if self.replay is not None:
+            arrays |= {f"{_REPLAY_PREFIX}{name}": array for name, array in self.replay._asdict().items()}
         return arrays
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -141,22 +163,16 @@ class EnvironmentRollouts:
         if self.style is not None:
             self._poses = arrays[f"{ENVIRONMENT_PREFIX}poses"]
             self.style_state = networks.restore_tree("style", self.style_state, arrays)
+        if self.replay is not None:
+            self.replay = StartReplay(*(arrays[f"{_REPLAY_PREFIX}{name}"] for name in StartReplay._fields))
 
     def _read_poses(self, observation: np.ndarray) -> np.ndarray:
         """Return the poses (..., numbers) of observations (..., size) as a style sees them; (0,) without a style."""
         return np.zeros(0) if self.style is None else self.style.poses(self.task, observation)
 
-    def _view(self, observation: np.ndarray, info: Mapping, index: int | None = None) -> np.ndarray:
-        """Return observations as networks view them.
-
-        Args:
-            observation: observation of all environments, or of one.
-            info: info of all environments.
-            index: index of the environment of the observation; None for all environments.
-        """
-        privileged = None
-        if self._has_privileged:
-            privileged = info["privileged"] if index is None else info["privileged"][index]
+    def _view(self, observation: np.ndarray, info: Mapping) -> np.ndarray:
+        """Return observations (num_envs, ...) as networks view them."""
+        privileged = info["privileged"] if self._has_privileged else None
         return network_views(self.architecture, observation, privileged, self._columns)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from arc_suite import evaluation, files, policies, style
+from arc_suite import evaluation, files, policies, style, usage
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
@@ -119,7 +119,9 @@ def _run_row(run: Run, folder: Path) -> dict[str, str]:
         updates = int(float(row.get("phase_updates", 0)))
         if updates:
             phases[row["step"]] = updates
-    fields = {"run": run.name, "kind": run.kind, **run_folder.read_config(folder), "phases": phases or None}
+    progress = run_folder.read_progress(folder)
+    used = {name: progress[name] for name in (*usage.STEP_COUNTS, results.SOURCES) if name in progress}
+    fields = {"run": run.name, "kind": run.kind, **run_folder.read_config(folder), "phases": phases or None, **used}
     return {name: cell(value) for name, value in fields.items()}
 
 

@@ -24,8 +24,10 @@ EVALUATIONS = "evaluations.csv"  # a line for each episode
 FINALS = "finals.csv"  # a line for each episode that judges a final policy, with the hash of the policy
 DEMONSTRATORS = "demonstrators.csv"
 
-# Columns of the table of runs: the configuration, then the updates of stabilization phases by environment step.
-RUN_COLUMNS = ("run", "kind", *CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, "phases")
+SOURCES = "sources"  # column of the table of runs
+# Columns of the table of runs: the configuration, the updates of stabilization phases by environment step, and what the
+# run has used (`usage.Usage`), which is empty for runs from before.
+RUN_COLUMNS = ("run", "kind", *CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, "phases", *usage.STEP_COUNTS, SOURCES)
 TIMES = ("wall_seconds", "cpu_seconds")  # from the start of the run to the end of an evaluation
 STYLE = "style_"  # prefix of the columns with metrics of style, which the latest evaluation has
 _NOT_METRICS = (
@@ -63,6 +65,7 @@ class RunResult(NamedTuple):
         curve_seeds: seeds of the episodes of `returns`; empty if they are unknown.
         policy_sha256: hash of the judged policy; empty if it is not judged.
         other_settings: whether the task had other settings than the study has now.
+        sources: what the run has learned from in addition to its own steps; empty if it is unknown.
     """
 
     run: Run
@@ -79,6 +82,7 @@ class RunResult(NamedTuple):
     curve_seeds: Sequence[int] = ()
     policy_sha256: str = ""
     other_settings: bool = False
+    sources: Sequence[str] = ()
 
     @property
     def final(self) -> float:
@@ -91,6 +95,7 @@ class RunResult(NamedTuple):
         reasons = list(note_few_episodes(self.finals))
         if self.run.configuration.definition.source == usage.UNKNOWN:
             reasons.append(UNKNOWN_SOURCE)
+            reasons += [f"has used {source}" for source in self.sources]
         if self.training_seeds is None:
             reasons.append(provenance.UNKNOWN)
         elif common_seeds(self.training_seeds, EVALUATION):
@@ -182,6 +187,7 @@ def _result(
         model_sha256=run_row["model_sha256"],
         policy_sha256=judged[0].get("policy_sha256", ""),
         other_settings=published_run != run,
+        sources=json.loads(run_row[SOURCES] or "[]"),
     )
 
 

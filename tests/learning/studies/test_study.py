@@ -137,6 +137,9 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     assert tables_of() == tables_before
     published = results.read_results(tiny_studies.WITH_NUMPY.runs, tmp_path / "results")
     assert [each.run.name for each in published] == [names[0], names[1], names[7]]
+    for row, result in zip(csv_files.read(tmp_path / "results/runs.csv"), published, strict=True):
+        assert int(row["environment_steps"]) + int(row["steps_by_learner"]) == result.steps[-1]
+        assert row["sources"] == "[]" and result.sources == []
     environment = load("tick", "walk", tiny_studies.SHORT)
     policy = policies.policy(folder / first.name, "tick")
     for index in (0, 7):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from published_tables import as_in_the_paper, cells, constant, publish
 
-from arc_suite import evaluation
+from arc_suite import evaluation, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import published
+from arc_suite.learning.agents import algorithms
 from arc_suite.learning.studies import csv_files, publication, report, results
 from arc_suite.learning.studies.tables import Study, run
 
@@ -110,6 +111,20 @@ def test_finals_are_those_that_judge_the_policy(tmp_path):
     assert first.run == new and not first.other_settings
     assert second.policy_sha256 == "" and second.final == 204.5 and second.seeds == [*range(10)]
     assert second.other_settings and second.run.place == "tick, rough" != new.place
+
+
+def test_what_an_algorithm_has_used_is_noted_unless_it_declares_it(tmp_path, monkeypatch):
+    monkeypatch.setitem(algorithms.ALGORITHMS, "mine", algorithms.ALGORITHMS["sac"]._replace(source=usage.UNKNOWN))
+    runs = [run("tick", name, 1_000_000) for name in ("mine", "sope")]
+    for each in runs:
+        publish(tmp_path, each, constant(100.0, 200.0))
+    rows = csv_files.read(tmp_path / results.RUNS)
+    for row in rows:
+        row["sources"] = '["a demonstrator", "prior data"]'
+    csv_files.write(tmp_path / results.RUNS, results.RUN_COLUMNS, rows)
+    mine, declared = results.read_results(runs, tmp_path)
+    assert mine.notes == ("ten episodes", "source unknown", "has used a demonstrator", "has used prior data")
+    assert declared.sources == mine.sources and declared.notes == ("ten episodes",)
 
 
 def test_damaged_tables_are_one_line(tmp_path):
