@@ -13,7 +13,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.posture import find_rest_pose
-from arc_suite.models.standing import measure_standing, stability_margin
+from arc_suite.models.standing import GRAVITY, measure_standing, stability_margin
 from arc_suite.motions import gait_transfer
 from arc_suite.motions import motion as values
 from arc_suite.motions.motion import Motion
@@ -171,7 +171,7 @@ def _spread(shifts: np.ndarray, paths: Paths, height: float) -> np.ndarray:
     """Return shifts (frames, 2) that begin before they are needed and end after it, smoothly."""
     frames = len(shifts)
     frame_time = paths.seconds / (frames - 1)
-    width = max(1, round(_SHIFT_TIME * math.sqrt(height / 9.81) / frame_time))
+    width = max(1, round(_SHIFT_TIME * math.sqrt(height / GRAVITY) / frame_time))
     padded = np.pad(shifts, ((2 * width, 2 * width), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1, axis=0)
     sizes = np.linalg.norm(windows, axis=1)
