@@ -76,6 +76,8 @@ _WITH_ADDITIONS = (
     ("sac_parallel-refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
     ("sac_parallel-phases", _SHORT_PHASES, None),
 )
+# `ppo` by the label of its network.
+_NETWORKS = {"ppo": {}, "ppo-perceptron": {"network": "perceptron"}}
 _UNEVEN_TASKS = ("rough", "slopes", "stairs", "navigate")  # tasks of uneven ground or pillars, without trenches
 # Tasks of the study from nothing; `walk` has studies of its own.
 _TASKS_FROM_NOTHING = ("steer", "rough", "slopes", "stairs", "gaps", "course", "shoved", "limp", "roam", "navigate")
@@ -169,6 +171,24 @@ STUDIES = {
         tuple(
             run(robot, "sac_parallel", 60_000, hyperparameters=changes, prior=prior, label=label)
             for robot, (label, changes, prior) in itertools.product(("tick", "leaper"), _WITH_ADDITIONS)
+        ),
+    ),
+    # Noise falls over a run: a short one is no part of a long one. One to three minutes of a core a run.
+    "schedules": Study(
+        "PPO with schedules of 200,000 and 400,000 steps",
+        tuple(
+            run(robot, "ppo", steps, evaluate_every=steps, label=f"ppo-{steps // 1000}k")
+            for steps, robot in itertools.product((200_000, 400_000), _TICK_FIRST)
+        ),
+    ),
+    # What the network that legs share gives: ten minutes of a core a run.
+    "legs": Study(
+        "PPO on Tick with the network that legs share, and with a perceptron of its width and minibatch",
+        tuple(
+            run("tick", "ppo", 1_000_000, seed, task, hyperparameters=changes, label=label)
+            for seed, task, (label, changes) in itertools.product(
+                range(SEEDS), ("walk", "steer", "navigate", "directed"), _NETWORKS.items()
+            )
         ),
     ),
     "ppo-forces": Study(
