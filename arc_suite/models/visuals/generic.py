@@ -16,7 +16,8 @@ _TAIL_WIDTH = 0.16  # radius at the pivot, of the tail's length
 
 def generic_visuals(body: Body) -> Visuals:
     """Return visuals for a body: slate armor, violet joints, an eye on a snout in front, a tail."""
-    corners = solid_corners(body.torso.solids[0])
+    all_corners = [solid_corners(solid) for solid in body.torso.solids]
+    corners = max(all_corners, key=lambda corners: corners[:, 0].max())  # of the foremost solid, such as a head
     center = corners.mean(axis=0)
     half_extents = np.ptp(corners, axis=0) / 2.0
     radius = 0.4 * min(half_extents)
