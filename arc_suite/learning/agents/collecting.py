@@ -6,7 +6,6 @@ from collections.abc import Mapping
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from arc_suite import seed_ranges
 from arc_suite.learning.agents import architectures, critic_blocks, learner, motion_style, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
@@ -14,9 +13,6 @@ from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT_PREFIX, Diverged, RunContext, generator
 from arc_suite.learning.agents.motion_style import MotionStyle, StyleState, pair_poses
 from arc_suite.learning.agents.normalizer import Normalizer
-from arc_suite.learning.agents.start_replay import StartReplay
-
-_REPLAY_PREFIX = "replay/"  # of the names of its arrays in a checkpoint
 
 # Names of the arrays of a rollout.
 ROLLOUT_ARRAYS = ("observations", "actions", "means", "rewards", "terminated", "ended", "next_observations")
@@ -32,7 +28,6 @@ class EnvironmentRollouts:
         observation: (num_envs, ...) before the next step, as networks view it.
         style: the motion whose style the policy learns; None for none.
         style_state: what it has learned; None for none.
-        replay: seeds of the episodes; None where they are continued streams, without start replay.
     """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
@@ -54,10 +49,6 @@ class EnvironmentRollouts:
         if hp.style:
             self.style = MotionStyle.of(self.task, hp.style, hp.style_share, both_sides=hp.symmetry_augmentation)
             self.style_state = self.style.begin(generator(context.seed, "discriminator", 0))
-        self._run_seeds = seed_ranges.of_run(context.seed)
-        self.replay: StartReplay | None = None
-        if hp.start_replay:
-            self.replay = StartReplay.begin(self._run_seeds, hp.num_envs)
         observation, info = self.environment.reset()
         self._poses = self._read_poses(observation)
         self.observation = self._view(observation, info)
@@ -109,21 +100,13 @@ class EnvironmentRollouts:
             rollout["next_observations"].append(next_view)
             self.observation = view
             self._poses = poses
-            self._begin_episodes(has_ended, terminated, random)
+            if has_ended.any():
+                self._begin_episodes(has_ended)
         return {name: np.stack(arrays) for name, arrays in rollout.items()}
 
-    def _begin_episodes(self, ended: np.ndarray, fell: np.ndarray, random: np.random.Generator) -> None:
-        """Begin episodes in the environments (num_envs,) whose episodes have ended; some of them by a fall."""
-        if self.replay is not None:
-            self.replay = self.replay._replace(steps=self.replay.steps + 1)
-        if not ended.any():
-            return
-        seeds = None
-        if self.replay is not None:
-            replay = self.replay.end_episodes(ended, fell)
-            self.replay = replay.begin_episodes(ended, self._hp.start_replay, self._run_seeds, random)
-            seeds = self.replay.present.tolist()
-        observation, info = self.environment.reset(seed=seeds, options={"reset_mask": ended})
+    def _begin_episodes(self, ended: np.ndarray) -> None:
+        """Begin episodes in the environments (num_envs,) whose episodes have ended."""
+        observation, info = self.environment.reset(options={"reset_mask": ended})
         self.observation[ended] = self._view(observation, info)[ended]
         self._poses = self._read_poses(observation)
 
@@ -152,8 +135,6 @@ class EnvironmentRollouts:
         if self.style is not None:
             arrays[f"{ENVIRONMENT_PREFIX}poses"] = self._poses
             arrays |= motion_style.arrays(self.style_state)
-        if self.replay is not None:
-            arrays |= {f"{_REPLAY_PREFIX}{name}": array for name, array in self.replay._asdict().items()}
         return arrays
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -163,8 +144,6 @@ class EnvironmentRollouts:
         if self.style is not None:
             self._poses = arrays[f"{ENVIRONMENT_PREFIX}poses"]
             self.style_state = networks.restore_tree("style", self.style_state, arrays)
-        if self.replay is not None:
-            self.replay = StartReplay(*(arrays[f"{_REPLAY_PREFIX}{name}"] for name in StartReplay._fields))
 
     def _read_poses(self, observation: np.ndarray) -> np.ndarray:
         """Return the poses (..., numbers) of observations (..., size) as a style sees them; (0,) without a style."""

@@ -270,8 +270,6 @@ class ProximalPolicy:
         exclude_blocks: names of blocks of the observation that networks do not see, where a task has them.
         critic_blocks: names of blocks of the privileged observation that the value function sees too; see
             `arc_suite.tasks.privileged`.
-        start_replay: share of episodes that repeat a start after which the body has fallen, while there is one; see
-            `start_replay`. 0 for none.
         style: file of a motion (.npz) that the policy is to resemble, see `motion_style`; "" for none.
         style_share: share of the style in the reward.
     """
@@ -299,7 +297,6 @@ class ProximalPolicy:
     hidden: int = 256
     exclude_blocks: tuple[str, ...] = BLOCKS_LEFT_OUT
     critic_blocks: tuple[str, ...] = ()
-    start_replay: float = 0.0
     style: str = ""
     style_share: float = 0.5
 
@@ -309,7 +306,6 @@ class ProximalPolicy:
             "value_warm_up": (0,),
             "gae_lambda": (0.0, 1.0),
             "normalize_until": (0.0, 1.0),
-            "start_replay": (0.0, 1.0),
             "initial_std": _POSITIVE_RANGE,
             "final_std": _POSITIVE_RANGE,
             "initial_desired_kl": _POSITIVE_RANGE,

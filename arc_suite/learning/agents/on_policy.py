@@ -174,12 +174,6 @@ def check(hp: ProximalPolicy, context: RunContext) -> None:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
     if hp.style and hp.simulation != "mujoco":
         raise ValueError(f"simulation: expected mujoco with a style, got {hp.simulation}")
-    if hp.start_replay and hp.simulation != "mujoco":
-        raise ValueError(f"simulation: expected mujoco with start_replay, got {hp.simulation}")
-    if hp.start_replay and context.setup.several:
-        raise ValueError(f"start_replay: expected 0 with several bodies, got {hp.start_replay}")
-    if hp.start_replay and context.training.definition.adapts:
-        raise ValueError(f"start_replay: expected 0 with a curriculum, got {hp.start_replay}")
     if not context.setup.several:
         return
     if hp.style:

@@ -13,7 +13,6 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 import jax
 
-from arc_suite import seed_ranges
 from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -128,38 +127,16 @@ def test_the_rate_follows_the_divergence(wanted, factor):
     assert after.rate == pytest.approx(SMALL.policy_rate * factor)
 
 
-REPLAY = {"start_replay": 0.5}
 STUMBLING = {"healthy_range": (0.22, 10.0)}  # m: episodes of a few steps
 
 
-@pytest.mark.parametrize(("task", "changes"), [("walk", {}), ("steer", {}), ("walk", REPLAY)])
-def test_it_resumes_bit_exactly(begun, task, changes):
-    settings = STUMBLING if changes else None
-    whole, first = (begun("tick", task, changes, settings=settings) for _ in range(2))
+@pytest.mark.parametrize(("task", "settings"), [("walk", None), ("steer", None), ("walk", STUMBLING)])
+def test_it_resumes_bit_exactly(begun, task, settings):
+    whole, first = (begun("tick", task, settings=settings) for _ in range(2))
     arrays = {name: array.copy() for name, array in first.until(128).checkpoint.items()}
-    second = begun("tick", task, changes, checkpoint=arrays, steps_before=128, settings=settings)
+    second = begun("tick", task, checkpoint=arrays, steps_before=128, settings=settings)
     for name, array in whole.until(320).checkpoint.items():
         assert_array_equal(second.until(320).checkpoint[name], array, err_msg=name)
-
-
-def test_episodes_repeat_the_starts_after_which_the_body_fell(begun):
-    agent = begun("tick", changes={"start_replay": 0.9}, settings=STUMBLING, steps=960)
-    starts = []
-    reset = VectorEnv.reset
-
-    def recording(self, *, seed=None, options=None):
-        observation, info = reset(self, seed=seed, options=options)
-        if options is not None:
-            starts.extend((seed[i], observation[i].tobytes()) for i in np.flatnonzero(options["reset_mask"]))
-        return observation, info
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(VectorEnv, "reset", recording)
-        agent.until(960)
-    seeds = [seed for seed, _ in starts]
-    assert len(seeds) > 40 and len(set(seeds)) < 0.6 * len(seeds)
-    assert len(set(starts)) == len(set(seeds))  # a seed is a start
-    assert all(seed in seed_ranges.of_run(3) for seed in seeds)
 
 
 def test_a_new_command_cuts_the_returns(begun, monkeypatch):
@@ -317,17 +294,6 @@ def test_a_start_that_does_not_fit_is_refused_in_one_line(begun, tmp_path, imita
             begun(robot, task, changes).advance()
     with pytest.raises(OSError, match="no such file"):
         begun(changes={"start": str(tmp_path / "none")}).advance()
-
-
-def test_start_replay_is_refused_where_a_seed_is_no_start(tmp_path):
-    for robot, task, changes, training, message in (
-        ("tick", "walk", {"simulation": "mjx"}, {}, "simulation: expected mujoco with start_replay, got mjx"),
-        ("varied:0-3", "walk", {"network": "legs"}, {}, "start_replay: expected 0 with several bodies, got 0.5"),
-        ("tick", "rough", {}, {"curriculum": True}, "start_replay: expected 0 with a curriculum, got 0.5"),
-    ):
-        run = Configuration.of(Setup.of(robot, task), "ppo", CHANGES | REPLAY | changes, steps=64, training=training)
-        with refused(message):
-            on_policy.check(run.hyperparameters, run.context(tmp_path))
 
 
 def test_hyperparameters_that_do_not_fit_are_refused():
