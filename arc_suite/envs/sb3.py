@@ -8,11 +8,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from stable_baselines3.common import vec_env
 
-from arc_suite import checks
+from arc_suite import checks, versions
 from arc_suite.envs.setup import ATTRIBUTE, Setup
 from arc_suite.envs.vector import VectorEnv
+
+with versions.require_extra("arc_suite.envs.sb3 needs stable-baselines3", "sb3"):
+    from stable_baselines3.common import vec_env
 
 _METHODS_WITH_MASK = ("change_model", "change_settings", "command")
 

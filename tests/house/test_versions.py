@@ -1,5 +1,8 @@
 """Versions that are recorded with results."""
 
+import importlib
+import sys
+
 import mujoco
 import numpy as np
 import programs
@@ -31,3 +34,10 @@ def test_an_extra_is_named_for_a_clone_and_for_an_installed_package(monkeypatch,
     assert line() == f"ONNX needs onnx: {programs.install('learn')} (No module named 'onnx')"
     monkeypatch.setattr(versions, "__file__", str(tmp_path / "site-packages" / "arc_suite" / "versions.py"))
     assert line() == "ONNX needs onnx: install arc_suite with the extra 'learn' (No module named 'onnx')"
+
+
+def test_a_module_for_another_library_names_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.delitem(sys.modules, "arc_suite.envs.sb3", raising=False)
+    with pytest.raises(ImportError, match=r"^arc_suite.envs.sb3 needs stable-baselines3: pip install .*sb3"):
+        importlib.import_module("arc_suite.envs.sb3")

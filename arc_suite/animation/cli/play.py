@@ -18,7 +18,7 @@ keeps walking, and left and right turn its course.
 from absl import flags
 
 from arc_suite import checks, files
-from arc_suite.animation import play_pages
+from arc_suite.animation import pages, play_pages
 from arc_suite.cli.flags import (
     bodies_from_flags,
     choose_bodies,
@@ -47,6 +47,7 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
     checks.extension(FLAGS.output, [".html"])
+    pages.read_built_file("play.js")  # raises an error now if there is none
     bodies = _bodies_from_flags()  # first: this imports the modules that flags name
     bodies = choose_bodies(policy_setup(), bodies)
     policy = policy_name(FLAGS.policy)
