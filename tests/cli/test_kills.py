@@ -157,3 +157,31 @@ def test_training_that_is_asked_to_end_leaves_a_checkpoint(tmp_path):
     assert process.returncode == 143
     assert output.splitlines()[-1].startswith("run: stopped; the same command resumes it, ")
     assert (tmp_path / "run" / "checkpoint.npz").exists()
+
+
+ENDING = """
+import os, signal
+import arc_suite, tiny_studies
+def learn(hp, context):
+    for piece in tiny_studies.learn(hp, context):
+        if not context.checkpoint:
+            os.kill(os.getpid(), signal.SIGTERM)
+        yield piece
+ending = tiny_studies.climb._replace(learn=learn)
+arc_suite.register(module=__name__, algorithms={"ending": ending})
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="has no SIGTERM to catch")
+def test_a_signal_in_the_last_step_of_training_waits_for_no_judge(tmp_path):
+    (tmp_path / "ending.py").write_text(ENDING)
+    flags = ["--robot=tick", "--algorithm=ending:ending", "--set=time_limit=2", "--steps=1", "--output=run"]
+    command = [sys.executable, "-m", "arc_suite", "train", *flags]
+    environ = os.environ | {"PYTHONPATH": f"{FIXTURES}{os.pathsep}{tmp_path}"}
+    done = subprocess.run(command, cwd=tmp_path, env=environ, capture_output=True, text=True)
+    assert done.returncode == 143, done.stderr
+    assert done.stdout.splitlines()[-1].startswith("run: finished; the same command judges it, ")
+    assert not (tmp_path / "run" / "final.csv").exists()
+    done = subprocess.run(command, cwd=tmp_path, env=environ, capture_output=True, text=True)
+    assert done.returncode == 0 and "judged in 100 episodes" in done.stdout, done.stderr

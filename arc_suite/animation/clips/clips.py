@@ -111,13 +111,7 @@ def clips(
     checks.boolean("straight", straight)
     checks.boolean("plant", plant)
     character = weights.choose_character(weight)
-    if not names:
-        raise ValueError(f"clips: expected one or more of {', '.join(catalog.clip_names())}, got none")
-    for name in names:
-        catalog.clip_of(name)
-    names = [registry.bare_name(name) for name in names]
-    if len(set(names)) < len(names):
-        raise ValueError(f"clips: expected each once, got {', '.join(names)}")
+    names = _check_names(names)
     has_command = "command" in setup.definition.blocks
     has_level_ground = not setup.kind.own_arena  # a task without an arena of its own
     if policy == "cpg" and preset is None and has_command and has_level_ground:
@@ -138,6 +132,22 @@ def clips(
             bases = additive.find_bases(setup.body, name, motion_of_clip, clip_loops, drafts["idle"].start)
             clip_of_name[name] = clip._replace(additive_over=tuple(bases))
     return list(clip_of_name.values())
+
+
+def _check_names(names: Sequence[str]) -> list[str]:
+    """Return names of clips without their modules.
+
+    Raises:
+        ValueError: no name, an unknown one, or one twice.
+    """
+    if not names:
+        raise ValueError(f"clips: expected one or more of {', '.join(catalog.clip_names())}, got none")
+    for name in names:
+        catalog.clip_of(name)
+    bare_names = [registry.bare_name(name) for name in names]
+    if len(set(bare_names)) < len(bare_names):
+        raise ValueError(f"clips: expected each once, got {', '.join(bare_names)}")
+    return bare_names
 
 
 def _report_left_out(body: Body, names: Sequence[str], left_out: Mapping[str, str]) -> None:

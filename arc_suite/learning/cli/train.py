@@ -220,13 +220,15 @@ def train_run(run: Configuration, threshold: float | None) -> int:
     is_complete = finished or step is not None
     save_onnx(run, folder, is_complete)
     say(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
+    if terminated:
+        return TERMINATED
     if is_complete:
         with resumable(folder):
             play_final_episodes(run, folder, FLAGS.threads)
             cards.write(run, folder)
-    if is_complete and FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
-        print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
-    return TERMINATED if terminated and not is_complete else 0
+        if FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
+            print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
+    return 0
 
 
 def play_final_episodes(run: Configuration, folder: Path, threads: int | None) -> None:
@@ -239,10 +241,11 @@ def play_final_episodes(run: Configuration, folder: Path, threads: int | None) -
 
 def describe_end(folder: Path, step: int | None, finished: bool, terminated: bool) -> str:
     """Return why a run has ended: at a score, after its last step, by SIGTERM, or after minutes."""
+    judging = "; the same command judges it" if terminated else ""
     if step is not None:
-        return f"score {FLAGS.until_score:g} reached {outcomes.when(folder, step)}"
+        return f"score {FLAGS.until_score:g} reached {outcomes.when(folder, step)}{judging}"
     if finished:
-        return "finished"
+        return f"finished{judging}"
     if terminated:
         return "stopped; the same command resumes it"
     return f"stopped at --minutes={FLAGS.minutes:g} of CPU time; more minutes resume it"
@@ -287,13 +290,12 @@ def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
     for run, run_folder_path in zip(runs, folders, strict=True):
         end = describe_end(run_folder_path, None, finished, terminated)
         print(f"{run_folder_path}: {end}, {outcomes.latest_result(run, run_folder_path)}")
-        if finished:
-            play_final_episodes(run, run_folder_path, threads=None)
         save_onnx(run, run_folder_path, finished)
-        if finished:
+        if finished and not terminated:
+            play_final_episodes(run, run_folder_path, threads=None)
             cards.write(run, run_folder_path)
     print(f"{folder}: {outcomes.mean(runs, folder)}")
-    return TERMINATED if terminated and not finished else 0
+    return TERMINATED if terminated else 0
 
 
 def save_onnx(run: Configuration, folder: Path, is_complete: bool) -> None:
