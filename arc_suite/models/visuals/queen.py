@@ -2,7 +2,7 @@
 
 from arc_suite.models.visuals.spec import Bone, Ornament, Visuals, whip
 
-_ANTENNA = Bone("antenna", "antenna", (0.42, 0.18, 0.31), (0.70, 0.30, 0.60), 0.032, 0.03, paired=True)
+_ANTENNA = Bone("antenna", "antenna", (0.42, 0.18, 0.31), (0.78, 0.32, 0.46), 0.032, 0.03, paired=True)
 
 VISUALS = Visuals(
     colors={
