@@ -31,8 +31,7 @@ def replace_torso(body: Body, torso: str = UNCHANGED, head: str = UNCHANGED, tai
     Raises:
         ValueError: an unknown name, or a body whose torso is not plain.
     """
-    parts = {"torso": (torso, TORSOS), "head": (head, HEADS), "tail": (tail, TAILS)}
-    for part, (name, choices) in parts.items():
+    for (part, choices), name in zip(PARTS.items(), (torso, head, tail), strict=True):
         if name != UNCHANGED:
             checks.name(name, choices, part, suggestions=(UNCHANGED,))
     if torso == head == tail == UNCHANGED:
@@ -106,3 +105,4 @@ def _long_tail(chassis: Solid) -> Solid:
 TORSOS = {"box": _box, "capsule": _capsule}
 HEADS = {"round": _round_head, "long": _long_head}
 TAILS = {"short": _short_tail, "long": _long_tail}
+PARTS = {"torso": TORSOS, "head": HEADS, "tail": TAILS}  # by the argument of `replace_torso`

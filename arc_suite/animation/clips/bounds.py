@@ -18,6 +18,7 @@ from arc_suite.robots.spec import Body
 _CHECKED_TIME_STEP = 1.0 / 240.0  # s between the samples that are checked
 _FOOT_SIZE = 2.0  # radii of a foot about its center, in which the end of its leg is a part of it
 _STANCE_HEIGHT = 0.01  # standing heights: a lower sole stands
+_FLIGHT_HEIGHT = 0.02  # standing heights: while all soles are higher, a body flies
 
 
 class Measures(NamedTuple):
@@ -154,6 +155,12 @@ def measure_ground(body: Body, motion: ClipMotion) -> Ground:
     yaw = motion.root[:, None, 2]
     offsets = rotations.to_heading_frame(np.stack(feet, axis=1), -yaw)
     return Ground(lowest_part, np.stack(soles, axis=1), motion.root[:, None, :2] + offsets)
+
+
+def find_flight(body: Body, motion: ClipMotion) -> np.ndarray:
+    """Return the indices of the samples in which no foot is near the ground."""
+    soles = measure_ground(body, motion).soles
+    return np.flatnonzero((soles > _FLIGHT_HEIGHT * body.torso.standing_height).all(axis=-1))
 
 
 def measure_slide(body: Body, ground: Ground) -> float:

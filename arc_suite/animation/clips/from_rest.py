@@ -19,7 +19,6 @@ from arc_suite.models import sizing
 from arc_suite.robots.spec import Body
 
 _MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
-_FLIGHT_HEIGHT = 0.02  # standing heights: while all soles are higher, a body flies
 _FREE_SOLE_DEPTH = 0.025  # standing heights: soles that are deeper in the ground are raised
 _BLOW_SIZES = tuple(0.15 * 1.4**step for step in range(10))  # that are tried, sqrt(g h): up to 3.1
 _MIN_BLOW_DURATION = 7.0  # sqrt(h / g), of the clip of a blow
@@ -224,8 +223,7 @@ def _to_samples(body: Body, duration: float, time_step: float) -> int:
 
 def _find_flight(body: Body, motion: ClipMotion) -> tuple[int, int] | None:
     """Return the samples of the last flight, and those after it; None if a foot is always near the ground."""
-    soles = bounds.measure_ground(body, motion).soles
-    in_air = np.flatnonzero((soles > _FLIGHT_HEIGHT * body.torso.standing_height).all(axis=-1))
+    in_air = bounds.find_flight(body, motion)
     if not len(in_air):
         return None
     landing = int(in_air[-1])

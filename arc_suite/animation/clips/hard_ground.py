@@ -45,6 +45,8 @@ def _compile_with_drawn_shapes(body: Body) -> mujoco.MjModel:
     touches = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     is_drawn = ~touches & (model.geom_bodyid > 0) & ~np.isin(model.geom_bodyid, feet)
     drawn_names = [model.geom(geom).name for geom in np.flatnonzero(is_drawn).tolist()]
-    for name in [name for name in drawn_names if name not in visuals.geoms_of_bones(body)]:
-        spec.add_pair(geomname1=_FLOOR, geomname2=name)
+    swinging_names = visuals.geoms_of_bones(body)
+    for name in drawn_names:
+        if name not in swinging_names:
+            spec.add_pair(geomname1=_FLOOR, geomname2=name)
     return spec.compile()

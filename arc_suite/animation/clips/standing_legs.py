@@ -86,8 +86,7 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
     to_root = torso_rotation.T
     legs = Legs.of(body, used=1.0).to_foot_centers()
     rest_angles = legs.by_leg(rest.joints)
-    # A joint at rest may be a little beyond its range, as limits are soft.
-    legs = legs._replace(low=np.minimum(legs.low, rest_angles), high=np.maximum(legs.high, rest_angles))
+    legs = legs.widen_ranges(rest_angles[None])
     rest_feet = legs.soles(rest_angles)[0] @ to_root  # m, from the torso
     lift_vectors = standing_height * (np.zeros(3) if lifts is None else lifts)  # m
 

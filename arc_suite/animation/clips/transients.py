@@ -39,7 +39,6 @@ _STOP = _Transient(before={}, after={"forward": 0.06, "height": -0.04, "pitch": 
 
 _ANTICIPATION_CYCLES = 0.6  # gait cycles of a start, in which the body still hardly moves
 _HALT_SHARE = 0.3  # of the largest speed: a slower body has stopped
-_FLIGHT_HEIGHT = 0.02  # h: while all soles are higher, a body flies
 _SETTLING_SHARE = 0.4  # of the time after an action, in which what is left of the swing fades
 
 
@@ -92,8 +91,7 @@ def _make_poses(body, draft: Draft, transient: _Transient, begin: int, end: int,
 
 def _find_flight(body: Body, draft: Draft) -> tuple[int, int] | None:
     """Return the first and the last sample of a flight; None without one."""
-    soles = bounds.measure_ground(body, draft.motion).soles
-    in_air = np.flatnonzero((soles > _FLIGHT_HEIGHT * body.torso.standing_height).all(axis=-1))
+    in_air = bounds.find_flight(body, draft.motion)
     return (int(in_air[0]), int(in_air[-1])) if len(in_air) else None
 
 

@@ -5,11 +5,10 @@ from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.sketch import LEGS, RANDOM
 from arc_suite.animation.studio.states import POSE, VELOCITY, VisitorCommand
+from arc_suite.bodies import torsos
 from arc_suite.bodies.shaping import Shape
-from arc_suite.bodies.torsos import has_plain_torso
 
 _PROPORTIONS = Shape._fields[: Shape._fields.index("links")]  # fields of a shape that are about the body as a whole
-_TORSO = ("torso", "head", "tail")
 _SHAPE = (*_PROPORTIONS, "lengths")  # fields of a sketch that change the shape of a body
 
 
@@ -34,8 +33,8 @@ def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
         idle += ["legs", "links", "layout"]
     if sketch.source != RANDOM:
         idle.append("seed")
-    if not has_plain_torso(sketches.source_body(sketch)):
-        idle += _TORSO
+    if not torsos.has_plain_torso(sketches.source_body(sketch)):
+        idle += torsos.PARTS
     if is_imported:  # an imported body keeps its shape
         idle += _SHAPE
     if "gait" in typed_settings:

@@ -56,8 +56,6 @@ _PROPORTIONS = (
     _Slider("fan", "Fan of the legs", -40.0, 40.0, 1.0),  # degrees
 )
 
-_TORSO_PARTS = {"torso": torsos.TORSOS, "head": torsos.HEADS, "tail": torsos.TAILS}
-
 
 def add_source(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
     """Add widgets for the source of the body, with the values of a sketch."""
@@ -78,7 +76,7 @@ def add_source(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
 def add_shape(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
     """Add widgets for the body's torso, proportions and colors, with the values of a sketch."""
     widgets: dict[str, Any] = {}
-    for field, names in _TORSO_PARTS.items():
+    for field, names in torsos.PARTS.items():
         options = (DEFAULT_CHOICE, *names)
         widgets[field] = gui.add_dropdown(_label(field), options, initial_value=getattr(sketch, field))
     for field, label, low, high, step in _PROPORTIONS:

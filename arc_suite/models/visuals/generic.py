@@ -24,7 +24,7 @@ def generic_visuals(body: Body) -> Visuals:
     eye_size = (0.4 * radius, 0.7 * radius, 0.7 * radius)
     x, y, z = center + half_extents * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
     half_length = half_extents[0] / 2.0  # of the snout
-    tail = _tail(body)
+    tail = _tail(body, min(all_corners, key=lambda corners: corners[:, 0].min()))
     return Visuals(
         colors={
             "shell": (0.62, 0.66, 0.72),
@@ -42,10 +42,8 @@ def generic_visuals(body: Body) -> Visuals:
     )
 
 
-def _tail(body: Body) -> Bone:
-    """Return a tail that rises behind the rearmost solid of the torso, above the mounts of legs."""
-    all_corners = [solid_corners(solid) for solid in body.torso.solids]
-    corners = min(all_corners, key=lambda corners: corners[:, 0].min())
+def _tail(body: Body, corners: np.ndarray) -> Bone:
+    """Return a tail that rises behind the rearmost solid of the torso, of given corners, above the mounts of legs."""
     half_extents = np.ptp(corners, axis=0) / 2.0
     pivot = corners.mean(axis=0) - half_extents * (_PIVOT_SHARE, 0.0, -_PIVOT_SHARE * math.sqrt(1.0 - _PIVOT_SHARE**2))
     length = _TAIL_LENGTH * math.sqrt(2.0 * half_extents[0] * body.torso.standing_height)
