@@ -1,4 +1,4 @@
-"""Collection of datasets: it plays the missing episodes, and keeps finished ones if it is killed."""
+"""Collection of datasets: `collect` plays the missing episodes. Finished ones are kept if the process is killed."""
 
 import contextlib
 import functools
@@ -19,12 +19,10 @@ from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import Task, terms
 
-NUM_ENVS = 64  # with more, steps are not faster, and more environments wait for the last episodes
+NUM_ENVS = 64  # more do not make steps faster, and more of them would idle during the last episodes
 
-# Finished episodes are written at once, unless writing has taken more than this share of the time so far. That happens
-# where episodes are short; then they wait until they have the size.
-MAX_WRITING_SHARE = 0.1
-MAX_PENDING_BYTES = 1 << 24
+MAX_WRITING_SHARE = 0.1  # of the time so far; below it, finished episodes are written at once
+MAX_PENDING_BYTES = 1 << 24  # of finished episodes that wait to be written where writing has taken more of the time
 
 
 def collect(
@@ -60,12 +58,12 @@ def collect(
         ValueError: settings that do not fit, a dataset that is damaged or has other settings, or a
             policy with an invalid action. Episodes finished before are kept.
         OSError: the disk is full, or another error of writing. Finished episodes are kept.
-        KeyboardInterrupt: the same.
+        KeyboardInterrupt: Ctrl-C. Finished episodes are kept.
     """
-    _check(settings, episodes)
+    _check_settings(settings, episodes)
     checks.boolean("overwrite", overwrite)
     checks.boolean("wait", wait)
-    further_metadata = _further_metadata(author, code_permalink)
+    named_metadata = _make_named_metadata(author, code_permalink)
     provenance = settings.provenance()
     with Storage.open(dataset_id, overwrite, wait) as storage:
         _check_same_dataset(storage, dataset_id, provenance, overwrite)
@@ -75,7 +73,7 @@ def collect(
                 if missing:
                     if storage.metadata is None:
                         storage.metadata = _metadata(dataset_id, settings, provenance, threads)
-                    storage.metadata |= further_metadata
+                    storage.metadata |= named_metadata
                     _play(storage, settings, missing, num_envs, threads, progress)
             finally:
                 if not overwrite or storage.kept.issuperset(missing):
@@ -90,7 +88,7 @@ def collect(
         return len(missing)
 
 
-def _further_metadata(author: str | None, code_permalink: str | None) -> dict[str, Any]:
+def _make_named_metadata(author: str | None, code_permalink: str | None) -> dict[str, Any]:
     """Return the part of Minari's metadata that the caller names."""
     metadata: dict[str, Any] = {}
     if author is not None:
@@ -100,7 +98,7 @@ def _further_metadata(author: str | None, code_permalink: str | None) -> dict[st
     return metadata
 
 
-def _check(settings: DatasetSettings, episodes: int) -> None:
+def _check_settings(settings: DatasetSettings, episodes: int) -> None:
     checks.integer("steps", settings.steps, 1)
     last = seed_ranges.COLLECTING[-1] - (episodes - 1)
     checks.integer(f"seed of the first of {episodes} episodes", settings.seed, seed_ranges.COLLECTING.start, last)
@@ -112,7 +110,11 @@ def _policy(settings: DatasetSettings, num_envs: int, task: Task | None = None) 
 
 
 def _check_same_dataset(storage: Storage, dataset_id: str, provenance: dict, overwrite: bool) -> None:
-    """Check that stored episodes have a provenance; others are deleted if they may be overwritten."""
+    """Check that stored episodes have the provenance of the new ones; delete others if they may be overwritten.
+
+    Raises:
+        ValueError: there are episodes of another provenance, and they may not be overwritten.
+    """
     if storage.metadata is None:
         return
     difference = _difference(storage.metadata["arc_suite"], provenance)
@@ -147,7 +149,7 @@ def _play(
     progress: Callable[..., Any],
 ) -> None:
     """Play the missing episodes into the storage."""
-    # So many environments that each plays about the same number of episodes.
+    # As few environments as play the episodes in the same number of rounds.
     episodes_per_environment = math.ceil(len(missing) / num_envs)
     num_envs = math.ceil(len(missing) / episodes_per_environment)
     environment = settings.environment(num_envs, threads)
@@ -223,6 +225,6 @@ def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, thre
 
 
 def _mean_return(environment: VectorEnv, settings: DatasetSettings) -> float:
-    """Return the mean return by the evaluation protocol."""
+    """Return the mean return of the episodes from seed 0 on, one in each environment."""
     policy = _policy(settings, environment.num_envs, environment.task.definition)
     return float(np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, policy)]))

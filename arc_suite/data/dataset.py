@@ -1,4 +1,4 @@
-"""Datasets of recorded episodes, to be read."""
+"""Reading of datasets: a dataset is a sequence of recorded episodes."""
 
 import contextlib
 import json
@@ -56,7 +56,7 @@ class Dataset:
             setup = Setup.from_dict(provenance)
         except ValueError as error:
             raise ValueError(f"dataset {dataset_id!r}: {METADATA}: {checks.quote(error)}") from None
-        with damages(dataset_id, path / "data" / METADATA):
+        with explain_damage(dataset_id, path / "data" / METADATA):
             presets = _check_type("presets", provenance["presets"], list)
             self.settings = DatasetSettings(
                 setup=setup,
@@ -110,13 +110,13 @@ class Dataset:
 
     @contextlib.contextmanager
     def reading(self):
-        """Yield the open HDF5 file; errors in reading it become a ValueError of one line."""
+        """Yield the open HDF5 file. In this context, an error of a damaged file becomes a ValueError of one line."""
         path = self.path / "data" / MAIN
-        with damages(self.id, path), h5py.File(files.plain(path), "r") as file:
+        with explain_damage(self.id, path), h5py.File(files.plain(path), "r") as file:
             yield file
 
 
-def damages(dataset_id: str, file: Path) -> contextlib.AbstractContextManager[None]:
+def explain_damage(dataset_id: str, file: Path) -> contextlib.AbstractContextManager[None]:
     """Turn errors of a damaged file into one line that names dataset and file; see `parsers.guard`."""
     return parsers.guard(f"dataset {dataset_id!r} is damaged: {file}")
 
@@ -138,7 +138,7 @@ def _check_spec(spec: str | None, settings: DatasetSettings, provenance: Mapping
         return
     stored = json.loads(spec)
     expected = json.loads(settings.setup.spec(settings.steps).to_json())
-    # A robot is written as in the file. Versions of tasks may have increased since.
+    # Texts of one robot may differ, so that of the file is taken. Versions of tasks may have increased since.
     expected["kwargs"]["domain_name"] = provenance["robot"]
     stored["id"] = _without_version(stored["id"])
     expected["id"] = _without_version(expected["id"])
@@ -160,11 +160,11 @@ def read_metadata(dataset_id: str, folder: Path) -> dict:
         ValueError: it is damaged, or the dataset is not of this suite.
     """
     path = folder / METADATA
-    with damages(dataset_id, path):
+    with explain_damage(dataset_id, path):
         metadata = files.read_json(path)
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
-    with damages(dataset_id, path):
+    with explain_damage(dataset_id, path):
         for name, kind in (("versions", dict), ("model_sha256", str)):
             _check_type(f"{name} of arc_suite", metadata["arc_suite"][name], kind)
     return metadata

@@ -69,7 +69,7 @@ def folder(dataset_id: str) -> Path:
     return root() / dataset_id
 
 
-def parts(dataset_id: str) -> Path:
+def parts_folder(dataset_id: str) -> Path:
     """Return the hidden folder of the episodes that are not merged into the dataset yet."""
     dataset_folder = folder(dataset_id)
     return dataset_folder.with_name(f".{dataset_folder.name}.parts")
@@ -89,7 +89,7 @@ def find(dataset_id: str) -> Path:
         ValueError: a malformed id, no such dataset, or one whose first collection was killed.
     """
     if not folder(dataset_id).joinpath("data").is_dir():
-        if parts(dataset_id).is_dir():
+        if parts_folder(dataset_id).is_dir():
             raise ValueError(f"dataset {checks.preview(dataset_id)} is unfinished: collect it again to continue it")
         dataset_ids = existing()
         if not dataset_ids:

@@ -1,4 +1,4 @@
-"""Plays seeded episodes in a vector environment."""
+"""Recording of seeded episodes in a vector environment: `play` starts the next seed where an episode has ended."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -14,8 +14,8 @@ class Step(NamedTuple):
     """The outcome of one control step of all environments.
 
     Attributes:
-        playing: number of environments that played.
-        finished: episodes that ended.
+        playing: number of environments that had an episode in this step.
+        finished: episodes that this step ended.
     """
 
     playing: int

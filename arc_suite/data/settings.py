@@ -19,8 +19,8 @@ class DatasetSettings(NamedTuple):
     Attributes:
         setup: body, task and settings of the task.
         policy: a name, or `module:attribute`; see `policies.policy`.
-        presets: presets of the demonstrator, names or `module:name`; the episode with seed s has number s modulo their
-            count. Empty for the one that suits the task and the body, and for other policies.
+        presets: presets of the demonstrator, names or `module:name`; of n presets, the episode with seed s has number
+            s modulo n. Empty for the one that suits the task and the body, and for other policies.
         noise: standard deviation of the normal noise on actions, which are clipped after it.
         seed: seed of the first episode, of `seed_ranges.COLLECTING`.
         steps: control steps after which an episode is truncated, unless the task's limit is shorter.
@@ -49,7 +49,7 @@ class DatasetSettings(NamedTuple):
         """Return the default id of such a dataset.
 
         Args:
-            label: in place of the policy's name.
+            label: text that takes the place of the policy's name.
         """
         parts = [label or self.policy, *self.preset_names]
         if self.noise:

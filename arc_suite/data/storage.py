@@ -22,7 +22,7 @@ from minari.namespace import create_namespace, list_local_namespaces
 
 from arc_suite import files
 from arc_suite.data import episodes, ids
-from arc_suite.data.dataset import MAIN, METADATA, damages, read_metadata
+from arc_suite.data.dataset import MAIN, METADATA, explain_damage, read_metadata
 from arc_suite.data.episodes import Episode
 
 
@@ -47,7 +47,7 @@ class Storage:
         self.id = dataset_id
         self.metadata: dict[str, Any] | None = None
         self._data = ids.folder(dataset_id) / "data"
-        self._parts = ids.parts(dataset_id)
+        self._parts = ids.parts_folder(dataset_id)
         self._overwrite = overwrite
         self._continues = False  # whether the parts belong to this collection
         self._stored: dict[int, StoredEpisode] = {}  # by index
@@ -90,7 +90,7 @@ class Storage:
 
         Args:
             dataset_id: id of an existing dataset or of a new one.
-            overwrite: whether to start a new dataset even if there is one, which stays until `finish`.
+            overwrite: whether to start a new dataset in place of an existing one, which stays until `finish`.
             wait: whether to wait until no other process collects it; else that is an error.
 
         Raises:
@@ -106,7 +106,7 @@ class Storage:
 
     @property
     def kept(self) -> frozenset[int]:
-        """Return the indices of the episodes that are on disk."""
+        """The indices of the episodes that are on disk."""
         return frozenset(self._stored)
 
     def clear(self) -> None:
@@ -179,8 +179,8 @@ class Storage:
             shutil.rmtree(self._parts)
 
     def _scan(self, path: Path) -> None:
-        """Find the episodes of a file, and read them: `episodes.read` compares their digests."""
-        with damages(self.id, path), h5py.File(files.plain(path), "r") as file:
+        """Note the episodes of a file. Each is read, as `episodes.read` compares its digest."""
+        with explain_damage(self.id, path), h5py.File(files.plain(path), "r") as file:
             for index in map(episodes.index, file):
                 self._stored[index] = StoredEpisode(path, episodes.read(file, index).length)
 

@@ -1,4 +1,4 @@
-"""Verification of datasets: episodes are replayed and compared bit by bit."""
+"""Verification of datasets: `verify` replays episodes and compares them bit by bit."""
 
 import contextlib
 from collections.abc import Callable
@@ -119,4 +119,4 @@ def _difference(recorded: Episode, replayed: Episode) -> str:
         for step, (recorded_row, replayed_row) in enumerate(pairs):
             if recorded_row.tobytes() != replayed_row.tobytes():
                 return f"{name}[{step}]"
-    raise AssertionError("episodes with different digests differ")
+    raise AssertionError("expected a difference, as the digests of the episodes differ")

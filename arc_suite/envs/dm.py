@@ -376,7 +376,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """
         self._check_begun()
         blocks = self.definition.privileged(self.memory, self._physics.data.ptr)
-        changed_fields = self._physics.lasting  # those that `change_model` has set
+        changed_fields = self._physics.lasting_fields  # those that `change_model` has set
         return blocks | self.definition.read_back(blocks, changed_fields)
 
     def privileged_vector(self) -> np.ndarray:

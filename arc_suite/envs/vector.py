@@ -687,7 +687,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         if not self.batch.changed:
             return blocks
         for index, task in enumerate(self._tasks):
-            changed_fields = self.batch.lasting(index)
+            changed_fields = self.batch.lasting_fields(index)
             if not changed_fields:
                 continue
             own_blocks = {name: block[index] for name, block in blocks.items()}

@@ -96,7 +96,8 @@ def of_levels(levels: Mapping[str, Level]) -> Anchors:
 def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
     """Return the anchors of a robot, a task and settings; those that are not committed are measured.
 
-    They are those of `judging` where these are committed, except for episodes of seeds 0 to 99, which have their own.
+    Anchors come from `judging.csv` where it has the place, except for episodes of seeds 0 to 99: these are scored by
+    the same episodes in `anchors.csv`.
 
     Args:
         setup: robot, task and settings.
@@ -106,10 +107,10 @@ def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
         ValueError: a setting of the task that does not fit, or episodes that need not end.
     """
     if setup.several:
-        return _of_several(setup)
+        return _measure_several_bodies(setup)
     returns_by_policy = committed_returns(setup)
-    is_of_before = returns_by_policy is not None and len(seeds) and max(seeds) < protocol.EPISODES
-    levels = None if is_of_before else judging.levels(setup)
+    table_has_seeds = returns_by_policy is not None and len(seeds) and max(seeds) < protocol.EPISODES
+    levels = None if table_has_seeds else judging.levels(setup)
     if levels is not None:
         return of_levels(levels)
     if returns_by_policy is None:
@@ -118,7 +119,7 @@ def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
 
 
 @functools.lru_cache(maxsize=16)
-def _of_several(setup: Setup) -> Anchors:
+def _measure_several_bodies(setup: Setup) -> Anchors:
     """Return the anchors of several bodies, each in one episode with the demonstrator that suits it."""
     zero = []
     demonstrators = []
@@ -222,12 +223,12 @@ def read(path: Path) -> dict[str, dict[str, np.ndarray]]:
 def write(path: Path, table: Mapping[str, Returns]) -> None:
     """Write returns by place and policy as a table."""
     with path.open("w", encoding="utf-8", newline="") as file:
-        lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(HEADS)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(HEADS)
         for place_name, returns_by_policy in table.items():
             for policy, returns in returns_by_policy.items():
                 for seed, value in enumerate(returns):
-                    lines.writerow((place_name, policy, seed, repr(float(value))))
+                    writer.writerow((place_name, policy, seed, repr(float(value))))
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""First walks of bodies: whether the demonstrator walks a body, and which fields of its spec prevent it."""
+"""First walks of bodies: whether the demonstrator can walk a body, and which fields of its spec to leave out if not."""
 
 import itertools
 from typing import NamedTuple
@@ -55,7 +55,7 @@ def walk(body: Body) -> FirstWalk:
 
 
 def given_fields(body: Body) -> list[str]:
-    """Return the fields of joints that a spec has and could leave out; an imported body has none."""
+    """Return the names of `FIELDS` that a joint of a body's spec has; none for an imported body."""
     joints = () if body.source else body.joints
     return [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
 
@@ -67,7 +67,7 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
 
     Args:
         body: any.
-        quality: quality of its walk with all fields.
+        quality: `FirstWalk.quality` of its walk with all fields.
     """
     names_in_spec = given_fields(body)
     better_walks = {}
@@ -77,7 +77,7 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
             if first_walk.quality > quality:
                 better_walks[names] = first_walk
         if any(first_walk.quality == 2 for first_walk in better_walks.values()):
-            break  # with more fields left out, none is better
+            break  # a walk of quality 2 with more fields left out would rank lower
 
     def rank(item: tuple[tuple[str, ...], FirstWalk]) -> tuple:
         names, first_walk = item

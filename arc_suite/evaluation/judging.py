@@ -1,8 +1,8 @@
 """The episodes that judge a final policy: seeds and ground follow from its content, so that nobody has seen them.
 
 A policy is judged once, when its training has ended. Its curve, `--until_score` and the choice of a checkpoint have
-`seed_ranges.VALIDATION`. Another bit of a policy draws other episodes. So a policy that is saved until it is
-lucky gains about a standard error of the mean of its episodes.
+`seed_ranges.VALIDATION`. A policy that differs in one bit gets other episodes. So saving a policy again and again
+until its episodes are lucky gains about one standard error of the mean.
 
 `judging.csv` holds the anchors of scores at the benchmark's places, a line for each ground or share of the seeds,
 written by `python tools/judge_anchors.py`.
@@ -76,7 +76,7 @@ def seeds_of(sha256: str | None) -> range:
 
 
 def on_ground(setup: Setup, seed: int) -> Setup:
-    """Return a setup whose random ground has a seed; a setup without random ground stays."""
+    """Return the setup with this seed of its random ground; a setup without random ground as it is."""
     ground = getattr(setup.kind, "ground", None)
     if ground is None or "terrain_seed" not in ground.settings:
         return setup
@@ -120,13 +120,16 @@ def read(path: Path) -> list[Part]:
 def write(path: Path, parts: Iterable[Part]) -> None:
     """Write a table of anchors."""
     with path.open("w", encoding="utf-8", newline="") as file:
-        lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(Part._fields)
-        lines.writerows(parts)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(Part._fields)
+        writer.writerows(parts)
 
 
 def levels(setup: Setup) -> Mapping[str, Level] | None:
-    """Return the committed anchors of a setup by policy; None without both. The seed of its ground does not count."""
+    """Return the committed anchors of a setup by policy: standing still, the demonstrator, and maybe `BLIND`.
+
+    None unless the first two are there. The seed of the setup's ground does not count.
+    """
     levels_by_policy = _table().get(str(setup.with_settings({}, dropped=["terrain_seed"])), {})
     policies_that_see = levels_by_policy.keys() - {BLIND}
     return levels_by_policy if len(policies_that_see) == 2 else None  # while the table is measured, one may be missing

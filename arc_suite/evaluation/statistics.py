@@ -113,9 +113,10 @@ def student_interval(strata: Sequence[np.ndarray]) -> np.ndarray:
     # Variances of the means of strata, with the strata last.
     variances = np.stack([values.var(axis=-1, ddof=1) for values in strata], axis=-1) / run_counts
     total_variance = variances.sum(axis=-1)
-    lost_freedom = (variances**2 / (run_counts - 1)).sum(axis=-1)
-    freedom = np.divide(total_variance**2, lost_freedom, out=np.ones_like(mean), where=lost_freedom > 0.0)
-    half_width = stdtrit(freedom, 0.5 + CONFIDENCE / 2) * np.sqrt(total_variance) / len(strata)
+    # Degrees of freedom by Welch and Satterthwaite; 1 where all runs of each stratum are equal.
+    sum_of_squares = (variances**2 / (run_counts - 1)).sum(axis=-1)
+    degrees = np.divide(total_variance**2, sum_of_squares, out=np.ones_like(mean), where=sum_of_squares > 0.0)
+    half_width = stdtrit(degrees, 0.5 + CONFIDENCE / 2) * np.sqrt(total_variance) / len(strata)
     return np.stack([mean, mean - half_width, mean + half_width])
 
 
@@ -140,7 +141,7 @@ def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float
 
     Args:
         strata_x: scores of X by stratum, such as of each robot; one for each run.
-        strata_y: values of Y, in the same strata.
+        strata_y: scores of Y, in the same strata.
         seed: seed of the resampling.
 
     Returns:
@@ -154,10 +155,10 @@ def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float
     random = np.random.default_rng(seed)
     pairs = [(np.asarray(x, float), np.asarray(y, float)) for x, y in zip(strata_x, strata_y, strict=True)]
     resamples = np.mean(
-        [_better(random.choice(x, (RESAMPLES, x.size)), random.choice(y, (RESAMPLES, y.size))) for x, y in pairs],
+        [_win_rate(random.choice(x, (RESAMPLES, x.size)), random.choice(y, (RESAMPLES, y.size))) for x, y in pairs],
         axis=0,
     )
-    return float(np.mean([_better(x, y) for x, y in pairs])), _interval(resamples)
+    return float(np.mean([_win_rate(x, y) for x, y in pairs])), _interval(resamples)
 
 
 def performance_profile(strata, thresholds, seed: int = 0) -> Curve:
@@ -191,7 +192,7 @@ def curve(strata: Sequence[np.ndarray]) -> Curve:
     return Curve(*student_interval([np.asarray(scores, float).T for scores in strata]))
 
 
-def _better(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _win_rate(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return P(x > y) + P(x = y) / 2 of all pairs of two samples, over the last axis."""
     first = x[..., :, None]
     second = y[..., None, :]

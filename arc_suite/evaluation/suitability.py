@@ -12,13 +12,8 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
 
 SEEDS = range(500, 508)  # no demonstrator was tuned on these episodes
-METRICS = (
-    "goals",
-    "tracking",
-    "speed",
-    "joint_error",
-    "up",
-)  # names of metrics, of which a task shows the first that it has
+# Names of metrics. A trial has the first of them that its task has.
+METRICS = ("goals", "tracking", "speed", "joint_error", "up")
 MAX_SHORTFALL = 0.05  # of a default preset, as a share of what the best preset gains over standing still
 
 
@@ -29,7 +24,7 @@ class Trial(NamedTuple):
         task: name of the task.
         preset: name of the demonstrator's preset; `zero` for standing still.
         mean_return: over the episodes.
-        metric: name of the metric.
+        metric: name of the task's metric; see `METRICS`.
         value: mean of the metric at the end of the episodes.
         upright: number of episodes without a fall.
         episodes: number of episodes.

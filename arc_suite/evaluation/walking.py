@@ -112,17 +112,17 @@ class WalkWatcher:
         return assess(targets, displacements, np.array(self._touching), steps, self.ending)
 
 
-def assess(targets: np.ndarray, moved: np.ndarray, touching: np.ndarray, steps: float, ending: str) -> Verdict:
+def assess(targets: np.ndarray, displacements: np.ndarray, touching: np.ndarray, steps: float, ending: str) -> Verdict:
     """Return the result of a walk of n control steps.
 
     Args:
         targets: (n, 2) target displacements, m; see `target`.
-        moved: (n, 2) displacements of the torso, m.
+        displacements: (n, 2) displacements of the torso, m.
         touching: (n + 1,) whether the torso touched the ground at the start and after each step.
         steps: number of control steps of the whole trial; after a fall the body counts as at rest.
         ending: `TIME`, `FALL` or `DIVERGENCE`.
     """
-    speed, drift = shares(targets, moved, steps)
+    speed, drift = shares(targets, displacements, steps)
     touching_share = float(touching.mean())
     return Verdict(speed, drift, touching_share, failures(speed, touching_share, ending))
 
@@ -162,12 +162,12 @@ def target(task: Task, blocks: Mapping[str, np.ndarray], place: np.ndarray) -> n
     return rotations.to_heading_frame(desired, -place[2])
 
 
-def shares(targets: np.ndarray, moved: np.ndarray, steps: float) -> tuple[float, float]:
+def shares(targets: np.ndarray, displacements: np.ndarray, steps: float) -> tuple[float, float]:
     """Return how far a body moved along its targets, and how far aside, as shares of the target path.
 
     Args:
         targets: (n, 2) displacements of the control steps until the end or a fall, m; see `target`.
-        moved: (n, 2) displacements of the torso in these steps, m.
+        displacements: (n, 2) displacements of the torso in these steps, m.
         steps: number of control steps of the whole trial; after a fall the body counts as at rest.
 
     Returns:
@@ -175,8 +175,8 @@ def shares(targets: np.ndarray, moved: np.ndarray, steps: float) -> tuple[float,
         targets are 0.
     """
     path = float((targets * targets).sum()) * steps / len(targets)
-    along = float((targets * moved).sum())
-    aside = float((targets[:, 0] * moved[:, 1] - targets[:, 1] * moved[:, 0]).sum())
+    along = float((targets * displacements).sum())
+    aside = float((targets[:, 0] * displacements[:, 1] - targets[:, 1] * displacements[:, 0]).sum())
     return (along / path, aside / path) if path else (1.0, 0.0)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from arc_suite.simulation import forks, timers
 from arc_suite.simulation.model import ReadOnly, change_fields, field, merge_lasting
-from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, check_snapshot, model_fields
+from arc_suite.simulation.state_arrays import LASTING_PREFIX, MODEL_PREFIX, check_snapshot, model_fields
 
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 # Sizes of models on which `MjData` does not depend.
@@ -52,12 +52,12 @@ class Batch:
         self._simulations.set_models(self._models)
         self._changed_fields: dict[str, None] = {}  # an ordered set of names
         self._lasting: dict[str, np.ndarray] = {}  # (count, *shape) values that stay over resets, NaN for no change
-        # Models without sensors, for all substeps but the last.
+        # Models whose sensors are off. They step all substeps but the last, which alone needs sensors and is slower.
         if self._compiled is None:
-            self._silent = _without_sensors(model)
+            self._sensorless = _without_sensors(model)
         else:
-            self._silent = [_without_sensors(compiled) for compiled in self._compiled]
-        # Every call fills bound arrays, so they are bound before the first one.
+            self._sensorless = [_without_sensors(compiled) for compiled in self._compiled]
+        # MuJoCo's batch fills bound arrays in every call, so they are bound before the first one.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
         self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
 
@@ -74,8 +74,12 @@ class Batch:
     @property
     def models(self) -> list[ReadOnly]:
         """The model of each simulation, to read; `change_model` changes them."""
-        models = self._models or [self._simulations.model] * self._simulations.nsim
-        return [ReadOnly(model) for model in models]
+        return [ReadOnly(model) for model in self._models or self._compiled_models]
+
+    @property
+    def _compiled_models(self) -> list[mujoco.MjModel]:
+        """The model of each simulation as it was compiled."""
+        return self._compiled or [self._simulations.model] * self._simulations.nsim
 
     @property
     def changed(self) -> list[str]:
@@ -105,7 +109,7 @@ class Batch:
         simulations = self._simulations
         simulations.warning[...] = 0
         with timers.off:
-            simulations.set_models(self._silent)
+            simulations.set_models(self._sensorless)
             try:
                 simulations.step(mask, nstep - 1)
             finally:
@@ -161,8 +165,7 @@ class Batch:
 
     def compiled_field(self, name: str) -> np.ndarray:
         """Return a field (count, *shape) of the models as they were compiled."""
-        compiled = self._compiled or [self._simulations.model] * self._simulations.nsim
-        return np.stack([field(model, name) for model in compiled])
+        return np.stack([field(model, name) for model in self._compiled_models])
 
     def change_model(self, fields: Mapping[str, np.ndarray], mask: np.ndarray) -> None:
         """Set fields of the models of some simulations from now on, over resets.
@@ -185,7 +188,7 @@ class Batch:
     def _change_for_episode(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
         """Set models of some simulations to the compiled ones with fields of one episode, and with lasting changes."""
         self._changed_fields |= dict.fromkeys(name for fields in (*models, self._lasting) for name in fields)
-        compiled = self._compiled or [self._simulations.model] * len(mask)
+        compiled = self._compiled_models
         changes = []
         for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
             compiled_fields = {name: field(compiled[index], name) for name in self._changed_fields}
@@ -196,23 +199,29 @@ class Batch:
         self._write(mask, changes)
 
     def _write(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
-        """Write fields (changed,) into models of some simulations, which get a model each at the first change."""
+        """Write fields into the models of some simulations.
+
+        The first change gives each simulation a model of its own.
+
+        Args:
+            mask: (count,) the simulations.
+            models: fields by name for each of them.
+        """
         self._changed_fields |= dict.fromkeys(name for fields in models for name in fields)
         if self._models is self._compiled:
-            compiled = self._compiled or [self._simulations.model] * len(mask)
-            self._models = [copy.copy(model) for model in compiled]
-            self._silent = [_without_sensors(model) for model in compiled]
+            self._models = [copy.copy(model) for model in self._compiled_models]
+            self._sensorless = [_without_sensors(model) for model in self._compiled_models]
         scratch = mujoco.MjData(self._simulations.model)
         for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
             change_fields(self._models[index], fields, scratch)
-            change_fields(self._silent[index], fields, scratch)
+            change_fields(self._sensorless[index], fields, scratch)
 
-    def lasting(self, index: int) -> dict[str, np.ndarray]:
-        """Return fields of a simulation's model of which rows stay over resets, by name."""
+    def lasting_fields(self, index: int) -> dict[str, np.ndarray]:
+        """Return by name those fields of a simulation's model in which some rows stay over resets."""
         return {name: field(self._models[index], name) for name in self._lasting_of(index)}
 
     def _lasting_of(self, index: int) -> dict[str, np.ndarray]:
-        """Return the lasting values of a simulation's model, by name; NaN where values do not last."""
+        """Return the values of a simulation's model that stay over resets, by name; NaN where values do not."""
         fields = {name: values[index] for name, values in self._lasting.items()}
         return {name: values for name, values in fields.items() if not np.isnan(values).all()}
 
@@ -220,10 +229,10 @@ class Batch:
         """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""
         fields = {name: array.copy() for name, array in vars(self.data).items()}
         models = {
-            f"{OF_MODEL}{name}": np.stack([field(model, name) for model in self._models])
+            f"{MODEL_PREFIX}{name}": np.stack([field(model, name) for model in self._models])
             for name in self._changed_fields
         }
-        lasting = {f"{LASTING}{name}": values.copy() for name, values in self._lasting.items()}
+        lasting = {f"{LASTING_PREFIX}{name}": values.copy() for name, values in self._lasting.items()}
         return {"state": self._simulations.state.copy(), **fields, **models, **lasting}
 
     def check_snapshot(self, arrays: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
@@ -232,8 +241,8 @@ class Batch:
         Raises:
             ValueError: an array is missing, too many, of another shape or type, or holds a value out of range.
         """
-        models = self._compiled or [self._simulations.model] * self._simulations.nsim
-        return check_snapshot({"state": self._simulations.state, **vars(self.data)}, models, arrays)
+        like = {"state": self._simulations.state, **vars(self.data)}
+        return check_snapshot(like, self._compiled_models, arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue bit-identically from the arrays of `snapshot`."""
@@ -272,9 +281,9 @@ def layout(model: mujoco.MjModel) -> tuple[int, ...]:
 
 def _without_sensors(model: mujoco.MjModel) -> mujoco.MjModel:
     """Return a copy of a model with sensors disabled."""
-    silent_model = copy.copy(model)
-    silent_model.opt.disableflags |= _NO_SENSORS
-    return silent_model
+    sensorless_model = copy.copy(model)
+    sensorless_model.opt.disableflags |= _NO_SENSORS
+    return sensorless_model
 
 
 def _fill(array: np.ndarray, values: np.ndarray) -> None:

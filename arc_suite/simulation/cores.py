@@ -9,11 +9,11 @@ from pathlib import Path
 _GROUPS = Path("/proc/self/cgroup")
 _MOUNT = Path("/sys/fs/cgroup")
 _DEVICES = Path("/dev")
-# A second thread hardly makes a run faster, so that two cores serve two runs better.
-_ONE_THREAD = {"NPROC": "1", "OMP_NUM_THREADS": "1", "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
-# With NPROC=1, JAX would compile for a GPU on one core. It takes memory of a GPU as it needs it, and leaves the rest to
-# Warp and to other programs.
-_GPU = {"OMP_NUM_THREADS": "1", "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}
+# Environment variables for JAX on a CPU. A second thread hardly makes a run faster; two cores serve two runs better.
+_VARIABLES_OF_ONE_THREAD = {"NPROC": "1", "OMP_NUM_THREADS": "1", "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
+# Environment variables for JAX on a GPU. They lack NPROC=1, with which JAX would compile on one core. JAX allocates the
+# GPU's memory as it needs it, and leaves the rest to Warp and to other programs.
+_VARIABLES_OF_GPU = {"OMP_NUM_THREADS": "1", "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}
 
 
 def prepare_jax() -> None:
@@ -21,7 +21,7 @@ def prepare_jax() -> None:
 
     Environment variables that are set stay as they are.
     """
-    for name, value in (_GPU if uses_gpu() else _ONE_THREAD).items():
+    for name, value in (_VARIABLES_OF_GPU if uses_gpu() else _VARIABLES_OF_ONE_THREAD).items():
         os.environ.setdefault(name, value)
 
 

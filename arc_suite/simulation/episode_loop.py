@@ -1,7 +1,7 @@
-"""The loop that plays an episode in one environment: every return, track, recording, film and live view takes it.
+"""The loop that plays an episode in one environment: every return, track, recording, film and live view uses it.
 
-Loops over batches are others: `evaluation.episodes_in_batch` stops environments that have ended, `data.rollouts` starts
-their next seeds, and learners never stop.
+Batches have other loops: `evaluation.episodes_in_batch` stops environments whose episode has ended, `data.rollouts`
+starts the next seed in them, and learners never stop.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,9 +12,9 @@ import numpy as np
 def play_episode(
     environment, act: Callable[..., np.ndarray], seed: int | None = None, max_steps: int | None = None
 ) -> Iterator:
-    """Play one episode, a control step whenever the next one is asked for.
+    """Play one episode; the generator advances by a control step whenever its next item is asked for.
 
-    Meanwhile the environment stands still: who watches may read it, set commands or apply forces.
+    Between items the environment stands still: the caller may read it, set commands or apply forces.
 
     Args:
         environment: environment of `arc_suite.load`.

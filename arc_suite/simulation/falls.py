@@ -20,8 +20,8 @@ _MAX_CLEARANCE = 1.0  # of the lowest point over the floor at the start of a dro
 def drop_body(body: Body, seed: int, drops: int) -> np.ndarray:
     """Return poses (drops, nq) of a body on level ground, after drops from any attitude with any joint angles.
 
-    Motors are limp. Most bodies have come to rest after that time, and all start at rest from such a pose. The torso's
-    position is that of the root body, above the origin.
+    Motors are limp. A drop lasts 6 sqrt(h / g), after which most bodies have come to rest. The velocity that others
+    still have is left out. The torso's position is that of the root body, above the origin.
 
     Args:
         body: the body.
@@ -45,15 +45,15 @@ def drop_body(body: Body, seed: int, drops: int) -> np.ndarray:
     clearances = height * random.uniform(0.0, _MAX_CLEARANCE, drops)
 
     simulations = Batch(model, drops, fields=("geom_xpos",))
-    are_all = np.ones(drops, bool)
+    all_drops = np.ones(drops, bool)
     no_velocity = np.zeros((drops, model.nv))
-    simulations.reset(are_all, poses, no_velocity)
+    simulations.reset(all_drops, poses, no_velocity)
     moves = model.geom_bodyid > 0
     lowest_points = (simulations.data.geom_xpos[:, moves, 2] - model.geom_rbound[moves]).min(axis=-1)
     poses[:, 2] += clearances - lowest_points
-    simulations.reset(are_all, poses, no_velocity)
+    simulations.reset(all_drops, poses, no_velocity)
     substeps = round(_DURATION * np.sqrt(height / GRAVITY) / model.opt.timestep)
-    has_diverged = simulations.step(substeps, are_all)
+    has_diverged = simulations.step(substeps, all_drops)
     poses = simulations.data.qpos[~has_diverged]
     poses[:, :2] = 0.0
     poses[:, 3:7] = rotations.turn_about_z(poses[:, 3:7], -rotations.yaw(poses[:, 3:7]))

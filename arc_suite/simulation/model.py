@@ -16,9 +16,10 @@ from arc_suite.robots.spec import Body
 
 _MAX_VALUE = 1e6  # of a model's field
 _TOLERANCE = 1e-6  # of the length of a quaternion
+_LEAST_POSITIVE = 1e-15  # of a field that must not be 0
 _POSITIVE = ("body_mass", "body_inertia")  # fields that must not be 0, as accelerations divide by them
 
-# Fields that `checked_fields` takes, with the bounds of their values.
+# Fields that `check_fields` takes, with the bounds of their values.
 FIELDS = {
     "gravity": (-_MAX_VALUE, _MAX_VALUE),  # of the model's `opt`
     **dict.fromkeys(_POSITIVE, (0.0, _MAX_VALUE)),
@@ -159,7 +160,10 @@ def check_fields(
 
 
 def _check_effect(model: mujoco.MjModel, fields: Mapping[str, Any]) -> None:
-    """Check that simulations of a model read fields; in some scenes contacts read pairs, and others read geoms."""
+    """Raise ValueError for a field that simulations of a model do not read.
+
+    Contacts read fields of pairs in some scenes, and fields of geoms in others.
+    """
     if "jnt_actfrcrange" in fields and not model.jnt_actfrclimited.any():
         raise ValueError("model field 'jnt_actfrcrange': torques of this model have no limits of joints")
     if "actuator_biasprm" in fields and not model.actuator_biastype.any():
@@ -174,11 +178,11 @@ def _check_effect(model: mujoco.MjModel, fields: Mapping[str, Any]) -> None:
             if name in fields:
                 raise ValueError(f"model field {field_name!r}: {name} changes it, too; leave one of them out")
             if not contacts_read[kind]:
-                what = f"contacts of this model read {other_field}"
-                raise ValueError(f"model field {field_name!r}: {what}; change {name}")
+                reason = f"contacts of this model read {other_field}"
+                raise ValueError(f"model field {field_name!r}: {reason}; change {name}")
             if contacts_read[other_kind] and other_field not in fields:
-                what = f"contacts of this model read {other_field}, too"
-                raise ValueError(f"model field {field_name!r}: {what}; change {name}")
+                reason = f"contacts of this model read {other_field}, too"
+                raise ValueError(f"model field {field_name!r}: {reason}; change {name}")
 
 
 def _contact_fields(
@@ -211,10 +215,10 @@ def _check_numbers(name: str, values: Any, shape: tuple[int, ...], low: Any, hig
             f"model field {name!r}: expected numbers of shape {shape}, got {checks.preview(values)}"
         ) from None
     if not ((array >= low) & (array <= high)).all():
-        above = ", above 0 where the model's are" if name in _POSITIVE else ""
+        where = ", above 0 where the model's are" if name in _POSITIVE else ""
         lowest = np.min(low) if name not in _POSITIVE else 0.0
         raise ValueError(
-            f"model field {name!r}: expected numbers from {lowest:g} to {high:g}{above}, got {checks.preview(values)}"
+            f"model field {name!r}: expected numbers from {lowest:g} to {high:g}{where}, got {checks.preview(values)}"
         )
     return array
 
@@ -222,7 +226,7 @@ def _check_numbers(name: str, values: Any, shape: tuple[int, ...], low: Any, hig
 def _check_values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
     """Return values of a field in the shape of the present ones, `like`."""
     low, high = FIELDS[name]
-    lowest = np.where(like > 0.0, 1e-15, low) if name in _POSITIVE else low
+    lowest = np.where(like > 0.0, _LEAST_POSITIVE, low) if name in _POSITIVE else low
     array = _check_numbers(name, values, like.shape, lowest, high)
     if name == "body_iquat" and (abs(np.linalg.norm(array, axis=-1) - 1.0) > _TOLERANCE).any():
         raise ValueError(f"model field {name!r}: expected quaternions of length 1, got {checks.preview(values)}")

@@ -253,7 +253,7 @@ class _Renderer:
             with contextlib.suppress(Exception):  # another library may have closed the display already
                 self.call(self._free)
             self._closed = True
-        else:  # what is the parent's would hang
+        else:  # to free the parent's context would hang
             egl = sys.modules.get(f"{_BACKEND}.pyopengl.egl_renderer")
             if egl is not None:
                 atexit.unregister(egl.EGL.eglTerminate)

@@ -18,7 +18,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
 from arc_suite.simulation.annotations import Data, Model, Named
 from arc_suite.simulation.model import change_fields, compile_model, field, merge_lasting, shared_model
-from arc_suite.simulation.state_arrays import LASTING, OF_MODEL, check_snapshot, model_fields
+from arc_suite.simulation.state_arrays import LASTING_PREFIX, MODEL_PREFIX, check_snapshot, model_fields
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -86,7 +86,7 @@ class Physics(dm_mujoco.Physics):
         self.marker = None
         self.failed_legs = None
         self._forks = forks.count
-        self._option = self.model.ptr.opt
+        self._option = self.model.ptr.opt  # kept, as a step is faster without this look-up
 
     def reset(self, keyframe_id: int | None = None) -> None:
         """Restart from the default pose, as in dm_control, with the compiled model and its lasting changes."""
@@ -121,8 +121,8 @@ class Physics(dm_mujoco.Physics):
         return field(shared_model(self.body, self.arena), name)
 
     @property
-    def lasting(self) -> Mapping[str, np.ndarray]:
-        """Fields of the model of which rows stay over resets, by name."""
+    def lasting_fields(self) -> Mapping[str, np.ndarray]:
+        """Those fields of the model in which some rows stay over resets, by name."""
         self._keep_edits(self._written)
         return {name: field(self.model.ptr, name) for name in self._lasting}
 
@@ -183,7 +183,7 @@ class Physics(dm_mujoco.Physics):
         if nstep < 1:
             raise ValueError(f"nstep: expected an integer from 1, got {checks.preview(nstep)}")
         with timers.off:
-            if nstep > 1 and not self._shared:  # whose options another thread may be using
+            if nstep > 1 and not self._shared:  # another thread may be using the options of a shared model
                 flags = option.disableflags
                 option.disableflags = flags | _NO_SENSORS
                 try:
@@ -277,14 +277,14 @@ class Physics(dm_mujoco.Physics):
         state = np.empty((1, mujoco.mj_stateSize(model, _STATE)))
         mujoco.mj_getState(model, data, state[0], _STATE)
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
-        models = {f"{OF_MODEL}{name}": field(model, name)[None].copy() for name in self._written}
-        lasting = {f"{LASTING}{name}": np.array(values)[None] for name, values in self._lasting.items()}
+        models = {f"{MODEL_PREFIX}{name}": field(model, name)[None].copy() for name in self._written}
+        lasting = {f"{LASTING_PREFIX}{name}": np.array(values)[None] for name, values in self._lasting.items()}
         return {"state": state, **{name: getattr(data, name)[None].copy() for name in fields}, **models, **lasting}
 
     def check_snapshot(self, arrays: Mapping[str, np.ndarray], fields: Iterable[str]) -> Mapping[str, np.ndarray]:
         """Return the arrays of a snapshot if `restore` can take them; see `Batch.check_snapshot`."""
         present = self.snapshot(fields)
-        like = {name: array for name, array in present.items() if not name.startswith((OF_MODEL, LASTING))}
+        like = {name: array for name, array in present.items() if not name.startswith((MODEL_PREFIX, LASTING_PREFIX))}
         return check_snapshot(like, [self.model.ptr], arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -302,7 +302,7 @@ class Physics(dm_mujoco.Physics):
         mujoco.mj_forward(model, data)
         mujoco.mj_setState(model, data, arrays["state"][0], _STATE)  # again, as the solver starts from it
         for name, array in arrays.items():
-            if name != "state" and not name.startswith((OF_MODEL, LASTING)):
+            if name != "state" and not name.startswith((MODEL_PREFIX, LASTING_PREFIX)):
                 getattr(data, name)[:] = array[0]
         self.divergence = None
 

@@ -48,11 +48,8 @@ QUALITIES = {
 }
 MAX_SCALE = 2  # of the largest picture
 
-_DEFAULT_OPTIONS: dict[str, Any] = {
-    "width": 640,
-    "height": 480,
-    "camera_id": "tracking",
-}  # of pictures of environments; pixels
+# Of pictures of environments; width and height in pixels.
+_DEFAULT_OPTIONS: dict[str, Any] = {"width": 640, "height": 480, "camera_id": "tracking"}
 _FAILED_LEG_COLOR = (0.07, 0.07, 0.08, 1.0)
 
 
@@ -78,10 +75,10 @@ class Decorated(dm_mujoco.Physics):
             ground: red, green, blue and alpha of a ground without a grid; None keeps the grid.
         """
         decorated = cls.from_model(wrapper.MjModel(models.model_spec(body, arena, decorated=True).compile()))
-        drawing = decorated.model.vis.quality
-        drawing.shadowsize = quality.shadows
-        drawing.offsamples = 0
-        drawing.numslices, drawing.numstacks = quality.faces
+        model_quality = decorated.model.vis.quality
+        model_quality.shadowsize = quality.shadows
+        model_quality.offsamples = 0
+        model_quality.numslices, model_quality.numstacks = quality.faces
         if not quality.ornaments:
             groups = decorated.model.geom_group
             groups[groups > 0] = mujoco.mjNGROUP - 1  # a group that pictures leave out
@@ -225,14 +222,14 @@ def picture(
         share = None
         markers = ()
         failed_legs = ()
-    drawing = QUALITIES[checks.name(quality, QUALITIES, "quality")]
+    drawn_quality = QUALITIES[checks.name(quality, QUALITIES, "quality")]
     if kwargs.get("depth") or kwargs.get("segmentation"):
         scale = 1
     else:
-        scale = min(drawing.scale, MAX_SCALE * MAX_HEIGHT // height, MAX_SCALE * MAX_WIDTH // width)
+        scale = min(drawn_quality.scale, MAX_SCALE * MAX_HEIGHT // height, MAX_SCALE * MAX_WIDTH // width)
 
     def draw():
-        decorated = _decorated_body(body, arena, drawing)
+        decorated = _decorated_body(body, arena, drawn_quality)
         check_camera(decorated.model.ptr, camera_id)
         decorated.pose(qpos, share, mocap_pos, markers, failed_legs)
         return decorated.render(scale * height, scale * width, camera_id, **kwargs)

@@ -10,8 +10,9 @@ import numpy as np
 
 from arc_suite.simulation.model import FIELDS, check_fields, field
 
-OF_MODEL = "model_"  # prefix of a field of the models
-LASTING = "lasting_"  # prefix of a field of the models that stays over resets
+MODEL_PREFIX = "model_"  # prefix of a field of the models
+LASTING_PREFIX = "lasting_"  # prefix of a field of the models that stays over resets
+# Parts of MuJoCo's state that lie before the buffers of delayed controls.
 _BEFORE_HISTORY = int(
     mujoco.mjtState.mjSTATE_TIME
     | mujoco.mjtState.mjSTATE_QPOS
@@ -34,7 +35,7 @@ def check_snapshot(
     Raises:
         ValueError: an array is missing, too many, of another shape or type, or holds a value out of range.
     """
-    fields = {f"{kind}{name}": name for name in FIELDS for kind in (OF_MODEL, LASTING)}
+    fields = {f"{kind}{name}": name for name in FIELDS for kind in (MODEL_PREFIX, LASTING_PREFIX)}
     expected = {**like, **dict.fromkeys(arrays.keys() & fields.keys())}
     differences = expected.keys() ^ arrays.keys()
     if differences:
@@ -47,7 +48,7 @@ def check_snapshot(
     for name in expected.keys() - like.keys():
         compiled = np.stack([field(model, fields[name]) for model in models])
         values = check_same_form(name, arrays[name], compiled)
-        if name.startswith(LASTING):  # NaN stands for no change
+        if name.startswith(LASTING_PREFIX):  # NaN stands for no change
             values = np.where(np.isnan(values), compiled, values)
         for model, model_values in zip(models, values, strict=True):
             check_fields(model, {fields[name]: model_values})
@@ -55,7 +56,7 @@ def check_snapshot(
 
 
 def _check_cursors(model: mujoco.MjModel, state: np.ndarray) -> None:
-    """Raise ValueError for a cursor of a delay outside of its buffer, of which MuJoCo would read another memory."""
+    """Raise ValueError for a cursor outside of its buffer of delayed controls: MuJoCo would read foreign memory."""
     sizes = model.actuator_history[:, 0]
     has_history = sizes > 0
     start = mujoco.mj_stateSize(model, _BEFORE_HISTORY)
@@ -66,8 +67,8 @@ def _check_cursors(model: mujoco.MjModel, state: np.ndarray) -> None:
 
 
 def model_fields(arrays: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return the fields of models in a snapshot by name: their values, and those that stay over resets."""
-    return _copy_with_prefix(OF_MODEL, arrays), _copy_with_prefix(LASTING, arrays)
+    """Return two mappings by name of the models' fields in a snapshot: all values, and those that stay over resets."""
+    return _copy_with_prefix(MODEL_PREFIX, arrays), _copy_with_prefix(LASTING_PREFIX, arrays)
 
 
 def _copy_with_prefix(prefix: str, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
