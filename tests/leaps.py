@@ -33,7 +33,7 @@ def drawn(environment: VectorEnv, kind: str) -> list[int]:
     while len(seeds) < environment.num_envs:
         tried = range(first, first := first + environment.num_envs)
         environment.reset(seed=list(tried))
-        lanes = np.rint(environment._memory.ground.middle / (terrain.WIDTH * arena.unit)).astype(int)
+        lanes = np.rint(environment._memory.ground.center_y / (terrain.WIDTH * arena.unit)).astype(int)
         lanes += len(arena.lanes) // 2
         seeds += [seed for seed, lane in zip(tried, lanes, strict=True) if arena.lanes[lane][0] == kind]
     return seeds[: environment.num_envs]
@@ -45,7 +45,7 @@ def crossed(body, kind: str, preset: str) -> int:
     size = {"width": TRENCH * height} if kind == "trenches" else {"rise": HURDLE * height}
     environment = VectorEnv(body, "leap", EPISODES, 1, "Disabled", task_kwargs=size)
     observation, _ = environment.reset(seed=drawn(environment, kind))
-    task, lanes = environment.task.definition, environment._memory.ground.middle
+    task, lanes = environment.task.definition, environment._memory.ground.center_y
     x = np.tile(height * np.arange(0.0, 30.0, 0.02), (EPISODES, 1))
     uneven = task.scene.arena.height(x, np.tile(lanes[:, None], (1, x.shape[1]))) != 0.0
     first = uneven.argmax(axis=1)

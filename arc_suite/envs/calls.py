@@ -1,4 +1,4 @@
-"""Calls of an environment: one thread at a time, checked actions and live commands, and commands from any thread."""
+"""Calls of environments: refusal of concurrent calls, checks of actions and commands, live commands of any thread."""
 
 import functools
 import threading
@@ -12,8 +12,8 @@ from arc_suite.envs import trees
 from arc_suite.tasks import Task
 from arc_suite.tasks.parameters import LARGEST
 
-# Kinds of arrays that NumPy would convert to floats although they are no real numbers: complex, objects, text, dates.
-_UNREAL_KINDS = "cOSUMmT"
+# Kinds of dtypes that NumPy would convert to floats although they are no real numbers: complex, objects, text, dates.
+_KINDS_NOT_REAL = "cOSUMmT"
 
 _Environment = TypeVar("_Environment")
 _Arguments = ParamSpec("_Arguments")
@@ -56,7 +56,8 @@ class KnownAttributes:
 class Lock(type(threading.RLock())):  # type: ignore[misc]  # the class has no name
     """The lock of one environment, as MuJoCo crashes where two threads step one simulation.
 
-    Its pickles and copies are new locks, which nobody holds.
+    A thread that holds it may take it again, as methods of an environment call one another. Its pickles and copies are
+    new locks, which nobody holds.
     """
 
     def __reduce__(self):
@@ -90,13 +91,13 @@ def one_thread_at_a_time(
 
 
 class LiveCommands:
-    """The latest value of each live command that no step has used yet; any thread may set one at any time.
+    """Live commands that no step has used yet, the latest value of each; any thread may set one at any time.
 
     Pickles and copies have the same values.
     """
 
     def __init__(self):
-        """Start without any."""
+        """Start without commands."""
         self._lock = Lock()
         # By name of the command: its value, and the mask of its environments or None. The dictionary is replaced as a
         # whole, never changed, so that other threads may read it without the lock.
@@ -220,7 +221,7 @@ def _to_floats(value) -> np.ndarray | None:
     try:
         array = np.asarray(value)
         hides_numbers = array is not value and isinstance(value, np.ma.MaskedArray)
-        if array.dtype.kind in _UNREAL_KINDS or hides_numbers:
+        if array.dtype.kind in _KINDS_NOT_REAL or hides_numbers:
             return None
         return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError, RecursionError):

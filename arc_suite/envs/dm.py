@@ -28,11 +28,10 @@ from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import check_fields
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, privileged, terms
-from arc_suite.tasks.contract import CURRICULUM
+from arc_suite.tasks.contract import LEVEL
 from arc_suite.tasks.readings import root_qpos, root_qvel
 
 _FLAT = "observations"  # dm_control's name of a flat observation
-_LEVEL = CURRICULUM[1]  # name of the setting that restarts the curriculum
 
 # Settings of dm_control's environments that this suite refuses, and why.
 _REFUSED_SETTINGS = {
@@ -184,7 +183,7 @@ class Environment(KnownAttributes, control.Environment):
         self.physics.check_process()
         run = self.task  # dm_control calls a `TaskRun` the task
         changes, next_task = checked_changes(run.opened, self.task_kwargs, run.next_changes, settings)
-        run.put_changes(changes, next_task, restart=_LEVEL in settings)
+        run.put_changes(changes, next_task, restart=LEVEL in settings)
 
     @one_thread_at_a_time
     def snapshot(self) -> dict[str, np.ndarray]:
@@ -554,7 +553,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
     def restore(self, state: snapshots.State, task: Task, next_task: Task) -> None:
         """Continue from a state, given the task of its episode and that of the next."""
         self._now.memory = trees.map_leaves(
-            lambda array, present_leaf: snapshots.number(array[0], present_leaf), state.memory, self._now.memory
+            lambda array, present_leaf: snapshots.to_number_like(array[0], present_leaf), state.memory, self._now.memory
         )
         self._now.readings = None
         self._is_starting = False
@@ -579,7 +578,10 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         return self.definition.read(physics.data.ptr)
 
     def _begin(self, physics):
-        """Lift the body out of the ground at the start of an episode, begin the memory, and return the readings."""
+        """Complete the start of an episode, and return its readings.
+
+        The body is lifted out of the ground, and the memory begins with the readings there.
+        """
         self._is_starting = False
         data = physics.data.ptr
         readings = self.definition.read(data)

@@ -69,8 +69,8 @@ def prepare_task(
     return task, model
 
 
-# Arguments that some calls have -> what other calls have in their place.
-_CURES = {
+# Argument that only some of the functions which open environments have -> hint for the others, in their errors.
+_HINTS = {
     "num_envs": "gymnasium.make_vec makes several environments",
     "num_threads": "gymnasium.make_vec makes environments that threads simulate",
     "autoreset_mode": "gymnasium.make_vec makes environments that reset themselves",
@@ -100,8 +100,8 @@ def refuse_arguments(arguments: Mapping[str, Any], function: Callable) -> None:
         function: function that opens an environment.
     """
     for name, value in arguments.items():
-        if name in _CURES:
-            raise ValueError(f"argument {name!r}: {_CURES[name]}")
+        if name in _HINTS:
+            raise ValueError(f"argument {name!r}: {_HINTS[name]}")
         setting_names = registry.setting_names()
         if name in setting_names:
             setting = f"{{{name!r}: {checks.preview(value)}}}"
@@ -123,7 +123,7 @@ def _take_modifier_settings(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _step_limit(time_limit, control_timestep: float) -> float:
-    """Return how many control steps fill a time limit, s: at least 1."""
+    """Return how many control steps fill a time limit, s: at least 1; without a limit `STEPS`."""
     if time_limit is None:
         return STEPS
     if isinstance(time_limit, float | np.floating) and time_limit == math.inf:
@@ -132,7 +132,7 @@ def _step_limit(time_limit, control_timestep: float) -> float:
     return max(1, math.ceil(steps - _ROUNDING))
 
 
-# Settings that an environment never changes, and what to do in place of a change.
+# Setting that an environment never changes -> what to do in place of a change.
 _CONSTANT_SETTINGS = {
     "arena": "open another environment",
     "time_limit": "open another environment",
@@ -140,7 +140,7 @@ _CONSTANT_SETTINGS = {
     "on_divergence": "open another environment",
 }
 
-# Properties of a task that a change of its settings must not change, by their name in errors.
+# Name in errors -> function that reads a property of a task which changes of settings must keep.
 _CONSTANT_PROPERTIES = {
     "motors, senses or kicks": lambda task: (type(task), task.structure),
     "ground": lambda task: task.scene.arena,
@@ -158,7 +158,8 @@ def checked_changes(task: Task, settings: Mapping[str, Any], earlier_changes: st
         changes: further settings by name.
 
     Raises:
-        ValueError: an unknown name, a value that does not fit, or a setting that changes more than numbers of the task.
+        ValueError: an unknown name, a value that does not fit, or a setting that would change modifiers, ground or
+            observation.
     """
     all_changes = {**json.loads(earlier_changes), **checks.mapping("settings", changes)}
     text = checks.json_text("settings", all_changes)

@@ -26,7 +26,7 @@ from arc_suite.tasks.contract import Task
 # Name of an attribute that `envs.sb3.VecEnv` gives its observation space: `Setup.to_dict` of the environments. An agent
 # saves its observation space, and with it the setup of its training.
 ATTRIBUTE = "arc_suite"
-HELD_OUT = 100_000  # first seed of the bodies of a family that serve for validation alone
+FIRST_VALIDATION_SEED = 100_000  # of bodies of a family; bodies from this seed on serve for validation alone
 
 
 def pair_with_tasks(bodies: Sequence[Body], tasks: Sequence[str]) -> list[tuple[Body, str]]:
@@ -232,8 +232,8 @@ class Setup:
     def validation(self, count: int) -> "Setup":
         """Return the setup for evaluations of a policy while it learns.
 
-        Several bodies of families are replaced by at most `count` bodies of these families from the seed `HELD_OUT` on,
-        which training does not have. Of several other bodies the first `count` remain.
+        Several bodies of families are replaced by at most `count` bodies of these families from the seed
+        `FIRST_VALIDATION_SEED` on, which training does not have. Of several other bodies the first `count` remain.
         """
         if not isinstance(self.domain, str):
             return self
@@ -370,5 +370,5 @@ def _validation_bodies(robot: str, count: int) -> str:
     families = families[:count]
     if not families:
         return ",".join(parts[:count])
-    last_seed = HELD_OUT + count // len(families) - 1
-    return ",".join(f"{family}:{HELD_OUT}-{last_seed}" for family in families)
+    last_seed = FIRST_VALIDATION_SEED + count // len(families) - 1
+    return ",".join(f"{family}:{FIRST_VALIDATION_SEED}-{last_seed}" for family in families)

@@ -44,18 +44,18 @@ def describe(task: Task) -> str:
     return json.dumps(facts)
 
 
-def check_equal(here: str, snapshot: Any) -> None:
+def check_equal(facts_of_environment: str, facts_of_snapshot: Any) -> None:
     """Refuse the facts of a snapshot that differ from those of an environment; names that only one has are ignored.
 
     Args:
-        here: JSON of the environment's facts.
-        snapshot: JSON of the snapshot's facts, unchecked.
+        facts_of_environment: JSON.
+        facts_of_snapshot: JSON, unchecked.
 
     Raises:
         ValueError: a difference, or no such JSON.
     """
-    expected_facts = json.loads(here)
-    facts = checks.mapping("setup", json.loads(snapshot))
+    expected_facts = json.loads(facts_of_environment)
+    facts = checks.mapping("setup", json.loads(facts_of_snapshot))
     for name, expected in expected_facts.items():
         fact = facts.get(name, expected)
         if fact != expected:

@@ -25,8 +25,8 @@ class _RandomArray(NamedTuple):
 
     Attributes:
         dtype: dtype of the array.
-        smallest: valid number.
-        largest: valid number.
+        smallest: smallest valid number.
+        largest: largest valid number.
     """
 
     dtype: type
@@ -35,7 +35,8 @@ class _RandomArray(NamedTuple):
 
 
 _KEY_COUNT = 624  # numbers in the key of the Mersenne Twister
-# By name, in the order of the parts in `RandomState.get_state()` after the generator's name.
+# By name, in the order of the parts of `RandomState.get_state()` after the generator's name: keys, pos, has_gauss and
+# cached_gaussian. The generator draws normal numbers in pairs, of which the last two parts store the second.
 _RANDOM_ARRAYS = {
     "random/keys": _RandomArray(np.uint32, 0, 2**32 - 1),
     "random/positions": _RandomArray(np.int64, 0, _KEY_COUNT),
@@ -177,7 +178,7 @@ def _split_stream_name(name: str) -> tuple[int, str]:
     return int(index), leaf
 
 
-def number(value: np.ndarray, like) -> Any:
+def to_number_like(value: np.ndarray, like) -> Any:
     """Return an array () as a number of the type of `like`; if `like` is an array, return the array as it is."""
     if isinstance(like, np.ndarray):
         return value
@@ -258,7 +259,7 @@ def _read_stream(like, leaves_by_index: Mapping[str, np.ndarray]) -> Any:
         array = leaves_by_index[str(next(leaf_indices))]
         leaf_array = np.asarray(leaf)
         checked_array = check_finite("stream", check_same_form("stream", array, leaf_array), np.isnan(leaf_array))
-        return number(checked_array, leaf)
+        return to_number_like(checked_array, leaf)
 
     return trees.map_leaves(read_leaf, like)
 

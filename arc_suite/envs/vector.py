@@ -32,12 +32,11 @@ from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.cores import usable_cores
 from arc_suite.simulation.model import check_fields
 from arc_suite.tasks import Task, privileged, terms
-from arc_suite.tasks.contract import CURRICULUM, Inputs
+from arc_suite.tasks.contract import LEVEL, Inputs
 from arc_suite.tasks.readings import root_qpos, root_qvel
 
 _MAX_THREADS = 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
-_LEVEL = CURRICULUM[1]  # name of the setting that restarts the curriculum
 
 
 class VectorTask(TaskView, KnownAttributes):
@@ -65,7 +64,8 @@ class VectorTask(TaskView, KnownAttributes):
         Raises:
             ResetNeeded: before the first reset.
         """
-        return self.definition.progress(self._memory)
+        self._check_begun()
+        return self.definition.progress(self._environment._memory)
 
     @property
     def privileged(self) -> Mapping[str, np.ndarray]:
@@ -74,13 +74,13 @@ class VectorTask(TaskView, KnownAttributes):
         Raises:
             ResetNeeded: before the first reset.
         """
-        return self._environment._privileged_blocks(self.definition, self._memory)
+        self._check_begun()
+        return self._environment._privileged_blocks()
 
-    @property
-    def _memory(self) -> Any:
+    def _check_begun(self) -> None:
+        """Raise ResetNeeded before the first reset."""
         if self._environment._memory is None:
             raise ResetNeeded("no episode has begun; call reset first")
-        return self._environment._memory
 
 
 class VectorEnv(KnownAttributes, BaseVectorEnv):
@@ -286,13 +286,13 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         is_stepping = ~(self._ended | self._resting)
         is_starting = self._ended & ~(self._resting | must_wait)
 
-        memory_of_inputs, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
+        memory_with_action, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
         self._write_inputs(inputs, is_stepping)
         has_diverged = self.batch.step(task.scene.substeps, is_stepping)
         if usage.recording:
             usage.count_steps(int(np.count_nonzero(is_stepping)))
         readings = task.read(self.batch.data)
-        memory = trees.where(is_stepping, task.after(memory_of_inputs, readings), earlier_memory)
+        memory = trees.where(is_stepping, task.after(memory_with_action, readings), earlier_memory)
         self._memory = memory
         self._steps += 1
 
@@ -398,22 +398,22 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """
         self._check_open("change settings")
         mask = self._checked_mask(mask, "mask")
-        self._put_changes(mask, self._checked_changes(settings), restart=_LEVEL in settings)
+        self._put_changes(mask, self._checked_changes(settings), restart=LEVEL in settings)
 
     def _checked_changes(self, settings: Any) -> list[tuple[str, Task]]:
         """Return for each environment the JSON of all changed settings, and the task with them."""
         _, _, task_kwargs = self.arguments
-        found_changes: dict[tuple[int, str], tuple[str, Task]] = {}  # equal changes of one task give one task
+        known_changes: dict[tuple[int, str], tuple[str, Task]] = {}  # equal changes of one task give one task
         changes = []
         for opened_task, earlier_changes in zip(self._opened_tasks, self._next_changes, strict=True):
             key = (id(opened_task), earlier_changes)
-            if key not in found_changes:
-                found_changes[key] = checked_changes(opened_task, task_kwargs, earlier_changes, settings)
+            if key not in known_changes:
+                known_changes[key] = checked_changes(opened_task, task_kwargs, earlier_changes, settings)
                 if stacked.kind(opened_task) is None:
                     raise ValueError(
                         f"task {opened_task.name}: without from_body environments cannot differ in settings"
                     )
-            changes.append(found_changes[key])
+            changes.append(known_changes[key])
         return changes
 
     def _put_changes(self, mask: np.ndarray, changes: Sequence[tuple[str, Task]], restart: bool) -> None:
@@ -600,19 +600,19 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         # A task that is the same for all environments gets those of the mask alone. A stacked task needs all of them.
         task = self._task
         memory = trees.map_leaves(lambda *leaves: np.stack(leaves), *memories)
-        part = mask  # (num_envs,) the environments that the task gets
+        task_mask = mask  # (num_envs,) the environments that the task gets
         is_stacked = task is not self._tasks[0]
         if is_stacked:
-            part = np.ones(self.num_envs, bool)
+            task_mask = np.ones(self.num_envs, bool)
             if self._memory is not None:
                 memory = _replace_entries(self._memory, mask, memory)
-        is_starting = mask[part]  # which environments of the part start an episode
+        is_starting = mask[task_mask]  # which environments of the task start an episode
 
-        readings = task.read(self.batch.part(part))
+        readings = task.read(self.batch.part(task_mask))
         clear_qpos = task.clear_spawn(memory, readings)
         if clear_qpos is not None:
             self.batch.place(mask, root_qpos(clear_qpos[is_starting], layout))
-            readings = task.read(self.batch.part(part))
+            readings = task.read(self.batch.part(task_mask))
         memory = task.begin(memory, readings)
         observation[mask] = task.vector(task.observe(memory, readings), np.float32)[is_starting]
 
@@ -679,19 +679,19 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
     def _privileged_vectors(self) -> np.ndarray:
         """Return the present privileged observations (num_envs, size) float32."""
-        return privileged.vector(self._task, self._privileged_blocks(self._task, self._memory))
+        return privileged.vector(self._task, self._privileged_blocks())
 
-    def _privileged_blocks(self, definition: Task, memory: Any) -> dict[str, np.ndarray]:
+    def _privileged_blocks(self) -> dict[str, np.ndarray]:
         """Return the privileged observations by block, with what `change_model` has set in place of what was drawn."""
-        blocks = definition.privileged(memory, self.batch.data)
+        blocks = self._task.privileged(self._memory, self.batch.data)
         if not self.batch.changed:
             return blocks
         for index, task in enumerate(self._tasks):
             changed_fields = self.batch.lasting_fields(index)
             if not changed_fields:
                 continue
-            own_blocks = {name: block[index] for name, block in blocks.items()}
-            for name, changed_block in task.read_back(own_blocks, changed_fields).items():
+            drawn_blocks = {name: block[index] for name, block in blocks.items()}
+            for name, changed_block in task.read_back(drawn_blocks, changed_fields).items():
                 blocks[name] = blocks[name].copy()  # it may be an array of the memory
                 blocks[name][index] = changed_block
         return blocks

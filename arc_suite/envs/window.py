@@ -29,10 +29,10 @@ class Window:
         """Open the window.
 
         Args:
-            shown: the decorated body; the caller sets its poses.
+            shown: the decorated body that the window shows; the caller sets its poses.
             camera_id: name or index of the first camera, -1 for one that follows the torso and that the mouse turns.
-            pressed: called with GLFW's number of each key, in the window's thread.
-            instead: what to do without a window, for the error.
+            pressed: function that is called with GLFW's number of each key that is pressed, in the window's thread.
+            instead: alternative to a window, for the error.
 
         Raises:
             RenderingUnavailable: no window can be opened here.
@@ -72,7 +72,7 @@ class Window:
         return self._viewer.is_running()
 
     def show(self, duration: float, markers: Iterable[Marker] = (), text: str = "") -> None:
-        """Draw the present pose, wait until the previous picture has had its time, and return.
+        """Draw the present pose, and wait until the duration of the previous picture is over.
 
         A window that was closed shows nothing and does not wait.
 

@@ -1,6 +1,6 @@
 """Policies: one protocol of acting, and policies by name."""
 
-from arc_suite.policies.cures import refuse_other_words
+from arc_suite.policies.hints import refuse_other_words
 from arc_suite.policies.named import (
     HELP,
     POLICIES,

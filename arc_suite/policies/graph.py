@@ -116,7 +116,7 @@ def _truth(compare: np.ufunc) -> Operator:
 
 
 # Take returns numbers of an environment by their indices, in the shape of the indices. Concat returns all numbers of
-# its inputs. Sum sums over the axis after that of environments.
+# its inputs as one vector. Sum sums over the first axis after that of environments.
 # Pick returns the rows (n, size) of an array (num_envs, count, size) where a mask (num_envs, count) is not 0, so that
 # later nodes compute these rows alone. Place puts rows back, with 0 elsewhere. As operators between them compute each
 # row by itself, an export that computes all rows has the same results.

@@ -18,7 +18,7 @@ from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import check_preset_name, preset_names
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import cures, network, other_libraries
+from arc_suite.policies import hints, network, other_libraries
 from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.other_libraries import PolicyFile
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
@@ -70,8 +70,8 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
     path = _packaged_path(body, task_name)
     if not is_packaged(body, task_name):
         names = ", ".join(sorted(file.stem for file in PACKAGED.glob(f"*{network.EXTENSION}")))
-        cure = "arc-suite train makes others, and universal moves any body"
-        raise ValueError(f"policy ppo: none for {path.stem} (there are: {names}); {cure}")
+        hint = "arc-suite train makes others, and universal moves any body"
+        raise ValueError(f"policy ppo: none for {path.stem} (there are: {names}); {hint}")
     return _from_file(path, body, task)
 
 
@@ -138,20 +138,20 @@ def policy(
         check_preset_name(preset)
     checks.number("noise", noise, 0.0)
     if isinstance(name, str | os.PathLike) and name not in POLICIES:
-        cures.refuse_other_files(name)
+        hints.refuse_other_files(name)
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
         checkpoints = network.checkpoint_files(Path(name))
         if checkpoints:
-            made_policy = Mixture([_from_file(path, body, task) for path in checkpoints], num_envs)
+            named_policy = Mixture([_from_file(path, body, task) for path in checkpoints], num_envs)
         else:
-            made_policy = _from_file(Path(name), body, task)
+            named_policy = _from_file(Path(name), body, task)
     elif isinstance(name, str) and ":" in name:
-        made_policy = _from_path(name, body, num_envs)
+        named_policy = _from_function(name, body, num_envs)
     else:
-        cures.refuse_other_words(name, POLICIES)
+        hints.refuse_other_words(name, POLICIES)
         make = POLICIES[checks.name(name, POLICIES, "policy")]
-        made_policy = make(body, preset_list, num_envs, task)
-    return Sum(made_policy, _noise(body, noise, num_envs)) if noise else made_policy
+        named_policy = make(body, preset_list, num_envs, task)
+    return Sum(named_policy, _noise(body, noise, num_envs)) if noise else named_policy
 
 
 def check_preset(policy_name: Any, preset: str | None) -> None:
@@ -266,7 +266,7 @@ def setup_of(name) -> Setup | None:
         return name.setup if isinstance(name, Network) else None
     if name in POLICIES:
         return None
-    cures.refuse_other_files(name)
+    hints.refuse_other_files(name)
     if not (isinstance(name, os.PathLike) or _is_path(name)):
         return None
     policy_file = other_libraries.find(name)
@@ -344,7 +344,7 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
         if task is None:
             task, _ = prepare_task(body, "walk")
         return registry.resolve(_UNIVERSAL_MODULE).Universal(policy_network, task)
-    _check(path, policy_network.setup, body, task)
+    _check_setup(path, policy_network.setup, body, task)
     _check_joints(path, policy_network.joints, body)
     return policy_network
 
@@ -355,14 +355,14 @@ def _from_other_library(policy_file: PolicyFile, body: Body, task: Task | None) 
     if setup is None:
         warnings.warn(f"policy {path}: {policy_file.reader.NO_SETUP}", stacklevel=5)
     else:
-        _check(path, setup, body, task)
+        _check_setup(path, setup, body, task)
     loaded = policy_file.load()
     _check_joints(path, loaded.joints, body)
     return loaded
 
 
-def _check(path: Path, setup: Setup, body: Body, task: Task | None) -> None:
-    """Raise a ValueError of one line if a policy was trained for another body, or for other actions."""
+def _check_setup(path: Path, setup: Setup, body: Body, task: Task | None) -> None:
+    """Raise ValueError if a policy was trained for another body, or for other actions."""
     if setup.body != body and not (is_robot(setup.body) and setup.body.name == body.name):
         name = "another body of that name" if setup.body.name == body.name else setup.body.name
         raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
@@ -376,13 +376,14 @@ def _check_joints(path: Path, joints: int, body: Body) -> None:
         raise ValueError(f"policy {path}: moves {joints} joints, and {body.name} has {len(body.joint_names)}")
 
 
-def _from_path(path: str, body: Body, num_envs: int) -> Policy:
+def _from_function(path: str, body: Body, num_envs: int) -> Policy:
+    """Return the policy that a function makes, given the function as `module:attribute` or `file.py:attribute`."""
     module, _, _ = path.rpartition(":")
     resolve = _resolve_in_file if module.endswith(PYTHON_EXTENSION) else pkgutil.resolve_name
     factory = checks.import_object(path, "policy", resolve)
     if not callable(factory):
         raise ValueError(f"policy {checks.preview(path)}: expected a function that makes a policy from a robot's name")
-    cures.check_takes_robot(path, factory)
+    hints.check_takes_robot(path, factory)
     make = _add_check(path, factory, body.name if is_robot(body) else body)
     make()  # raises an error at once if the function does not fit
     return Individuals(make, num_envs, len(body.joint_names), f"policy {checks.preview(path)}")
@@ -408,7 +409,7 @@ def _add_check(path: str, factory: Callable, robot: str | Body) -> Callable[[], 
             kind = type(act).__name__
             raise ValueError(
                 f"policy {checks.preview(path)}: expected it to return a function of a TimeStep, got {kind}"
-                f"{cures.suggest_method(act)}"
+                f"{hints.suggest_method(act)}"
             )
         return act
 

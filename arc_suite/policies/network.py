@@ -81,18 +81,18 @@ class Network(NamedTuple):
         sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
             names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
-            wrong = ", ".join(
+            differences = ", ".join(
                 f"{checks.quote(name)} has {sizes.get(name, 0)}, not {self.blocks.get(name, 0)}"
                 for name in names[:_MAX_NAMES]
             )
             are_all_additional = set(names).isdisjoint(self.blocks)
             if are_all_additional:
-                cure = f"exclude_blocks={checks.quote(json.dumps(names))} leaves out what it does not read"
+                hint = f"exclude_blocks={checks.quote(json.dumps(names))} leaves out what it does not read"
             else:
-                cure = "train with this body and task"
+                hint = "train with this body and task"
             setup_text = f"{self.setup.name}, {self.setup.task_label}"
             raise ValueError(
-                f"policy of {setup_text}: observations differ from those in training: {wrong} numbers; {cure}"
+                f"policy of {setup_text}: observations differ from those in training: {differences} numbers; {hint}"
             )
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
@@ -140,10 +140,10 @@ def load(path: str | os.PathLike[str]) -> Network:
     if not path.exists():
         is_of_run = path.name == FILE and path.parent.is_dir()
         if is_of_run:
-            cure = "; a run writes it at its first evaluation"
+            hint = "; a run writes it at its first evaluation"
         else:
-            cure = checks.hint(str(path), map(str, path.parent.glob("*")))
-        raise OSError(f"cannot read {path}: no such file{cure}")
+            hint = checks.hint(str(path), map(str, path.parent.glob("*")))
+        raise OSError(f"cannot read {path}: no such file{hint}")
     try:
         with parsers.guard(f"{path}: no policy, or a damaged one", passes=(registry.NotImported,)):
             return _read(path)

@@ -16,11 +16,11 @@ from arc_suite.policies.protocol import Policy
 READERS = {".zip": "arc_suite.policies.zips"}
 
 
-class Loaded(Policy, Protocol):
-    """A policy that such a file holds.
+class LoadedPolicy(Policy, Protocol):
+    """A policy from a file of another library.
 
     Attributes:
-        joints: joints that it moves.
+        joints: number of joints that it moves.
     """
 
     joints: int
@@ -51,7 +51,7 @@ class Reader(Protocol):
         """Return the sha256 of the content of a policy, without times of its files."""
         ...
 
-    def load(self, path: Path, further: Path | None) -> Loaded:
+    def load(self, path: Path, further: Path | None) -> LoadedPolicy:
         """Return the policy of a file."""
         ...
 
@@ -82,7 +82,7 @@ class PolicyFile(NamedTuple):
         """Return the sha256 of its content; see `Reader.digest`."""
         return self.reader.digest(self.path, self.further)
 
-    def load(self) -> Loaded:
+    def load(self) -> LoadedPolicy:
         """Return its policy."""
         return self.reader.load(self.path, self.further)
 

@@ -17,7 +17,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.policies.network import Network
 from arc_suite.policies.tracing import Traced, traced
 
-# Module of PyTorch -> function that adds its node to a graph, given the inputs.
+# Class of a PyTorch module -> function that adds the module's node to a graph, given the inputs and the module.
 _NODES = {
     torch.nn.Linear: lambda x, module: x.node("Linear", _array(module.weight.T), _array(module.bias)),
     torch.nn.ReLU: lambda x, module: x.node("Relu"),

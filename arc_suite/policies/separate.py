@@ -1,4 +1,4 @@
-"""Modules that act in a process of their own; environments and returns stay in the process of the judge.
+"""Policies of modules that act in a process of their own; environments and returns stay in the process of the judge.
 
 The process is `python -m arc_suite.policies.separate`, in the folder of the module. Messages go through its standard
 input and output, and have sizes that both sides know:
@@ -27,7 +27,7 @@ import numpy as np
 from arc_suite import checks, registry
 
 MAX_START = 300.0  # s until a module is imported and has made its first function
-MAX_STEP = 60.0  # s until an answer
+MAX_STEP = 60.0  # s until the answer to a reset or an act
 
 _DONE = b"k"
 _ERROR = b"e"
@@ -60,7 +60,7 @@ class Separate:
             num_envs: number of environments.
             sizes: size of each block of the observation by name.
             name: name of the policy, with which errors begin.
-            max_step: s until an answer.
+            max_step: time until the answer to a reset or an act, s; a later one is an error.
 
         Raises:
             ValueError: the module does not fit, dies or hangs.

@@ -1,4 +1,4 @@
-"""Functions of arrays as graphs: a function that computes with NumPy also writes the nodes of a graph."""
+"""Tracing of functions: a function of `Traced` numbers, written as if they were NumPy arrays, gives a graph."""
 
 import functools
 import math

@@ -12,7 +12,7 @@ from typing import Any
 
 from arc_suite import archives, files, parsers, registry, versions
 from arc_suite.envs.setup import ATTRIBUTE, Setup
-from arc_suite.policies.other_libraries import Loaded
+from arc_suite.policies.other_libraries import LoadedPolicy
 
 EXTENSION = ".zip"
 _MAX_BYTES = 1 << 32  # of all members; replay buffers are saved apart
@@ -65,7 +65,7 @@ def digest(path: Path, further: Path | None) -> str:
     return hashlib.sha256(f"{members_hash}\0{statistics_hash}".encode()).hexdigest()
 
 
-def load(path: Path, further: Path | None) -> Loaded:
+def load(path: Path, further: Path | None) -> LoadedPolicy:
     """Return the policy of a zip. The pickles that it holds run code.
 
     Args:
@@ -102,6 +102,7 @@ def statistics(path: Path, given: Path | None = None) -> Path | None:
         return given
     if not is_normalized:
         return None
+    # `CheckpointCallback` writes ppo_1000_steps.zip and ppo_vecnormalize_1000_steps.pkl.
     numbered = re.sub(r"_(\d+_steps)$", r"_vecnormalize_\1", path.stem)
     names = dict.fromkeys((f"{path.stem}_vecnormalize.pkl", f"{numbered}.pkl", "vecnormalize.pkl"))
     names.pop(f"{path.stem}.pkl", None)

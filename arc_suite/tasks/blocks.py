@@ -24,7 +24,8 @@ ANGULAR_VELOCITY_NOISE = 0.05  # sqrt(g / h)
 JOINT_VELOCITY_NOISE = 0.3  # sqrt(g / h)
 CONTACT_FORCE_NOISE = 0.02  # share of the range to which forces are clipped
 
-PAGE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # that scripts of a page compute
+# Blocks that the JavaScript of a playable page computes, so that a policy of them can act there.
+PAGE_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")
 
 
 class Block(NamedTuple):
@@ -33,7 +34,7 @@ class Block(NamedTuple):
     Attributes:
         parts: its parts, in order.
         noise: half-widths of the noise of each part at level 1, in its unit, or one number for all; None without noise.
-        sensed: whether the sensors of a robot give each part, or one value for all; see `modifiers.SensorsOnly`.
+        sensed: whether the sensors of a robot measure each part, or one value for all; see `modifiers.SensorsOnly`.
     """
 
     parts: tuple[Part, ...]
@@ -73,7 +74,7 @@ class Block(NamedTuple):
 
     @property
     def are_sensed(self) -> np.ndarray:
-        """Whether (size,) the sensors of a robot give each number."""
+        """Whether (size,) the sensors of a robot measure each number."""
         return self._repeat_by_size(self.sensed)
 
     def _repeat_by_size(self, values) -> np.ndarray:

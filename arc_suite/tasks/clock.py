@@ -1,7 +1,7 @@
-"""The gait's clock, with tables by tick, one tick a control step, and how well feet follow its contact schedule.
+"""The clock of a gait: tables of phases and of the contact schedule, with an entry for each control step, a tick.
 
-Feet touch down and lift off exactly at control steps, where rounding decides on which side. So the phases are summed
-up once, in double precision, and every run, on a CPU or a GPU, looks them up.
+Feet touch down and lift off exactly at control steps, so rounding decides between a step and the next. Phases are
+therefore summed up once, in double precision, and every run, on a CPU or a GPU, looks them up.
 """
 
 import math
@@ -55,7 +55,7 @@ class Clock(NamedTuple):
             stance=desired_contacts(phases, duty_factor, offsets),
         )
 
-    def at(self, table: np.ndarray, tick):
+    def entries(self, table: np.ndarray, tick):
         """Return the entries (..., n) of a table at ticks (...), integers of Python, NumPy or JAX."""
         if not isinstance(tick, int):
             table = tick.__array_namespace__().asarray(table)
@@ -90,7 +90,7 @@ class Clocks(NamedTuple):
         phases, circle, stance = (np.concatenate(tables) for tables in zip(*distinct_clocks.values(), strict=True))
         return cls(phases, circle, stance, starts[indices], counts[indices])
 
-    def at(self, table: np.ndarray, tick):
+    def entries(self, table: np.ndarray, tick):
         """Return the entries (environments, n) of a table at ticks (environments,)."""
         return table[self.starts + tick % self.counts]
 

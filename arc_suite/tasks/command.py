@@ -47,7 +47,7 @@ _MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
 
 
 class Followed(NamedTuple):
-    """A command after a control step.
+    """What a command returns after a control step, see `Command.follow`.
 
     Attributes:
         memory: memory of the command.
@@ -94,14 +94,14 @@ class Command(ABC):
         """Return the velocity (..., 3) that holds at a place after control steps (...)."""
 
     @abstractmethod
-    def follow(self, context: Context, memory, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory, steps, place_before, place, motion, readings) -> Followed:
         """Return the command after a control step.
 
         Args:
             context: context of the task.
             memory: memory of the command, before the step.
             steps: (...) control steps since the start.
-            before: (..., 3) the place before the step.
+            place_before: (..., 3) the place before the step.
             place: (..., 3) the place after it.
             motion: (..., 3) mean velocity of the torso.
             readings: after the step.
@@ -139,7 +139,12 @@ class Command(ABC):
         return {}
 
     def schedule(self, random: np.random.RandomState, share: float) -> "Scheduled":
-        """Draw a schedule, which every command does; a curriculum has widened its ranges by `share`, from 0 to 1."""
+        """Draw a schedule. Every command draws one, so that tasks have the same draws; `Schedule` alone uses it.
+
+        Args:
+            random: the random generator.
+            share: share, from 0 to 1, by which a curriculum has widened the ranges of commands.
+        """
         return draw_schedule(random)
 
     def begin(self, context: Context, memory, place) -> Any:
@@ -164,7 +169,7 @@ class Command(ABC):
 
 
 class Live(NamedTuple):
-    """Memory of a command that can be set live.
+    """Memory of `AlongLane`.
 
     Attributes:
         live: (..., 3) velocity that is set from outside; NaN for that of the command itself.
@@ -178,7 +183,7 @@ class Live(NamedTuple):
 
 
 class Scheduled(NamedTuple):
-    """Memory of a schedule.
+    """Memory of `Schedule`.
 
     Attributes:
         ends: (..., COMMANDS) steps at which the commands of the schedule end.
@@ -288,7 +293,7 @@ class Schedule(Command):
         scheduled = scheduled_value(memory.ends, memory.schedule, steps)
         return xp.where(xp.isnan(memory.live), scheduled, memory.live)
 
-    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory: Scheduled, steps, place_before, place, motion, readings) -> Followed:
         """Return the command after a control step, and the share of it that the motion reaches."""
         desired = self.desired(context, memory, steps, place)
         memory = memory._replace(speed_share=projected_share(desired, motion))
@@ -337,7 +342,7 @@ def begins_next(ends, live, steps):
 
 @dataclasses.dataclass(frozen=True)
 class AlongLane(Command):
-    """Along world x at the target velocity, with a turn back into that direction."""
+    """Velocity along world x at the target velocity, with a turn that brings the heading back to that direction."""
 
     def start(self, context: Context, random, schedule: Scheduled) -> Live:
         """Return a memory without displacement; the drawn schedule is not used."""
@@ -351,10 +356,10 @@ class AlongLane(Command):
         along_lane = xp.stack([xp.cos(heading), -xp.sin(heading), turning], axis=-1)
         return xp.where(xp.isnan(memory.live), along_lane, memory.live)
 
-    def follow(self, context: Context, memory: Live, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory: Live, steps, place_before, place, motion, readings) -> Followed:
         """Return the command after a control step, and the distance."""
         desired = self.desired(context, memory, steps, place)
-        displacement = component(place, 0) - component(before, 0)
+        displacement = component(place, 0) - component(place_before, 0)
         speed_share = _mean_speed_share(context, memory.speed_share, displacement)
         memory = Live(memory.live, memory.distance + displacement, speed_share)
         return Followed(memory, desired, tracking(desired, motion))
@@ -377,7 +382,7 @@ class AlongLane(Command):
 
 
 class Chain(NamedTuple):
-    """Memory of a chain of goals.
+    """Memory of `ToGoal`: a chain of goals.
 
     Attributes:
         goals: (..., GOALS, 2) positions, m.
@@ -455,7 +460,7 @@ class ToGoal(Command):
         xp = memory.goals.__array_namespace__()
         return command_to_goal(xp.arctan2(goal[..., 1], goal[..., 0]))
 
-    def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory: Chain, steps, place_before, place, motion, readings) -> Followed:
         """Return the command after a control step: progress to the goal, and the next goal where it is reached."""
         xp = place.__array_namespace__()
         distance_before = xp.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])  # m

@@ -79,7 +79,7 @@ class CommandTaskSettings(NamedTuple):
     gait_and_pose: GaitAndPose | None = None
 
 
-# A NamedTuple cannot extend another one, so the fields of `Readings` are repeated, and two of its methods.
+# A NamedTuple cannot inherit from another one, so this one takes the fields of `Readings`, and two of its methods.
 class Sensed(
     NamedTuple("Sensed", [(field, np.ndarray) for field in (*Readings._fields, "heading", "touches", "feet")])
 ):
@@ -88,7 +88,7 @@ class Sensed(
     Attributes:
         heading: (...) yaw of the torso, rad.
         touches: (...) whether the body touches an obstacle; None where there are none.
-        feet: (..., feet, 2) places from the torso's frame, forward and left, m; None where no pose is by command.
+        feet: (..., feet, 2) places from the torso's frame, forward and left, m; None in tasks without a commanded pose.
     """
 
     torso_height = Readings.torso_height
@@ -130,7 +130,7 @@ class Core(NamedTuple):
 
 
 class CommandTaskMemory(NamedTuple):
-    """Memory of an episode: that of all tasks with a command, and those of the values of which the task is composed."""
+    """Memory of an episode: `core`, which all tasks with a command have, and the memory of each value of the task."""
 
     core: Core
     command: Any
@@ -274,7 +274,7 @@ class CommandTask(Task):
     def phase(self, memory: CommandTaskMemory):
         """Return the phase (...) of the gait, rad."""
         if self.settings.gait_and_pose is None:
-            return self.clock.at(self.clock.phases, memory.core.tick)
+            return self.clock.entries(self.clock.phases, memory.core.tick)
         return self.settings.gait_and_pose.phase(memory.gait_and_pose)
 
     def leg_phases(self, memory: CommandTaskMemory) -> tuple[Any, Any]:
@@ -383,11 +383,11 @@ class CommandTask(Task):
         gait_and_pose = self.settings.gait_and_pose
         gait_memory = memory.gait_and_pose
         if gait_and_pose is None:
-            stance = self.clock.at(self.clock.stance, tick)
+            stance = self.clock.entries(self.clock.stance, tick)
             crouch = 1.0  # share of the standing height that the command asks for
         else:
-            # The gait by command goes on before feet are judged by it.
-            gait_memory = gait_and_pose.before_feet(context, gait_memory, steps, is_going)
+            # The commanded gait advances first, as the contacts of this step are judged by it.
+            gait_memory = gait_and_pose.advance(context, gait_memory, steps, is_going)
             stance = gait_and_pose.stance(gait_memory)
             crouch = gait_and_pose.crouch(gait_memory)
         stance = stance | ~is_going[..., None]  # at a stop, all feet stand
@@ -484,7 +484,7 @@ class CommandTask(Task):
         velocity = rotations.to_heading_frame(velocities[..., :2], heading)
         gait_and_pose = self.settings.gait_and_pose
         if gait_and_pose is None:
-            clock_circle = self.clock.at(self.clock.circle, core.tick)
+            clock_circle = self.clock.entries(self.clock.circle, core.tick)
             gait_blocks = {}
         else:
             clock_circle = gait_and_pose.circle(memory.gait_and_pose)

@@ -1,4 +1,4 @@
-"""Lengths and speeds of a body, which are the units of tasks with a command."""
+"""Lengths and speeds of a body, in which tasks with a command measure, and the time constants of their means."""
 
 import math
 from typing import Any, NamedTuple
@@ -24,11 +24,11 @@ class Context(NamedTuple):
             three times the weight, N.
         step_units: (3,) displacements of a control step at `units`, m and rad.
         pace: displacement of a control step at the target velocity, m.
-        leak: weight of the latest step in leaky means over a cycle of the gait.
+        leak: weight of the latest step in exponential moving averages over a cycle of the gait, called leaky means.
         leaks: (3,) the same weight, for means of vectors.
         steps: control steps over which an episode is judged: its limit, 1000 without one.
-        tempo: sqrt(h / g), control steps.
-        reference: what gait and pose by command measure the body by; None without them.
+        tempo: time unit sqrt(h / g), control steps.
+        reference: the `gait_and_pose.Reference` of a task with a commanded gait and pose; None for other tasks.
     """
 
     arena: Any

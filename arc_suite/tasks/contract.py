@@ -50,7 +50,8 @@ from arc_suite.tasks.scene import Inputs, Scene, Start
 STEPS = 1000  # control steps of an episode
 
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
-CURRICULUM = ("curriculum", "level")
+LEVEL = "level"
+CURRICULUM = ("curriculum", LEVEL)
 
 _CLEARANCE = 0.01  # standing heights; feet start at least so far above the ground
 _RINGS = (0.35, 0.7, 0.9)  # distances from a foot's center at which the ground is measured, shares of the ball's radius
@@ -81,7 +82,9 @@ class FileSetting(NamedTuple):
 
 
 class Observed(ABC):
-    """What follows from the blocks of the observation that a task declares.
+    """Base of `Task` and of `wrapper.Wrapper`: what follows from the blocks of the observation that a task declares.
+
+    A wrapper may change the blocks, so it computes this again and does not take it from the task that it wraps.
 
     Attributes:
         name: name of the task.
@@ -251,7 +254,7 @@ class Task(Observed):
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The fields of the simulation that `read` takes."""
+        """The names of the fields of `MjData` that `read` takes."""
         layout = self.scene.layout
         if layout.torso_place is not None:
             return reading.FIELDS_OF_PLACED_TORSOS
@@ -420,7 +423,7 @@ class Task(Observed):
         return {}
 
     def resampled(self, memory) -> Any:
-        """Return whether (...) the latest step began another drawn command; one boolean will do for all environments.
+        """Return whether (...) the latest step began another drawn command, or one boolean for all environments.
 
         The reward of that step already judges the motion by it. See `VectorEnv.resampled`.
         """

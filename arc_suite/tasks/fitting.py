@@ -1,4 +1,4 @@
-"""Numbers of walk for a body without published ones, from its standing pose.
+"""Parameters of the task walk for a body without published ones, from its standing pose.
 
 Speeds are multiples of sqrt(g h) (a Froude number of speed / sqrt(g h)), frequencies of
 sqrt(g / h) and lengths of h, the height at which the torso stands, so that bodies of one shape and
@@ -47,7 +47,7 @@ def fitted_parameters(body: Body) -> dict:
 
 
 def fitted_noise(body: Body) -> dict[str, float]:
-    """Return every noise of a start that suits any body: names and units as in `walk.Noise`."""
+    """Return every noise of a start that suits any body: names and units as in `parameters.Noise`."""
     height = body.torso.standing_height
     velocity_unit = math.sqrt(GRAVITY * height)
     rate_unit = math.sqrt(GRAVITY / height)

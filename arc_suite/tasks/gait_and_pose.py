@@ -1,7 +1,7 @@
-"""A gait and a pose of the torso by command, drawn for the episode or set while it runs.
+"""Commanded gaits and poses of the torso, drawn for the episode or set while it runs.
 
-Pose and gait glide to the command. The clock counts integers, so that touchdowns of every gait are exact. The phase
-continues when the command changes to another gait.
+The present pose and gait glide: they approach the commanded ones by bounded steps. The clock counts integers, so that
+touchdowns of every gait are exact. The phase continues when the command changes to another gait.
 """
 
 import dataclasses
@@ -27,8 +27,8 @@ CYCLE = 1 << 20  # units of the clock in a cycle of the gait
 DRAWN_GAITS = ("trot", "walk", "tripod", "tetrapod", "ripple")  # those that fit the body
 
 _FREQUENCY_RANGE = (0.8, 1.2)  # of drawn frequencies, multiples of the prescribed one
-_DRAWN_SHARE = 0.35  # probability that a number of a pose is drawn; others are 0
-_GLIDE_SPEED = 0.25  # of a pose, standing heights or rad in a time of sqrt(h / g)
+_DRAW_PROBABILITY = 0.35  # that a number of a pose is drawn; others are 0
+_MAX_POSE_SPEED = 0.25  # at which a pose changes, standing heights or rad in a time of sqrt(h / g)
 _MIN_POSE_SIZE = 0.1  # standing heights or rad; smaller poses are judged as strictly as one of this size
 _CHANCE_IN_SCHEDULE = 0.7  # share of feet that follow a contact schedule by chance, in a walk in another gait
 _DUTY_FACTORS = (0.05, 0.95)  # bounds
@@ -54,20 +54,20 @@ class Reference(NamedTuple):
     """Reference of a body by which poses and gaits are measured.
 
     Attributes:
-        ride: height of the torso at rest, standing heights.
+        ride_height: height of the torso at rest, standing heights.
         feet: (legs, 2) positions from the torso at rest, forward and left, m.
         angles: (joints,) at rest, relative to the default ones, rad.
-        turns: (joints, 6) change of joint angles with each number of a pose, rad.
+        angle_jacobian: (joints, 6) derivatives of joint angles by the numbers of a pose, rad.
         glide: largest change of a pose in a control step, standing heights or rad.
         step: control step, s.
         gait: (legs + 2,) the prescribed gait, in units of the clock.
         choices: ranges of drawn poses and gaits.
     """
 
-    ride: float
+    ride_height: float
     feet: np.ndarray
     angles: np.ndarray
-    turns: np.ndarray
+    angle_jacobian: np.ndarray
     glide: float
     step: float
     gait: np.ndarray
@@ -75,7 +75,7 @@ class Reference(NamedTuple):
 
 
 class GaitAndPoseMemory(NamedTuple):
-    """Memory of a gait and a pose by command.
+    """Memory of `GaitAndPose`.
 
     Attributes:
         pose_ends: (..., COMMANDS) steps at which the poses of the schedule end.
@@ -85,7 +85,7 @@ class GaitAndPoseMemory(NamedTuple):
         gaits: (..., COMMANDS, legs + 2) in units of the clock: offsets, duty factor, and advance in a control step.
         live_gait: (..., legs + 2) set from outside: offsets, cycles, duty factor, and frequency, Hz; NaN for that
             of the schedule.
-        pose: (..., 6) the present one, which glides to the command.
+        pose: (..., 6) the present one, which approaches the commanded one.
         gait: (..., legs + 2) the present one, in units of the clock.
         phase: (...) phase of the gait, in units of the clock.
         pose_error: (..., 6) error of the torso's pose, a leaky mean over a cycle of the prescribed gait.
@@ -114,7 +114,7 @@ _FIELD_OF_COMMAND = {"pose": "live_pose", "gait": "live_gait"}
 
 @dataclasses.dataclass(frozen=True)
 class GaitAndPose:
-    """A gait and a pose of the torso by command, in addition to a velocity; each holds for some seconds.
+    """A commanded gait and a commanded pose of the torso, in addition to a velocity; each holds for some seconds.
 
     Attributes:
         poses: share of the body's room from which poses are drawn; 0 for no poses.
@@ -169,21 +169,21 @@ class GaitAndPose:
         body = scene.body
         rest_pose = posture.find_pose_with_room(body)
         height = body.torso.standing_height
-        step = scene.control_timestep
+        control_timestep = scene.control_timestep
         prescribed = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))
         choices = Choices(
             room=self.poses * posture.measure_room(body, planted=False),
-            gaits=to_clock_units(self._drawn_gaits(body, prescribed), step),
+            gaits=to_clock_units(self._drawn_gaits(body, prescribed), control_timestep),
             frequency_range=(1.0, 1.0) if self.gaits == () else _FREQUENCY_RANGE,
         )
         return Reference(
-            ride=rest_pose.ride_height,
+            ride_height=rest_pose.ride_height,
             feet=rest_pose.sole_positions[:, :2],
             angles=rest_pose.legs.by_joint(rest_pose.joint_angles),
-            turns=posture.linearize_joint_angles(body),
-            glide=_GLIDE_SPEED * math.sqrt(GRAVITY / height) * step,
-            step=step,
-            gait=to_clock_units(prescribed, step),
+            angle_jacobian=posture.linearize_joint_angles(body),
+            glide=_MAX_POSE_SPEED * math.sqrt(GRAVITY / height) * control_timestep,
+            step=control_timestep,
+            gait=to_clock_units(prescribed, control_timestep),
             choices=choices,
         )
 
@@ -224,7 +224,7 @@ class GaitAndPose:
         low, high = choices.room.T
         pose_ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
         gait_ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
-        poses = random.uniform(-1.0, 1.0, (COMMANDS, 6)) * (random.uniform(size=(COMMANDS, 6)) < _DRAWN_SHARE)
+        poses = random.uniform(-1.0, 1.0, (COMMANDS, 6)) * (random.uniform(size=(COMMANDS, 6)) < _DRAW_PROBABILITY)
         # Numbers are not at their bounds all at once.
         poses /= abs(poses).sum(axis=-1, keepdims=True).clip(min=1.0)
         indices = (random.uniform(size=COMMANDS) * len(choices.gaits)).astype(int)
@@ -249,7 +249,7 @@ class GaitAndPose:
             feet_in_schedule=np.float64(1.0),
         )
 
-    def before_feet(self, context: Context, memory: GaitAndPoseMemory, steps, is_going) -> GaitAndPoseMemory:
+    def advance(self, context: Context, memory: GaitAndPoseMemory, steps, is_going) -> GaitAndPoseMemory:
         """Return the memory with pose and gait a control step nearer to the command, and the clock advanced.
 
         Args:
@@ -262,8 +262,8 @@ class GaitAndPose:
         reference = context.reference
         scheduled_pose = scheduled_value(memory.pose_ends, memory.poses, steps)
         commanded_pose = xp.where(xp.isnan(memory.live_pose), scheduled_pose, memory.live_pose)
-        glide = xp.asarray(reference.glide)[..., None]
-        pose = memory.pose + xp.minimum(xp.maximum(commanded_pose - memory.pose, -glide), glide)
+        max_change = xp.asarray(reference.glide)[..., None]
+        pose = memory.pose + xp.minimum(xp.maximum(commanded_pose - memory.pose, -max_change), max_change)
         live_gait = to_clock_units(memory.live_gait, xp.asarray(reference.step)[..., None])
         scheduled_gait = scheduled_value(memory.gait_ends, memory.gaits, steps)
         commanded_gait = xp.where(xp.isnan(memory.live_gait), scheduled_gait, live_gait)
@@ -276,7 +276,7 @@ class GaitAndPose:
 
         Args:
             context: context of the task.
-            memory: from `before_feet`.
+            memory: from `advance`.
             readings: after the step.
             feet_in_schedule: (...) share of the feet that followed the contact schedule.
         """
@@ -333,7 +333,7 @@ class GaitAndPose:
             default_angles: (joints,) default angles of the task, rad.
         """
         reference = context.reference
-        angles_in_pose = (reference.turns * memory.pose[..., None, :]).sum(axis=-1)
+        angles_in_pose = (reference.angle_jacobian * memory.pose[..., None, :]).sum(axis=-1)
         return default_angles + reference.angles + angles_in_pose
 
     def terms(self, memory: GaitAndPoseMemory, bonuses: Mapping[str, Any], step_tracking) -> dict:
@@ -412,7 +412,7 @@ def measure_pose(context: Context, readings):
     sine = (feet_x * rest_y - feet_y * rest_x).sum(axis=-1)
     cosine = (feet_x * rest_x + feet_y * rest_y).sum(axis=-1)
     yaw = xp.arctan2(sine, cosine)
-    rise = readings.torso_height / height - reference.ride
+    rise = readings.torso_height / height - reference.ride_height
     tilt = posture.roll_and_pitch_of(rotations.matrix(readings.torso_quaternion)[..., 2, :])
     return xp.concatenate([rise[..., None], shift, tilt, yaw[..., None]], axis=-1)
 

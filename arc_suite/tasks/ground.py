@@ -33,15 +33,15 @@ START_SPREAD = 6.0  # largest distance of the start from the middle of the lane,
 OFF_LANE = 10.0  # distance from the middle of the lane at which an episode is truncated, h
 MAX_LANE_LENGTH = 300.0  # ahead of the start, h
 SUNK_DEPTH = 0.05  # of a foot's center under the ground, h; the center of a foot in contact is never so deep
+SUNK_STEPS = 5  # consecutive control steps at this depth after which a foot is stuck
 _LANE_MARGIN_FACTOR = 1.15  # of the length of a lane, over the distance at the target velocity
 _LANE_MARGIN = 6.0  # added to the length of a lane, h
-SUNK_STEPS = 5  # consecutive control steps at this depth after which a foot is stuck
 
 SCAN_BLOCKS = {"scan": Block((Grid(SCAN, "ground {:.2f} R forward, {:.2f} R left", "h"),), noise=0.1)}
 
 
 class Nothing(NamedTuple):
-    """Memory of a ground that needs none."""
+    """Memory of a ground that has nothing to remember."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,7 +138,7 @@ class Stream(NamedTuple):
         level: level of the episode.
         outcome: outcome of the episode, see `Command.outcome`; NaN where there was none.
         failed: whether the episode ended in failure.
-        visited: whether the episode visited a level, from the highest one.
+        visited: whether the episode visited another level from the highest one, to which the next one returns.
     """
 
     level: int | np.ndarray
@@ -148,10 +148,10 @@ class Stream(NamedTuple):
 
 
 class Lane(NamedTuple):
-    """Memory of lanes.
+    """Memory of `Lanes`: the lane in which the episode began.
 
     Attributes:
-        middle: (...) y of the middle of the lane, m.
+        center_y: (...) y of the middle of the lane, m.
         level: (...) level of the curriculum; 0 without one.
         visits: (...) whether the episode visits this level, from the highest one.
         steps_under_ground: (...) consecutive control steps for which a foot has been at `SUNK_DEPTH`.
@@ -159,7 +159,7 @@ class Lane(NamedTuple):
         has_left: (...) whether the torso has left the lane to a side.
     """
 
-    middle: np.ndarray
+    center_y: np.ndarray
     level: np.ndarray
     visits: np.ndarray
     steps_under_ground: np.ndarray
@@ -213,7 +213,7 @@ def observe_scan(context: Context, place, readings: Readings) -> dict:
 
 
 class Widened(NamedTuple):
-    """Memory of level ground with a curriculum.
+    """Memory of `Level` with a curriculum.
 
     Attributes:
         level: (...) level of the curriculum.
@@ -440,11 +440,11 @@ class Lanes(Ground):
         number = (kind * levels + int(level)) * self._copies + lane  # of the lane among those with starts
         starting_lanes = len(self.kinds) * levels * self._copies
         side_lanes = (len(arena.lanes) - starting_lanes) // 2
-        middle = arena.start(side_lanes + number)  # m
+        center_y = arena.start(side_lanes + number)  # m
         x = self.middle * arena.length * arena.unit
-        y = middle + distance * arena.unit
+        y = center_y + distance * arena.unit
         memory = Lane(
-            middle=np.float64(middle),
+            center_y=np.float64(center_y),
             level=int(level),
             visits=visits,
             steps_under_ground=0,
@@ -458,7 +458,7 @@ class Lanes(Ground):
         unit = context.arena.unit  # m, the standing height h
         is_under_ground = (readings.foot_heights < -SUNK_DEPTH * unit).any(axis=-1)
         steps_under_ground = (memory.steps_under_ground + 1) * is_under_ground
-        is_off_lane = abs(place[..., 1] - memory.middle) > OFF_LANE * unit
+        is_off_lane = abs(place[..., 1] - memory.center_y) > OFF_LANE * unit
         return memory._replace(
             steps_under_ground=steps_under_ground,
             is_stuck=steps_under_ground >= SUNK_STEPS,
@@ -489,7 +489,7 @@ class Lanes(Ground):
 
 
 class Pillared(NamedTuple):
-    """Memory of a field of pillars.
+    """Memory of `PillarField`.
 
     Attributes:
         pillars: (..., COUNT, 2) positions, m.

@@ -29,9 +29,9 @@ class Upright:
     """A body is healthy while its torso is upright, high enough and not carried by the ground.
 
     Attributes:
-        lowest: height of the torso over the ground, h.
-        lying: share of the weight that the ground carries under the torso, from which on the torso lies.
-        least_upright: cosine of the torso's tilt.
+        lowest: lowest height of the torso over the ground, h.
+        lying: share of the weight; a torso that carries as much or more of it on the ground lies.
+        least_upright: lowest cosine of the torso's tilt.
         up: height of the torso at which a body that starts lying has risen, h.
         patience: time within which it has to rise, sqrt(h / g).
     """

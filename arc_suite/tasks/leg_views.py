@@ -59,12 +59,12 @@ def leg_views(body: Body, blocks: Mapping[str, Block], symmetry: Symmetry | None
     Raises:
         ValueError: a block has numbers without a frame, or a feature is made from more than two numbers.
     """
-    seen_as, is_mirrored = _pair_legs(body, symmetry)
-    pairs = seen_as[:, None] == np.unique(seen_as)  # (legs, pairs)
+    viewing_leg_of, is_mirrored = _pair_legs(body, symmetry)
+    pairs = viewing_leg_of[:, None] == np.unique(viewing_leg_of)  # (legs, pairs)
     weights_of_legs = []
     biases_of_legs = []
     actions_of_legs = []
-    for leg, pair, mirrored in zip(_viewing_legs(body, seen_as), pairs, is_mirrored, strict=True):
+    for leg, pair, mirrored in zip(_viewing_legs(body, viewing_leg_of), pairs, is_mirrored, strict=True):
         views = [_view_block(name, block, leg) for name, block in blocks.items()]
         no_weights_of_pairs = np.zeros((0, len(pair)))
         leg_weights = diagonal(no_weights_of_pairs, *(view.weights for view in views))
@@ -120,7 +120,7 @@ def _view_block(name: str, block: Block, leg: ViewingLeg) -> _BlockView:
 
 
 def _pair_legs(body: Body, symmetry: Symmetry | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return by index the leg (legs,) whose view each leg has, and whether (legs,) the leg has it in the mirror.
+    """Return for each leg the index (legs,) of the leg whose view it has, and whether (legs,) the view is mirrored.
 
     With a symmetry, a leg on the right has the mirrored view of its counterpart on the left.
     """

@@ -46,7 +46,6 @@ _ATTITUDE_WIDTH = 0.1  # rad
 _MAX_DISTANCE = 0.5  # standing heights, of the torso
 _MAX_ATTITUDE = 1.0  # rad, about
 
-
 _GHOST_DISTANCE = 2.2  # of the motion's pose in pictures from the motion, mean distances of the feet
 
 
@@ -248,7 +247,7 @@ class Mimic(Task):
         """Return targets (..., joints) by which position control brings joints to the next pose at its speed, rad."""
         row = self._row(memory)
         angles = self.tables.angles
-        return self._lead(self.tables.at(angles, row + 1), self.tables.at(angles, row + 2))
+        return self._lead(self.tables.entries(angles, row + 1), self.tables.entries(angles, row + 2))
 
     def observed_position_center(self, blocks: Mapping[str, np.ndarray]):
         """Return the same angles (..., joints) from the block `next_poses`, rad."""
@@ -275,7 +274,7 @@ class Mimic(Task):
         errors = self._compare(memory, readings)
         place = _read_place(readings)
         xp = place.__array_namespace__()
-        is_over = memory.tick >= self.tables.at(self.tables.counts, memory.motion)
+        is_over = memory.tick >= self.tables.entries(self.tables.counts, memory.motion)
         return memory._replace(
             tick=xp.where(is_over, 0, memory.tick),
             origin=xp.where(xp.asarray(is_over)[..., None], place, memory.origin),
@@ -286,7 +285,7 @@ class Mimic(Task):
 
     def _row(self, memory: MimicMemory):
         """Return the row (...) of the tables that belongs to a memory."""
-        start = self.tables.at(self.tables.starts, memory.motion)
+        start = self.tables.entries(self.tables.starts, memory.motion)
         return start + memory.tick + memory.side * self.tables.mirror_offset
 
     def _compare(self, memory: MimicMemory, readings: Readings) -> Errors:
@@ -294,14 +293,14 @@ class Mimic(Task):
         tables = self.tables
         row = self._row(memory)
         spread_row = memory.motion + memory.side * len(tables.counts)
-        angle_errors = readings.joint_angles - tables.at(tables.angles, row)
-        rate_errors = readings.velocities[..., 6:] - tables.at(tables.velocities, row)[..., 6:]
-        foot_errors = self._feet_from_torso(readings) - tables.at(tables.feet, row)
-        relative_angles = angle_errors / tables.at(tables.angle_spreads, spread_row)
-        relative_rates = rate_errors / tables.at(tables.rate_spreads, spread_row)
-        relative_feet = foot_errors / tables.at(tables.foot_spreads, spread_row)[..., None]
+        angle_errors = readings.joint_angles - tables.entries(tables.angles, row)
+        rate_errors = readings.velocities[..., 6:] - tables.entries(tables.velocities, row)[..., 6:]
+        foot_errors = self._feet_from_torso(readings) - tables.entries(tables.feet, row)
+        relative_angles = angle_errors / tables.entries(tables.angle_spreads, spread_row)
+        relative_rates = rate_errors / tables.entries(tables.rate_spreads, spread_row)
+        relative_feet = foot_errors / tables.entries(tables.foot_spreads, spread_row)[..., None]
         distances = self._torso_offset(memory, readings, row)
-        quaternion = rotations.turn_about_z(tables.at(tables.quaternions, row), memory.origin[..., 2])
+        quaternion = rotations.turn_about_z(tables.entries(tables.quaternions, row), memory.origin[..., 2])
         half_cosine = (quaternion * readings.torso_quaternion).sum(axis=-1)
         return Errors(
             pose=(relative_angles * relative_angles).mean(axis=-1),
@@ -324,12 +323,12 @@ class Mimic(Task):
     def _torso_offset(self, memory: MimicMemory, readings: Readings, row):
         """Return how far (..., 3) the torso of a row is from the body's: forward, left and up, standing heights."""
         tables = self.tables
-        place = tables.at(tables.places, row)
+        place = tables.entries(tables.places, row)
         xp = readings.posture.__array_namespace__()
         from_origin = rotations.to_heading_frame(place[..., :2], -memory.origin[..., 2])
         in_world = memory.origin[..., :2] + from_origin - readings.torso_position[..., :2]
         ground = rotations.to_heading_frame(in_world, rotations.yaw(readings.torso_quaternion))
-        rise = tables.at(tables.heights, row) - readings.torso_height
+        rise = tables.entries(tables.heights, row) - readings.torso_height
         return xp.concatenate([ground, rise[..., None]], axis=-1) / self._height
 
     def terms(self, memory: MimicMemory, readings: Readings) -> dict:
@@ -365,7 +364,7 @@ class Mimic(Task):
     def _observe_motion(self, memory: MimicMemory, xp):
         """Return where in which motion the body is."""
         tables = self.tables
-        circle = tables.at(tables.circle, self._row(memory))
+        circle = tables.entries(tables.circle, self._row(memory))
         sign = xp.asarray(1.0 - 2.0 * memory.side)[..., None]
         is_followed = xp.asarray(memory.motion)[..., None] == np.arange(len(tables.counts))
         observed_motions = [is_followed.astype(float)] if len(tables.counts) > 1 else []
@@ -379,10 +378,10 @@ class Mimic(Task):
         turn = memory.origin[..., 2] - heading
         numbers = []
         for ahead in range(1, 1 + POSES_AHEAD):
-            quaternion = rotations.turn_about_z(tables.at(tables.quaternions, row + ahead), turn)
+            quaternion = rotations.turn_about_z(tables.entries(tables.quaternions, row + ahead), turn)
             sign = xp.where(quaternion[..., :1] < 0.0, -1.0, 1.0)  # q and -q are one orientation
             offset = self._torso_offset(memory, readings, row + ahead)
-            numbers += [offset, sign * quaternion, tables.at(tables.angles, row + ahead)]
+            numbers += [offset, sign * quaternion, tables.entries(tables.angles, row + ahead)]
         return xp.concatenate(numbers, axis=-1)
 
     def markers(self, memory: MimicMemory, readings: Readings) -> list[Marker]:
@@ -437,18 +436,18 @@ def _sets_noise(overrides: Mapping[str, Any], name: str) -> bool:
     return any(setting in overrides for setting in (name, *names))
 
 
-def _read_motions(body: Body, walk: Parameters, words: Any) -> tuple[Motion, ...]:
-    """Return the motions of a body, given a word or a list of words; see `Mimic.settings_for`."""
-    words = [words] if isinstance(words, str) else words
-    if not isinstance(words, list | tuple) or not 0 < len(words) <= _MAX_MOTIONS:
-        raise ValueError(f"motion: expected a motion, or a list of up to {_MAX_MOTIONS}, got {checks.preview(words)}")
+def _read_motions(body: Body, walk: Parameters, setting: Any) -> tuple[Motion, ...]:
+    """Return the motions of a body, given the setting `motion`: a text or a list of texts; see `Mimic.settings_for`."""
+    texts = [setting] if isinstance(setting, str) else setting
+    if not isinstance(texts, list | tuple) or not 0 < len(texts) <= _MAX_MOTIONS:
+        raise ValueError(f"motion: expected a motion, or a list of up to {_MAX_MOTIONS}, got {checks.preview(texts)}")
     motions = []
-    for word in words:
-        if word == striding.NAME:
+    for text in texts:
+        if text == striding.NAME:
             offsets = walk.phase_offsets / (2.0 * math.pi)
             motion = striding.stride(body, walk.gait_frequency, walk.duty_factor, offsets, walk.target_velocity)
         else:
-            motion = motion_text.read(word)
+            motion = motion_text.read(text)
         check_body(motion, body)
         motions.append(motion)
     return tuple(motions)

@@ -74,10 +74,10 @@ def has_active(task: Task, kind: type[Modifier]) -> bool:
 
 
 def sensed_mask(task: Task) -> np.ndarray:
-    """Return which numbers (size,) of the observation a robot's sensors give; see `modifiers.SensorsOnly`."""
+    """Return which numbers (size,) of the observation a robot's sensors measure; see `modifiers.SensorsOnly`."""
     masks = {name: block.are_sensed for name, block in task.blocks.items()}
     if has_active(task, History):
-        masks["history"] = task.modifier(History).repeat(masks, len(task.scene.body.joint_names))  # type: ignore[attr-defined]
+        masks["history"] = task.modifier(History).repeat_masks(masks, len(task.scene.body.joint_names))  # type: ignore[attr-defined]
     return np.concatenate(list(masks.values()))
 
 

@@ -88,7 +88,7 @@ class MotionTables(NamedTuple):
         columns = {name: np.concatenate([getattr(table, name) for table in tables]) for name in _COLUMNS}
         return cls(lengths.cumsum() - lengths, counts, mirror_offset, **columns)
 
-    def at(self, table: np.ndarray, index):
+    def entries(self, table: np.ndarray, index):
         """Return the entries (..., n) of a table at indices (...), integers of Python, NumPy or JAX."""
         if not isinstance(index, int):
             table = index.__array_namespace__().asarray(table)

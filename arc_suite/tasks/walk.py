@@ -133,7 +133,7 @@ class Walk(Task):
 
     def phase(self, memory: WalkMemory):
         """Return the phase (...) of the gait, rad."""
-        return self.clock.at(self.clock.phases, memory.tick)  # the clock has a table with a row for each tick
+        return self.clock.entries(self.clock.phases, memory.tick)  # the clock has a table with a row for each tick
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the state: the standing pose with noise. The clock starts at tick 0, which is phase 0."""
@@ -168,7 +168,7 @@ class Walk(Task):
         """Advance the clock, and measure the step's displacement and contact schedule errors."""
         tick = memory.tick + 1
         x = component(readings.frame_position, 0) + 0.0  # a copy
-        stance = self.clock.at(self.clock.stance, tick)
+        stance = self.clock.entries(self.clock.stance, tick)
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
         displacement = x - memory.x
         low, high = self.settings.healthy_range
@@ -205,7 +205,7 @@ class Walk(Task):
             "posture": readings.posture,
             "velocities": readings.velocities,
             "contact_forces": readings.contact_forces,
-            "gait_clock": self.clock.at(self.clock.circle, memory.tick),
+            "gait_clock": self.clock.entries(self.clock.circle, memory.tick),
         }
 
     def ended(self, memory: WalkMemory, readings: Readings) -> tuple:

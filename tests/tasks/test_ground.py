@@ -177,8 +177,8 @@ def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
     for _ in range(40):
         environment.reset()
         memory, data = inner(environment.task.memory), environment.physics.data.ptr
-        lanes.add(float(memory.ground.middle))
-        assert abs(data.qpos[1] - memory.ground.middle) < 6.5 * arena.unit
+        lanes.add(float(memory.ground.center_y))
+        assert abs(data.qpos[1] - memory.ground.center_y) < 6.5 * arena.unit
         assert abs(memory.core.place[2]) < (0.5 if name != "roam" else 3.2)
         assert (task.read(data).foot_heights - radii).min() > 0.0099 * arena.unit
     assert len(lanes) > 0.6 * min(40, len(arena.lanes))
@@ -225,7 +225,7 @@ def test_how_an_episode_ends():
     readings, unit = task.read(environment.physics.data.ptr), task.scene.arena.unit
 
     def ended(x, y):
-        place = np.array([x, memory.ground.middle + y, 0.0])
+        place = np.array([x, memory.ground.center_y + y, 0.0])
         after = task.ground.after(task.context, memory.ground, place, readings, False)
         core = memory.core._replace(place=place)
         return tuple(bool(end) for end in task.ended(memory._replace(core=core, ground=after), readings))

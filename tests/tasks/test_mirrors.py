@@ -36,8 +36,8 @@ def look_into_the_mirror(task):
             schedule = memory.command.schedule * (1, -1, -1)
             memory = memory._replace(command=memory.command._replace(schedule=schedule))
         qpos = poses(begun.qpos)
-        if "middle" in getattr(memory, "ground", memory)._fields:
-            qpos[1] += 2.0 * memory.ground.middle  # a lane is mirrored about its middle
+        if "center_y" in getattr(memory, "ground", memory)._fields:
+            qpos[1] += 2.0 * memory.ground.center_y  # a lane is mirrored about its middle
         return begun._replace(qpos=qpos, qvel=velocities(begun.qvel), memory=memory)
 
     vars(task)["start"] = mirrored

@@ -1,4 +1,7 @@
-"""Servos whose torques fall with speed: changes of their gains leave the drags of their motors as they are."""
+"""Servos whose torques fall with speed: the drag of a servo is the torque per speed that its motor loses.
+
+A drag adds to the damping of the servo. Where an episode scales the gains of servos, drags stay as they are.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -34,7 +37,11 @@ def _servos(body: Body) -> list:
 
 
 def _find_drags(body: Body, model: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Return the parts of the fields that are drags: of servos, their releases, and the actuators of drags."""
+    """Return the parts of the fields that are drags.
+
+    The actuators are those of servos, of their releases, which take torque off a weak servo, and of their drags; see
+    `Motors.drive`.
+    """
     drags = np.array([servo.drag or 0.0 for servo in _servos(body)])
     joints = len(body.joints)
     leg_drags = drags[:joints]

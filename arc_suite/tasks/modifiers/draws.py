@@ -1,7 +1,7 @@
 """The random numbers of the suite's own modifiers in one episode: all are drawn, always, in one order.
 
-The first ones come from the stream of seeds. The last of these is a key, and all other numbers follow from the key. So
-a new modifier takes nothing from the stream, and the episodes of a seed stay as they are.
+The first ones are drawn from the random stream of episodes. The last of these is a key, and all other numbers follow
+from the key. So a new modifier draws nothing from the stream, and the episodes of a seed stay as they are.
 """
 
 import math

@@ -95,8 +95,13 @@ class History(_HistoryFields, Modifier):
         parts.append(Joints(body, "action of {}"))
         return {**blocks, "history": Block((Repeated(tuple(parts), self.history),))}
 
-    def repeat(self, masks: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
-        """Return which numbers of the block `history` count, given the masks of other blocks; those of actions do."""
+    def repeat_masks(self, masks: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
+        """Return the mask (size,) of the block `history`: those of its blocks at each step, and true for actions.
+
+        Args:
+            masks: masks (size,) of the blocks that the history keeps, by name; further ones are ignored.
+            joints: number of joints of an action.
+        """
         step = [*(masks[name] for name in self.names), np.ones(joints, bool)]
         return np.tile(np.concatenate(step), self.history)
 

@@ -53,7 +53,7 @@ class Kicks(_KicksFields, Modifier):
         kicks: the greatest change of the torso's velocity by a kick, sqrt(g h). The size of each kick is uniform from 0
             up to it, in any horizontal direction. Kicks are 40 to 120 control steps apart.
         height: (1,) the standing height, m.
-        velocities: the number of velocities of torso and joints; passive joints of a source come after them.
+        velocities: the number of velocities of torso and joints, held ones included, at the beginning of qvel.
     """
 
     __slots__ = ()

@@ -15,7 +15,7 @@ from arc_suite.tasks.modifiers.modifier import Modifier
 
 
 class NoiseState(NamedTuple):
-    """From what the noise of an episode follows.
+    """The key from which the noise of an episode follows.
 
     Attributes:
         key: (..., 1) uint32.
@@ -38,8 +38,8 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
         observation_noise: level of uniform noise on what is measured, for all blocks that declare
             `noise`, or by the name of a block.
         widths: half-widths (size,) of the noise of each block that has some, by name.
-        slices: where its noise lies among that of all blocks, by name.
-        total: how many numbers are drawn in a step.
+        slices: slice of each of these blocks in the random numbers of a step, by name.
+        total: how many random numbers a step has.
     """
 
     __slots__ = ()
@@ -78,7 +78,7 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
 
     @property
     def structure(self) -> Hashable:
-        """The names of the blocks that have some."""
+        """The names of the blocks that have noise."""
         return tuple(self.slices)
 
     def draw(self, episode: Episode) -> NoiseState:

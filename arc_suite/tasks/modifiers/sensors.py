@@ -62,7 +62,7 @@ class Sensors(_SensorsFields, Modifier):
         return SensorsState(self.joint_offset * signed_shares)
 
     def drive(self, state: SensorsState, inputs: Inputs, elapsed) -> Inputs:
-        """Return the inputs with the true positions that servos hold, as their sensors show others."""
+        """Return the inputs with positions less the offsets: servos hold positions as their sensors show them."""
         if not self.are_of_servos:
             return inputs
         return inputs._replace(ctrl=inputs.ctrl - state.joint_offset / self.reach)

@@ -1,4 +1,4 @@
-"""What to type in place of files and functions that are no policies."""
+"""Errors for files, words and functions that are no policies, with hints what to type instead."""
 
 import ast
 import inspect
@@ -16,8 +16,8 @@ _MAX_SIZE = 1 << 20  # bytes of a file of Python whose names an error lists
 _MAX_NAMES = 8  # in an error
 _METHODS = ("act", "predict", "select_action", "get_action")  # by which agents of other libraries act
 _AS_FUNCTION = "write a function that loads it, and name it as file.py:function"
-# By extension of a file that is no policy: what the file is, and what helps.
-_CURES = {
+# By extension of a file that is no policy: what the file is, and what to do instead.
+_HINTS = {
     ".onnx": "it is for other programs; expected the folder of the run that it comes from",
     ".json": "it is no policy; expected the folder of a run",
     ".csv": "it is no policy; expected the folder of a run",
@@ -40,8 +40,8 @@ def refuse_other_files(name: str | os.PathLike[str]) -> None:
     extension = path.suffix.lower()
     if extension == ".py":
         _refuse_file_of_python(path)
-    elif extension in _CURES:
-        raise ValueError(f"policy {checks.preview(os.fspath(name))}: {_CURES[extension]}")
+    elif extension in _HINTS:
+        raise ValueError(f"policy {checks.preview(os.fspath(name))}: {_HINTS[extension]}")
     elif path.suffix and path.suffix != network.EXTENSION and path.is_file():
         if other_libraries.find(name) is None:
             raise ValueError(f"policy {checks.preview(os.fspath(name))}: it is no policy; expected the folder of a run")
@@ -54,9 +54,9 @@ def refuse_other_words(name: Any, policy_names: Iterable[str]) -> None:
     for kind, names in {"robot": registry.robot_words(), "task": TASKS, "preset": preset_names()}.items():
         if isinstance(name, str) and name in names:
             raise ValueError(f"policy {name!r}: it is a {kind}; expected as {kind}, next to a policy such as cpg")
-    cure = files.suggest_path(name) if isinstance(name, str) and not checks.hint(name, policy_names) else ""
-    if cure:
-        raise ValueError(f"unknown policy {checks.preview(name)}{cure}")
+    hint = files.suggest_path(name) if isinstance(name, str) and not checks.hint(name, policy_names) else ""
+    if hint:
+        raise ValueError(f"unknown policy {checks.preview(name)}{hint}")
 
 
 def _refuse_file_of_python(path: Path) -> NoReturn:
