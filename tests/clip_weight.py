@@ -15,7 +15,7 @@ import sys
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bounds, planting, weight
+from arc_suite.animation.clips import on_ground, planting, weight
 from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.bodies.families import sound_body
@@ -75,7 +75,7 @@ def main(*names: str) -> None:
         for clip in [clip for clip in LOOPS if clip in light]:
             draft = light[clip]
             speed, cadence = draft.motion.twist[0] / walk.motion.twist[0], walk.cycle / draft.cycle
-            soles = bounds.measure_ground(body, draft.motion).soles[:-1]
+            soles = on_ground.measure_ground(body, draft.motion).soles[:-1]
             duty = (soles < LOW * body.torso.standing_height).mean()
             lift = soles.max(axis=0).mean() / body.torso.standing_height
             lines.append(

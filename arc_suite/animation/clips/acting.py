@@ -6,15 +6,14 @@ import math
 import mujoco
 import numpy as np
 
-from arc_suite import policies, rotations
+from arc_suite import rotations
 from arc_suite.animation.clips import hard_ground, standing_legs
 from arc_suite.animation.clips.blows import Blow
-from arc_suite.animation.clips.recordings import Recording, record, samples_to_rest
+from arc_suite.animation.clips.recordings import Recording, samples_to_rest
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, stay_at_end, stay_at_start
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.selection import presets_of
-from arc_suite.envs.setup import Setup
 from arc_suite.models import sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
@@ -29,12 +28,6 @@ _HOLD_DURATION = 2.0
 _MAX_JUMP_TRIES = 6  # jumps that are simulated from rest, of those that a trial finds
 
 _MAX_ASIDE = 0.3  # of the distance ahead, by which a leap goes aside
-
-_RECOVERY_TASK = "recover"
-_FALL_SECONDS = 4.0  # of getting up, and of standing after it
-_FALLS = 20  # that are tried, of the judges' table
-# By what a body lies on: the least and the largest cosine of the tilt of its torso.
-_TILTS = {"belly": (0.7, 1.0), "side": (-0.4, 0.4), "back": (-1.0, -0.7)}
 
 # A death, by a blow after which motors are limp. Joints then turn freely, and become stiff. The numbers of a joint
 # are those of a body of unit weight and height, by the number of its legs.
@@ -66,34 +59,6 @@ def rise(body: Body, rest: Pose) -> ClipMotion:
     first = sizing.simulation(body).substeps * (sink_steps + hold_steps)
     _check_lies(body, rest, recording.poses[first])
     return stay_at_end(recording, first)
-
-
-def get_up(body: Body, rest: Pose, lies_on: str) -> ClipMotion:
-    """Return how a body gets up from a fall, by the policy of the package for the task recover.
-
-    The root stays where the torso is in the end.
-
-    Args:
-        body: the spec.
-        rest: pose that it gets up to.
-        lies_on: belly, side or back.
-
-    Raises:
-        ValueError: the package has no such policy, or the body does not get up.
-    """
-    if not policies.is_packaged(body, _RECOVERY_TASK):
-        raise ValueError(f"the package has no policy of {_RECOVERY_TASK} for it")
-    setup = Setup.of(body, _RECOVERY_TASK)
-    policy = policies.policy("ppo", body, task=setup.definition)
-    least, largest = _TILTS[lies_on]
-    for seed in range(_FALLS):
-        environment = setup.load(seed)
-        recording = record(environment, policy, settle=0, steps=round(_FALL_SECONDS / environment.control_timestep()))
-        has_got_up = environment.task.progress["up"]
-        environment.close()
-        if has_got_up and least <= rotations.upright(recording.poses[0, 3:7]) <= largest:
-            return stay_at_end(recording, first=0)
-    raise ValueError(f"it does not get up from its {lies_on} within {_FALL_SECONDS:g} s")
 
 
 def jump(body: Body, rest: Pose) -> ClipMotion:

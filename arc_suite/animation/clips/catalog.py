@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, get_args
 
 from arc_suite import registry
-from arc_suite.animation.clips import acting, gestures
+from arc_suite.animation.clips import acting, gestures, getting_up
 from arc_suite.animation.clips.blows import DIRECTIONS
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.robots.gaits import PACES, Pace
@@ -118,6 +118,12 @@ def _fall(side: str, unlike: tuple[str, ...] = ()) -> Acted:
     return Acted(functools.partial(acting.death, side=side), ends=(0,), planted=False, unlike=unlike)
 
 
+def _get_up(lies_on: str) -> Acted:
+    """Return how a body gets up from a fall on its belly, side or back."""
+    play = functools.partial(getting_up.get_up, lies_on=lies_on)
+    return Acted(play, ends=(-1,), steps=True, planted=False)
+
+
 WALK = WalkLoop((1.0, 0.0, 0.0))
 BOTH_ENDS = (0, -1)  # of `Acted.ends`: the first and the last sample
 CLIPS: dict[str, Kind] = {
@@ -150,9 +156,9 @@ CLIPS: dict[str, Kind] = {
     **{f"stagger_{side}": BlowClip(side, max_tilt=30.0, cycles=2) for side in DIRECTIONS},
     "attack": Acted(gestures.strike, BOTH_ENDS, steps=True),
     "rise": Acted(acting.rise, ends=(-1,), planted=False),
-    "get_up": Acted(functools.partial(acting.get_up, lies_on="back"), ends=(-1,), planted=False),
-    "get_up_side": Acted(functools.partial(acting.get_up, lies_on="side"), ends=(-1,), planted=False),
-    "get_up_belly": Acted(functools.partial(acting.get_up, lies_on="belly"), ends=(-1,), planted=False),
+    "get_up": _get_up(lies_on="back"),
+    "get_up_side": _get_up(lies_on="side"),
+    "get_up_belly": _get_up(lies_on="belly"),
     "jump": Acted(acting.jump, BOTH_ENDS, planted=False),
     "leap": Acted(acting.leap, BOTH_ENDS, planted=False),
     "death": _fall("front"),

@@ -172,7 +172,7 @@ def sample_clip(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     _, contacts = draft.stance_height_and_contacts(body)
     slip = planting.slip(body, motion) if draft.loops else None
     slide = None
-    if bounds.is_planted(catalog.clip_of(name)):
+    if bounds.feet_stand(catalog.clip_of(name)):
         slide = bounds.measure(body, motion).slide * body.torso.standing_height
     return Clip(
         name, motion, draft.loops, draft.cycles, tuple(contacts), body.foot_names, slip, slide, weight=draft.weight

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bounds, planting, root_motion, standing_legs, turning
+from arc_suite.animation.clips import bounds, on_ground, planting, root_motion, standing_legs, turning
 from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, BlowClip, Passage, Turn, clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.recorder import Recorder, TransitionRecording
@@ -201,7 +201,7 @@ def _raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[in
         fixed_ends: ends whose poses stay: 0, -1 or both.
     """
     height = body.torso.standing_height
-    ground = bounds.measure_ground(body, motion)
+    ground = on_ground.measure_ground(body, motion)
     depths = np.maximum(-ground.lowest_part, -ground.soles.min(axis=-1) - _FREE_SOLE_DEPTH * height)
     if depths.max() <= 0.0:
         return motion
@@ -223,7 +223,7 @@ def _to_samples(body: Body, duration: float, time_step: float) -> int:
 
 def _find_flight(body: Body, motion: ClipMotion) -> tuple[int, int] | None:
     """Return the samples of the last flight, and those after it; None if a foot is always near the ground."""
-    in_air = bounds.find_flight(body, motion)
+    in_air = on_ground.find_flight(body, motion)
     if not len(in_air):
         return None
     landing = int(in_air[-1])

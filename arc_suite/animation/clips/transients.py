@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.animation.clips import bounds
+from arc_suite.animation.clips import on_ground
 from arc_suite.animation.clips.catalog import Passage
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
@@ -91,7 +91,7 @@ def _make_poses(body, draft: Draft, transient: _Transient, begin: int, end: int,
 
 def _find_flight(body: Body, draft: Draft) -> tuple[int, int] | None:
     """Return the first and the last sample of a flight; None without one."""
-    in_air = bounds.find_flight(body, draft.motion)
+    in_air = on_ground.find_flight(body, draft.motion)
     return (int(in_air[0]), int(in_air[-1])) if len(in_air) else None
 
 

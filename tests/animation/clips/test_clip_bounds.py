@@ -10,7 +10,7 @@ from tiers import tiers
 
 from arc_suite import models
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import acting, bounds, from_rest, gestures, standing_legs, turning
+from arc_suite.animation.clips import acting, bounds, from_rest, gestures, on_ground, standing_legs, turning
 from arc_suite.animation.clips.catalog import BOTH_ENDS, CLIPS, Acted, Turn
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.bodies.families import sound_body
@@ -78,7 +78,7 @@ def test_the_ground_is_measured_where_mujoco_has_the_drawn_body():
     motion = still(TICK)
     turns = 0.3 * np.sin(np.arange(101))[:, None] * np.ones(len(TICK.joint_names))
     motion = motion._replace(joints=motion.joints + turns, root=np.linspace(0.0, 0.1, 101)[:, None] * np.ones(3))
-    ground = bounds.measure_ground(TICK, motion)
+    ground = on_ground.measure_ground(TICK, motion)
     places, _ = placed(TICK, motion.poses(), TICK.foot_names)
     np.testing.assert_allclose(ground.feet, places[..., :2], atol=1e-9)
     np.testing.assert_allclose(ground.soles, places[..., 2] - [leg.foot.radius for leg in TICK.legs], atol=1e-9)
@@ -149,14 +149,14 @@ def test_a_death_ends_at_rest_on_the_ground(body):
     assert bounds.find_excess(body, FALLS, motion) == ""
     measures = bounds.measure(body, motion)
     assert measures.last_speed < 2.0 and measures.part_depth < 0.01
-    assert bounds.measure_ground(body, motion).lowest_part[-1] < 0.15 * body.torso.standing_height
+    assert on_ground.measure_ground(body, motion).lowest_part[-1] < 0.15 * body.torso.standing_height
 
 
 @pytest.mark.slow
 def test_a_jump_comes_down_where_it_stood():
     """And nothing glides after it: what is left is mended in the air."""
     motion = acting.jump(QUEEN, rest_of(QUEEN))
-    ground, height = bounds.measure_ground(QUEEN, motion), QUEEN.torso.standing_height
+    ground, height = on_ground.measure_ground(QUEEN, motion), QUEEN.torso.standing_height
     assert ground.soles.min(axis=1).max() > 0.1 * height
     assert np.linalg.norm((ground.feet[-1] - ground.feet[0]).mean(axis=0)) < 0.1 * height
     met = from_rest._act(QUEEN, CLIPS["jump"], rest_of(QUEEN)).motion

@@ -7,7 +7,7 @@ import pytest
 from refusals import refused
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bounds, planting, standing_legs, transients, weight
+from arc_suite.animation.clips import bounds, on_ground, planting, standing_legs, transients, weight
 from arc_suite.animation.clips.catalog import clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.drafts import make_drafts
@@ -49,7 +49,7 @@ def test_a_walk_bobs_and_rolls_towards_standing_feet():
     assert 0.02 < np.ptp(walk.motion.positions[:, 2]) / TICK.torso.standing_height < 0.05
     roll = tilt_of(walk.motion)[:, 0]
     assert 1.0 < np.ptp(roll) / 2.0 < 3.0
-    soles = bounds.measure_ground(TICK, walk.motion).soles < 0.01 * TICK.torso.standing_height
+    soles = on_ground.measure_ground(TICK, walk.motion).soles < 0.01 * TICK.torso.standing_height
     sides = np.array([1.0 if leg.side == "left" else -1.0 for leg in TICK.legs])
     stands_left = soles @ sides
     assert np.corrcoef(roll, stands_left)[0, 1] < -0.3  # a roll that is negative lowers the left side
@@ -77,10 +77,10 @@ def test_the_torso_draws_back_before_an_action_and_swings_on_after_it():
     early = len(start) // 5
     assert start[:early, 0].min() < -0.02 and start[:early, 1].min() < -0.015
     assert stop[:, 0].max() > 0.01 and stop[-1, 0] == pytest.approx(0.0, abs=1e-9)
-    soles = bounds.measure_ground(TICK, drafts_of(0.0)["attack"].motion).soles
+    soles = on_ground.measure_ground(TICK, drafts_of(0.0)["attack"].motion).soles
     strike = np.flatnonzero((soles > 0.3 * height).any(axis=-1))[-1]
     assert attack[:strike, 0].min() < -0.02 and attack[strike:, 0].max() > 0.004
-    soles = bounds.measure_ground(TICK, drafts_of(0.0)["jump"].motion).soles
+    soles = on_ground.measure_ground(TICK, drafts_of(0.0)["jump"].motion).soles
     flight = np.flatnonzero((soles > 0.02 * height).all(axis=-1))
     assert not jump[: flight[-1]].any()
     assert -0.06 < jump[flight[-1] :, 1].min() < -0.02
