@@ -49,7 +49,7 @@ export class Panel {
   }
 
   // The command, the pose of sliders and of keys that are held, shares of the room from -1 to 1, and the gait, which
-  // suits the speed; a run is faster ahead.
+  // suits the speed; a run, which not all bodies have, is faster ahead.
   asked(command, shares, runs = false) {
     if (!this.direction) return { command };
     const { room, gaits, frequency, paces, run } = this.direction;
@@ -61,7 +61,7 @@ export class Panel {
     const used = sought.reduce((sum, value, i) => sum + (value && value / room[i][value < 0 ? 0 : 1]), 0);
     const pose = sought.map((value) => value / Math.max(used, 1));
     const [forward, ...others] = command;
-    const going = [runs && forward > 0 ? run * forward : forward, ...others];
+    const going = [runs && run && forward > 0 ? run * forward : forward, ...others];
     const { tempo, change } = paceUnder(paces, going), [...offsets] = gaits[this.list.value], duty = offsets.pop();
     const gait = [...offsets, duty + change, frequency * this.tempo.value * tempo];
     return { command: going, pose, gait };

@@ -272,6 +272,7 @@ async function main() {
     pulls(canvas, () => state.play);
     panel.offer(body.task.direction);
     for (const each of document.querySelectorAll(".directed")) each.hidden = !body.task.direction;
+    for (const each of document.querySelectorAll(".running")) each.hidden = !body.task.direction?.run;
     const leaps = Object.keys(body.policy.constants.leaps ?? {});
     for (const each of document.querySelectorAll(".leaping")) each.hidden = !leaps.length;
     byId("leap").textContent = leaps[0] ?? "";

@@ -6,6 +6,7 @@ policies are graphs, which the page runs as they are.
 """
 
 import base64
+import functools
 import html
 import itertools
 import json
@@ -36,6 +37,7 @@ from arc_suite.policies import other_libraries
 from arc_suite.policies.network import Network
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
+from arc_suite.simulation.episode_loop import play_episode
 from arc_suite.tasks import Task, clock, readings
 from arc_suite.tasks.blocks import PAGE_BLOCKS
 from arc_suite.tasks.recover import LEAST_HEIGHT, LEAST_UPRIGHT
@@ -54,6 +56,8 @@ _PAGE_LAWS = (Stepping, Limping)  # one law where the pose is by command, see we
 
 # The largest kick. Queen as she walks falls in half of the tries: in 81 of 160, over directions and phases of the gait.
 _KICK = 2.3  # multiple of the velocity at which an inverted pendulum passes the nearest edge of the feet
+_MIN_RUN = 1.1  # times the speed of the walk: a run is as fast, or the page has none
+_RUN_CYCLES = (3, 7)  # gait cycles between which speeds are measured
 _LEAST_MARGIN = 0.3  # standing heights, from the center of mass to that edge
 
 
@@ -133,7 +137,8 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
     command_task = setup.definition
     if policy == "cpg":
         task = command_task
-        driver = _describe_law(task, preset or suited_preset(task))
+        preset = preset or suited_preset(task)
+        driver = _describe_law(task, preset)
     else:
         network = _load_network(body, policy, command_task)
         task = network.setup.definition
@@ -143,6 +148,9 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
     for leg in body.legs:
         part_index = body.part_names.index(leg.full_name(leg.foot))
         feet.append({"part": part_index, "radius": leg.foot.radius})
+    task_values = _describe_task(task, command_task)
+    if policy == "cpg":
+        task_values["direction"]["run"] = _choose_run(body, preset)
     return pages.body_drawing(body) | {
         "name": body.name,
         "counts": _count_legs_and_links(body),
@@ -151,7 +159,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
         "feet": feet,
         "kick": largest_kick(body),
         "grounds": {name: _describe_ground(setup, word) for name, word in _grounds(arena).items()},
-        "task": pages.to_json_values(_describe_task(task, command_task), decimals=None),
+        "task": pages.to_json_values(task_values, decimals=None),
         "policy": pages.to_json_values(driver, decimals=None),
         "recovery": pages.to_json_values(_describe_recovery(body, task), decimals=None),
     }
@@ -266,11 +274,49 @@ def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
         "frequency": task.parameters.gait_frequency,
         "gaits": player_controls.gaits_by_name(task),
         "paces": [list(pace) for pace in gaits.PACES_BY_SPEED],
-        "run": gaits.PACES["run"].speed,
+        "run": None,
     }
 
 
 # Demonstrators.
+
+
+@functools.lru_cache(maxsize=64)
+def _choose_run(body: Body, preset: str | None) -> float | None:
+    """Return the multiple of the command at which a body runs: the quickest pace that is faster than its walk, or None.
+
+    Args:
+        body: any.
+        preset: preset of the demonstrator.
+    """
+    setup = Setup.of(body, _DEMONSTRATOR_TASK)
+    walk_speed = _measure_speed(setup, preset, 1.0)
+    for name in ("run", "fast"):
+        pace = gaits.PACES[name].speed
+        if walk_speed > 0.0 and _measure_speed(setup, preset, pace) >= _MIN_RUN * walk_speed:
+            return pace
+    return None
+
+
+def _measure_speed(setup: Setup, preset: str | None, forward: float) -> float:
+    """Return the mean speed of a demonstrator, m/s, in the gait in which a page goes at a command; 0 if it falls."""
+    environment = setup.load(seed=0)
+    task = environment.task.definition
+    policy = Demonstrator(task, preset)
+    commands = player_controls.commands(task, (forward, 0.0, 0.0), np.zeros(6), player_controls.OWN_GAIT)
+    steps_in_cycle = 1.0 / (task.parameters.gait_frequency * task.scene.control_timestep)
+    start, end = (round(cycles * steps_in_cycle) for cycles in _RUN_CYCLES)
+    places = []
+    for timestep in play_episode(environment, policies.alone(policy), max_steps=end):
+        if timestep.first():
+            for name, value in commands.items():
+                environment.command(name, value)
+        places.append(environment.physics.data.qpos[:2].copy())
+    environment.close()
+    if len(places) <= end:
+        return 0.0
+    seconds = (end - start) * task.scene.control_timestep
+    return float(np.linalg.norm(places[end] - places[start]) / seconds)
 
 
 def _describe_law(task: Task, preset: str) -> dict[str, Any]:

@@ -139,6 +139,17 @@ def test_shift_or_a_button_runs(tab):
     assert advanced_ahead(tab, ("w",)) == pytest.approx(walked, rel=0.1)
 
 
+def test_a_body_without_a_run_has_no_button_and_walks_under_shift(tab):
+    tab.evaluate("play.state.play.body.task.direction.run = null")
+    tab.dispatch_event("#ground", "change")
+    assert tab.is_hidden("#run")
+    walked = advanced_ahead(tab, ("w",))
+    assert advanced_ahead(tab, ("Shift", "w")) == pytest.approx(walked, rel=0.1)
+    tab.evaluate("play.state.play.body.task.direction.run = 1.75")
+    tab.dispatch_event("#ground", "change")
+    assert tab.is_visible("#run")
+
+
 def advanced_ahead(tab, keys):
     """How far a body comes in three seconds with some keys held, after one to begin."""
     tab.keyboard.press("r")

@@ -20,7 +20,7 @@ from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.models.kinematics import Legs
 from arc_suite.policies import alone, network, policy
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import ROBOTS, gaits
 
 OTHERS = [imports.quadruped(), imports.hexapod(), imports.body("a1_like.urdf")]
 OTHERS += [imports.with_arm(), imports.on_its_floor()]
@@ -448,3 +448,30 @@ def test_networks_that_a_page_cannot_run(tmp_path, task, settings, message):
     network.save(tmp_path / "policy.npz", made._replace(setup=Setup.of("tick", task, settings)))
     with pytest.raises(ValueError, match=message):
         play_pages.creature(ROBOTS["tick"], str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("body", "run"),
+    [
+        (ROBOTS["tick"], 1.75),
+        (ROBOTS["leaper"], None),  # which gets slower
+        (generator.generate(9, 2), None),
+        (generator.generate(5, 4), 1.25),  # at 1.75 it walks badly
+    ],
+    ids=["tick", "leaper", "9x2", "5x4"],
+)
+def test_a_run_is_faster_than_the_walk_or_there_is_none(body, run, script):
+    creature = play_pages.creature(body)
+    direction = creature["task"]["direction"]
+    assert direction["run"] == run
+    start = {"qpos": creature["grounds"]["level"]["start"], "qvel": [0.0] * (6 + len(body.joint_names))}
+    ahead = []
+    for forward in (1.0, run or 1.75):
+        pace = gaits.pace_at(forward)
+        *offsets, duty = direction["gaits"]["own"]
+        gait = [*offsets, duty + pace.duty_change, pace.tempo * direction["frequency"]]
+        asked = [{"command": (forward, 0.0, 0.0), "pose": [0.0] * 6, "gait": gait}] * STEPS
+        episode = {"creature": creature, "ground": "level", "asked": asked, "desired": [0.0] * 3, **start}
+        (path,) = nodes.run(script, [episode])
+        ahead.append(path["positions"][-1][0] - path["positions"][STEPS // 3][0])
+    assert (ahead[1] > 1.1 * ahead[0]) == (run is not None)
