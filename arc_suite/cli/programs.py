@@ -19,6 +19,7 @@ PROGRAMS = {
     "play": "arc_suite.animation.cli",
     "view": "arc_suite.animation.cli",
     "studio": "arc_suite.animation.cli",
+    "settings": "arc_suite.cli",
     "evaluate": "arc_suite.cli",
     "style": "arc_suite.animation.cli",
     "collect": "arc_suite.cli",

@@ -35,6 +35,7 @@ COMMANDS = {
     "import": ((str(TESTS / "fixtures" / "robots" / "go2_like.xml"), "--output=a.json"), "a.json"),
     "check": (("spider", "--walk"), None),
     "doctor": ((), None),
+    "settings": ((), None),
 }
 if (TESTS.parent / "arc_suite" / "animation" / "web" / "viewer.js").exists():
     COMMANDS["play"] = (("--robot=all", "--output=a.html"), "a.html")

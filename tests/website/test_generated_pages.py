@@ -4,14 +4,14 @@ import re
 
 import numpy as np
 import pytest
-from website import observations, reference, robots, settings, sources, tasks
+from website import observations, reference, robots, sources, tasks
 
 import arc_suite
 from arc_suite import registry
 from arc_suite.cli.programs import PROGRAMS
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks import TASKS, modifiers, walk
+from arc_suite.tasks import TASKS, modifiers, setting_table, walk
 
 
 def row(page, first, section=""):
@@ -83,7 +83,7 @@ BOUNDED = [
 
 @pytest.mark.parametrize(("task", "name"), BOUNDED)
 def test_bounds_are_those_of_the_task(task, name):
-    low, _, high = settings.bounds(name).removeprefix("from ").partition(" to ")
+    low, _, high = setting_table.bounds_of(name).removeprefix("from ").partition(" to ")
     outside = [float(low) - 1, *([float(high) + 1] if high else [])]
     for value in outside:
         with pytest.raises(ValueError, match=name):
@@ -115,6 +115,8 @@ def test_the_front_page_has_every_page():
     assert {f"docs/{name}" for name in expected} <= listed
     assert set(sources.BELOW["docs/tasks.md"]) == set(TASKS)
     assert "iframe" in sources.front_page(walks=True)
+    pages_of_studies = {path.stem for path in (sources.ROOT / "studies").glob("*.md")} - {"README"}
+    assert pages_of_studies <= set(sources.BELOW["studies/README.md"])
 
 
 def test_links_that_sphinx_can_follow():

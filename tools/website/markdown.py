@@ -1,14 +1,8 @@
 """Parts of Markdown pages, as text."""
 
 import inspect
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, indent, tostring
-
-import numpy as np
-
-# An entry of a docstring's section `Attributes`: names with commas between, a colon, and a text of one or more lines.
-_ATTRIBUTES_ENTRY = re.compile(r"^    (?P<names>\w+(?:, \w+)*): (?P<text>.*(?:\n {8,}.*)*)", re.MULTILINE)
 
 
 def page(title: str, *parts: str) -> str:
@@ -59,38 +53,7 @@ def cards(texts: Mapping[str, str]) -> str:
     return "\n\n".join(["::::{grid} 1 2 2 2\n:gutter: 2", *items, "::::"])
 
 
-def format_value(value) -> str:
-    """Return the text of a value in a table's cell. The value is a number, a text, None, or a collection of these.
-
-    More than two equal numbers are written as one.
-    """
-    if isinstance(value, tuple | list | np.ndarray):
-        values = np.asarray(value).tolist()
-        if len(values) > 2 and all(item == values[0] for item in values):
-            return format_value(values[0])
-        return f"({', '.join(map(format_value, values))})"
-    if isinstance(value, Mapping):
-        return ", ".join(f"{name} {format_value(item)}" for name, item in value.items()) or "none"
-    if value is None:
-        return "none"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return {"None": "none", "True": "true", "False": "false"}.get(value, value)
-    return f"{float(value):.4g}"
-
-
 def summary(documented) -> str:
     """Return the first paragraph of a docstring in one line."""
     paragraph, _, _ = inspect.getdoc(documented).partition("\n\n")
     return " ".join(paragraph.split())
-
-
-def attribute_meanings(documented) -> dict[str, str]:
-    """Return the meanings of a class's attributes by name, from the section `Attributes` of its docstring."""
-    _, _, section = inspect.getdoc(documented).partition("Attributes:\n")
-    meanings = {}
-    for entry in _ATTRIBUTES_ENTRY.finditer(section):
-        for name in entry["names"].split(", "):
-            meanings[name] = " ".join(entry["text"].split()).removesuffix(".")
-    return meanings

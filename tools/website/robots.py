@@ -5,6 +5,7 @@ import math
 
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies.text_tables import table
+from arc_suite.tasks import setting_table
 from website import markdown, observations, players, returns
 
 
@@ -61,9 +62,9 @@ def _body(setup: Setup, model) -> str:
             ("legs", f"{len(body.legs)}: {legs}"),
             ("joints", f"{model.nu}"),
             ("rigid parts", f"{len(body.part_names)}"),
-            ("mass", f"{markdown.format_value(model.body_mass.sum())} kg"),
-            ("standing height h", f"{markdown.format_value(body.torso.standing_height)} m"),
-            ("control step", f"{markdown.format_value(setup.definition.scene.control_timestep)} s"),
+            ("mass", f"{setting_table.format_value(model.body_mass.sum())} kg"),
+            ("standing height h", f"{setting_table.format_value(body.torso.standing_height)} m"),
+            ("control step", f"{setting_table.format_value(setup.definition.scene.control_timestep)} s"),
         ],
     )
 
@@ -79,9 +80,9 @@ def _joints(model) -> str:
             f"`{joint.name}`",
             f"{math.degrees(low):.0f} to {math.degrees(high):.0f}",
             f"{low:.3f} to {high:.3f}",
-            markdown.format_value(model.actuator_gear[index, 0]),
-            markdown.format_value(joint.damping[0]),
-            markdown.format_value(joint.armature[0]),
+            setting_table.format_value(model.actuator_gear[index, 0]),
+            setting_table.format_value(joint.damping[0]),
+            setting_table.format_value(joint.armature[0]),
         ]
         lines.append(line)
     heads = ("index", "joint", "range, degrees", "range, rad", "torque, N m", "damping, N m s/rad", "armature, kg m^2")
@@ -90,7 +91,7 @@ def _joints(model) -> str:
 
 def _weights(task) -> str:
     """Return the table of the weights of the reward's terms."""
-    lines = [[f"`{term}`", markdown.format_value(weight)] for term, weight in task.settings.weights.items()]
+    lines = [[f"`{term}`", setting_table.format_value(weight)] for term, weight in task.settings.weights.items()]
     return table(("term", "weight"), lines)
 
 
@@ -104,13 +105,13 @@ def _gait(task) -> str:
     return table(
         ("quantity", "value"),
         [
-            ("target velocity v*", f"{markdown.format_value(parameters.target_velocity)} m/s"),
-            ("velocity band", f"{markdown.format_value(settings.velocity_band)} m/s"),
-            ("frequency", f"{markdown.format_value(parameters.gait_frequency)} Hz"),
-            ("duty factor", markdown.format_value(parameters.duty_factor)),
-            ("phase offsets, cycles", markdown.format_value(offsets)),
-            ("a foot stands below", f"{markdown.format_value(parameters.stance_threshold)} m"),
-            ("healthy heights of the torso", f"{markdown.format_value(settings.healthy_range)} m"),
+            ("target velocity v*", f"{setting_table.format_value(parameters.target_velocity)} m/s"),
+            ("velocity band", f"{setting_table.format_value(settings.velocity_band)} m/s"),
+            ("frequency", f"{setting_table.format_value(parameters.gait_frequency)} Hz"),
+            ("duty factor", setting_table.format_value(parameters.duty_factor)),
+            ("phase offsets, cycles", setting_table.format_value(offsets)),
+            ("a foot stands below", f"{setting_table.format_value(parameters.stance_threshold)} m"),
+            ("healthy heights of the torso", f"{setting_table.format_value(settings.healthy_range)} m"),
         ],
     )
 
@@ -142,9 +143,9 @@ def _creature_cells(name: str) -> list[str]:
         f"`{name}`",
         f"{len(body.legs)}",
         f"{model.nu}",
-        markdown.format_value(model.body_mass.sum()),
-        markdown.format_value(body.torso.standing_height),
-        markdown.format_value(task.parameters.target_velocity),
-        markdown.format_value(task.parameters.gait_frequency),
-        markdown.format_value(task.parameters.duty_factor),
+        setting_table.format_value(model.body_mass.sum()),
+        setting_table.format_value(body.torso.standing_height),
+        setting_table.format_value(task.parameters.target_velocity),
+        setting_table.format_value(task.parameters.gait_frequency),
+        setting_table.format_value(task.parameters.duty_factor),
     ]

@@ -17,8 +17,12 @@ README = ROOT / "README.md"
 DOCS_README = ROOT / "docs" / "README.md"
 FRONT = (README, DOCS_README)  # pages whose texts the front page contains
 
-# Texts of the cards of measured tables that are no study, by page.
+# Texts of the cards of pages in studies/ that are no report of a study, by page.
 _MEASURED_TABLES = {
+    "catalog": "Our studies",
+    "any_body": "One policy for any body",
+    "gpu": "Worlds on a GPU",
+    "motions": "Motions",
     "demonstrators": "Demonstrators",
     "robots_of_others": "Robots of others",
     "clips": "Clips",

@@ -10,7 +10,7 @@ from arc_suite.cpg.selection import suited_presets
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies.text_tables import table
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks import TASKS, ground
+from arc_suite.tasks import TASKS, ground, setting_table
 from arc_suite.tasks.command_task import CommandTask
 from arc_suite.tasks.contract import STEPS, Task
 from website import markdown, observations, returns, settings
@@ -155,7 +155,7 @@ def _text_by_robot(tasks: Mapping[str, Task], describe: Callable[[Task], str]) -
 
 
 def _duration(task: Task) -> str:
-    return f"{markdown.format_value(STEPS * task.scene.control_timestep)} s"
+    return f"{setting_table.format_value(STEPS * task.scene.control_timestep)} s"
 
 
 def _presets(task: Task) -> str:
@@ -171,7 +171,7 @@ def _parts(task_class: type[Task]) -> str:
         ("ground", markdown.summary(type(task_class.ground))),
     ]
     for name, value in task_class.modifiers.items():
-        lines.append((f"`{name}`", f"{markdown.format_value(value)}: {settings.MEANINGS[name]}"))
+        lines.append((f"`{name}`", f"{setting_table.format_value(value)}: {setting_table.modifier_meanings()[name]}"))
     return table(("part", "what it is"), lines)
 
 
@@ -195,7 +195,7 @@ def _reward(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
     first_task = next(iter(tasks.values()))
     lines = []
     for term in first_task.settings.weights:
-        weight = _text_by_robot(tasks, lambda task, term=term: markdown.format_value(task.settings.weights[term]))
+        weight = _text_by_robot(tasks, lambda task, term=term: setting_table.format_value(task.settings.weights[term]))
         lines.append([f"`{term}`", weight, definitions[term]])
     text = "The sum of weighted terms. Infos have the terms as `reward_...`, without weights."
     if issubclass(task_class, CommandTask):
@@ -210,7 +210,7 @@ def _end(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
     if not issubclass(task_class, CommandTask):
         if task_class.name in _ENDS:
             return _ENDS[task_class.name]
-        heights = _text_by_robot(tasks, lambda task: f"{markdown.format_value(task.settings.healthy_range)} m")
+        heights = _text_by_robot(tasks, lambda task: f"{setting_table.format_value(task.settings.healthy_range)} m")
         return f"The discount is 0 where the torso leaves its healthy heights ({heights}), and 1 at the time limit."
     health = task_class.health
     tilt = f"{math.degrees(math.acos(health.least_upright)):.0f} degrees"
