@@ -17,15 +17,35 @@ MAX_SEED = 2**32 - 1  # the largest seed of a NumPy `RandomState`
 
 # Names of other libraries, and the names that this suite has for the same; errors suggest the first that is valid.
 SYNONYMS: Mapping[str, tuple[str, ...]] = {
+    "a2c": ("ppo",),
     "algo": ("algorithm",),
+    "ant": ("leaper",),
     "batch_size": ("minibatch", "batch"),
+    "behavior_cloning": ("bc",),
+    "cheetah": ("leaper",),
     "clip_range": ("clip",),
+    "contact_cost_weight": ("weights",),
+    "ctrl_cost_weight": ("weights",),
+    "ddpg": ("sac",),
+    "dog": ("hound",),
     "env": ("robot",),
     "env_id": ("robot",),
+    "exclude_current_positions_from_observation": ("exclude_blocks",),
+    "fetch": ("navigate",),
+    "forward_reward_weight": ("weights",),
     "gamma": ("discount",),
+    "halfcheetah": ("leaper",),
+    "half_cheetah": ("leaper",),
+    "healthy_reward": ("weights",),
+    "hopper": ("leaper",),
+    "humanoid": ("leaper",),
+    "imitation": ("mimic",),
+    "joystick": ("steer",),
+    "jump": ("leap",),
     "learning_starts": ("start_steps",),
     "learning_rate": ("policy_rate",),
     "lr": ("learning_rate", "policy_rate"),
+    "max_episode_steps": ("time_limit",),
     "max_grad_norm": ("gradient_norm",),
     "model": ("policy",),
     "n_envs": ("num_envs",),
@@ -34,9 +54,25 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "n_steps": ("horizon", "n_step", "steps"),
     "net_arch": ("hidden",),
     "num_workers": ("threads", "jobs"),
+    "ppo2": ("ppo",),
+    "quadruped": ("leaper",),
+    "reset_noise_scale": ("base_noise",),
+    "run": ("walk",),
+    "seed": ("random",),
+    "speed": ("target_velocity",),
+    "stand": ("walk",),
+    "standup": ("recover",),
+    "td3": ("sac",),
+    "terminate_when_unhealthy": ("healthy_range",),
     "timesteps": ("steps",),
     "total_timesteps": ("steps",),
+    "tqc": ("sac",),
+    "trpo": ("ppo",),
+    "velocity": ("target_velocity", "steer"),
+    "walker": ("leaper",),
+    "walker2d": ("leaper",),
 }
+_VERSION = re.compile(r"-v\d{1,3}$")  # of Gymnasium's names
 
 # Lower bounds between 0 and this number only exclude 0, so errors say "above 0" in place of the bound.
 _MIN_NAMED_BOUND = 1e-6
@@ -98,9 +134,13 @@ def hint(value, valid: Iterable[str]) -> str:
     """
     valid_names = list(valid)
     text = preview(value).strip("'")
-    synonyms = [synonym for synonym in SYNONYMS.get(text, ()) if synonym in valid_names]
-    same_letters = [name for name in valid_names if str(name).lower() == text.lower()]
-    suggestions = synonyms or same_letters or difflib.get_close_matches(text, valid_names, n=1)
+    lower_text = _VERSION.sub("", text).lower()
+    synonyms = [synonym for synonym in SYNONYMS.get(lower_text, ()) if synonym in valid_names]
+    same_letters = [name for name in valid_names if str(name).lower() == lower_text]
+    close_matches = [
+        match for form in (text, lower_text) for match in difflib.get_close_matches(form, valid_names, n=1)
+    ]
+    suggestions = same_letters or synonyms or close_matches
     return f"; did you mean {suggestions[0]!r}?" if suggestions else ""
 
 

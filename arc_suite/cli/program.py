@@ -201,7 +201,7 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
 def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> None:
     """Raise ValueError for a flag that is the name of a setting or of a hyperparameter, with the flag that takes it."""
     words_of_flags = {
-        "set": registry.setting_names(),
+        "set": registry.setting_names() - {"random"},  # programs seed episodes by flags of their own
         "hp": set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flag_names else set(),
     }
     meanings = (name, *checks.SYNONYMS.get(name, ()))

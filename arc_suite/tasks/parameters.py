@@ -178,7 +178,7 @@ def values(
     Raises:
         ValueError: an unknown name, or a gait that does not fit the body.
     """
-    suggestions = ("time_limit", *names_of_others, *modifiers.MODIFIERS)
+    suggestions = ("time_limit", "random", *names_of_others, *modifiers.MODIFIERS)
     for name in overrides:
         checks.name(name, names, f"setting of {task}", suggestions=suggestions)
     published = robots.parameters(PARAMETERS["walk"], body, "walk")

@@ -99,7 +99,7 @@ class Recover(Task):
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> RecoverSettings:
         """Return the settings for a body, some of them overridden."""
-        settings_of_all_tasks = ("time_limit", *modifiers.MODIFIERS)
+        settings_of_all_tasks = ("time_limit", "random", *modifiers.MODIFIERS)
         for name in overrides:
             checks.name(name, cls.names(), f"setting of {cls.name}", suggestions=settings_of_all_tasks)
         fall_seed = checks.integer("fall_seed", overrides.get("fall_seed", _JUDGING_SEED), 0, checks.MAX_SEED)

@@ -3,6 +3,7 @@
 import programs
 import pytest
 
+import arc_suite
 from arc_suite import checks
 
 POLICY = """
@@ -24,6 +25,15 @@ LINES = {
     "train --hp lr=1e-4": "unknown hyperparameter 'lr'; did you mean 'policy_rate'? (there are: ",
     "train --hp gamma=.9": "unknown hyperparameter 'gamma'; did you mean 'discount'? (there are: ",
     "train --hp num_envs=1k": "hyperparameter num_envs: expected int like 64, got '1k'; did you mean 1000?\n",
+    "train --algorithm=PPO2": "unknown algorithm 'PPO2'; did you mean 'ppo'? (there are: ",
+    "train --algorithm=td3": "unknown algorithm 'td3'; did you mean 'sac'? (there are: ",
+    "evaluate --task=stand": "unknown task 'stand'; did you mean 'walk'? (there are: ",
+    "evaluate --task=Stairs": "unknown task 'Stairs'; did you mean 'stairs'? (there are: ",
+    "evaluate --set forward_reward_weight=2": "unknown setting of walk 'forward_reward_weight'; did you mean 'we",
+    "evaluate --set speed=2": "unknown setting of walk 'speed'; did you mean 'target_velocity'? (there are: ",
+    "evaluate --speed=2": "unknown flag 'speed'; did you mean --set target_velocity=2?\n",
+    "evaluate --set seed=5": "--set seed=5: programs seed every episode; see --help for the flag of the first seed\n",
+    "animate --seed=5": "unknown flag 'seed' (there are: ",
     "train --algo=sac": "unknown flag 'algo'; did you mean 'algorithm'? (there are: ",
     "train --total_timesteps=1e5": "unknown flag 'total_timesteps'; did you mean 'steps'? (there are: ",
     "train --steps=1e5": "flag --steps=1e5: expected a positive integer; did you mean --steps=100000?\n",
@@ -84,3 +94,17 @@ def test_one_line_with_the_cure(command, folder):
 )
 def test_an_integer_in_another_notation(value, text):
     assert checks.hint_integer(value) == (f"; did you mean {text}?" if text else "")
+
+
+@pytest.mark.parametrize(
+    ("robot", "near"), [("ant", "leaper"), ("Ant-v5", "leaper"), ("dog", "hound"), ("QUEEN", "queen")]
+)
+def test_robots_of_other_suites_get_the_nearest(robot, near):
+    with pytest.raises(ValueError, match=f"^unknown robot '{robot}'; did you mean '{near}'\\? "):
+        arc_suite.load(robot, "walk")
+
+
+@pytest.mark.parametrize("task", ["walk", "recover", "mimic", "steer"])
+def test_the_setting_of_a_seed_is_random(task):
+    with pytest.raises(ValueError, match=f"^unknown setting of {task} 'seed'; did you mean 'random'\\? "):
+        arc_suite.load("tick", task, {"seed": 5})
