@@ -87,6 +87,28 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def check_target(path: str | os.PathLike[str] | None) -> None:
+    """Raise OSError for a file that cannot be written, before long work whose result it is to hold; leave it as it is.
+
+    Args:
+        path: the target; None for none, which passes.
+    """
+    if path is not None:
+        with writing(path) as temporary:
+            temporary.unlink()  # so that nothing replaces the target
+
+
+def check_folder(path: str | os.PathLike[str]) -> None:
+    """Raise OSError for a folder that can neither be made nor written to, before long work; make nothing."""
+    nearest = Path(os.path.realpath(path))
+    while not nearest.exists() and nearest != nearest.parent:
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise OSError(f"cannot make folder {path}: {nearest} is a file")
+    if not os.access(nearest, os.W_OK):
+        raise OSError(f"cannot make folder {path}: permission denied in {nearest}")
+
+
 @contextlib.contextmanager
 def naming(path: str | os.PathLike[str]) -> Iterator[None]:
     """Name a file, or another place that is written to, in errors of its disk, which name none.

@@ -33,6 +33,7 @@ flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with e
 
 def main() -> None:
     """Print the table and write the JSON."""
+    files.check_target(FLAGS.json)
     setups = setups_from_flags()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     policy = policy_name(FLAGS.policy)

@@ -39,6 +39,7 @@ def main(file: str | None = None) -> None:
     check_flags_suit_file(extension, reading.OPTIONS)
     if FLAGS.output is not None:
         checks.extension(FLAGS.output, [motion_files.EXTENSION])
+        files.check_target(FLAGS.output)
     if reading.holds_motion(file):
         refuse_flags(("loop", "fps"), f"goes with a table, and {file} is a motion")
         refuse_flags(("of",), f"goes with files of other tools, and {file} names its body")

@@ -15,6 +15,7 @@ import programs
 import pytest
 
 import arc_suite
+from arc_suite import files
 from arc_suite.cli import program
 from arc_suite.files import writing, writing_json
 
@@ -187,6 +188,45 @@ def test_writing_refuses_before_the_work_starts(tmp_path, monkeypatch, path, rea
     (tmp_path / "folder").mkdir()
     with pytest.raises(OSError, match=f"^cannot write {path}: {reason}$"), writing(path):
         pytest.fail("the block ran")
+    with pytest.raises(OSError, match=f"^cannot write {path}: {reason}$"):
+        files.check_target(path)
+
+
+def test_a_check_leaves_files_and_folders_as_they_are(tmp_path):
+    (tmp_path / "old.txt").write_text("old")
+    for path in (None, tmp_path / "old.txt", tmp_path / "new.txt"):
+        files.check_target(path)
+    files.check_folder(tmp_path / "new" / "folder")
+    files.check_folder(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["old.txt"]
+    assert (tmp_path / "old.txt").read_text() == "old"
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    for path in (file, file / "folder"):
+        with pytest.raises(OSError, match=f"^cannot make folder {path}: {file} is a file$"):
+            files.check_folder(path)
+
+
+@pytest.mark.parametrize(
+    ("command", "line"),
+    [
+        ("transfer --policy=none --output=missing/a.csv", "cannot write missing/a.csv: no such file or directory"),
+        ("motion none.npz --output=missing/a.npz", "cannot write missing/a.npz: no such file or directory"),
+        ("evaluate --policy=none --json=missing/a.json", "cannot write missing/a.json: no such file or directory"),
+        ("export none --output=missing/a.onnx", "cannot write missing/a.onnx: no such file or directory"),
+        ("benchmark samples --results=file/a", "cannot make folder file/a/samples-ppo: {folder}/file is a file"),
+    ],
+)
+def test_programs_check_their_files_before_they_work(command, line, tmp_path):
+    """Even before they read the files of their arguments, none of which is there."""
+    (tmp_path / "file").touch()
+    program, *arguments = command.split()
+    done = programs.arc_suite(program, *arguments, cwd=tmp_path)
+    programs.refused(done, f"arc-suite {program}: {line.format(folder=tmp_path)}\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_writing_json_is_strict_json(tmp_path):

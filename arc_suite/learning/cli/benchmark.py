@@ -16,7 +16,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks
+from arc_suite import checks, files
 from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable
 from arc_suite.learning.studies import benchmark, entries, publication, report, results, runner, tables
@@ -78,6 +78,7 @@ def run_division(division: str, places: list[str]) -> int:
     name = f"{division}-{learner}"
     folder = Path(FLAGS.runs, name)
     published = Path(FLAGS.results, name)
+    files.check_folder(published)
     runs = [run for run in study.runs if _is_selected(run, places)]
     with resumable(folder):
         status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
@@ -100,6 +101,7 @@ def score_policies(division: str) -> None:
     folder = Path(FLAGS.policies)
     name = FLAGS.name or folder.resolve().name
     benchmark.check_name(name)
+    files.check_folder(FLAGS.results)
     judged = entries.score_policies(folder, progress)
     studies = Path(FLAGS.results)
     lines_by_run = {entries.run_name(policy.score): policy.lines for policy in judged}

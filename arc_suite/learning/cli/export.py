@@ -21,7 +21,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks, policies
+from arc_suite import checks, files, policies
 from arc_suite.bodies import universal
 from arc_suite.cli.flags import (
     complete_task,
@@ -56,6 +56,8 @@ def main(run: str | None = None) -> None:
     folder = path if path.is_dir() else path.parent
     output = Path(FLAGS.output or folder / "policy.onnx")
     checks.extension(output, [".onnx"])
+    if FLAGS.output:
+        files.check_target(FLAGS.output)
     if FLAGS["robot"].present or custom_body() is not None:
         task, settings = complete_task(policy_setup(run), *task_from_flags())
         setup = Setup.of(only_body(), task, settings)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks, versions
+from arc_suite import checks, files, versions
 from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable
 from arc_suite.learning.studies import publication, report, runner, tables
@@ -101,6 +101,7 @@ def make_or_report(
         if parts > 1:
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
         return submit(command, min(FLAGS.submit, len(runs)), folder, results)
+    files.check_folder(results)
     with resumable(folder):
         if FLAGS.device:
             prepare_jax()

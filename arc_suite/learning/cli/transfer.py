@@ -17,7 +17,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks, policies
+from arc_suite import checks, files, policies
 from arc_suite.bodies import universal
 from arc_suite.cli.flags import complete_task, define_task, refuse_flags, task_from_flags
 from arc_suite.envs.setup import Setup
@@ -39,6 +39,7 @@ def main() -> None:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
+        files.check_target(FLAGS.output)
     else:
         refuse_flags(["name"], "goes with --output")
     # A policy of many bodies is the same in the task of any body; Queen's stands for all.
