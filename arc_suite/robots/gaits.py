@@ -60,7 +60,7 @@ def pace_at(speed: float) -> Pace:
     return Pace(speed, *(float(np.interp(speed, speeds, numbers)) for numbers in gaits))
 
 
-def pace_under_command(command: Sequence[float]) -> Pace:
+def pace_under_command(command: Sequence[float] | np.ndarray) -> Pace:
     """Return the pace under a command, which counts ahead and in curves; other ways have the walk's.
 
     Args:

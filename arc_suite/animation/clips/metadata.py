@@ -9,7 +9,7 @@ from arc_suite.animation import swinging
 from arc_suite.animation.clips.catalog import WalkLoop, clip_names, clip_of
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import LIFT_OFF, TOUCH_DOWN
-from arc_suite.animation.parts import Part, Swing
+from arc_suite.animation.parts import Part, Swing, describe_body
 from arc_suite.robots.spec import Body
 
 # By the name that users choose: whether the root moves, for each animation of a clip.
@@ -35,7 +35,7 @@ _BLEND_SPACES = {
 
 
 def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
-    """Return the metadata of clips by name of the animation, their blend spaces, and the springs of bones that swing.
+    """Return the metadata of clips by name of the animation, their blend spaces, and their bones.
 
     Args:
         body: body of the clips.
@@ -51,10 +51,20 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
         "body": body.name,
         "units": {"length": "m", "time": "s", "angle": "rad"},
         "axes": {"up": "y", "forward": "z", "left": "x"},
+        "bones": _parent_of_bone(body),
         "swinging_bones": {bone.name: _spring_metadata(bone) for bone in swinging.list_bones(body)},
         "clips": metadata_of_animation,
         "blend": _make_blend_spaces(clips, roots_move),
     }
+
+
+def _parent_of_bone(body: Body) -> dict[str, str | None]:
+    """Return the bone above each bone by name, from the root outwards; None for the root."""
+    parts, _ = describe_body(body)
+    parents: dict[str, str | None] = {"root": None}
+    for part in parts:
+        parents[part.name] = "root" if part.parent is None else parts[part.parent].name
+    return parents
 
 
 def _spring_metadata(bone: Part) -> dict[str, float]:
@@ -67,6 +77,7 @@ def _spring_metadata(bone: Part) -> dict[str, float]:
 def clip_metadata(clip: Clip) -> dict[str, Any]:
     """Return the metadata of a clip.
 
+    `frames` counts the first and the last frame, and `fps` is the rate between them.
     `duty_factor` is the share of a loop in which feet touch the ground.
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
     `slip` is the path of a foot in stance over the ground, m a meter of the root. `slide` is the largest diagonal of
@@ -82,6 +93,7 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
     metadata: dict[str, Any] = {
         "seconds": clip.motion.seconds,
         "frames": len(clip.times),
+        "fps": round(1.0 / clip.motion.time_step, 6),
         "loops": clip.loops,
         "cycles": clip.cycles,
         "forward_speed": round(forward_speed, 6),

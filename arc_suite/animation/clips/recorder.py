@@ -1,6 +1,6 @@
 """Recordings of one body under one policy: walks under commands, a stop and a start, blows, showcases of presets."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -147,7 +147,7 @@ class Recorder:
             ValueError: the episode ends, the task has no command, or the body or policy cannot crouch.
         """
         setup = self._setup
-        fixed_commands = {}
+        fixed_commands: dict[str, Any] = {}
         lift = 1.0
         if failing is not None:
             setup = _with_settings(setup, actuator_failure=failing)

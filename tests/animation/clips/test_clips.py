@@ -172,7 +172,11 @@ def test_names_and_hierarchy(robot):
     file, body = read(robot), ROBOTS[robot]
     nodes = file.json["nodes"]
     (skin,) = file.json["skins"]
-    swinging = export.sidecar(body, list(made(robot).values()))["swinging_bones"]
+    sidecar = export.sidecar(body, list(made(robot).values()))
+    swinging = sidecar["swinging_bones"]
+    parents = {nodes[child]["name"]: node["name"] for node in nodes for child in node.get("children", ())}
+    assert sidecar["bones"] == {"root": None} | parents
+    assert list(sidecar["bones"]) == [nodes[joint]["name"] for joint in skin["joints"]]
     assert [nodes[joint]["name"] for joint in skin["joints"]] == ["root", *body.part_names, *swinging]
     names = [animation["name"] for animation in file.json["animations"]]
     loops = ["walk_loop", "walk_in_place_loop", "turn_left_loop", "turn_left_in_place_loop"]
@@ -192,6 +196,7 @@ def test_names_and_hierarchy(robot):
         assert (way[1] != way[0]).any() == (not animation["name"].endswith(("in_place", "in_place_loop", "idle_loop")))
         figures = export.sidecar(body, list(made(robot).values()))["clips"][animation["name"]]
         assert animation["extras"] == figures
+        assert figures["fps"] == 30.0 and figures["frames"] == round(figures["seconds"] * 30.0) + 1
 
 
 def test_colors_are_linear_and_what_glows_is_emissive():
