@@ -24,7 +24,7 @@ class Shape(NamedTuple):
         length, width, thickness: factors of the torso along x, y and z, with the mounts of the legs along x and y.
         fan: degrees by which the first legs turn forward and the last ones backward.
         torso, head, tail: see `torsos.replace_torso`; the torso's form changes before its factors.
-        links: factors of the lengths of links, by name of the link.
+        links: factors of the lengths of links: of all legs by name of the link, of one leg by name of the part.
         ends: ends (3,) of links of single legs in place of the body's own, before all factors, m, by name of the part.
     """
 
@@ -66,11 +66,12 @@ def shaped(body: Body, **changes) -> Body:
             `torsos.replace_torso`.
     """
     shape = Shape(**changes)
-    link_factors = {
-        checks.name(name, link_names(body), "link"): checks.number(f"links[{name!r}]", factor, *FACTOR_RANGE)
-        for name, factor in shape.links.items()
-    }
     body_ends = link_ends(body)
+    link_factors = {}
+    for name, factor in shape.links.items():
+        if name not in body_ends:  # of one leg
+            checks.name(name, link_names(body), "link")
+        link_factors[name] = checks.number(f"links[{name!r}]", factor, *FACTOR_RANGE)
     ends = {checks.name(name, body_ends, "part"): end for name, end in shape.ends.items()}
     length = checks.number("length", shape.length, *FACTOR_RANGE)
     width = checks.number("width", shape.width, *FACTOR_RANGE)
@@ -112,7 +113,7 @@ def _shape_leg(
 
     Args:
         leg: leg to change.
-        link_factors: factors of lengths, by name of the link.
+        link_factors: factors of lengths, by name of the link or of the part.
         ends: ends of links, m, by name of the part.
         torso_factors: factors by which the mount moves along x and y.
         turn: turn of the leg forward, degrees; a leg on the midline keeps its heading.
@@ -122,7 +123,7 @@ def _shape_leg(
     links = []
     for link in leg.links:
         end = ends.get(leg.full_name(link), link.end)
-        factor = link_factors.get(link.name, 1.0)
+        factor = link_factors.get(link.name, 1.0) * link_factors.get(leg.full_name(link), 1.0)
         links.append(link.replace(end=tuple(factor * component for component in end)))
     side = math.copysign(1.0, y) if abs(y) > _MIDLINE else 0.0
     return leg.replace(mount=(length * x, width * y, z), links=tuple(links), yaw_deg=leg.yaw_deg - side * turn)

@@ -52,7 +52,7 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     flags.DEFINE_multi_string(
         "length",
         [],
-        "Factor on the length of a link of a spec or body made to order: --length lower=1.5.",
+        "Factor on the length of a link of a spec or body made to order: --length lower=1.5, of one leg l1_lower=1.5.",
     )
     flags.DEFINE_string("palette", None, f"Colors of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
 
@@ -325,15 +325,16 @@ def task_from_flags() -> tuple[str, dict[str, Any]]:
     opened.
 
     Raises:
-        ValueError: an unknown task, a setting without a value, or the setting `random`.
+        ValueError: an unknown task, a setting without a value, or a seed as a setting.
     """
     registry.tasks_of(FLAGS.task)
     settings = named_values("set", FLAGS["set"].value)
-    if "random" in settings:
-        raise ValueError(
-            f"--set random={checks.quote(settings['random'])}: programs seed every episode; "
-            "see --help for the flag of the first seed"
-        )
+    for name in ("random", "seed"):
+        if name in settings:
+            raise ValueError(
+                f"--set {name}={checks.quote(settings[name])}: programs seed every episode; "
+                "see --help for the flag of the first seed"
+            )
     if FLAGS.arena is not None:
         if "arena" in settings:
             raise ValueError("expected one of --arena and --set arena, got both")

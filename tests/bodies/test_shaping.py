@@ -8,7 +8,7 @@ from refusals import refused
 
 import arc_suite
 from arc_suite.bodies import generator
-from arc_suite.bodies.shaping import link_names, shaped
+from arc_suite.bodies.shaping import link_ends, link_names, shaped
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
@@ -20,6 +20,15 @@ WALKER = generator.generate(6, 3)
 
 def lengths(body, name):
     return [math.hypot(*link.end) for leg in body.legs for link in leg.links if link.name == name]
+
+
+def test_a_link_of_one_leg_has_a_length_of_its_own():
+    body = shaped(WALKER, links={"lower": 2.0, "l1_lower": 1.5})
+    lengths = {part: math.hypot(*end) for part, end in link_ends(body).items()}
+    before = {part: math.hypot(*end) for part, end in link_ends(WALKER).items()}
+    for part, length in lengths.items():
+        factor = {"l1_lower": 3.0}.get(part, 2.0 if part.endswith("_lower") else 1.0)
+        assert length == pytest.approx(factor * before[part])
 
 
 def test_a_link_becomes_longer_and_the_feet_stand_on_the_floor():
