@@ -12,6 +12,17 @@ ADDRESS = write_address.read_address()
 NEW = "https://code.example.net/walkers/legs"
 
 
+def test_readme_gets_one_line_that_clones(tmp_path):
+    for name in ("setup.cfg", "README.md"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    for address in (NEW, f"{NEW}-2"):
+        write_address.write_address(address, tmp_path)
+        text = (tmp_path / "README.md").read_text()
+        assert text.count("git clone ") == 1
+        assert f"```sh\ngit clone {address} arc_suite && cd arc_suite\npython3 -m venv .venv" in text
+        assert len(text.split()) <= 600 and len(text.splitlines()) <= 105
+
+
 def test_an_address_is_written_wherever_the_former_one_stands(tmp_path):
     for name in ("setup.cfg", "docs/install.md", "examples/notebooks/first_steps.ipynb"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -22,7 +33,7 @@ def test_an_address_is_written_wherever_the_former_one_stands(tmp_path):
     assert names == ["setup.cfg", "docs/install.md", "examples/notebooks/first_steps.ipynb"]
     assert write_address.read_address(tmp_path) == NEW
     assert f"git clone {NEW} arc_suite && cd arc_suite" in (tmp_path / "docs/install.md").read_text()
-    assert all(ADDRESS not in path.read_text() for path in changed)
+    assert all("example.org" not in path.read_text() for path in changed)
     json.loads((tmp_path / names[-1]).read_text())
 
 
