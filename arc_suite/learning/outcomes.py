@@ -72,5 +72,6 @@ def _describe_returns(run: Configuration, returns: np.ndarray) -> str:
         levels += f", blind walker {scale.blind:.1f}"
     if scale.demonstrator is not None:
         score = f"score {scale.score(mean_return):z.2f}"
-        levels = f"{score} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f}{demonstrator_error})"
+        demonstrator = f"demonstrator {scale.preset} {scale.demonstrator:.1f}{demonstrator_error}"
+        levels = f"{score} ({levels}, {demonstrator}, over other seeds)"
     return f"return {mean_return:.1f} +- {returns.std():.1f}, {levels}"

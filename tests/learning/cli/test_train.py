@@ -30,7 +30,7 @@ for number in ("hidden=16", "batch=8", "start_steps=20", "phase_every=100", "pha
 WORDS = f"(there are: {', '.join(registry.robot_words())})"
 FINISHED = re.compile(
     r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d \+- \d+\.\d, score -?\d\.\d\d "
-    r"\(standing still \d+\.\d, demonstrator refined \d+\.\d\)\n"
+    r"\(standing still \d+\.\d, demonstrator refined \d+\.\d, over other seeds\)\n"
 )
 
 
