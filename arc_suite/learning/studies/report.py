@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import evaluation, files
-from arc_suite.evaluation import anchors, published
+from arc_suite.evaluation import anchors, judging, published
+from arc_suite.evaluation.anchors import Anchors
 from arc_suite.learning.studies import results
 from arc_suite.learning.studies.results import Groups, RunResult
 from arc_suite.learning.studies.tables import Study
@@ -61,10 +62,10 @@ _ABOUT_CURVES = (
 )
 _ABOUT_FINALS = (
     "Mean over 100 seeded episodes of the latest policy, unless noted. Over three seeds or more it has a 95 % interval "
-    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same episodes. "
-    "Earlier model: the body or the ground has changed since the run. The paper's returns are at equal steps, read off "
-    "its curves within about 30. Then come standing still and the demonstrators, with the standard deviation over "
-    "episodes."
+    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same episodes, or "
+    "as the benchmark judges. Earlier model: the body or the ground has changed since the run. The paper's returns are "
+    "at equal steps, read off its curves within about 30. Then come standing still and the demonstrators, with the "
+    "standard deviation over episodes."
 )
 _ABOUT_EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
@@ -163,17 +164,32 @@ def list_text(values: np.ndarray) -> str:
 def score_text(seeds: Sequence[RunResult], demonstrators) -> str:
     """Return the mean score of the latest policies in a place as text; a dash without anchors.
 
-    Anchors are means over the episodes that a policy has played.
-
     Args:
         seeds: results in a place.
-        demonstrators: anchors of the study, see `results.read_demonstrators`.
+        demonstrators: see `results.read_demonstrators`.
     """
-    returns_by_policy = demonstrators.get(seeds[0].run.place)
-    if returns_by_policy is None:
+    scales = [anchors_of(result, result.seeds, demonstrators) for result in seeds]
+    if None in scales:
         return "-"
-    scores = [anchors.of_returns(returns_by_policy, result.seeds).score(result.final) for result in seeds]
-    return _format_score(np.mean(scores))
+    return _format_score(np.mean([scale.score(result.final) for scale, result in zip(scales, seeds, strict=True)]))
+
+
+def anchors_of(result: RunResult, seeds: Sequence[int], demonstrators) -> Anchors | None:
+    """Return the anchors for episodes of a result; None where none are known.
+
+    For a judged policy they are those of `judging`. Otherwise they are means over the same episodes of the study's
+    demonstrators.
+
+    Args:
+        result: result of a run.
+        seeds: seeds of the episodes.
+        demonstrators: see `results.read_demonstrators`.
+    """
+    levels = judging.levels(result.run.configuration.setup) if result.policy_sha256 else None
+    if levels is not None:
+        return anchors.of_levels(levels)
+    returns_by_policy = demonstrators.get(result.run.place)
+    return None if returns_by_policy is None else anchors.of_returns(returns_by_policy, seeds)
 
 
 def _format_score(score: float) -> str:
@@ -233,9 +249,8 @@ def _efficiency_table(groups: Groups, demonstrators) -> str:
     """Return the table of steps and CPU time until two returns."""
     lines = []
     for place, kind, seeds in by_kind(groups):
-        half_score = np.inf
-        if place in demonstrators:
-            half_score = anchors.of_returns(demonstrators[place], seeds[0].curve_seeds).at(0.5)
+        scale = anchors_of(seeds[0], seeds[0].curve_seeds, demonstrators)
+        half_score = np.inf if scale is None else scale.at(0.5)
         cells = []
         for threshold in (half_score, 3500.0):
             steps, seconds = results.cost_of_return(seeds, threshold)

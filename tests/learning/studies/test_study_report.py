@@ -9,7 +9,7 @@ from published_tables import as_in_the_paper, cells, constant, publish
 
 from arc_suite import evaluation, usage
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import published
+from arc_suite.evaluation import judging, published
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.studies import csv_files, publication, report, results
 from arc_suite.learning.studies.tables import Study, run
@@ -91,6 +91,26 @@ def test_demonstrators_play_where_runs_were_evaluated_alone(tmp_path, monkeypatc
     assert bars == [(3, "run"), (1, "place")] * 2
 
 
+def judge(sha256):
+    """Return lines of episodes that judge a policy, with the return 300.5 each."""
+    fields = {"policy_sha256": sha256, "return": "300.5", "length": "9", "fell": "1.0"}
+    return [fields | {"seed": str(4_200_000_000 + index)} for index in range(100)]
+
+
+def test_a_judged_policy_has_the_score_of_the_benchmark(tmp_path):
+    new, old = (run("tick", "sac", 1_000_000, seed) for seed in (0, 1))
+    for each in (new, old):
+        publish(tmp_path, each, constant(100.0, 200.0))
+    publication.write_finals(tmp_path, {new.name: judge("ab" * 32)})
+    first, second = results.read_results([new, old], tmp_path)
+    levels = judging.levels(new.configuration.setup)
+    zero, best = levels["zero"].mean, levels["refined"].mean
+    assert report.score_text([first], {}) == f"{(300.5 - zero) / (best - zero):.2f}"
+    demonstrators = {new.place: {"zero": np.full(10, 0.0), "medium": np.full(10, second.final * 2)}}
+    assert report.score_text([second], demonstrators) == "0.50"
+    assert report.score_text([first, second], {}) == "-", "without anchors of the second"
+
+
 def test_finals_are_those_that_judge_the_policy(tmp_path):
     """A run from before has the episodes of its last evaluation; its settings are those of its row."""
     new, old = (run("tick", "sac", 1_000_000, seed, "rough", {"rise": 0.1}) for seed in (0, 1))
@@ -100,11 +120,7 @@ def test_finals_are_those_that_judge_the_policy(tmp_path):
     rows[1]["task_kwargs"] = "{}"
     csv_files.write(tmp_path / results.RUNS, results.RUN_COLUMNS, rows)
     sha256 = "ab" * 32
-    judged = [
-        {"policy_sha256": sha256, "seed": str(4_200_000_000 + index), "return": "300.5", "length": "9", "fell": "1.0"}
-        for index in range(100)
-    ]
-    publication.write_finals(tmp_path, {new.name: judged})
+    publication.write_finals(tmp_path, {new.name: judge(sha256)})
     first, second = results.read_results([new, old], tmp_path)
     assert first.policy_sha256 == sha256 and first.final == 300.5 and first.progress["fell"].tolist() == [1.0] * 100
     assert list(first.seeds) == list(range(4_200_000_000, 4_200_000_100)) and first.curve_seeds == [*range(10)]
