@@ -109,13 +109,17 @@ def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
     if setup.several:
         return _measure_several_bodies(setup)
     returns_by_policy = committed_returns(setup)
-    table_has_seeds = returns_by_policy is not None and len(seeds) and max(seeds) < protocol.EPISODES
-    levels = None if table_has_seeds else judging.levels(setup)
-    if levels is not None:
+    levels = judging.levels(setup)
+    if levels is not None and (returns_by_policy is None or not are_of_before(seeds)):
         return of_levels(levels)
     if returns_by_policy is None:
         returns_by_policy = measure_returns(setup)
     return of_returns(returns_by_policy, seeds)
+
+
+def are_of_before(seeds: Sequence[int]) -> bool:
+    """Return whether seeds are those with which earlier versions judged: 0 to 99, or some of them."""
+    return len(seeds) > 0 and max(seeds) < protocol.EPISODES
 
 
 @functools.lru_cache(maxsize=16)

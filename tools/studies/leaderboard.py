@@ -33,10 +33,10 @@ _TEXT = (
     "All committed studies, written by `python tools/study.py NAME --report`. "
     "Return: mean over 100 episodes of the latest policy, unless noted; over three seeds or more with a 95 % interval "
     "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same "
-    "episodes, or as the [benchmark](../docs/benchmark.md#how-we-judge) judges. Then the task's own metric, speed in "
-    "m/s; headings are relative to the x axis, which is not the direction of a command. Runs of one configuration that several studies have are in one row. Phases: the most "
-    "updates of the critics alone; 75,000 are published. Earlier model: the body or the ground has changed since the "
-    "run, so that the command gives another return."
+    "episodes or as the [benchmark](../docs/benchmark.md#how-we-judge) judges. Then the task's own metric, speed in "
+    "m/s; headings are relative to the x axis, which is not the direction of a command. Runs of one configuration "
+    "that several studies have are in one row. Phases: the most updates of the critics alone; 75,000 are published. "
+    "Earlier model: the body or the ground has changed since the run, so that the command gives another return."
 )
 
 

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from arc_suite import evaluation, files, policies, style, usage
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import anchors
+from arc_suite.evaluation import anchors, judging
 from arc_suite.learning import finals
 from arc_suite.learning.agents import run_folder
 from arc_suite.learning.studies import csv_files, results
@@ -35,7 +35,8 @@ _STYLE_COLUMNS = tuple(STYLE + name for name in METRICS)
 def publish(runs: Sequence[Run], folder: Path, published: Path, progress: Callable = tqdm) -> None:
     """Write the tables of all evaluated runs of a study, and the returns of standing still and of demonstrators.
 
-    Rows of runs that have no folder stay. Demonstrators play in the places of evaluated runs alone.
+    Rows of runs that have no folder stay. Demonstrators play in the places of evaluated runs alone, and in none of the
+    benchmark, which has anchors.
 
     Args:
         runs: runs of the study.
@@ -182,9 +183,15 @@ def _measure_style(run: Run, folder: Path, step: str, seeds: Sequence[str]) -> l
 
 
 def _publish_demonstrators(runs: Sequence[Run], published: Path, progress: Callable) -> None:
-    """Add the returns of standing still and of demonstrators in the places of runs that the table lacks."""
+    """Add the returns of standing still and of demonstrators in the places of runs that have no anchors yet.
+
+    Those of the benchmark have some.
+    """
     published_returns = results.read_demonstrators(published)
-    setups = {run.place: run.configuration.validation for run in runs if run.place not in published_returns}
+    setups = {}
+    for run in runs:
+        if run.place not in published_returns and judging.levels(run.configuration.setup) is None:
+            setups[run.place] = run.configuration.validation
     if not setups:
         return
     new_returns = {}

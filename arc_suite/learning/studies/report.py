@@ -62,7 +62,7 @@ _ABOUT_CURVES = (
 )
 _ABOUT_FINALS = (
     "Mean over 100 seeded episodes of the latest policy, unless noted. Over three seeds or more it has a 95 % interval "
-    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same episodes, or "
+    "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same episodes or "
     "as the benchmark judges. Earlier model: the body or the ground has changed since the run. The paper's returns are "
     "at equal steps, read off its curves within about 30. Then come standing still and the demonstrators, with the "
     "standard deviation over episodes."
@@ -121,6 +121,7 @@ def _plot_curves(groups: Groups, demonstrators):
 
     curves_by_place = {}
     paper_returns_by_place = {}
+    levels_by_place = {}
     for place, kinds in groups.items():
         curves = {}
         for kind, seeds in kinds.items():
@@ -132,8 +133,7 @@ def _plot_curves(groups: Groups, demonstrators):
         algorithms = [curve.algorithm for curve in curves.values()]
         last_step = max(curve.steps[-1] for curve in curves.values())
         paper_returns_by_place[place] = evaluation.published_returns(setup, algorithms, last_step)
-    levels_by_place = {}
-    for place, returns_by_policy in demonstrators.items():
+        returns_by_policy = _anchor_returns(first_kind[0], demonstrators)
         levels_by_place[place] = {_policy_label(name): returns.mean() for name, returns in returns_by_policy.items()}
     return plots.plot_study(curves_by_place, levels_by_place, paper_returns_by_place)
 
@@ -147,7 +147,20 @@ def by_kind(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:
 
 def _policy_label(name: str) -> str:
     """Return the label of standing still or of a demonstrator by the name of its policy."""
-    return "standing still" if name == anchors.ZERO else f"demonstrator {name}"
+    others = {anchors.ZERO: "standing still", judging.BLIND: "blind walker"}
+    return others.get(name, f"demonstrator {name}")
+
+
+def _anchor_returns(result: RunResult, demonstrators) -> Mapping[str, np.ndarray]:
+    """Return the returns by policy of standing still and of demonstrators in the place of a result.
+
+    They are those of the study, (episodes,), or else mean returns () of the benchmark, where it has any.
+    """
+    returns_by_policy = demonstrators.get(result.run.place)
+    if returns_by_policy is not None:
+        return returns_by_policy
+    levels = judging.levels(result.run.configuration.setup) or {}
+    return {name: np.array(level.mean) for name, level in levels.items()}
 
 
 def interval_text(values: np.ndarray) -> str:
@@ -177,16 +190,16 @@ def score_text(seeds: Sequence[RunResult], demonstrators) -> str:
 def anchors_of(result: RunResult, seeds: Sequence[int], demonstrators) -> Anchors | None:
     """Return the anchors for episodes of a result; None where none are known.
 
-    For a judged policy they are those of `judging`. Otherwise they are means over the same episodes of the study's
-    demonstrators.
+    They are those of the benchmark where it has any. Episodes of earlier versions have means over the same episodes of
+    the study's demonstrators.
 
     Args:
         result: result of a run.
         seeds: seeds of the episodes.
         demonstrators: see `results.read_demonstrators`.
     """
-    levels = judging.levels(result.run.configuration.setup) if result.policy_sha256 else None
-    if levels is not None:
+    levels = judging.levels(result.run.configuration.setup)
+    if levels is not None and not anchors.are_of_before(seeds):
         return anchors.of_levels(levels)
     returns_by_policy = demonstrators.get(result.run.place)
     return None if returns_by_policy is None else anchors.of_returns(returns_by_policy, seeds)
@@ -225,24 +238,33 @@ def _finals_table(groups: Groups, demonstrators) -> str:
                 results.join_notes(seeds),
             )
             lines.append(run_cells)
-        expert_return = evaluation.expert_return(seeds[0].run.configuration.setup)
-        for name, episode_returns in demonstrators.get(place, {}).items():
-            is_paper_expert = name == "medium" and expert_return
-            anchor_cells = (
-                place,
-                _policy_label(name),
-                "-",
-                "-",
-                f"{episode_returns.mean():.1f} +- {episode_returns.std():.1f}",
-                "-",
-                "-",
-                _format_score(anchors.of_returns(demonstrators[place]).score(episode_returns.mean())),
-                f"{expert_return:.0f}" if is_paper_expert else "-",
-                "".join(results.note_few_episodes(episode_returns)) or "-",
-            )
-            lines.append(anchor_cells)
+        lines += _anchor_lines(seeds[0], demonstrators)
     heads = ("robot, task", "algorithm", "steps", "seeds", "return", "95 %", "of each seed", "score")
     return table((*heads, "paper, equal steps", "notes"), lines)
+
+
+def _anchor_lines(result: RunResult, demonstrators) -> list[tuple[str, ...]]:
+    """Return the lines of standing still and of demonstrators in the place of a result."""
+    returns_by_policy = _anchor_returns(result, demonstrators)
+    expert_return = evaluation.expert_return(result.run.configuration.setup)
+    lines = []
+    for name, returns in returns_by_policy.items():
+        is_paper_expert = name == "medium" and expert_return
+        is_of_benchmark = returns.ndim == 0
+        cells = (
+            result.run.place,
+            _policy_label(name),
+            "-",
+            "-",
+            f"{returns:.1f}" if is_of_benchmark else f"{returns.mean():.1f} +- {returns.std():.1f}",
+            "-",
+            "-",
+            _format_score(anchors.of_returns(returns_by_policy).score(returns.mean())),
+            f"{expert_return:.0f}" if is_paper_expert else "-",
+            "anchor of the benchmark" if is_of_benchmark else "".join(results.note_few_episodes(returns)) or "-",
+        )
+        lines.append(cells)
+    return lines
 
 
 def _efficiency_table(groups: Groups, demonstrators) -> str:
