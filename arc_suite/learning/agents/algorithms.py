@@ -244,9 +244,9 @@ ALGORITHMS = {
         evaluate_every=20_000,
         steps=100_000,
     ),
-    # Noise falls over the length of a run: uneven ground takes a longer one.
+    # Noise falls over the length of a run: uneven ground takes a longer one. studies/catalog.md has shorter schedules.
     "ppo": _on_policy(
-        ProximalPolicy(network="legs", hidden=64, minibatch=512),
+        ProximalPolicy(network="legs", hidden=64, minibatch=512, schedule_steps=200_000),
         "proximal policy optimization of a network that legs share",
         evaluate_every=100_000,
         terrain_steps=3_000_000,

@@ -28,6 +28,7 @@ CONFIGURATION_FIELDS = ("robot", "task", "task_kwargs", *_LEARNING_FIELDS)
 # `learner` is in records of earlier versions.
 PRIOR_SHA256 = "prior_sha256"
 STYLE_FIELDS = ("style", "style_share")  # hyperparameters of `motion_style`
+SCHEDULE_STEPS = "schedule_steps"  # a hyperparameter of `on_policy`
 TRAINING_SEEDS = "training_seeds"
 DATA_FIELDS = (PRIOR_SHA256, TRAINING_SEEDS)
 PROVENANCE_FIELDS = (
@@ -243,13 +244,21 @@ class Configuration:
         return shlex.join(words)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the configuration as files hold it, plain values by field; without a style, no fields of it."""
+        """Return the configuration as files hold it, plain values by field, without idle hyperparameters."""
         learning_fields = {name: getattr(self, name) for name in _LEARNING_FIELDS}
-        hyperparameters = dataclasses.asdict(self.hyperparameters)
-        if not hyperparameters.get("style"):  # as runs of earlier versions, which go on
-            hyperparameters = {name: value for name, value in hyperparameters.items() if name not in STYLE_FIELDS}
-        learning_fields["hyperparameters"] = hyperparameters
+        learning_fields["hyperparameters"] = self._active_hyperparameters()
         return self.setup.to_dict() | learning_fields
+
+    def _active_hyperparameters(self) -> dict[str, Any]:
+        """Return the hyperparameters by name, without idle ones that runs of earlier versions lack, as those go on."""
+        hyperparameters = dataclasses.asdict(self.hyperparameters)
+        idle_names = set()
+        if not hyperparameters.get("style"):
+            idle_names.update(STYLE_FIELDS)
+        default_steps = getattr(algorithms.algorithm(self.algorithm).hyperparameters, SCHEDULE_STEPS, None)
+        if default_steps is not None and hyperparameters[SCHEDULE_STEPS] == default_steps <= self.steps:
+            idle_names.add(SCHEDULE_STEPS)
+        return {name: value for name, value in hyperparameters.items() if name not in idle_names}
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:

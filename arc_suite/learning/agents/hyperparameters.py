@@ -256,13 +256,15 @@ class ProximalPolicy:
         gae_lambda: decay of the generalized advantage estimate.
         clip: range of the probability ratio around 1.
         initial_std: standard deviation of actions at the start.
-        final_std: the same at the end; it falls geometrically.
+        final_std: the same at the end of the schedule; it falls geometrically.
         initial_desired_kl: desired Kullback-Leibler divergence of an iteration's policy from the last, at the start.
-        final_desired_kl: the same at the end.
+        final_desired_kl: the same at the end of the schedule.
+        schedule_steps: fewest environment steps of the schedule. That of a longer run spans the run; a shorter run
+            stops within it, as noise that falls faster keeps it from learning.
         policy_rate: learning rate of the policy at the start; it follows the divergence.
         value_rate: learning rate of the value function.
         gradient_norm: the largest norm of a gradient; longer ones are scaled down.
-        normalize_until: share of the run during which the observation normalizer is updated; never if learning
+        normalize_until: share of the schedule during which the observation normalizer is updated; never if learning
             starts from a policy.
         value_warm_up: control steps of each environment during which only the value function learns; 0 unless
             learning starts from a policy.
@@ -289,6 +291,7 @@ class ProximalPolicy:
     final_std: float = 0.07
     initial_desired_kl: float = 0.03
     final_desired_kl: float = 0.01
+    schedule_steps: int = 1
     policy_rate: float = 3e-4
     value_rate: float = 5e-4
     gradient_norm: float = 1.0

@@ -32,7 +32,7 @@ _TINY_STD = 1e-8  # added to the standard deviation of advantages, which may be 
 
 
 class Schedules(NamedTuple):
-    """What depends on how much of a run is done.
+    """What depends on how much of the schedule is done.
 
     Attributes:
         std: standard deviation of actions.
@@ -55,7 +55,7 @@ class Schedules(NamedTuple):
             steps: environment steps of the whole run.
             iterations: number of iterations before it.
         """
-        progress = min(iterations * hp.num_envs * hp.horizon / steps, 1.0)
+        progress = min(iterations * hp.num_envs * hp.horizon / max(steps, hp.schedule_steps), 1.0)
         return cls(
             std=hp.initial_std * (hp.final_std / hp.initial_std) ** progress,
             desired_kl=hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** progress,

@@ -27,6 +27,7 @@ from arc_suite.policies import network
 from arc_suite.tasks import command
 
 CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16, "network": "perceptron"}
+CHANGES |= {"schedule_steps": 1}  # that of the whole run
 SIZES = Perceptron((6,), 3)
 SMALL = ProximalPolicy(**CHANGES)
 
@@ -301,6 +302,35 @@ def test_hyperparameters_that_do_not_fit_are_refused():
         dataclasses.replace(SMALL, minibatch=65)
     with pytest.raises(ValueError, match=r"^num_envs: "):
         dataclasses.replace(SMALL, num_envs=0)
+
+
+@pytest.mark.parametrize("steps", [100, 200, 400])
+def test_a_schedule_spans_the_run_or_its_fewest_steps(steps):
+    hp = dataclasses.replace(SMALL, num_envs=10, horizon=5, minibatch=50, schedule_steps=200)
+    start, halfway, end = (on_policy.Schedules.of(hp, steps, count) for count in (0, steps // 100, steps // 50))
+    assert start.std == hp.initial_std and start.desired_kl == hp.initial_desired_kl
+    progress = min(steps / 200, 1.0)
+    assert end.std == pytest.approx(hp.initial_std * (hp.final_std / hp.initial_std) ** progress)
+    assert end.desired_kl == pytest.approx(
+        hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** progress
+    )
+    assert halfway.std == pytest.approx(np.sqrt(start.std * end.std))
+    assert end.updates_normalizer == (steps == 100)
+
+
+def test_runs_without_an_active_schedule_have_the_fields_of_before():
+    """A run of an earlier version goes on where the schedule spans it anyway, and only there."""
+    for steps, changes, is_in_file in (
+        (199_999, {}, True),
+        (200_000, {}, False),
+        (200_000, {"schedule_steps": 1}, True),
+    ):
+        configuration = Configuration.of(Setup.of("tick"), "ppo", changes, steps=steps, evaluate_every=steps)
+        fields = configuration.to_dict()
+        assert ("schedule_steps" in fields["hyperparameters"]) == is_in_file
+        assert Configuration.from_dict(fields) == configuration
+    finetune = Configuration.of(Setup.of("tick"), "finetune", {"start": "runs/x"}, steps=100, evaluate_every=100)
+    assert "schedule_steps" not in finetune.to_dict()["hyperparameters"]
 
 
 @pytest.mark.long
