@@ -147,8 +147,8 @@ def by_kind(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:
 
 def _policy_label(name: str) -> str:
     """Return the label of standing still or of a demonstrator by the name of its policy."""
-    others = {anchors.ZERO: "standing still", judging.BLIND: "blind walker"}
-    return others.get(name, f"demonstrator {name}")
+    labels = {anchors.ZERO: "standing still", judging.BLIND: "blind walker"}
+    return labels.get(name, f"demonstrator {name}")
 
 
 def _anchor_returns(result: RunResult, demonstrators) -> Mapping[str, np.ndarray]:
