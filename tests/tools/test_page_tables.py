@@ -1,22 +1,17 @@
 """tools/page_tables.py: pages hold the tables of committed studies."""
 
-import re
-
 import page_tables
 import pytest
+from published_tables import without_model_notes
 from refusals import refused
 
-from arc_suite.learning.studies import results
 from studies import pages
 
 
 @pytest.mark.parametrize(("page", "name"), page_tables.TABLES)
-def test_a_page_holds_its_table(page, name, monkeypatch):
-    """The notes on earlier models count apart: hashes of a compiled model differ among kinds of processors."""
-    page_text = (page_tables.DOCS / f"{page}.md").read_text()
-    monkeypatch.setattr(results, "note_earlier_models", lambda models: ())
-    table = page_tables.TABLES[page, name]()
-    page_text = re.sub(rf"; {results.EARLIER_MODEL}(: \d+ of \d+ runs)?(?= )", "", page_text)
+def test_a_page_holds_its_table(page, name):
+    table = without_model_notes(page_tables.TABLES[page, name]())
+    page_text = without_model_notes((page_tables.DOCS / f"{page}.md").read_text())
     assert f"<!-- {name} -->\n\n{table}\n\n<!-- end -->" in page_text
 
 
