@@ -137,10 +137,8 @@ def hint(value, valid: Iterable[str]) -> str:
     lower_text = _VERSION.sub("", text).lower()
     synonyms = [synonym for synonym in SYNONYMS.get(lower_text, ()) if synonym in valid_names]
     same_letters = [name for name in valid_names if str(name).lower() == lower_text]
-    close_matches = [
-        match for form in (text, lower_text) for match in difflib.get_close_matches(form, valid_names, n=1)
-    ]
-    suggestions = same_letters or synonyms or close_matches
+    suggestions = same_letters or synonyms or difflib.get_close_matches(text, valid_names, n=1)
+    suggestions = suggestions or difflib.get_close_matches(lower_text, valid_names, n=1)
     return f"; did you mean {suggestions[0]!r}?" if suggestions else ""
 
 

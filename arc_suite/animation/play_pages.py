@@ -139,18 +139,17 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
         task = command_task
         preset = preset or suited_preset(task)
         driver = _describe_law(task, preset)
+        run = _choose_run(body, preset)
     else:
         network = _load_network(body, policy, command_task)
         task = network.setup.definition
         driver = _describe_network(network)
+        run = None
     scene = command_task.scene
     feet = []
     for leg in body.legs:
         part_index = body.part_names.index(leg.full_name(leg.foot))
         feet.append({"part": part_index, "radius": leg.foot.radius})
-    task_values = _describe_task(task, command_task)
-    if policy == "cpg":
-        task_values["direction"]["run"] = _choose_run(body, preset)
     return pages.body_drawing(body) | {
         "name": body.name,
         "counts": _count_legs_and_links(body),
@@ -159,7 +158,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None, arena: 
         "feet": feet,
         "kick": largest_kick(body),
         "grounds": {name: _describe_ground(setup, word) for name, word in _grounds(arena).items()},
-        "task": pages.to_json_values(task_values, decimals=None),
+        "task": pages.to_json_values(_describe_task(task, command_task, run), decimals=None),
         "policy": pages.to_json_values(driver, decimals=None),
         "recovery": pages.to_json_values(_describe_recovery(body, task), decimals=None),
     }
@@ -221,12 +220,13 @@ def _describe_ground(setup: Setup, arena: str) -> dict[str, Any]:
     return ground | {"surface": pages.to_json_values(surface)}
 
 
-def _describe_task(task: Task, command_task: Task) -> dict[str, Any]:
+def _describe_task(task: Task, command_task: Task, run: float | None) -> dict[str, Any]:
     """Return what a page computes of a task: its frame, clock, units and health; see web/task.js.
 
     Args:
         task: task of the policy.
         command_task: task of the same body, whose units and health hold where the task has none.
+        run: multiple of the command at which the body runs; None where it does not.
     """
     has_command = "command" in task.commands
     # Tasks with commands have a context with their units, and health, which others lack.
@@ -253,11 +253,11 @@ def _describe_task(task: Task, command_task: Task) -> dict[str, Any]:
         "lowest": health.lowest * context.height,
         "lying": health.lying,
         "least_upright": health.least_upright,
-        "direction": _describe_pose_and_gait(task) if player_controls.is_directed(task) else None,
+        "direction": _describe_pose_and_gait(task, run) if player_controls.is_directed(task) else None,
     }
 
 
-def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
+def _describe_pose_and_gait(task: Task, run: float | None) -> dict[str, Any]:
     """Return what a page computes of pose and gait, and what the player chooses from.
 
     See web/direction.js and web/panel.js.
@@ -274,7 +274,7 @@ def _describe_pose_and_gait(task: Task) -> dict[str, Any]:
         "frequency": task.parameters.gait_frequency,
         "gaits": player_controls.gaits_by_name(task),
         "paces": [list(pace) for pace in gaits.PACES_BY_SPEED],
-        "run": None,
+        "run": run,
     }
 
 
@@ -306,17 +306,17 @@ def _measure_speed(setup: Setup, preset: str | None, forward: float) -> float:
     commands = player_controls.commands(task, (forward, 0.0, 0.0), np.zeros(6), player_controls.OWN_GAIT)
     steps_in_cycle = 1.0 / (task.parameters.gait_frequency * task.scene.control_timestep)
     start, end = (round(cycles * steps_in_cycle) for cycles in _RUN_CYCLES)
-    places = []
+    positions = []
     for timestep in play_episode(environment, policies.alone(policy), max_steps=end):
         if timestep.first():
             for name, value in commands.items():
                 environment.command(name, value)
-        places.append(environment.physics.data.qpos[:2].copy())
+        positions.append(environment.physics.data.qpos[:2].copy())
     environment.close()
-    if len(places) <= end:
+    if len(positions) <= end:
         return 0.0
     seconds = (end - start) * task.scene.control_timestep
-    return float(np.linalg.norm(places[end] - places[start]) / seconds)
+    return float(np.linalg.norm(positions[end] - positions[start]) / seconds)
 
 
 def _describe_law(task: Task, preset: str) -> dict[str, Any]:

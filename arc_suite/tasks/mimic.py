@@ -323,9 +323,9 @@ class Mimic(Task):
     def _torso_offset(self, memory: MimicMemory, readings: Readings, row):
         """Return how far (..., 3) the torso of a row is from the body's: forward, left and up, standing heights."""
         tables = self.tables
-        place = tables.entries(tables.places, row)
+        position = tables.entries(tables.places, row)
         xp = readings.posture.__array_namespace__()
-        from_origin = rotations.to_heading_frame(place[..., :2], -memory.origin[..., 2])
+        from_origin = rotations.to_heading_frame(position[..., :2], -memory.origin[..., 2])
         in_world = memory.origin[..., :2] + from_origin - readings.torso_position[..., :2]
         ground = rotations.to_heading_frame(in_world, rotations.yaw(readings.torso_quaternion))
         rise = tables.entries(tables.heights, row) - readings.torso_height

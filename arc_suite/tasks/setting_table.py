@@ -33,6 +33,7 @@ _MEANINGS_WITHOUT_FIELD = {
     "random": "seed of the episodes, for `load`; Gymnasium takes it in `reset`",
 }
 
+# Lowest and highest values of settings by name; modifiers have their own.
 _BOUNDS = {
     **parameters.BOUNDS,
     **terrain.SIZES,
@@ -87,7 +88,8 @@ def shared_settings(task_kwargs: Mapping[str, Any] = {}) -> list[Setting]:
         values |= modifier.defaults
     names = ["random", "time_limit", "arena", "on_divergence", *values]
     values |= task_kwargs
-    return [_describe(name, values, modifier_meanings() | _MEANINGS_WITHOUT_FIELD) for name in names]
+    meanings = modifier_meanings() | _MEANINGS_WITHOUT_FIELD
+    return [_describe(name, values, meanings) for name in names]
 
 
 def modifier_meanings() -> dict[str, str]:

@@ -3,7 +3,6 @@
 import pathlib
 import shlex
 
-import gymnasium
 import programs
 import pytest
 
@@ -41,14 +40,11 @@ def test_folders_are_quoted_and_modules_are_named_again(tmp_path, monkeypatch):
         "    name = 'icy'\n\n\narc_suite.register(module=__name__, tasks=(Ice,))\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    ids = set(gymnasium.registry)
     try:
         setup = Setup.of("tick", "icy:icy", {"time_limit": 2})
         evaluate, _, view = commands(setup, "my runs/ice")
     finally:
         TASKS.pop("icy", None)
-        for env_id in set(gymnasium.registry) - ids:
-            del gymnasium.registry[env_id]
     flags = "--policy 'my runs/ice' --task icy:icy --set time_limit=2"
     assert (evaluate, view) == (f"evaluate {flags}", f"view {flags}")
 

@@ -170,8 +170,9 @@ def _parts(task_class: type[Task]) -> str:
         ("command", markdown.summary(type(task_class.command))),
         ("ground", markdown.summary(type(task_class.ground))),
     ]
+    meanings = setting_table.modifier_meanings()
     for name, value in task_class.modifiers.items():
-        lines.append((f"`{name}`", f"{setting_table.format_value(value)}: {setting_table.modifier_meanings()[name]}"))
+        lines.append((f"`{name}`", f"{setting_table.format_value(value)}: {meanings[name]}"))
     return table(("part", "what it is"), lines)
 
 

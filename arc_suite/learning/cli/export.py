@@ -56,8 +56,7 @@ def main(run: str | None = None) -> None:
     folder = path if path.is_dir() else path.parent
     output = Path(FLAGS.output or folder / "policy.onnx")
     checks.extension(output, [".onnx"])
-    if FLAGS.output:
-        files.check_target(FLAGS.output)
+    files.check_target(FLAGS.output)
     if FLAGS["robot"].present or custom_body() is not None:
         task, settings = complete_task(policy_setup(run), *task_from_flags())
         setup = Setup.of(only_body(), task, settings)
