@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from PIL import Image
 
 import arc_suite
 from arc_suite import checks, evaluation, files, policies, rotations
@@ -219,16 +220,16 @@ MEDIA = (
         quality=75,
         fps=_CLIP_FPS,
     ),
-    Media("docs/robots.png", ROBOT_VIEWS, columns=2, size=(640, 400), steps=0, captions=True, limit=700_000),
+    Media("docs/robots.png", ROBOT_VIEWS, columns=2, size=(640, 400), steps=0, captions=True, limit=300_000),
     Media(
         "docs/tasks.png",
         TASK_VIEWS,
         columns=6,
-        size=(300, 180),
+        size=(280, 168),
         steps=0,
         captions=True,
         large=True,
-        limit=800_000,
+        limit=300_000,
     ),
     Media("docs/films/recover.webp", FALL_VIEWS, columns=4, size=(120, 84), limit=240_000, quality=12),
     *(Media(f"docs/films/{name}.webp", {name: view}) for name, view in ONE_VIEWS.items()),
@@ -263,7 +264,7 @@ def draw(media: Media) -> None:
         if path.suffix == ".webp":
             films.write_webp(temporary, frames, 1.0 / media.fps, media.quality)
         else:
-            films.write_png(temporary, frames, 0.0)
+            films.write_small_png(temporary, Image.fromarray(frames[0]), dithers=True)
     num_bytes = path.stat().st_size
     if num_bytes > media.limit:
         raise ValueError(f"{media.path}: {num_bytes} bytes, at most {media.limit}")

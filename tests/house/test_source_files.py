@@ -7,7 +7,14 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
 FILES = sorted([*(ROOT / "arc_suite").rglob("*.py"), *(ROOT / "tools").rglob("*.py")])
-NO_TEXT = ("os.open(", "archive.open(", "data.open(", "Storage.open(", "open(dataset_id)")  # what opens no text
+NO_TEXT = (
+    "os.open(",
+    "Image.open(",
+    "archive.open(",
+    "data.open(",
+    "Storage.open(",
+    "open(dataset_id)",
+)  # what opens no text
 XML = ("<mujoco", "<body", "<geom", "</")  # PyMJCF builds it, which escapes what a spec says; strings do not
 
 

@@ -16,7 +16,7 @@ ROOT = make_media.ROOT
 PAGES = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
 PICTURE = re.compile(r"\]\((?P<path>[^):#\s]+\.(?:png|gif|webp|svg))\)")
 ROWS = {ROOT / media.path: media for media in make_media.MEDIA}
-OTHERS = 300_000  # bytes of a plot, or of a page seen in a browser
+MAX_STILL_BYTES = 300_000  # of a picture that does not move
 
 
 def named(text, folder):
@@ -34,9 +34,14 @@ def test_pictures_that_pages_name_are_there_and_small():
     assert len(pictures) > 10
     missing = [str(path) for path in pictures if not path.is_file()]
     assert missing == []
-    assert {path.name: path.stat().st_size for path in pictures - ROWS.keys() if path.stat().st_size > OTHERS} == {}
     used = pictures | generated()
     assert ROWS.keys() - used == set()
+
+
+def test_pictures_of_the_repository_are_small():
+    pictures = [path for folder in ("docs", "studies", "examples") for path in (ROOT / folder).rglob("*.png")]
+    assert len(pictures) > 10
+    assert {path.name: path.stat().st_size for path in pictures if path.stat().st_size > MAX_STILL_BYTES} == {}
 
 
 def test_every_row_is_drawn_and_within_its_limit():

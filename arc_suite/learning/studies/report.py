@@ -1,9 +1,11 @@
 """Reports of studies: Markdown and curves, of published tables alone."""
 
+import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from arc_suite import evaluation, files
 from arc_suite.evaluation import anchors, judging, published
@@ -12,6 +14,7 @@ from arc_suite.learning.studies import results
 from arc_suite.learning.studies.results import Groups, RunResult
 from arc_suite.learning.studies.tables import Study
 from arc_suite.learning.studies.text_tables import table
+from arc_suite.simulation import films
 
 REPORT = "README.md"
 CURVES = "curves.png"
@@ -49,8 +52,7 @@ def write(name: str, study: Study, published: Path, further: Sections | None = N
         sections["Phases"] = [_ABOUT_PHASES, _phases_table(groups)]
     sections["Style"] = [_ABOUT_STYLE, _style_table(groups)]
     sections.update(further or {})
-    with files.writing(published / CURVES) as temporary:
-        _plot_curves(groups, demonstrators).savefig(temporary)
+    _write_plot(published / CURVES, _plot_curves(groups, demonstrators))
     files.write(published / REPORT, _join_sections(sections))
     return published / REPORT
 
@@ -113,6 +115,14 @@ def _progress_table(study_results: Sequence[RunResult]) -> str:
         )
         lines.append(cells)
     return table(("robot, task", "algorithm", "seed", "steps", "CPU min", "command"), lines)
+
+
+def _write_plot(path: Path, figure) -> None:
+    """Write a figure as a small picture."""
+    drawing = io.BytesIO()
+    figure.savefig(drawing)
+    with files.writing(path) as temporary:
+        films.write_small_png(temporary, Image.open(drawing))
 
 
 def _plot_curves(groups: Groups, demonstrators):
