@@ -248,7 +248,7 @@ def test_keys_and_controls(shown, tracks):
     assert shown.evaluate("viewer.state.speed") == 0.5
     shown.keyboard.press("Home")
     shown.keyboard.press(" ")
-    shown.wait_for_function("viewer.state.time > 0.1", timeout=60_000)
+    shown.wait_for_function("viewer.state.time > 0.1")
     shown.keyboard.press(" ")
     assert shown.evaluate("viewer.state.playing") is False
     shown.fill("#time", "1.5")
@@ -310,9 +310,9 @@ def test_something_is_drawn(shown):
 def test_small_pages(browser, tracks, tmp_path, width, height):
     """The view is large enough or the page scrolls, nothing overlaps, controls have names and a size to hit."""
     (tmp_path / "walk.html").write_text(pages.page(tracks), encoding="utf-8")
-    tab = browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce")
+    tab = tabs.new(browser, viewport={"width": width, "height": height}, reduced_motion="reduce")
     tab.goto((tmp_path / "walk.html").as_uri())
-    tab.wait_for_function("window.viewer", timeout=60_000)
+    tab.wait_for_function("window.viewer")
     assert tab.evaluate("viewer.state.playing") is False
     tab.evaluate("viewer.seek(1)")
     tab.wait_for_function("document.querySelector('.reward').style.height")

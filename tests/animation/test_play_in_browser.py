@@ -416,7 +416,7 @@ def test_a_body_that_is_held_does_not_fall_and_then_lands(tab):
 
 
 def test_an_address_names_body_and_ground(browser, page):
-    tab = browser.new_page(viewport={"width": 320, "height": 256})
+    tab = tabs.new(browser, viewport={"width": 320, "height": 256})
     shown = "window.shown = document.getElementById('loading').checkVisibility()"
     tab.add_init_script(f"document.addEventListener('DOMContentLoaded', () => {{ {shown}; }})")
     tab.goto(f"{page.as_uri()}#walk&body=walker_6x3&ground=bumps")
@@ -439,8 +439,7 @@ def test_sliders_choose_bodies_by_legs_and_links(browser, tmp_path):
     path = tmp_path / "walkers.html"
     walkers = [play_pages.creature(generator.generate(*counts)) for counts in ((4, 2), (6, 3))]
     path.write_text(play_pages.page([*walkers, walkers[0] | {"counts": None}]), "utf-8")
-    tab = browser.new_page(viewport={"width": 320, "height": 256})
-    tab.set_default_timeout(tabs.PATIENCE)
+    tab = tabs.new(browser, viewport={"width": 320, "height": 256})
     name = "play.state.play.body.name"
     tab.goto(f"{path.as_uri()}#legs=6&links=3&ground=bumps")
     tab.wait_for_function("window.play")
@@ -563,8 +562,7 @@ def boxes(tab):
 def test_everything_has_its_place(browser, page, width, height):
     touch = width < 1000
     context = browser.new_context(viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch)
-    tab = context.new_page()
-    tab.set_default_timeout(tabs.PATIENCE)
+    tab = tabs.new(context)
     tab.goto(page.as_uri())
     tab.wait_for_function("window.play")
     tab.evaluate("play.pause(false)")

@@ -88,9 +88,9 @@ SOUGHT = {
 
 @pytest.mark.parametrize(("word", "page"), SOUGHT.items())
 def test_a_search_finds_the_page_that_explains_it_first(browser, word, page):
-    tab = browser.new_page()
+    tab = tabs.new(browser)
     tab.goto(f"{(SITE / 'search.html').as_uri()}?q={word}")
-    link = tab.wait_for_selector("ul.search li a", timeout=60_000).get_attribute("href")
+    link = tab.wait_for_selector("ul.search li a").get_attribute("href")
     assert link.partition("?")[0].partition("#")[0] == page
 
 
@@ -99,10 +99,10 @@ def test_a_search_finds_the_page_that_explains_it_first(browser, word, page):
 def test_a_creature_walks_on_the_front_page(browser, width, height):
     with tabs.opened(browser, SITE / "index.html", "document.querySelector('iframe')", width, height) as (tab, _):
         (frame,) = (frame for frame in tab.frames if "play.html" in frame.url)
-        frame.wait_for_function("window.play", timeout=60_000)
+        frame.wait_for_function("window.play")
         where = "play.state.play.simulation.data.qpos[0]"
         start = frame.evaluate(where)
-        frame.wait_for_function(f"Math.abs({where} - {start}) > 0.1", timeout=60_000)
+        frame.wait_for_function(f"Math.abs({where} - {start}) > 0.1")
         frame.evaluate("play.pause(false)")
         assert tab.evaluate("document.documentElement.scrollWidth") == width
         assert frame.evaluate("play.inputs.command") == [0.8, 0, 0.2]

@@ -7,6 +7,7 @@ import viser
 
 from arc_suite.animation.studio import layout, saving, texts
 from arc_suite.animation.studio.editor import Editor
+from arc_suite.animation.studio.handlers import in_order
 from arc_suite.animation.studio.picture_buttons import PictureButtons
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import Sketch, make_body
@@ -34,7 +35,7 @@ class Downloads:
         self._gallery_folder = gui.add_folder("Saved in this session", visible=False)
         with self._gallery_folder:
             self._gallery = PictureButtons(gui, "gallery", "", [""], columns=3, height=48)
-        self._gallery.on_update(self._reopen)
+        self._gallery.on_update(in_order(self._reopen))
         self._lines = gui.add_html("")
 
     def show_lines(self, sketch: Sketch) -> None:

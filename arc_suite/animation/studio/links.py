@@ -10,6 +10,7 @@ import viser
 from arc_suite.animation.studio import layout
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.editor import Editor
+from arc_suite.animation.studio.handlers import in_order
 from arc_suite.animation.studio.sketch import Sketch, drag_end, length_factor, set_length_factor
 from arc_suite.animation.studio.view import View
 
@@ -47,10 +48,10 @@ class LinkWidgets:
             self._symmetric = gui.add_checkbox("Symmetric", True, hint="The leg across changes, too")
             self._dragging = gui.add_checkbox("Drag joints", False, hint="Time stands still; drag the balls")
             self._sliders = [layout.add_length_factor(gui) for _ in range(layout.MAX_LINK_SLIDERS)]
-        self._leg.on_update(lambda event: self._show_state())
-        self._dragging.on_update(lambda event: self._switch_dragging())
+        self._leg.on_update(in_order(lambda event: self._show_state()))
+        self._dragging.on_update(in_order(lambda event: self._switch_dragging()))
         for index, slider in enumerate(self._sliders):
-            slider.on_update(functools.partial(self._set_length, index))
+            slider.on_update(in_order(functools.partial(self._set_length, index)))
 
     @property
     def is_dragging(self) -> bool:
@@ -94,8 +95,8 @@ class LinkWidgets:
         ]
         return tuple(names or creature.links)[: layout.MAX_LINK_SLIDERS]
 
-    async def _set_length(self, index: int, event: viser.GuiEvent) -> None:
-        """Set the length of a link; asynchronous, as viser keeps the order of asynchronous calls only."""
+    def _set_length(self, index: int, event: viser.GuiEvent) -> None:
+        """Set the length of a link."""
         is_by_visitor = event.client_id is not None  # not by the page itself
         if is_by_visitor and index < len(self._link_names):
             link = self._link_names[index]

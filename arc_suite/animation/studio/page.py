@@ -24,6 +24,7 @@ from arc_suite.animation.studio.downloads import Downloads
 from arc_suite.animation.studio.editor import Editor
 from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.gate import Server, offers
+from arc_suite.animation.studio.handlers import in_order
 from arc_suite.animation.studio.links import LinkWidgets
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, RANDOM, Sketch, open_body, open_file, original_shape
@@ -128,7 +129,7 @@ class Page:
         with tabs.add_tab("Files"):
             self._downloads = Downloads(self._gui, session, self._editor, self._show_state)
         for field, widget in self._widgets.items():
-            widget.on_update(functools.partial(self._set_field, field))
+            widget.on_update(in_order(functools.partial(self._set_field, field)))
         self._panel = self._gui.add_panel()
         with self._panel.add_tab("Measured"):
             self._charts = Charts(self._gui)
@@ -178,15 +179,15 @@ class Page:
             "Reset": self._reset,
         }
         buttons = self._gui.add_button_group("Changes", tuple(actions), hint="Ctrl+Z, Ctrl+Shift+Z")
-        buttons.on_click(lambda event: actions[event.target.value]())
+        buttons.on_click(in_order(lambda event: actions[event.target.value]()))
         undo_command = self._gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl")
-        undo_command.on_trigger(lambda event: self._undo())
+        undo_command.on_trigger(in_order(lambda event: self._undo()))
         redo_command = self._gui.add_command("Redo", hotkey="Z", modifier="cmd/ctrl+shift")
-        redo_command.on_trigger(lambda event: self._redo())
+        redo_command.on_trigger(in_order(lambda event: self._redo()))
         charts = self._gui.add_checkbox("Charts", False)
-        charts.on_update(self._switch_charts)
+        charts.on_update(in_order(self._switch_charts))
         keep = self._gui.add_checkbox("Keep", False, hint="This creature walks next to all later ones")
-        keep.on_update(lambda event: self._session.keep(event.target.value))
+        keep.on_update(in_order(lambda event: self._session.keep(event.target.value)))
 
     def _switch_charts(self, event: viser.GuiEvent) -> None:
         self._panel.visible = event.target.value
@@ -195,7 +196,7 @@ class Page:
         """Add the widgets for the body, with the values of a sketch."""
         self._check = self._gui.add_folder("Check")
         self._widgets |= layout.add_source(self._gui, sketch)
-        self._gui.add_button("Random body").on_click(lambda event: self._draw_random_body())
+        self._gui.add_button("Random body").on_click(in_order(lambda event: self._draw_random_body()))
         upload = self._gui.add_upload_button("Open a spec or a design", mime_type="application/json")
         upload.on_upload(self._open_upload)
         self._widgets |= layout.add_shape(self._gui, sketch)
@@ -222,16 +223,16 @@ class Page:
         self._pose_folder = gui.add_folder("Pose and gait")
         with self._pose_folder:
             self._widgets |= layout.add_pose(gui)
-            gui.add_button("Upright").on_click(lambda event: self._stand_upright())
+            gui.add_button("Upright").on_click(in_order(lambda event: self._stand_upright()))
         for key in _KEYS:
             command = gui.add_command(key.label, hotkey=key.letter)
-            command.on_trigger(functools.partial(self._press, key))
+            command.on_trigger(in_order(functools.partial(self._press, key)))
         key_texts = [f"{key.letter} {key.label.lower()}" for key in _KEYS]
         gui.add_html(texts.paragraph(f"Keys: {', '.join(key_texts)}"))
         gui.add_button("Kick").on_click(lambda event: self._session.kick(random.uniform(-math.pi, math.pi)))
         gui.add_button("Restart").on_click(lambda event: self._session.restart())
         self._pause = gui.add_checkbox("Pause", False)
-        self._pause.on_update(lambda event: self._session.pause(event.target.value))
+        self._pause.on_update(in_order(lambda event: self._session.pause(event.target.value)))
 
     def _fit(self, creature: Creature) -> None:
         """Show the choices, the flaws and the lines that belong to a creature."""
@@ -275,7 +276,8 @@ class Page:
                 if flaw.cure is not None:
                     advice = flaw.text.rpartition(": ")[2]  # of PROBLEM: ADVICE
                     button = self._gui.add_button(f"Apply: {advice}")
-                    button.on_click(functools.partial(self._apply_cure, open_body(creature.sketch, flaw.cure)))
+                    cured_sketch = open_body(creature.sketch, flaw.cure)
+                    button.on_click(in_order(functools.partial(self._apply_cure, cured_sketch)))
                     self._flaw_widgets.append(button)
 
     def _apply_cure(self, sketch: Sketch, event: viser.GuiEvent) -> None:
@@ -316,8 +318,8 @@ class Page:
         self._editor.reset()
         self._show_state()
 
-    async def _set_field(self, field: str, event: viser.GuiEvent) -> None:
-        """Set a field of the state; asynchronous, as viser keeps the order of asynchronous calls only."""
+    def _set_field(self, field: str, event: viser.GuiEvent) -> None:
+        """Set a field of the state."""
         is_by_visitor = event.client_id is not None  # not by the page itself
         if is_by_visitor:
             value = event.target.value

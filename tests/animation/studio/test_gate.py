@@ -179,6 +179,21 @@ def test_settings_of_a_visitor_import_nothing(studio):
     studio.update(studio.page._widgets["settings"], value="{}")
 
 
+def test_presses_are_taken_in_their_order_also_when_they_follow_each_other_at_once(studio, monkeypatch):
+    (buttons,) = (
+        handle
+        for handle in studio.server.gui._gui_input_handle_from_uuid.values()
+        if isinstance(handle, viser.GuiButtonGroupHandle) and "Undo" in handle.options
+    )
+    taken = []
+    for name in buttons.options:
+        monkeypatch.setattr(studio.page._editor, name.lower(), lambda name=name: taken.append(name))
+    sent = [buttons.options[index % 5 % 3] for index in range(60)]
+    studio.send(*(update(buttons, value=name) for name in sent))
+    until(lambda: len(taken) == len(sent))
+    assert taken == sent
+
+
 def test_an_upload_that_is_too_large_is_not_begun(studio):
     (upload,) = (
         handle

@@ -7,6 +7,7 @@ import time
 import mujoco
 import numpy as np
 import pytest
+import tabs
 
 from arc_suite import rotations
 from arc_suite.animation import player_controls
@@ -20,7 +21,7 @@ from arc_suite.robots.spec_files import body_from_json, body_to_json
 viser = pytest.importorskip("viser", reason="no viser here: make check-studio")
 from arc_suite.animation.studio import page as pages  # noqa: E402
 
-_PATIENCE = 240.0  # s: a browser that draws without a graphics card is slow
+_PATIENCE = 0.001 * tabs.PATIENCE  # s
 
 HIGH = generator.generate(6, 2)
 HIGH = HIGH.replace(torso=HIGH.torso.replace(standing_height=0.5))
@@ -66,8 +67,7 @@ def served():
 def tab(browser, served):
     context = browser.new_context(viewport={"width": 1100, "height": 700}, accept_downloads=True)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
-    tab, wrong, asked = context.new_page(), [], []
-    tab.set_default_timeout(1000.0 * _PATIENCE)
+    tab, wrong, asked = tabs.new(context), [], []
     tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     tab.on("pageerror", lambda error: wrong.append(str(error)))
     tab.on("request", lambda request: asked.append(request.url))
@@ -243,6 +243,11 @@ def seen(view, camera, name=None):
     return np.stack([x / (z * high * camera.aspect), y / (z * high)], axis=-1)
 
 
+def drawn(client):
+    """Wait until a browser has drawn all that it was sent before."""
+    client.get_render(height=8, width=8, timeout=_PATIENCE)
+
+
 @pytest.mark.parametrize("source", ["queen", "tick", "millipede"])
 def test_the_camera_has_any_creature_of_any_size_in_its_picture(served, tab, source):
     """Feet at the size that the slider has at most, where visitors see them."""
@@ -326,14 +331,14 @@ def test_a_joint_is_dragged(served, tab):
     (client,) = view._server.get_clients().values()
     tab.get_by_role("checkbox", name="Drag joints").click()
     served.until(lambda: served.session.paused and served.session.episodes.steps == 0 and view._figure._balls)
-    time.sleep(2.0)  # for the browser to draw them
+    drawn(client)
     box = tab.locator("canvas").first.bounding_box()
     unit, (place,) = view._unit, seen(view, client.camera, "r2_lower")
     x, y = box["x"] + 0.5 * (1.0 + place[0]) * box["width"], box["y"] + 0.5 * (1.0 + place[1]) * box["height"]
     tab.mouse.move(x, y)
     tab.mouse.down()
     tab.mouse.move(x + 12.0, y, steps=4)
-    time.sleep(0.5)
+    drawn(client)
     tab.mouse.up()
     served.until(lambda: len(served.session.creature.sketch.ends) == 2)
     ends = dict(served.session.creature.sketch.ends)
@@ -443,8 +448,7 @@ def test_lines_are_copied(served, tab):
 
 def test_another_visitor_sees_the_same_creature(served, tab):
     served.session.pause(True)
-    other = tab.context.new_page()
-    other.set_default_timeout(1000.0 * _PATIENCE)
+    other = tabs.new(tab.context)
     other.goto(served.addresses[0])
     other.get_by_text("walker_6x2 stands and can take steps").wait_for()
     other.close()
@@ -457,8 +461,7 @@ def test_a_phone_has_controls_for_fingers(served, tab):
     """A sheet as wide as the window and a third as high, and nothing to press that is too small."""
     page = served.page
     context = tab.context.browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
-    phone = context.new_page()
-    phone.set_default_timeout(1000.0 * _PATIENCE)
+    phone = tabs.new(context)
     phone.goto(served.addresses[0])
     undo = phone.get_by_role("button", name="Undo", exact=True)
     undo.wait_for()
@@ -472,15 +475,23 @@ def test_a_phone_has_controls_for_fingers(served, tab):
     context.close()
 
 
+# Returns once the page has shown that the studio runs in so many seconds.
+_BEATS = """(count) => {
+  const beats = window.beats ??= new Set();
+  beats.add(document.getElementById("status").dataset.beat);
+  return beats.size > count;
+}"""
+
+
 def test_a_page_says_when_the_studio_has_stopped(browser):
     ending = Served()
-    tab = browser.new_page()
+    tab = tabs.new(browser, viewport={"width": 320, "height": 256})  # which is drawn soon
     tab.goto(ending.addresses[0])
     tab.wait_for_selector("#status")
     note = tab.get_by_text("The studio has stopped. Start it again")
     ending.session.pause(True)
-    time.sleep(10.0)
-    assert not note.is_visible()  # time stands still, and the studio runs
+    tab.wait_for_function(_BEATS, arg=10)
+    note.wait_for(state="hidden")  # time stands still, and the studio runs
     ending.close()
     note.wait_for()
     tab.close()

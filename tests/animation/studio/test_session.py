@@ -34,6 +34,12 @@ class Shown:
             assert time.monotonic() < end, "the session did not come so far"
             time.sleep(0.01)
 
+    def pause(self):
+        """Have time stand still: the step under way when it is asked for is over."""
+        self.session.pause(True)
+        count = len(self.states)
+        self.until(lambda: len(self.states) > count + 1)
+
     def steps(self, count):
         """Wait for so many control steps of the creature that walks."""
         target = self.session.episodes.steps + count
@@ -163,8 +169,7 @@ def test_a_mistake_of_ours_is_told_too(monkeypatch, capsys):
 def test_time_can_stand_still_and_episodes_start_anew():
     with running() as (session, shown):
         shown.steps(10)
-        session.pause(True)
-        time.sleep(0.2)
+        shown.pause()
         steps, count = session.episodes.steps, len(shown.states)
         shown.until(lambda: len(shown.states) > count + 5)
         assert session.episodes.steps == steps
@@ -177,8 +182,7 @@ def test_time_can_stand_still_and_episodes_start_anew():
 def test_a_kick_throws_the_torso():
     with running(Sketch(legs=6, links=2, policy="zero")) as (session, shown):
         shown.steps(20)
-        session.pause(True)
-        time.sleep(0.2)
+        shown.pause()
         session.kick(0.0)
         velocity = session.episodes.environment.physics.data.qvel
         speed = np.sqrt(9.81 * session.creature.setup.body.torso.standing_height)
@@ -188,8 +192,7 @@ def test_a_kick_throws_the_torso():
 def test_history_and_states_of_a_walk():
     with running() as (session, shown):
         shown.steps(40)
-        session.pause(True)
-        time.sleep(0.2)
+        shown.pause()
         history = session.history
         assert len(history) == session.episodes.steps == len(history.times)
         total = sum(terms.sum() for terms in history.terms().values())
