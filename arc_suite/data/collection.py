@@ -17,6 +17,7 @@ from arc_suite.data import rollouts
 from arc_suite.data.settings import DatasetSettings
 from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.simulation.model_hash import PHYSICS
 from arc_suite.tasks import Task, terms
 
 NUM_ENVS = 64  # more do not make steps faster, and more of them would idle during the last episodes
@@ -129,6 +130,8 @@ def _difference(stored: dict, present: dict) -> str | None:
     stored = _with_versions_by_package(stored)
     present = _with_versions_by_package(present)
     for name, value in present.items():
+        if name == PHYSICS and name not in stored:
+            continue
         if stored.get(name) != value:
             if name == "presets_sha256":
                 return f"its presets {' and '.join(present['presets'])} had other numbers"

@@ -14,6 +14,7 @@ from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import DatasetSettings
 from arc_suite.envs.setup import Setup
+from arc_suite.simulation.model_hash import PHYSICS
 
 METADATA = "metadata.json"
 MAIN = "main_data.hdf5"
@@ -165,6 +166,7 @@ def read_metadata(dataset_id: str, folder: Path) -> dict:
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
     with explain_damage(dataset_id, path):
-        for name, kind in (("versions", dict), ("model_sha256", str)):
-            _check_type(f"{name} of arc_suite", metadata["arc_suite"][name], kind)
+        suite_metadata = metadata["arc_suite"]
+        _check_type("versions of arc_suite", suite_metadata["versions"], dict)
+        _check_type(f"{PHYSICS} of arc_suite", suite_metadata.get(PHYSICS, ""), str)
     return metadata

@@ -14,6 +14,7 @@ from arc_suite.data.episodes import Episode
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import Script
 from arc_suite.robots.spec import Body
+from arc_suite.simulation.model_hash import PHYSICS
 
 
 def verify(
@@ -103,7 +104,7 @@ def _check_provenance(dataset: Dataset) -> None:
     if stored.get("task_version") != task_version:
         stored_version = f"version {checks.quote(stored.get('task_version'))} of {setup.kind.name}"
         raise ValueError(f"dataset {dataset.id!r} was collected with {stored_version}; {task_version} is installed")
-    if stored["model_sha256"] != present["model_sha256"]:
+    if stored.get(PHYSICS, present[PHYSICS]) != present[PHYSICS]:
         raise ValueError(f"dataset {dataset.id!r} was collected with another model of {setup.body.name}")
 
 

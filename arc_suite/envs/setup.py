@@ -21,6 +21,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
+from arc_suite.simulation.model_hash import PHYSICS, hash_physics
 from arc_suite.tasks.contract import Task
 
 # Name of an attribute that `envs.sb3.VecEnv` gives its observation space: `Setup.to_dict` of the environments. An agent
@@ -329,12 +330,10 @@ class Setup:
         fields = self.to_dict()
         task_versions = [task.version for task in registry.tasks_of(self.task)]
         fields["task_version"] = task_versions[0] if len(task_versions) == 1 else task_versions
-        fields["body_sha256"] = _sha256(texts.encode())
+        fields["body_sha256"] = hashlib.sha256(texts.encode()).hexdigest()
         if not self.several:
             _, model = self.prepare()
-            buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
-            mujoco.mj_saveModel(model, None, buffer)
-            fields["model_sha256"] = _sha256(buffer.data)
+            fields[PHYSICS] = hash_physics(model)
         fields["versions"] = versions.dependency_versions()
         return fields
 
@@ -353,10 +352,6 @@ class Setup:
             settings[name] = self.kind.file_settings[name].label(settings[name])
         settings_text = f", {json.dumps(settings)}" if settings else ""
         return f"{self._label}, {self.task_label}{settings_text}"
-
-
-def _sha256(content) -> str:
-    return hashlib.sha256(content).hexdigest()
 
 
 def _validation_bodies(robot: str, count: int) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 from arc_suite import policies, seed_ranges
 from arc_suite.envs.setup import Setup
 
-_FIELDS = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "model_sha256")
+_FIELDS = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "physics_sha256")
 UNKNOWN = "training data unknown"
 
 

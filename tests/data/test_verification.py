@@ -68,7 +68,7 @@ def test_an_episode_that_is_whole_but_not_what_its_seed_gives_is_found(root, key
 def test_another_version_or_model_is_refused(kept):
     older = versions.dependency_versions() | {"mujoco": "3.16.0"}
     for change, found, difference in (
-        ({"model_sha256": "0" * 64}, "another model of queen", "model_sha256 is '0{64}', and not '[0-9a-f]{64}'; "),
+        ({"physics_sha256": "0" * 64}, "another model of queen", "physics_sha256 is '0{64}', and not '[0-9a-f]{64}'; "),
         ({"task_version": 1}, "version 1 of walk; 0 is installed", "task_version is 1, and not 0; "),
         (
             {"task_version": 0, "versions": older},

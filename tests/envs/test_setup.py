@@ -58,13 +58,13 @@ def test_files_hold_it(body):
 def test_provenance_tells_what_episodes_depend_on():
     told = Setup.of("queen").provenance()
     assert json.loads(json.dumps(told)) == told
-    assert {"robot", "task", "task_kwargs", "task_version", "body_sha256", "model_sha256", "versions"} == told.keys()
+    assert {"robot", "task", "task_kwargs", "task_version", "body_sha256", "physics_sha256", "versions"} == told.keys()
     for other in (
         Setup.of("tick"),
         Setup.of(QUEEN.replace(density=11.0)),
         Setup.of("queen", "walk", {"arena": "bumps"}),
     ):
-        assert other.provenance()["model_sha256"] != told["model_sha256"]
+        assert other.provenance()["physics_sha256"] != told["physics_sha256"]
 
 
 @pytest.mark.parametrize(

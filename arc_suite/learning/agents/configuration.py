@@ -15,8 +15,9 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.hyperparameters import BLOCKS_LEFT_OUT
 from arc_suite.learning.agents.learner import MAX_RUN_SEED, RunContext
-from arc_suite.learning.agents.run_folder import LEG_VIEWS
+from arc_suite.learning.agents.run_folder import LEG_VIEWS, MODEL_HASH
 from arc_suite.policies import network
+from arc_suite.simulation.model_hash import PHYSICS
 from arc_suite.tasks import leg_views
 from arc_suite.tasks.contract import CURRICULUM
 
@@ -34,7 +35,7 @@ DATA_FIELDS = (PRIOR_SHA256, TRAINING_SEEDS)
 PROVENANCE_FIELDS = (
     "task_version",
     "body_sha256",
-    "model_sha256",
+    PHYSICS,
     "learner",
     "episodes",
     LEG_VIEWS,
@@ -273,7 +274,7 @@ class Configuration:
             OSError: the file of a body cannot be read.
         """
         for name in fields:
-            checks.name(name, (*CONFIGURATION_FIELDS, *PROVENANCE_FIELDS), "field of a configuration")
+            checks.name(name, (*CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, MODEL_HASH), "field of a configuration")
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
         for kind, name in _registered_names(fields):

@@ -192,7 +192,8 @@ def restore_tree(prefix: str, template, arrays: Mapping[str, np.ndarray]):
         array = arrays[name]
         expected = np.asarray(template_leaf)
         if (array.shape, array.dtype) != (expected.shape, expected.dtype):
-            raise ValueError(f"{name}: expected {expected.dtype} {expected.shape}")
+            shapes = f"expected {expected.dtype} {expected.shape}, got {array.dtype} {array.shape}"
+            raise ValueError(f"{name}: {shapes}, which a run of another version may have")
         leaves.append(jnp.asarray(array))
     return jax.tree_util.tree_unflatten(structure, leaves)
 

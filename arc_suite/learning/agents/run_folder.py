@@ -21,16 +21,18 @@ from typing import IO, Any
 import numpy as np
 
 from arc_suite import archives, checks, files, parsers, usage
+from arc_suite.simulation.model_hash import PHYSICS
 
 CONFIG = "config.json"
 CHECKPOINT = "checkpoint.npz"
 LOCK = ".lock"
 TABLES = ("evaluations", "training", "times")
 LEG_VIEWS = "leg_views"  # name of a field of records: the version of what legs see; see `tasks.leg_views`
+MODEL_HASH = "model_sha256"  # in records of earlier versions, in place of `PHYSICS`; it differed among processors
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
 _NUMBERS_OF_PROGRESS = {"evaluated", "wall", "cpu", "return"}  # those that a checkpoint may have
-_IGNORED_FIELDS = ("learner",)  # fields of records of earlier versions, which may differ
+_IGNORED_FIELDS = ("learner", MODEL_HASH)  # fields of records of earlier versions, which may differ
 _MAX_TABLE = 1 << 30  # bytes
 _MAX_CHECKPOINT_BYTES = 1 << 34  # unpacked; the labels of imitation are the largest part
 
@@ -201,7 +203,8 @@ def check_same_run(path: str | os.PathLike[str], config: Mapping[str, Any], left
                 f"write to another folder with --algorithm {algorithm} --hp start={path}"
             )
         field, _, _ = name.partition(".")
-        if field not in (*left_out, *_IGNORED_FIELDS):
+        is_unknown = name == PHYSICS and folder_value is None
+        if field not in (*left_out, *_IGNORED_FIELDS) and not is_unknown:
             raise ValueError(
                 f"{path}: of another run, with {name} {checks.preview(folder_value)}, not {checks.preview(value)}; "
                 "write to another folder"

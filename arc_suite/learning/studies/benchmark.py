@@ -44,7 +44,7 @@ class RunScore(NamedTuple):
         policy_sha256: hash of the judged policy; empty for a run from before, which was judged on seeds 0 to 99.
         first_seed: seed of the first episode that judges it.
         notes: reasons why the score is not comparable with others; empty without any.
-        model_sha256: hash of the model in which the run learned, or in which a policy was judged; empty if unknown.
+        physics_sha256: hash of the model in which the run learned, or in which a policy was judged; empty if unknown.
     """
 
     robot: str
@@ -58,7 +58,7 @@ class RunScore(NamedTuple):
     policy_sha256: str = ""
     first_seed: int = 0
     notes: str = ""
-    model_sha256: str = ""
+    physics_sha256: str = ""
 
 
 COLUMNS = ("division", "learner", *RunScore._fields)  # columns of `SCORES`
@@ -102,7 +102,7 @@ def _score_result(result: RunResult) -> RunScore:
         policy_sha256=result.policy_sha256,
         first_seed=result.seeds[0] if len(result.seeds) else 0,
         notes="; ".join(notes),
-        model_sha256=result.model_sha256,
+        physics_sha256=result.physics_sha256,
     )
 
 
@@ -154,10 +154,10 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     """
     scores_by_learner: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
-        division, learner, robot, task, seed, *cells, policy_sha256, first_seed, notes, model_sha256 = row.values()
+        division, learner, robot, task, seed, *cells, policy_sha256, first_seed, notes, physics_sha256 = row.values()
         checks.name(division, DIVISIONS, "division")
         score = RunScore(
-            robot, task, int(seed), *map(float, cells), policy_sha256, int(first_seed), notes, model_sha256
+            robot, task, int(seed), *map(float, cells), policy_sha256, int(first_seed), notes, physics_sha256
         )
         if np.isinf((score.result, score.score)).any():
             raise ValueError(f"{studies / SCORES}: expected finite returns and scores, got {', '.join(cells)[:100]}")
@@ -266,6 +266,6 @@ def _notes_text(groups: Groups) -> str:
     for scores in groups.values():
         for score in scores:
             notes += [note for note in score.notes.split("; ") if note]
-    models = [(place_setup(*place), score.model_sha256) for place, scores in groups.items() for score in scores]
+    models = [(place_setup(*place), score.physics_sha256) for place, scores in groups.items() for score in scores]
     notes += results.note_earlier_models(models)
     return "; ".join(dict.fromkeys(notes)) or "-"

@@ -61,7 +61,7 @@ class RunResult(NamedTuple):
         phases: (phases,) updates of each stabilization phase; empty if they are not published.
         training_seeds: seeds of the episodes that the run learned from; None if they are unknown.
         seeds: seeds of the episodes of `finals`; empty if they are unknown.
-        model_sha256: hash of the model in which the run learned; empty if it is unknown.
+        physics_sha256: hash of the model in which the run learned; empty if it is unknown.
         curve_seeds: seeds of the episodes of `returns`; empty if they are unknown.
         policy_sha256: hash of the judged policy; empty if it is not judged.
         other_settings: whether the task had other settings than the study has now.
@@ -78,7 +78,7 @@ class RunResult(NamedTuple):
     phases: np.ndarray
     training_seeds: Ranges | None = ()
     seeds: Sequence[int] = ()
-    model_sha256: str = ""
+    physics_sha256: str = ""
     curve_seeds: Sequence[int] = ()
     policy_sha256: str = ""
     other_settings: bool = False
@@ -184,7 +184,7 @@ def _result(
         training_seeds=from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
         seeds=[int(row["seed"]) for row in judged],
         curve_seeds=[int(row["seed"]) for row in latest[: evaluation.CURVE_EPISODES]],
-        model_sha256=run_row["model_sha256"],
+        physics_sha256=run_row["physics_sha256"],
         policy_sha256=judged[0].get("policy_sha256", ""),
         other_settings=published_run != run,
         sources=json.loads(run_row[SOURCES] or "[]"),
@@ -259,13 +259,13 @@ def note_earlier_models(models: Iterable[tuple[Setup, str]]) -> tuple[str, ...]:
 @functools.cache
 def hash_model(setup: Setup) -> str:
     """Return the hash of the model of a setup, as the code makes it now; empty for several bodies."""
-    return setup.provenance().get("model_sha256", "")
+    return setup.provenance().get("physics_sha256", "")
 
 
 def join_notes(seeds: Sequence[RunResult]) -> str:
     """Return the notes of all results without repetitions; a dash without any."""
     notes = [note for result in seeds for note in result.notes]
-    notes += note_earlier_models((result.run.configuration.setup, result.model_sha256) for result in seeds)
+    notes += note_earlier_models((result.run.configuration.setup, result.physics_sha256) for result in seeds)
     return "; ".join(dict.fromkeys(notes)) or "-"
 
 

@@ -145,7 +145,7 @@ def test_the_record_of_a_run(tiny, tmp_path):
     config = json.loads((tmp_path / "run" / "config.json").read_text())
     assert config["hyperparameters"]["batch"] == 8 and config["task_kwargs"] == {"time_limit": 2.0}
     assert {"arc_suite", "mujoco", "numpy", "jax", "jaxlib", "optax"} <= config["versions"].keys()
-    assert len(config["model_sha256"]) == len(config["body_sha256"]) == 64
+    assert len(config["physics_sha256"]) == len(config["body_sha256"]) == 64
     assert configuration.read(tmp_path / "run" / "config.json") == tiny("sac")
 
 
