@@ -30,7 +30,7 @@ MUTANTS = {
     "a body's joints not looked at": "«body.joint_names != robot.joint_names→False»",
     "both sides of a body in step": 'side_offset = «0.5→0.0» if leg.side == "right"',
     "feet of a random body above the floor": "down = «(height - foot_radius)→height * 0.9» /",
-    "a scaled robot keeps its name": 'name=«f"{stem}_{change}"→body.name»',
+    "a scaled robot keeps its name": 'return «f"{stem}_{change}"→body.name»',
     # Models.
     "contact margin doubled": "default=«0.005→0.01»",
     "ballast touches the floor": '"mass": ballast.mass, **«_TOUCHES_NOTHING→touches_floor»}',

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.models import imported_sizes
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
 LEG_RANGE = (4, 12)  # fewest and most
@@ -196,7 +197,8 @@ def scaled(body: Body, factor: float) -> Body:
         factor: 0.01 to 100.
 
     Returns:
-        The body, `<name>_scaled`: a robot's name would give it the robot's numbers. MuJoCo bounds
+        The body, `<name>_scaled`: a robot's name would give it the robot's numbers. An imported body moves like the
+        first one, see `imported_sizes`. MuJoCo bounds
         inertias from below: at the density of 10 kg/m^3 legs must be 0.9 mm thick, which those of a
         body of `generate` are down to a height of 2 cm; at 300 kg/m^3 one of 1 cm walks too.
 
@@ -205,7 +207,7 @@ def scaled(body: Body, factor: float) -> Body:
     """
     factor = checks.number("scale", factor, *SCALE_RANGE)
     if body.source:
-        raise ValueError(f"scale: {body.name} was imported, and keeps the size of its file")
+        return imported_sizes.scale_import(body, factor).replace(name=_changed_name(body, "scaled"))
 
     standing_height = factor * body.torso.standing_height
     solids = tuple(_scale_solid(solid, factor) for solid in body.torso.solids)
@@ -334,9 +336,14 @@ def _change_body(body: Body, change: str, legs: Sequence[Leg], **fields) -> Body
         legs: legs of the body.
         **fields: fields of the body.
     """
-    stem = _SUFFIX.sub("", body.name)[: MAX_NAME - len(change) - 1]
     legs_to_size = tuple(_forget_sizes(leg) for leg in legs)
-    return body.replace(name=f"{stem}_{change}", legs=legs_to_size, simulation=None, camera=None, **fields)
+    return body.replace(name=_changed_name(body, change), legs=legs_to_size, simulation=None, camera=None, **fields)
+
+
+def _changed_name(body: Body, change: str) -> str:
+    """Return the name of a body with a change in place of an earlier one."""
+    stem = _SUFFIX.sub("", body.name)[: MAX_NAME - len(change) - 1]
+    return f"{stem}_{change}"
 
 
 def _forget_sizes(leg: Leg) -> Leg:

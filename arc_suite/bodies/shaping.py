@@ -7,13 +7,17 @@ from typing import NamedTuple
 from arc_suite import checks
 from arc_suite.bodies import generator
 from arc_suite.bodies.torsos import UNCHANGED, replace_torso
-from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Leg, Solid, Vector
+from arc_suite.models.imported_links import adjustable_links, change_link_ends
+from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Leg, Link, Solid, Vector
 
 FACTOR_RANGE = (0.1, 10.0)  # bounds of a factor of lengths
 FAN_RANGE = (-90.0, 90.0)  # degrees, bounds
 
 _SUFFIX = "_shaped"  # of names
 _MIDLINE = 1e-9  # m, half of its width
+
+
+IMPORT_FIELDS = ("scale", "links", "ends")  # of a shape, that an imported body can have
 
 
 class Shape(NamedTuple):
@@ -45,6 +49,11 @@ def link_names(body: Body) -> tuple[str, ...]:
     return tuple(dict.fromkeys(link.name for leg in body.legs for link in leg.links))
 
 
+def parts_with_lengths(body: Body) -> tuple[str, ...]:
+    """Return the names of the parts that are links whose lengths can change: all, except some of imported bodies."""
+    return adjustable_links(body) if body.source else tuple(link_ends(body))
+
+
 def link_ends(body: Body) -> dict[str, Vector]:
     """Return the ends (3,) of the links of all legs, m, by names of their parts."""
     return {leg.full_name(link): link.end for leg in body.legs for link in leg.links}
@@ -62,8 +71,8 @@ def shaped(body: Body, **changes) -> Body:
         if nothing changes.
 
     Raises:
-        ValueError: a value or a length out of range, a link that the body does not have, an imported body, or as
-            `torsos.replace_torso`.
+        ValueError: a value or a length out of range, a link that the body does not have, another torso of an imported
+            body, or as `torsos.replace_torso`.
     """
     shape = Shape(**changes)
     body_ends = link_ends(body)
@@ -84,8 +93,9 @@ def shaped(body: Body, **changes) -> Body:
     keeps_torso = shape._replace(links={}, ends={}) == Shape()
     if keeps_torso and keeps_links and keeps_ends:
         return body
+    stem = body.name[: MAX_NAME - len(_SUFFIX)].removesuffix(_SUFFIX)
     if body.source:
-        raise ValueError(f"shape: {body.name} was imported, and keeps the shape of its file")
+        return _shape_import(body, shape, link_factors, ends).replace(name=stem + _SUFFIX)
     body = replace_torso(body, shape.torso, shape.head, shape.tail)
 
     farthest_mount = max(abs(leg.mount[0]) for leg in body.legs) or 1.0  # m, forward or backward
@@ -98,8 +108,25 @@ def shaped(body: Body, **changes) -> Body:
     torso = body.torso.replace(standing_height=None, solids=solids)
     reshaped_body = body.replace(torso=torso, ballast=ballast, legs=tuple(legs))
     scaled_body = generator.scaled(reshaped_body, shape.scale)
-    stem = body.name[: MAX_NAME - len(_SUFFIX)].removesuffix(_SUFFIX)
     return scaled_body.replace(name=stem + _SUFFIX)
+
+
+def _shape_import(
+    body: Body, shape: Shape, link_factors: Mapping[str, float], ends: Mapping[str, Sequence[float]]
+) -> Body:
+    """Return an imported body of another size and with links of other lengths; arguments as of `_shape_leg`."""
+    for field in Shape._fields:
+        is_same = getattr(shape, field) == getattr(Shape(), field)
+        if field not in IMPORT_FIELDS and not is_same:
+            raise ValueError(
+                f"{field}: {body.name} was imported, and keeps its torso; {', '.join(IMPORT_FIELDS)} change"
+            )
+    new_ends = {}
+    for leg in body.legs:
+        for link in leg.links:
+            part = leg.full_name(link)
+            new_ends[part] = _change_end(leg, link, link_factors, ends)
+    return generator.scaled(change_link_ends(body, new_ends), shape.scale)
 
 
 def _shape_leg(
@@ -122,11 +149,17 @@ def _shape_leg(
     length, width, _ = torso_factors
     links = []
     for link in leg.links:
-        end = ends.get(leg.full_name(link), link.end)
-        factor = link_factors.get(link.name, 1.0) * link_factors.get(leg.full_name(link), 1.0)
-        links.append(link.replace(end=tuple(factor * component for component in end)))
+        links.append(link.replace(end=_change_end(leg, link, link_factors, ends)))
     side = math.copysign(1.0, y) if abs(y) > _MIDLINE else 0.0
     return leg.replace(mount=(length * x, width * y, z), links=tuple(links), yaw_deg=leg.yaw_deg - side * turn)
+
+
+def _change_end(leg: Leg, link: Link, link_factors: Mapping[str, float], ends: Mapping[str, Sequence[float]]) -> Vector:
+    """Return the end of a link, m; arguments as of `_shape_leg`."""
+    part = leg.full_name(link)
+    factor = link_factors.get(link.name, 1.0) * link_factors.get(part, 1.0)
+    x, y, z = ends.get(part, link.end)
+    return factor * x, factor * y, factor * z
 
 
 def _stretch(solid: Solid, factors: Vector) -> Solid:

@@ -11,7 +11,7 @@ import pytest
 from refusals import refused
 
 import arc_suite
-from arc_suite.bodies import BodiesEnv, generator, shaping
+from arc_suite.bodies import BodiesEnv, shaping
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import suited_presets
@@ -236,10 +236,8 @@ def test_settings_that_servos_cannot_have_are_refused():
     expected = "expected the default in a body with a source, which has its motors and weights"
     with refused(f"Body(quadruped_15_kg).agility: {expected}", SpecError):
         QUADRUPED.replace(agility=2.0)
-    with refused("shape: quadruped_15_kg was imported, and keeps the shape of its file"):
+    with refused("length: quadruped_15_kg was imported, and keeps its torso; scale, links, ends change"):
         shaping.shaped(QUADRUPED, length=2.0)
-    with refused("scale: quadruped_15_kg was imported, and keeps the size of its file"):
-        generator.scaled(QUADRUPED, 2.0)
 
 
 def test_positions_are_what_servos_take_anyway():

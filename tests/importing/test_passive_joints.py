@@ -5,6 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 from robots_of_others import reference
+from sprung_robots import CASES, CONNECT, CRANK, DRIVEN, FOOT, PLACES, ROBOT, write
 
 import arc_suite
 from arc_suite import models
@@ -13,58 +14,6 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.importing import import_robot
 from arc_suite.robots.spec import SpecError
 
-ROBOT = """
-<mujoco model="built here">
-  <compiler angle="degree"/>
-  <default><joint armature="0.01" damping="0.3" range="-80 80" limited="true"/><motor ctrlrange="-20 20"/></default>
-  <worldbody><body name="trunk" pos="0 0 0.5"><freejoint/>
-    <geom type="box" size="0.2 0.1 0.05" mass="8"/>
-    {legs}{further}
-  </body></worldbody>
-  <equality>{equalities}</equality>
-  <actuator>{motors}</actuator>
-</mujoco>"""
-LEG = """
-<body name="{name}_thigh" pos="{x} {y} 0" euler="0 35 0">
-  <joint name="{name}_roll" axis="1 0 0"/><joint name="{name}_pitch" axis="0 1 0"/>
-  <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.5"/>{thigh}
-  <body name="{name}_shank" pos="0 0 -0.2" euler="0 -70 0"><joint name="{name}_knee" axis="0 1 0"/>
-    <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.015" mass="0.2"/>{foot}
-  </body>
-</body>"""
-FOOT = '<geom size="0.03" pos="0 0 -0.2" mass="0.05"/>'
-ANKLE = """<body name="{name}_foot" pos="0 0 -0.2" euler="0 35 0">
-  <joint name="{name}_ankle" axis="0 1 0" stiffness="30" springref="5" damping="0.4"/>
-  <geom type="capsule" fromto="-0.02 0 -0.03 0.04 0 -0.03" size="0.015" mass="0.05"/></body>"""
-# A shank in two parts, with a leg's spring between them.
-SHOCK = """<body name="{name}_shock" pos="0 0 -0.2">
-  <joint name="{name}_shock" type="slide" axis="0 0 1" range="-0.02 0.02" stiffness="20000" damping="60"/>
-  <geom size="0.03" mass="0.05"/></body>"""
-# A rod beside the thigh, whose lower end a connection holds at the shank, 0.05 behind the knee.
-CRANK = """<body name="{name}_rod" pos="-0.05 0 0"><joint name="{name}_rod" axis="0 1 0"/>
-  <geom type="capsule" fromto="0 0 0 0 0 -0.18" size="0.008" mass="0.05"/>
-  <body name="{name}_end" pos="0 0 -0.2"><joint name="{name}_end" axis="0 1 0"/><geom size="0.01" mass="0.02"/></body>
-</body>"""
-CONNECT = '<connect body1="{name}_end" body2="{name}_shank" anchor="0 0 0"/>'
-TAIL = """<body pos="-0.2 0 0.1"><joint name="tail" axis="0 1 0" stiffness="2"/>
-  <geom type="capsule" fromto="0 0 0 -0.2 0 0" size="0.01" mass="0.1"/></body>"""
-PLACES = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "HL": (-0.2, 0.1), "HR": (-0.2, -0.1)}
-DRIVEN = ("roll", "pitch", "knee")
-CASES = {
-    "sprung ankles": {"foot": ANKLE},
-    "sprung shanks": {"foot": SHOCK},
-    "rods that connections close": {"foot": FOOT, "thigh": CRANK, "equality": CONNECT},
-    "ankles that welds hold": {
-        "foot": ANKLE,
-        "thigh": CRANK,
-        "equality": '<weld body1="{name}_end" body2="{name}_shank" anchor="0.03125 0 -0.0625" torquescale="0.5" '
-        'solref="0.01 1"/>',
-    },
-    "a tail": {
-        "foot": FOOT,
-        "further": TAIL,
-    },
-}
 PASSIVE = {
     "sprung ankles": 4,
     "sprung shanks": 4,
@@ -72,20 +21,6 @@ PASSIVE = {
     "ankles that welds hold": 12,
     "a tail": 1,
 }
-
-
-def write(folder, foot=FOOT, thigh="", equality="", further="", driven=DRIVEN):
-    """Write a robot whose legs are the same, and return the path."""
-    legs, motors, equalities = [], [], []
-    for name, (x, y) in PLACES.items():
-        parts = {"foot": foot.format(name=name), "thigh": thigh.format(name=name)}
-        legs.append(LEG.format(name=name, x=x, y=y, **parts))
-        motors += [f'<motor joint="{name}_{joint}"/>' for joint in driven]
-        equalities.append(equality.format(name=name))
-    texts = {"legs": legs, "motors": motors, "equalities": equalities}
-    path = folder / "robot.xml"
-    path.write_text(ROBOT.format(further=further, **{name: "".join(parts) for name, parts in texts.items()}))
-    return path
 
 
 @pytest.mark.parametrize("case", CASES)

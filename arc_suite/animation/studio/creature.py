@@ -10,7 +10,7 @@ from arc_suite import policies
 from arc_suite.animation.parts import Material, Part, describe_body
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.sketch import Sketch
-from arc_suite.bodies.shaping import link_names
+from arc_suite.bodies.shaping import parts_with_lengths
 from arc_suite.envs import dm
 from arc_suite.envs.setup import Setup
 from arc_suite.models.outline import outline
@@ -27,7 +27,7 @@ class Creature(NamedTuple):
         environment: environment in which it walks. Episodes have no time limit; physics that diverges ends an episode.
         act: maps a `TimeStep` to an action.
         flaws: flaws of the body.
-        links: names of the links of its legs.
+        parts_with_lengths: names of the parts that are links whose lengths can change.
         tile: side of the square tiles of its ground, m: the standing height of the body at scale 1. So tiles show how
             much a sketch scales the body.
         reach: greatest distance of a point of the body from the torso's origin along an axis, m.
@@ -40,7 +40,7 @@ class Creature(NamedTuple):
     environment: dm.Environment
     act: Callable[..., np.ndarray]
     flaws: tuple[Flaw, ...]
-    links: tuple[str, ...]
+    parts_with_lengths: tuple[str, ...]
     tile: float
     reach: float
     parts: tuple[Part, ...]
@@ -65,7 +65,7 @@ def open_creature(sketch: Sketch) -> Creature:
         environment=environment,
         act=act,
         flaws=tuple(flaws(setup.body)),
-        links=link_names(setup.body),
+        parts_with_lengths=parts_with_lengths(setup.body),
         tile=setup.body.torso.standing_height / sketch.scale,
         reach=float(abs(outline(setup.body)).max()),
         parts=tuple(parts),

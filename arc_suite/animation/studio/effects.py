@@ -6,10 +6,9 @@ from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.sketch import LEGS, RANDOM
 from arc_suite.animation.studio.states import POSE, VELOCITY, VisitorCommand
 from arc_suite.bodies import torsos
-from arc_suite.bodies.shaping import Shape
+from arc_suite.bodies.shaping import IMPORT_FIELDS, Shape, parts_with_lengths
 
 _PROPORTIONS = Shape._fields[: Shape._fields.index("links")]  # fields of a shape that are about the body as a whole
-_SHAPE = (*_PROPORTIONS, "lengths")  # fields of a sketch that change the shape of a body
 
 
 def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
@@ -35,8 +34,10 @@ def idle_fields(creature: Creature, command: VisitorCommand) -> frozenset[str]:
         idle.append("seed")
     if not torsos.has_plain_torso(sketches.source_body(sketch)):
         idle += torsos.PARTS
-    if is_imported:  # an imported body keeps its shape
-        idle += _SHAPE
+    if is_imported:  # it keeps its torso
+        idle += [field for field in _PROPORTIONS if field not in IMPORT_FIELDS]
+    if not parts_with_lengths(setup.body):
+        idle.append("lengths")
     if "gait" in typed_settings:
         idle.append("gait")
     if "target_velocity" in typed_settings or not has_target_velocity:

@@ -51,7 +51,7 @@ class Figure:
         ]
 
     def show_handles(self, on_drag: Callable[[str, np.ndarray], None] | None) -> None:
-        """Show a ball at the end of every link, which visitors drag; None hides the balls.
+        """Show a ball at the end of every link whose length can change, which visitors drag; None hides the balls.
 
         Args:
             on_drag: called with the name of a link's part, and the shift (3,) of its end in the frame of the link, m.
@@ -65,6 +65,8 @@ class Figure:
         for leg in self.creature.setup.body.legs:
             for link in leg.links:
                 part_name = leg.full_name(link)
+                if part_name not in self.creature.parts_with_lengths:
+                    continue
                 ball = self._scene.add_icosphere(
                     f"{frame_names[part_name]}/end",
                     radius=_HANDLE_SCALE * link.radius / self._unit,

@@ -90,10 +90,15 @@ class LinkWidgets:
 
     def _names_of_links(self, creature: Creature) -> tuple[str, ...]:
         """Return the names of the links of all legs, or of the parts of the leg that visitors choose."""
-        names = [
-            leg.full_name(link) for leg in creature.setup.body.legs if leg.name == self._leg.value for link in leg.links
-        ]
-        return tuple(names or creature.links)[: layout.MAX_LINK_SLIDERS]
+        names = []
+        for leg in creature.setup.body.legs:
+            for link in leg.links:
+                if leg.full_name(link) in creature.parts_with_lengths:
+                    if self._leg.value == _ALL_LEGS:
+                        names.append(link.name)
+                    elif self._leg.value == leg.name:
+                        names.append(leg.full_name(link))
+        return tuple(dict.fromkeys(names))[: layout.MAX_LINK_SLIDERS]
 
     def _set_length(self, index: int, event: viser.GuiEvent) -> None:
         """Set the length of a link."""

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from arc_suite import rotations
+from arc_suite.animation.parts import part_frames
 from arc_suite.animation.studio.creature import open_creature
-from arc_suite.animation.studio.sketch import Sketch, open_body
+from arc_suite.animation.studio.sketch import Sketch, drag_end, open_body
 from arc_suite.models.standing import standing_qpos
 from arc_suite.tasks import readings
 
@@ -40,3 +41,29 @@ def test_frames_are_where_the_simulation_has_the_feet(server, body):
         turns.append(turn @ rotations.matrix(np.array(frame.wxyz)))
     shown = [places[body.part_names.index(name)] for name in body.foot_names]
     np.testing.assert_allclose(shown, data.xpos[layout.feet], atol=1e-6)
+
+
+def test_the_ball_at_the_end_of_a_link_drags_its_end(server):
+    """Balls are at the ends of links, and a shift in the scene moves the end by as much in the model."""
+    view, robot = View(server), imports.quadruped()
+    creature = open_creature(open_body(Sketch(task="steer"), robot))
+    view.show(creature)
+    dragged = {}
+    view.show_handles(lambda part, shift: dragged.update({part: shift}))
+    figure = view._figure
+    positions, turns = part_frames(creature.parts)
+    model = creature.environment.physics.model.ptr
+    data = mujoco.MjData(model)
+    data.qpos[:] = standing_qpos(model)
+    mujoco.mj_kinematics(model, data)
+    index = robot.part_names.index("r1_link2")
+    (ball,) = (ball for ball in figure._balls if ball.name.endswith("r1_link2/end"))
+    place = positions[index] + turns[index] @ np.array(ball.position) * creature.reach
+    knee = data.joint("r1_joint3").xanchor - data.xpos[1]
+    np.testing.assert_allclose(place - positions[0], knee, atol=1e-4)
+    changed = drag_end(creature.sketch, "r1_link2", np.array((0.03, 0.0, -0.02)), symmetric=False)
+    after = open_creature(changed).environment.physics
+    after.data.qpos[:] = standing_qpos(after.model.ptr)
+    mujoco.mj_kinematics(after.model.ptr, after.data.ptr)
+    moved = after.data.ptr.joint("r1_joint3").xanchor - after.data.xpos[1] - knee
+    np.testing.assert_allclose(moved, (0.03, 0.0, -0.02), atol=1e-4)

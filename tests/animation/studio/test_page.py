@@ -4,6 +4,7 @@ import re
 import threading
 import time
 
+import imports
 import mujoco
 import numpy as np
 import pytest
@@ -428,6 +429,32 @@ def test_an_uploaded_body_and_the_value_that_fits(served, tab, tmp_path):
     tab.get_by_role("button", name="Apply: standing_height 0.4 fits").click()
     served.until(lambda: served.session.creature.setup.body.torso.standing_height == 0.4)
     tab.get_by_text("walker_6x2 stands and can take steps").wait_for()
+
+
+def test_an_imported_robot_changes_its_size_and_its_links(served, tab, tmp_path):
+    """By sliders and by a drag; what has no effect is hidden, and undo, reset and files follow."""
+    upload(tab, tmp_path / "robot.json", body_to_json(imports.quadruped()).encode())
+    served.until(lambda: served.session.creature.setup.body == imports.quadruped())
+    tab.get_by_text("Torso length", exact=True).wait_for(state="hidden")
+    for hidden in ("Torso width", "Fan of the legs", "Head"):
+        assert not tab.get_by_text(hidden, exact=True).is_visible()
+    press(tab, "link3", "ArrowRight", 4)
+    served.until(lambda: dict(served.session.creature.sketch.lengths).get("link3") == pytest.approx(1.2))
+    longer = served.session.creature.sketch
+    press(tab, "Size", "End")
+    served.until(lambda: served.session.creature.sketch.scale == 4.0)
+    body = served.session.creature.setup.body
+    assert body == shaping.shaped(imports.quadruped(), links={"link3": 1.2}, scale=4.0)
+    served.until(lambda: served.session.episodes.steps > 20)  # it walks
+    name, content = saved(tab, "Spec")
+    assert name == "quadruped_15_kg_shaped.json" and body_from_json(content) == body
+    tab.get_by_role("button", name="Undo").click()
+    served.until(lambda: served.session.creature.sketch == longer)
+    tab.get_by_role("button", name="Reset").click()
+    served.until(lambda: served.session.creature.setup.body.source is None)
+    for _ in range(3):
+        tab.get_by_role("button", name="Undo").click()
+    served.until(lambda: served.session.creature.setup.body == imports.quadruped())
 
 
 def test_files_are_saved(served, tab):

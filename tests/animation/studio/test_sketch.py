@@ -1,10 +1,12 @@
 """What the widgets say: the body, task and policy that it makes, and lines that make the same; no viser."""
 
 import dataclasses
+import math
 import re
 import shlex
 
 import ground_files
+import imports
 import programs
 import pytest
 from refusals import refused
@@ -13,12 +15,15 @@ from arc_suite import registry
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio import states
 from arc_suite.animation.studio.creature import open_creature
+from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
+from arc_suite.animation.studio.states import VisitorCommand
 from arc_suite.bodies import generator, shaping
 from arc_suite.bodies.families import sound_body
+from arc_suite.bodies.shaping import Shape
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.spec_files import body_to_json, load_body
+from arc_suite.robots.spec_files import body_from_json, body_to_json, load_body
 
 HIGH = generator.generate(6, 3)
 HIGH = HIGH.replace(torso=HIGH.torso.replace(standing_height=0.5))
@@ -208,3 +213,33 @@ def test_legs_that_overlap_are_moved_apart():
 def test_a_bad_combination_is_one_line(sketch, message):
     with refused(message, begins=True):
         open_creature(sketch)
+
+
+def test_an_imported_robot_has_sliders_of_its_size_and_its_links():
+    """They change the robot as `--length` of programs does, are saved and read back, and others are hidden."""
+    robot = imports.quadruped()
+    sketch = sketches.open_body(Sketch(task="steer"), robot)
+    creature = open_creature(sketch)
+    idle = idle_fields(creature, VisitorCommand())
+    assert idle & {*Shape._fields[:-2], "lengths"} == {"length", "width", "thickness", "fan", "torso", "head", "tail"}
+    assert creature.parts_with_lengths == tuple(shaping.link_ends(robot))
+    longer = sketches.set_length_factor(sketch, "link3", 1.2, symmetric=True)
+    longer = dataclasses.replace(sketches.set_length_factor(longer, "l1_link2", 0.9, symmetric=True), scale=2.0)
+    assert {part for part, _ in longer.ends} == {"l1_link2", "r1_link2"}
+    body = open_creature(longer).setup.body
+    assert body.name == "quadruped_15_kg_shaped" and body_from_json(body_to_json(body)) == body
+    lengths = {part: math.hypot(*end) for part, end in shaping.link_ends(body).items()}
+    for part, end in shaping.link_ends(robot).items():
+        factor = {"link3": 2.4}.get(part[3:], 1.8 if part in ("l1_link2", "r1_link2") else 2.0)
+        assert lengths[part] == pytest.approx(factor * math.hypot(*end), rel=1e-4)
+    assert states.from_json(states.to_json(states.PageState(longer))).sketch == longer
+
+
+def test_sliders_of_an_imported_robot_are_the_flags_of_programs(tmp_path):
+    path, made = imports.FILES / "go2_like.xml", tmp_path / "longer.json"
+    flags = ("--length=link3=1.2", "--scale=2", "--json", f"--output={made}")
+    done = programs.arc_suite("build_model", f"--spec={path}", *flags)
+    assert done.returncode == 0, done.stderr
+    sketch = sketches.set_length_factor(sketches.open_body(Sketch(), imports.quadruped()), "link3", 1.2, True)
+    body = sketches.make_body(dataclasses.replace(sketch, scale=2.0))
+    assert load_body(str(made)).replace(name=body.name) == body
