@@ -31,6 +31,18 @@ _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
 _EXPECTED_ERRORS = (flags.Error, ValueError, OSError, RenderingUnavailable, PhysicsError)
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
+# Answers to flags of other programs, which no flag of this suite replaces.
+_RESUME = "the same command goes on where it was interrupted"
+_DEVICE = "learners compute on the device of JAX; see docs/gpu.md"
+_CURES = {
+    "continue": _RESUME,
+    "resume": _RESUME,
+    "cuda": _DEVICE,
+    "device": _DEVICE,
+    "gpu": _DEVICE,
+    "format": "the extension of the output is its format",
+}
+
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
 _VERSION = flags.DEFINE_bool(
     "version", False, "Print the version, the folder and the commit, and exit.", short_name="V"
@@ -95,16 +107,16 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
     module = sys.modules[main.__module__]
 
     def parse_and_call():
-        _, *positional_arguments = _parse([script, *arguments], module)
+        parameters = inspect.signature(main).parameters
+        _, *positional_arguments = _parse([script, *arguments], module, list(parameters))
         if _HELP.value:
             print(help_text(docstring_of(module), _flags_of(module)))
             return None
         if _VERSION.value:
             print(describe_suite())
             return None
-        max_arguments = len(inspect.signature(main).parameters)
-        if len(positional_arguments) > max_arguments:
-            unexpected = positional_arguments[max_arguments]
+        if len(positional_arguments) > len(parameters):
+            unexpected = positional_arguments[len(parameters)]
             suggestion = _suggest_flag(unexpected)
             raise ValueError(f"unexpected argument {checks.preview(unexpected)}; {suggestion}see --help")
         return main(*positional_arguments)
@@ -159,10 +171,15 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     sys.exit(status)
 
 
-def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
+def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[str]) -> list[str]:
     """Parse arguments into absl's flags, and return the arguments that are no flags.
 
     A flag of several words may be written with dashes, too.
+
+    Args:
+        arguments: the name of the script, then those of the command line.
+        module: the module of the program.
+        parameters: names of the arguments that are no flags; errors suggest them.
 
     Raises:
         ValueError: a flag that the program does not have, a value that its flag does not take, or an empty one.
@@ -179,6 +196,9 @@ def _parse(arguments: Sequence[str], module: ModuleType) -> list[str]:
             long_names = [f"--{name}" for name in names if name[0] == error.flagname]
             if long_names:
                 raise ValueError(f"unknown flag '-{error.flagname}'; did you mean {' or '.join(long_names)}?") from None
+        _refuse_name_of_argument(error.flagname, value, parameters)
+        if error.flagname in _CURES:
+            raise ValueError(f"unknown flag {checks.preview(error.flagname)}; {_CURES[error.flagname]}") from None
         checks.name(error.flagname, names, "flag")  # raises a ValueError that suggests a name
         raise
     except flags.IllegalFlagValueError as error:
@@ -215,6 +235,13 @@ def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> N
     ]
     if suggestions:
         raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {' or '.join(suggestions)}?")
+
+
+def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -> None:
+    """Raise ValueError for a flag that is the name of an argument without a flag."""
+    if any(meaning in parameters for meaning in (name, *checks.SYNONYMS.get(name, ()))):
+        argument = checks.quote(value) or name.upper()
+        raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {argument}, without a flag?")
 
 
 def _suggest_flag(argument: str) -> str:

@@ -36,6 +36,21 @@ LINES = {
     "animate --seed=5": "unknown flag 'seed' (there are: ",
     "train --algo=sac": "unknown flag 'algo'; did you mean 'algorithm'? (there are: ",
     "train --total_timesteps=1e5": "unknown flag 'total_timesteps'; did you mean 'steps'? (there are: ",
+    "train --resume=runs/a": "unknown flag 'resume'; the same command goes on where it was interrupted\n",
+    "train --device=cuda": "unknown flag 'device'; learners compute on the device of JAX; see docs/gpu.md\n",
+    "train --out=runs/a": "unknown flag 'out'; did you mean 'output'? (there are: ",
+    "evaluate --run=runs/a": "unknown flag 'run'; did you mean 'policy'? (there are: ",
+    "evaluate --checkpoint=runs/a": "unknown flag 'checkpoint'; did you mean 'policy'? (there are: ",
+    "evaluate --output=a.json": "unknown flag 'output'; did you mean 'json'? (there are: ",
+    "export --policy=runs/a": "unknown flag 'policy'; did you mean runs/a, without a flag?\n",
+    "export --run runs/a": "unknown flag 'run'; did you mean RUN, without a flag?\n",
+    "export runs/a --format=onnx": "unknown flag 'format'; the extension of the output is its format\n",
+    "benchmark --division=samples": "unknown flag 'division'; did you mean samples, without a flag?\n",
+    "benchmark samples --output=a": "unknown flag 'output'; did you mean 'results'? (there are: ",
+    "render --duration=3": "unknown flag 'duration'; did you mean 'steps'? (there are: ",
+    "render --resolution=640x480": "unknown flag 'resolution'; did you mean 'width'? (there are: ",
+    "animate --creature=queen": "unknown flag 'creature'; did you mean 'robot'? (there are: ",
+    "animate --animation=walk": "unknown flag 'animation'; did you mean 'clips'? (there are: ",
     "train --steps=1e5": "flag --steps=1e5: expected a positive integer; did you mean --steps=100000?\n",
     "evaluate --episodes=1.5k": f"flag --episodes=1.5k: {INTEGER}; did you mean --episodes=1500?\n",
     "evaluate --episodes=1.5": f"flag --episodes=1.5: {INTEGER}\n",
@@ -71,7 +86,8 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("command", LINES)
 def test_one_line_with_the_cure(command, folder):
     program, *arguments = command.split()
-    robot = [] if "--legs" in command else ["--robot=tick"]
+    has_robot = program != "benchmark" and "--legs" not in command
+    robot = ["--robot=tick"] if has_robot else []
     done = programs.arc_suite(program, *robot, *arguments, cwd=folder)
     programs.refused(done, f"arc-suite {program}: {LINES[command]}")
 
