@@ -3,7 +3,7 @@
 # make test     installs everything, runs the tests, on all cores
 # make lint     ruff, the contracts of imports, and the schemas of workflows
 # make docs     builds the documentation site in out/docs/html; with Node, creatures walk there
-# make media    draws the pictures and films of creatures in README and docs; minutes
+# make media    draws the pictures and films of creatures in README and docs; needs Node and Chromium; half an hour
 # make notebooks  runs the notebooks of examples, and keeps their pictures and tables in them; minutes
 # make web      bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make dist     builds wheel and source distribution in dist/, with the viewer of pages; needs Node
@@ -80,9 +80,14 @@ docs: setup.cfg
 	$(VENV)/bin/python tools/make_site.py out/docs
 	$(VENV)/bin/python -m sphinx -q -W --keep-going -j auto -c docs out/docs/sources out/docs/html
 
-media: $(INSTALLED)
-	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) tools/make_media.py
+# A cut of README's film is a page, in Chromium.
+media: VENV := .venv-web
+media: $(VIEWER)
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[dev]' playwright==1.65.2
+	tools/ensure_egl.sh $(VENV)/bin/python
+	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
+	$(VENV)/bin/python tools/make_media.py
 
 notebooks: VENV := .venv-notebooks
 notebooks: setup.cfg

@@ -120,23 +120,42 @@ class Footage:
         return data.qpos.copy(), data.qvel.copy()
 
     def interpolate(self, share: float) -> np.ndarray:
-        """Return positions (nq,) at a share of the latest control step: Hermite's cubic, by velocities at its ends."""
-        start, start_velocity = self._state_before
-        end, end_velocity = self._state()
+        """Return positions (nq,) at a share of the latest control step."""
         model = self._environment.physics.model.ptr
-        displacement = np.empty_like(start_velocity)
-        mujoco.mj_differentiatePos(model, displacement, 1.0, start, end)
-        remaining = 1.0 - share
-        displacement *= share**2 * (1.0 + 2.0 * remaining)
-        tangents = remaining * start_velocity - share * end_velocity
-        displacement += self.control_timestep * share * remaining * tangents
-        qpos = start.copy()
-        mujoco.mj_integratePos(model, qpos, displacement, 1.0)
-        return qpos
+        return interpolate(model, self._state_before, self._state(), share, self.control_timestep)
 
     def close(self) -> None:
         """Free the simulation and its OpenGL context."""
         self._environment.close()
+
+
+def interpolate(
+    model: mujoco.MjModel,
+    before: tuple[np.ndarray, np.ndarray],
+    after: tuple[np.ndarray, np.ndarray],
+    share: float,
+    seconds: float,
+) -> np.ndarray:
+    """Return positions (nq,) between two states: Hermite's cubic, by the velocities at its ends.
+
+    Args:
+        model: model of both.
+        before: positions (nq,) and velocities (nv,).
+        after: the same, later.
+        share: share of the time between them, 0 to 1.
+        seconds: time between them.
+    """
+    start, start_velocity = before
+    end, end_velocity = after
+    displacement = np.empty_like(start_velocity)
+    mujoco.mj_differentiatePos(model, displacement, 1.0, start, end)
+    remaining = 1.0 - share
+    displacement *= share**2 * (1.0 + 2.0 * remaining)
+    tangents = remaining * start_velocity - share * end_velocity
+    displacement += seconds * share * remaining * tangents
+    qpos = start.copy()
+    mujoco.mj_integratePos(model, qpos, displacement, 1.0)
+    return qpos
 
 
 def cycle(footage: Footage, count: int) -> Iterator[np.ndarray]:

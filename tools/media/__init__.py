@@ -1,0 +1,1 @@
+"""Views of creatures, and the drawing of them, for the pictures of README and docs."""
