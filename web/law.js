@@ -1,5 +1,6 @@
 // The law `Stepping`, as arc_suite.cpg.stepping defines it, with constants that Python computed.
 import { clamp, moved, reached, tilt, vertical, verticalAbout, weighing } from "./legs.js";
+import { paceUnder } from "./pace.js";
 
 const share = (value) => value - Math.floor(value); // of a cycle
 
@@ -12,7 +13,7 @@ export class Law {
   begin() {
     this.leap = null; // the targets of a leap that are left, first those of this control step
     const zero = [0, 0, 0], angles = this.constants.legs.map((leg) => leg.angles);
-    this.state = { command: zero, integral: zero, motion: zero, size: 0, angles, off: zero };
+    this.state = { command: zero, integral: zero, motion: zero, size: 0, angles, off: zero, raised: 1 };
   }
 
   // Plays a leap by its name, unless one goes on. Until the crouch ends, joints go over from where they are.
@@ -58,9 +59,16 @@ export class Law {
       : state.motion;
     const up = vertical(posture.slice(1, 5)), { off, posed } = this.corrected(pose, posture[0], up);
     const balance = this.balanced(verticalAbout(up, pose.slice(3)), asked, velocities);
-    const angles = this.planned(requested, size, going, gait, posed, balance);
-    this.state = { command: smooth, integral, motion: requested, size, angles, off };
+    const raised = this.raised(asked);
+    const angles = this.planned(requested, size, going, gait, posed, balance, raised);
+    this.state = { command: smooth, integral, motion: requested, size, angles, off, raised };
     return [this.byJoint(state.angles), this.byJoint(angles)];
+  }
+
+  // The multiple of the height of steps, which goes over to that of the command's pace.
+  raised(asked) {
+    const { paces, smoothing } = this.constants, { raised } = this.state;
+    return paces ? raised + smoothing * (paceUnder(paces, asked).height - raised) : raised;
   }
 
   // The share of the request at which a torso that tilts walks on, and the shift of footholds, m.
@@ -80,7 +88,7 @@ export class Law {
   }
 
   // Angles of the links of each leg, rad, that bring the soles where they are to be in the next control step.
-  planned(requested, size, going, gait, posed, { slowed, shift }) {
+  planned(requested, size, going, gait, posed, { slowed, shift }, raised) {
     const c = this.constants, count = c.legs.length;
     const [forward, left, turn] = requested.map((value, i) => slowed * clamp(value, -c.most, c.most) * c.units[i]);
     const [duty, rate] = gait.slice(2 * count), frequency = rate * c.rate, time = (0.5 * duty) / frequency;
@@ -96,7 +104,7 @@ export class Law {
       const along = stands ? 1 - (2 * cycle) / duty : 2 * swung - 1;
       const shifted = c.take_off_share + (1 - c.take_off_share) * 0.5 * (1 + along);
       const ground = [0, 1].map((i) => leg.place[i] + size * (along * half * flow[i] + shifted * shift[i]));
-      const lift = size * c.lift * Math.sin(Math.PI * swung);
+      const lift = size * raised * c.lift * Math.sin(Math.PI * swung);
       const goal = moved([...ground, z + lift], posed, c.height);
       return reached(leg, this.state.angles[index], goal, weighing(flow, c.across), c.damping_of_feet, c.steps);
     });

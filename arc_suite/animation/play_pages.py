@@ -20,6 +20,7 @@ import numpy as np
 
 from arc_suite import models, policies, registry
 from arc_suite.animation import pages, player_controls
+from arc_suite.animation.pacing import paced_demonstrator
 from arc_suite.arenas import ground_text
 from arc_suite.arenas.mapped import sample_surface
 from arc_suite.bodies import generator, universal
@@ -302,7 +303,7 @@ def _measure_speed(setup: Setup, preset: str | None, forward: float) -> float:
     """Return the mean speed of a demonstrator, m/s, in the gait in which a page goes at a command; 0 if it falls."""
     environment = setup.load(seed=0)
     task = environment.task.definition
-    policy = Demonstrator(task, preset)
+    policy = paced_demonstrator(task, preset)
     commands = player_controls.commands(task, (forward, 0.0, 0.0), np.zeros(6), player_controls.OWN_GAIT)
     steps_in_cycle = 1.0 / (task.parameters.gait_frequency * task.scene.control_timestep)
     start, end = (round(cycles * steps_in_cycle) for cycles in _RUN_CYCLES)
@@ -325,7 +326,7 @@ def _describe_law(task: Task, preset: str) -> dict[str, Any]:
     if law_class(preset_of(task.scene.body, preset)) not in _PAGE_LAWS:
         names = [name for name, parameters in presets.items() if law_class(parameters) in _PAGE_LAWS]
         raise ValueError(f"preset {preset!r}: a page runs {', '.join(names)}, which follow a command by steps")
-    stepping = Demonstrator(task, preset).law
+    stepping = paced_demonstrator(task, preset).law
     return {"kind": "law", "constants": stepping.constants() | {"leaps": _describe_leaps(stepping)}}
 
 

@@ -24,6 +24,7 @@ from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.models import foot_paths, overlap, posture
 from arc_suite.models.kinematics import path_weights, point_velocities
 from arc_suite.models.standing import GRAVITY
+from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -56,6 +57,7 @@ class SteppingParameters(NamedTuple):
         lead: lead of all legs over the gait's clock, cycles.
         lean: shift of footholds, as a share of the distance by which the torso's weight falls aside of the feet.
         capture: shift of footholds, as a share of the distance that an unwanted velocity carries an inverted pendulum.
+        lift_by_pace: whether `lift` has the factor that suits the speed of the command, see `gaits.Pace`.
     """
 
     wider: float = 0.0
@@ -70,6 +72,7 @@ class SteppingParameters(NamedTuple):
     lead: float = 0.0
     lean: float = 0.5
     capture: float = 0.3
+    lift_by_pace: bool = False
 
 
 def observes_gait_and_pose(task: Task) -> bool:
@@ -83,10 +86,12 @@ class SteppingState(NamedTuple):
     Attributes:
         joint_angles: (environments, legs, links) planned, rad.
         pose_integral: (environments, 3) integral of the errors of height, standing heights, roll and pitch, rad.
+        lift_factor: (environments, 1) multiple of the height of a foot in mid-swing.
     """
 
     joint_angles: np.ndarray
     pose_integral: np.ndarray
+    lift_factor: np.ndarray
 
 
 class Stepping(CommandLaw):
@@ -152,8 +157,8 @@ class Stepping(CommandLaw):
         return posture.find_shifted_pose(body, parameters.ahead, parameters.higher)
 
     def initial_paths(self, count: int) -> SteppingState:
-        """Return the angles at rest and an integral of 0, for a number of environments."""
-        return SteppingState(np.tile(self.rest_angles, (count, 1, 1)), np.zeros((count, 3)))
+        """Return the angles at rest, an integral of 0 and a factor of 1, for a number of environments."""
+        return SteppingState(np.tile(self.rest_angles, (count, 1, 1)), np.zeros((count, 3)), np.ones((count, 1)))
 
     def follow_request(self, state: SteppingState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
@@ -168,14 +173,20 @@ class Stepping(CommandLaw):
 
         leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
         velocity, foothold_shift = self.balance(request.motion, balance_vertical, observation)
-        soles = self.next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
+        lift_factor = state.lift_factor
+        if self.parameters.lift_by_pace:
+            desired_factor = gaits.lifts_under_commands(observation["command"][:, :3])[:, None]
+            lift_factor = lift_factor + self.smoothing * (desired_factor - lift_factor)
+        soles = self.next_feet(
+            leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration, lift_factor
+        )
         pose_integral = state.pose_integral
         if self.directed:
             pose_integral, corrected_pose = self._correct_pose(pose_integral, pose, torso_height, vertical)
             soles = posture.move_ground_points(soles, corrected_pose, self.mechanics.height)
 
         joint_angles, target_angles, angle_changes = self.move_feet(state.joint_angles, soles, velocity)
-        return SteppingState(joint_angles, pose_integral), target_angles, angle_changes
+        return SteppingState(joint_angles, pose_integral, lift_factor), target_angles, angle_changes
 
     def move_feet(self, joint_angles, soles, velocity) -> tuple:
         """Return the next planned joint angles, target angles (environments, joints), rad, and their change.
@@ -258,7 +269,7 @@ class Stepping(CommandLaw):
         zero = xp.zeros_like(height)  # of the numbers without feedback: forward, left and yaw
         return pose_integral, pose + xp.concatenate([height, zero, zero, roll_and_pitch, zero], axis=-1)
 
-    def next_feet(self, leg_phases, velocity, foothold_shift, gait_size, duty_factor, stance_duration):
+    def next_feet(self, leg_phases, velocity, foothold_shift, gait_size, duty_factor, stance_duration, lift_factor=1.0):
         """Return positions (environments, legs, 3) of the soles in the next control step, m, under a level torso.
 
         Args:
@@ -268,6 +279,7 @@ class Stepping(CommandLaw):
             gait_size: (environments, 1) from 0 to 1.
             duty_factor: a number or (environments, 1).
             stance_duration: s, a number or (environments, 1, 1).
+            lift_factor: multiple of the height of a foot in mid-swing, a number or (environments, 1).
         """
         xp = leg_phases.__array_namespace__()
         path_position, swing_progress = foot_paths.find_path_position(leg_phases, duty_factor)
@@ -278,7 +290,7 @@ class Stepping(CommandLaw):
         shift_share = _TAKE_OFF_SHARE + (1.0 - _TAKE_OFF_SHARE) * 0.5 * (1.0 + path_position)
         shift = shift_share * foothold_shift[:, None]
         ground = self.rest_soles[:, :2] + gait_size[..., None] * (path_position * half_path + shift)
-        lift = self.foot_lift * xp.sin(np.pi * swing_progress)
+        lift = lift_factor * self.foot_lift * xp.sin(np.pi * swing_progress)
         heights = self.rest_soles[:, 2] + gait_size * lift
         return xp.concatenate([ground, heights[..., None]], axis=-1)
 
@@ -324,6 +336,7 @@ class Stepping(CommandLaw):
             "height": self.mechanics.height,
             "ride": self._rest_pose.ride_height,
             "lift": self.foot_lift,
+            "paces": [list(pace) for pace in gaits.PACES_BY_SPEED] if self.parameters.lift_by_pace else None,
             "across": self.parameters.across,
             "damping_of_feet": self._ik_damping,
             "steps": foot_paths.IK_ITERATIONS,

@@ -4,6 +4,7 @@ A gait is a duty factor, the share of a cycle that a foot spends on the ground, 
 for each leg. A leg with phase offset p is in stance while (t + p) mod 1 < duty factor, with the time t in cycles.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -70,6 +71,17 @@ def pace_under_command(command: Sequence[float] | np.ndarray) -> Pace:
     if forward <= 0.0:
         return _WALK
     return pace_at(float(forward + abs(left) + abs(turn)))
+
+
+def lifts_under_commands(commands):
+    """Return the heights (...) of paces under commands (..., 3); see `pace_under_command`."""
+    xp = commands.__array_namespace__()
+    speeds = commands[..., 0] + abs(commands[..., 1]) + abs(commands[..., 2])
+    heights = xp.zeros_like(speeds) + PACES_BY_SPEED[0].height
+    for slower, faster in itertools.pairwise(PACES_BY_SPEED):
+        share = ((speeds - slower.speed) / (faster.speed - slower.speed)).clip(0.0, 1.0)
+        heights = heights + share * (faster.height - slower.height)
+    return xp.where(commands[..., 0] > 0.0, heights, _WALK.height)
 
 
 def gait(body: Body, name: str) -> Gait:

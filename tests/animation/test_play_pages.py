@@ -13,7 +13,7 @@ import programs
 import pytest
 from page_data import data_of
 
-from arc_suite.animation import pages, play_pages
+from arc_suite.animation import pacing, pages, play_pages
 from arc_suite.bodies import generator, universal
 from arc_suite.cpg import leaps
 from arc_suite.cpg.presets import PRESETS
@@ -92,7 +92,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
     tolerance = 1e-6 if body.source else 1e-9
     setup, creature = Setup.of(body, "directed", {"time_limit": 1e6}), play_pages.creature(body, "cpg", preset)
     given = directions(steps, creature)
-    start, positions, actions, observations = played(setup, policy("cpg", body, preset, task=setup.definition), given)
+    start, positions, actions, observations = played(setup, pacing.paced_demonstrator(setup.definition, preset), given)
     (found,) = nodes.run(script, [{"creature": creature, "ground": "level", "asked": given, **start}])
     np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=tolerance)
     np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=tolerance)
@@ -456,7 +456,7 @@ def test_networks_that_a_page_cannot_run(tmp_path, task, settings, message):
         (ROBOTS["tick"], 1.75),
         (ROBOTS["leaper"], None),  # which gets slower
         (generator.generate(9, 2), None),
-        (generator.generate(5, 4), 1.25),  # at 1.75 it walks badly
+        (generator.generate(5, 4), 1.75),
     ],
     ids=["tick", "leaper", "9x2", "5x4"],
 )

@@ -119,3 +119,9 @@ def test_paces_lie_between_those_of_the_table():
     assert gaits.pace_at(0.1)[1:] == gaits.PACES["slow"][1:] and gaits.pace_at(3.0)[1:] == gaits.PACES["run"][1:]
     assert gaits.pace_under_command((0.5, 0.0, -0.5)) == gaits.pace_at(1.0)  # a curve
     assert gaits.pace_under_command((-0.5, 0.0, 0.0)) == gaits.pace_at(1.0)
+
+
+def test_lifts_of_many_commands_are_those_of_each():
+    commands = np.random.default_rng(0).uniform(-2.0, 2.0, (200, 3))
+    lifts = [gaits.pace_under_command(command).height for command in commands]
+    np.testing.assert_allclose(gaits.lifts_under_commands(commands), lifts)

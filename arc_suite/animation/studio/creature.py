@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import policies
+from arc_suite.animation.pacing import paced_demonstrator
 from arc_suite.animation.parts import Material, Part, describe_body
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.sketch import Sketch
@@ -92,4 +93,6 @@ def load_policy(sketch: Sketch, environment: dm.Environment) -> Policy:
         OSError: a file cannot be read.
     """
     task = environment.task.definition
+    if sketch.policy == "cpg":
+        return paced_demonstrator(task, sketches.chosen_preset(sketch), sketch.speed)
     return policies.policy(sketch.policy, task.scene.body, sketches.chosen_preset(sketch), task=task)
