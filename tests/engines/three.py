@@ -4,6 +4,7 @@ python tests/engines/three.py FOLDER BUNDLE, the bundle being that of loader.js
 """
 
 import base64
+import json
 import pathlib
 import shutil
 import sys
@@ -50,7 +51,8 @@ def check(tab, path: pathlib.Path) -> str:
     data = base64.b64encode(path.read_bytes()).decode()
     opened = tab.evaluate("([data, times]) => window.opened(data, times)", [data, TIMES])
     assert opened["clips"].keys() == truth.keys()
-    assert opened["bones"] == (len(parts) + 1 if rig == "skin" else 0)
+    swinging = json.loads(path.with_suffix(".clips.json").read_text())["swinging_bones"]
+    assert opened["bones"] == (1 + len(parts) + len(swinging) if rig == "skin" else 0)
     worst = 0.0
     for clip, told in opened["clips"].items():
         assert (told["contacts"] > 0) == (not clip.startswith(STILL))
