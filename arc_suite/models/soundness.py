@@ -53,7 +53,8 @@ def flaws(body: Body) -> list[Flaw]:
     Overlaps are not among them where the standing height is far off, as the length of strides follows from it.
     """
     body_flaws = list(_check_all_but_parts(body))
-    height_flaws = _check_height(body, measure_standing(body))
+    pose = measure_standing(body)
+    height_flaws = [*_check_feet(body, pose), *_check_torso(body, pose)]
     if not any(flaw.hopeless for flaw in height_flaws):
         body_flaws += _check_parts(body)
     return body_flaws
@@ -71,24 +72,30 @@ def hopeless_flaws(body: Body) -> list[Flaw]:
     """
     pose = measure_standing(body)
     body_flaws = []
-    for check in (_check_height, _check_support, _check_joints):
+    for check in (_check_feet, _check_torso, _check_support, _check_joints):
         body_flaws.extend(flaw for flaw in check(body, pose) if flaw.hopeless)
     return body_flaws
 
 
 def _check_all_but_parts(body: Body) -> Iterator[Flaw]:
     pose = measure_standing(body)
-    for check in (_check_height, _check_legs, _check_support, _check_motors, _check_joints):
+    for check in (_check_feet, _check_torso, _check_legs, _check_support, _check_motors, _check_joints):
         yield from check(body, pose)
 
 
-def _check_height(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
-    """Find feet above or below the floor, and parts of the torso below the feet."""
+def _check_feet(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+    """Find feet above or below the floor."""
     soles = pose.soles[:, 2]  # heights in the torso's frame, m
     lowest_sole = soles.min()
     max_gap = _MAX_GAP * pose.height
     gap = float(pose.height + lowest_sole)
-    if abs(gap) > max_gap:
+    floor_heights = pose.height + soles
+    is_deep = floor_heights < -max_gap
+    few_legs_are_deep = is_deep.any() and 2 * (abs(floor_heights) <= max_gap).sum() >= len(body.legs)
+    if few_legs_are_deep:
+        text = f"feet of {_join_names(body, is_deep)} stand {-gap:.3g} m in the floor: legs shorter by that fit"
+        yield Flaw(text, abs(gap) > _HOPELESS_GAP * pose.height, _lengthen_legs(body, floor_heights * is_deep))
+    elif abs(gap) > max_gap:
         fitting_height = float(f"{-lowest_sole:.3g}")
         cure = None
         if fitting_height > 0.0:
@@ -98,20 +105,21 @@ def _check_height(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
         yield Flaw(text, abs(gap) > _HOPELESS_GAP * pose.height, cure)
 
     heights_above_lowest = soles - lowest_sole
-    short_legs = [leg.name for leg, height in zip(body.legs, heights_above_lowest, strict=True) if height > max_gap]
-    if short_legs:
-        names = ", ".join(short_legs[:_MAX_NAMES])
-        if len(short_legs) > _MAX_NAMES:
-            names += ", ..."
+    is_high = heights_above_lowest > max_gap
+    if is_high.any() and not few_legs_are_deep:
+        names = _join_names(body, is_high)
         largest = max(soles) - min(soles)
         text = f"feet of {names} end up to {largest:.3g} m above the lowest foot: legs longer by that fit"
         yield Flaw(text, False, _lengthen_legs(body, heights_above_lowest))
 
+
+def _check_torso(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+    """Find parts of the torso below the feet."""
     lowest_corner, _ = torso_box(body)
-    depth = float(lowest_sole - lowest_corner[2])
+    depth = float(pose.soles[:, 2].min() - lowest_corner[2])
     if depth > 0.0:
         text = f"the torso reaches {depth:.3g} m lower than the feet: legs longer by more than that fit"
-        yield Flaw(text, depth > max_gap)
+        yield Flaw(text, depth > _MAX_GAP * pose.height)
 
 
 def _check_legs(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
@@ -263,8 +271,14 @@ def _move_legs(body: Body, displacements: Iterable) -> Body:
     return body.replace(legs=tuple(legs))
 
 
+def _join_names(body: Body, is_named: np.ndarray) -> str:
+    """Return the names of the first legs among those of a mask (legs,), with dots if there are more."""
+    names = [body.legs[index].name for index in np.flatnonzero(is_named)]
+    return ", ".join(names[:_MAX_NAMES]) + (", ..." if len(names) > _MAX_NAMES else "")
+
+
 def _lengthen_legs(body: Body, lengths: np.ndarray) -> Body:
-    """Return the body with the feet lower by lengths (legs,), m: the last link of each leg reaches further down."""
+    """Return the body with the feet lower by lengths (legs,), m, or higher if they are negative, by the last links."""
     legs = []
     for leg, length in zip(body.legs, lengths, strict=True):
         *first_links, last_link = leg.links

@@ -109,12 +109,12 @@ def assert_walks_agree(script, body, steps, preset="steered"):
     [
         ("tick", "steered", 64),
         ("leaper", "reactive", 40),
-        ("random_4", "surefooted", 64),
-        ("quadruped_15_kg", "braced", 64),
+        pytest.param("random_4", "surefooted", 64, marks=pytest.mark.release),
+        pytest.param("quadruped_15_kg", "braced", 64, marks=pytest.mark.release),
         ("quadruped_15_kg", "steered", 100),
         pytest.param("hexapod_2kg", "steered", 80, marks=pytest.mark.release),
         ("with_arm", "steered", 100),
-        ("on_its_floor", "steered", 60),
+        pytest.param("on_its_floor", "steered", 60, marks=pytest.mark.release),
     ],
 )
 def test_a_short_walk_is_that_of_python(script, name, preset, steps):
@@ -455,8 +455,8 @@ def test_networks_that_a_page_cannot_run(tmp_path, task, settings, message):
     [
         (ROBOTS["tick"], 1.75),
         (ROBOTS["leaper"], None),  # which gets slower
-        (generator.generate(9, 2), None),
-        (generator.generate(5, 4), 1.75),
+        pytest.param(generator.generate(9, 2), None, marks=pytest.mark.release),
+        pytest.param(generator.generate(5, 4), 1.75, marks=pytest.mark.release),
     ],
     ids=["tick", "leaper", "9x2", "5x4"],
 )
