@@ -108,7 +108,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
     ("name", "preset", "steps"),
     [
         ("tick", "steered", 64),
-        ("leaper", "reactive", 40),
+        pytest.param("leaper", "reactive", 40, marks=pytest.mark.long),
         pytest.param("random_4", "surefooted", 64, marks=pytest.mark.release),
         pytest.param("quadruped_15_kg", "braced", 64, marks=pytest.mark.release),
         ("quadruped_15_kg", "steered", 100),

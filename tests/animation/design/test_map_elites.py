@@ -3,6 +3,8 @@
 import functools
 import json
 
+import pytest
+
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes
 from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
@@ -68,6 +70,7 @@ def test_elites_are_the_best_of_their_cells():
     assert set(course.elites) == {one.cell for one in course.candidates}
 
 
+@pytest.mark.long
 def test_a_search_beats_as_many_random_bodies():
     (course, _), (control, _) = search(goes=15), search(goes=15, random=15 * BATCH_SIZE)
     assert course.candidates[:RANDOM_BODIES] == control.candidates[:RANDOM_BODIES]
