@@ -145,6 +145,11 @@ def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
     return tuple(name(item, valid, f"{kind} of {what}") for item in items)
 
 
+def meanings(name: str) -> tuple[str, ...]:
+    """Return a name, and the names that this suite has for it, if it is one of other libraries."""
+    return name, *SYNONYMS.get(name, ())
+
+
 def hint(value, valid: Iterable[str]) -> str:
     """Return the part of an error that suggests a valid name; empty if there is none.
 

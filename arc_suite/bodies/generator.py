@@ -198,9 +198,9 @@ def scaled(body: Body, factor: float) -> Body:
 
     Returns:
         The body, `<name>_scaled`: a robot's name would give it the robot's numbers. An imported body moves like the
-        first one, see `imported_sizes`. MuJoCo bounds
-        inertias from below: at the density of 10 kg/m^3 legs must be 0.9 mm thick, which those of a
-        body of `generate` are down to a height of 2 cm; at 300 kg/m^3 one of 1 cm walks too.
+        first one, see `imported_sizes`. MuJoCo bounds inertias from below: at the density of 10 kg/m^3 legs must be
+        0.9 mm thick, which those of a body of `generate` are down to a height of 2 cm; at 300 kg/m^3 one of 1 cm walks
+        too.
 
     Raises:
         ValueError: the factor, or a length of the scaled body, is out of range.

@@ -12,12 +12,10 @@ from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Leg, Link, Solid, Vec
 
 FACTOR_RANGE = (0.1, 10.0)  # bounds of a factor of lengths
 FAN_RANGE = (-90.0, 90.0)  # degrees, bounds
+IMPORT_FIELDS = ("scale", "links", "ends")  # of a shape, that an imported body can have
 
 _SUFFIX = "_shaped"  # of names
 _MIDLINE = 1e-9  # m, half of its width
-
-
-IMPORT_FIELDS = ("scale", "links", "ends")  # of a shape, that an imported body can have
 
 
 class Shape(NamedTuple):

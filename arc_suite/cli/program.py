@@ -224,7 +224,7 @@ def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> N
         "set": registry.setting_names() - {"random"},  # programs seed episodes by flags of their own
         "hp": set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flag_names else set(),
     }
-    meanings = (name, *checks.SYNONYMS.get(name, ()))
+    meanings = checks.meanings(name)
     if any(meaning in flag_names for meaning in meanings):
         return
     suggestions = [
@@ -239,7 +239,7 @@ def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> N
 
 def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -> None:
     """Raise ValueError for a flag that is the name of an argument without a flag."""
-    if any(meaning in parameters for meaning in (name, *checks.SYNONYMS.get(name, ()))):
+    if any(meaning in parameters for meaning in checks.meanings(name)):
         argument = checks.quote(value) or name.upper()
         raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {argument}, without a flag?")
 

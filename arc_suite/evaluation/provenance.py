@@ -6,8 +6,9 @@ from typing import Any
 
 from arc_suite import policies, seed_ranges
 from arc_suite.envs.setup import Setup
+from arc_suite.simulation.model_hash import PHYSICS
 
-_FIELDS = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "physics_sha256")
+_FIELDS = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", PHYSICS)
 UNKNOWN = "training data unknown"
 
 

@@ -80,15 +80,10 @@ def change_link_ends(body: Body, ends: Mapping[str, Sequence[float]]) -> Body:
                 stretches[part] = _stretch_between(np.array(link.end), np.array(end))
             links.append(link.replace(end=end))
         new_legs.append(leg.replace(links=tuple(links)))
-    drop = _lowest(body.legs) - _lowest(new_legs)  # m, by which the lowest foot is lower
+    drop = max(leg.foot_depth for leg in new_legs) - max(leg.foot_depth for leg in body.legs)  # m, of the lowest foot
     torso = body.torso.replace(standing_height=body.torso.standing_height + drop)
     new_source = _stretch_source(legs, stretches, drop)
     return sources.check(body.replace(torso=torso, legs=tuple(new_legs), source=new_source))
-
-
-def _lowest(legs) -> float:
-    """Return the height of the lowest sole over the torso's origin, m."""
-    return min(leg.foot_position[2] - leg.foot.radius for leg in legs)
 
 
 def _stretch_between(end: np.ndarray, new_end: np.ndarray) -> _Stretch:

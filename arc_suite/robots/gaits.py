@@ -70,13 +70,18 @@ def pace_under_command(command: Sequence[float] | np.ndarray) -> Pace:
     forward, left, turn = command
     if forward <= 0.0:
         return _WALK
-    return pace_at(float(forward + abs(left) + abs(turn)))
+    return pace_at(float(_speed_under(forward, left, turn)))
+
+
+def _speed_under(forward, left, turn):
+    """Return the multiple of the walk's speed that a command ahead asks for; steps aside and turns add to it."""
+    return forward + abs(left) + abs(turn)
 
 
 def lifts_under_commands(commands):
     """Return the heights (...) of paces under commands (..., 3); see `pace_under_command`."""
     xp = commands.__array_namespace__()
-    speeds = commands[..., 0] + abs(commands[..., 1]) + abs(commands[..., 2])
+    speeds = _speed_under(commands[..., 0], commands[..., 1], commands[..., 2])
     heights = xp.zeros_like(speeds) + PACES_BY_SPEED[0].height
     for slower, faster in itertools.pairwise(PACES_BY_SPEED):
         share = ((speeds - slower.speed) / (faster.speed - slower.speed)).clip(0.0, 1.0)

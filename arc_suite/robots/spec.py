@@ -567,6 +567,11 @@ class Leg(_Spec):
         """Return the position of the foot in the torso's frame with all joints at zero."""
         return self.points[-1]
 
+    @property
+    def foot_depth(self) -> float:
+        """Return the depth, m, of the lowest point of the foot below the torso's origin, with all joints at zero."""
+        return self.foot.radius - self.foot_position[2]
+
     @functools.cached_property
     def points(self) -> tuple[Vector, ...]:
         """Return the origin of every link, and last of the foot, in the torso's frame with all joints at zero."""
@@ -769,7 +774,7 @@ class Body(_Spec):
 
     def _standing_height(self) -> float:
         """Return the height, m, of the torso's origin above the lowest point of the lowest foot."""
-        height = max(leg.foot.radius - leg.foot_position[2] for leg in self.legs)
+        height = max(leg.foot_depth for leg in self.legs)
         if not _MIN_LENGTH <= height <= MAX_LENGTH:
             reason = f"feet end {abs(height):.4g} m {'below' if height > 0.0 else 'above'} the torso's origin"
             self._fail("torso", f"standing_height cannot be derived: {reason}")

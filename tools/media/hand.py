@@ -98,10 +98,10 @@ def _film(hand: Hand, tab, size: tuple[int, int]) -> Iterator[np.ndarray]:
     is_down = False
     torso = tab.evaluate(_TORSO)
     for frame in range(hand.frames):
-        *place, goes_down = _look_up(hand.path, frame / FPS)
+        *shares, goes_down = _look_up(hand.path, frame / FPS)
         if not is_down:
             torso = tab.evaluate(_TORSO)  # the pointer aims at it until it holds it
-        pointer = [start + share * length for start, share, length in zip(torso, place, size, strict=True)]
+        pointer = [start + share * length for start, share, length in zip(torso, shares, size, strict=True)]
         tab.mouse.move(*pointer)
         if goes_down != is_down:
             (tab.mouse.down if goes_down else tab.mouse.up)()

@@ -93,7 +93,7 @@ class _Stage(NamedTuple):
 
 
 def film_pictures(
-    body: Body, clip: Clip, size: int, transparent: bool = False, turntable: bool = False, heading: float = 0.0
+    body: Body, clip: Clip, size: int, transparent: bool = False, turntable: bool = False
 ) -> Iterator[np.ndarray]:
     """Yield the pictures of a film that plays forever, one for each frame of the clip.
 
@@ -103,7 +103,6 @@ def film_pictures(
         size: size of the square pictures, pixels.
         transparent: whether all but the body is left out.
         turntable: whether the body turns once while the clip is repeated.
-        heading: heading of the body, rad; at 0 it goes to the right, at -pi / 2 towards the viewer.
 
     Yields:
         (size, size, 3 or 4) uint8; the last value is the alpha of a transparent picture.
@@ -114,7 +113,7 @@ def film_pictures(
     picture_count = count_film_pictures(clip, turntable)
     frames = np.arange(picture_count) % _count_frames(clip)
     turn = 2.0 * np.pi if turntable else 0.0
-    headings = heading + np.linspace(0.0, turn, picture_count, endpoint=False)
+    headings = np.linspace(0.0, turn, picture_count, endpoint=False)
     stage, poses = _open_stage(body, clip, frames, headings, transparent)
     yield from _render(stage, poses, size, transparent)
 

@@ -93,11 +93,9 @@ class LinkWidgets:
         names = []
         for leg in creature.setup.body.legs:
             for link in leg.links:
-                if leg.full_name(link) in creature.parts_with_lengths:
-                    if self._leg.value == _ALL_LEGS:
-                        names.append(link.name)
-                    elif self._leg.value == leg.name:
-                        names.append(leg.full_name(link))
+                part = leg.full_name(link)
+                if part in creature.parts_with_lengths and self._leg.value in (_ALL_LEGS, leg.name):
+                    names.append(link.name if self._leg.value == _ALL_LEGS else part)
         return tuple(dict.fromkeys(names))[: layout.MAX_LINK_SLIDERS]
 
     def _set_length(self, index: int, event: viser.GuiEvent) -> None:

@@ -362,7 +362,7 @@ def _refuse_hyperparameters(settings: Mapping[str, Any]) -> None:
     names = dataclasses.asdict(algorithms.algorithm(FLAGS.algorithm).hyperparameters)
     setting_names = registry.setting_names()
     for name, value in settings.items():
-        meanings = [meaning for meaning in (name, *checks.SYNONYMS.get(name, ())) if meaning in names]
+        meanings = [meaning for meaning in checks.meanings(name) if meaning in names]
         if meanings and name not in setting_names:
             cure = f"; did you mean --hp {meanings[0]}={checks.quote(value)}?"
             raise ValueError(f"--set {name}={checks.quote(value)}: it is a hyperparameter{cure}")

@@ -266,6 +266,8 @@ def _notes_text(groups: Groups) -> str:
     for scores in groups.values():
         for score in scores:
             notes += [note for note in score.notes.split("; ") if note]
-    models = [(place_setup(*place), score.physics_sha256) for place, scores in groups.items() for score in scores]
+    models = []
+    for (robot, task), scores in groups.items():
+        models += [(place_setup(robot, task), score.physics_sha256) for score in scores]
     notes += results.note_earlier_models(models)
     return "; ".join(dict.fromkeys(notes)) or "-"

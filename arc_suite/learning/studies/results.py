@@ -17,6 +17,7 @@ from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, PROVEN
 from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
 from arc_suite.seed_ranges import EVALUATION, Ranges, common_seeds, from_json
+from arc_suite.simulation.model_hash import PHYSICS
 
 # Files of a study's tables.
 RUNS = "runs.csv"
@@ -184,7 +185,7 @@ def _result(
         training_seeds=from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
         seeds=[int(row["seed"]) for row in judged],
         curve_seeds=[int(row["seed"]) for row in latest[: evaluation.CURVE_EPISODES]],
-        physics_sha256=run_row["physics_sha256"],
+        physics_sha256=run_row[PHYSICS],
         policy_sha256=judged[0].get("policy_sha256", ""),
         other_settings=published_run != run,
         sources=json.loads(run_row[SOURCES] or "[]"),
@@ -259,7 +260,7 @@ def note_earlier_models(models: Iterable[tuple[Setup, str]]) -> tuple[str, ...]:
 @functools.cache
 def hash_model(setup: Setup) -> str:
     """Return the hash of the model of a setup, as the code makes it now; empty for several bodies."""
-    return setup.provenance().get("physics_sha256", "")
+    return setup.provenance().get(PHYSICS, "")
 
 
 def join_notes(seeds: Sequence[RunResult]) -> str:
