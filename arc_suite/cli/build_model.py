@@ -33,6 +33,7 @@ from arc_suite.cli.flags import (
 )
 from arc_suite.cli.summary import body_summary
 from arc_suite.envs.setup import Setup
+from arc_suite.models.standing import standing_qpos
 from arc_suite.robots import spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
@@ -78,6 +79,7 @@ def main() -> None:
         if FLAGS.render is not None:
             picture_path = stack.enter_context(files.writing(FLAGS.render))
             physics = Physics.from_body(body, arena)
+            physics.data.qpos[:] = standing_qpos(physics.model.ptr)
             physics.forward()
             imageio.imwrite(picture_path, physics.render(camera_id="portrait", quality="still"))
         if FLAGS.summary:

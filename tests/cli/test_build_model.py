@@ -1,16 +1,21 @@
 """`arc-suite build_model` and the bodies it makes to order."""
 
+import imageio.v3 as imageio
+import imports
 import mujoco
+import numpy as np
 import programs
 import pytest
 from dm_control import mjcf
 from saved_models import saved, without_keyframe
 
 from arc_suite import models, registry
+from arc_suite.arenas import FLAT
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import EXAMPLES, load_body
+from arc_suite.simulation.physics import Physics
 
 SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"
 
@@ -146,3 +151,20 @@ def test_a_task_brings_its_ground(tmp_path):
     assert rough.nhfield == 1 and rough.hfield_data.max() == 1.0
     wrong = build_model("--robot=tick", "--task=stairs", "--set=difficulty=2")
     programs.refused(wrong, "arc-suite build_model: difficulty: expected a number from 0 to 1, got 2\n")
+
+
+@pytest.mark.slow
+def test_the_picture_of_an_imported_robot_shows_it_as_it_stands(tmp_path):
+    """Its joints are not at zero as it stands, and the camera frames it as it stands."""
+    programs.passed(
+        programs.arc_suite("build_model", "--spec", str(imports.FILES / "go2_like.xml"), "--render=a.png", cwd=tmp_path)
+    )
+    physics = Physics.from_body(imports.quadruped(), FLAT)
+    physics.reset(keyframe_id=0)
+    standing_picture = physics.render(camera_id="portrait", quality="still")
+    picture = imageio.imread(tmp_path / "a.png")
+    assert np.abs(picture - standing_picture.astype(float)).mean() < 1.0  # of 255; processes draw edges differently
+    physics.reset()
+    picture_at_zero = physics.render(camera_id="portrait", quality="still")
+    assert np.abs(picture - picture_at_zero.astype(float)).mean() > 5.0
+    physics.free()
