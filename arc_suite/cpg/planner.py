@@ -59,12 +59,13 @@ class PlanningParameters(NamedTuple):
 class Planned:
     """Goes to the goal of the block `goal`, around the pillars in the block `ranges`."""
 
-    reads = (*Stepping.reads, "goal", "ranges")
+    reads: tuple[str, ...] = (*Stepping.reads, "goal", "ranges")
 
     def __init__(self, task: Task, parameters: PlanningParameters):
         """Fit the law that steers to a task; see `CommandLaw`."""
         self._parameters = parameters
         self._steering_law = Stepping(task, parameters.steering)
+        self.reads = (*self._steering_law.reads, "goal", "ranges")
         foot_radii = [leg.foot.radius for leg in self._steering_law.body.legs]
         distances = np.hypot(*self._steering_law.rest_soles[:, :2].T)  # of the feet from the torso, m
         self._extent = max(distances + foot_radii) / reach(self._steering_law.body)  # of the feet, R

@@ -52,6 +52,7 @@ class Straight:
         """Fit the law that steps to a task; see `CommandLaw`."""
         self._heading_gain = parameters.heading
         self._stepping = Stepping(task, parameters.steps)
+        self.reads = tuple(name for name in self._stepping.reads if name != "command")
         self._direction = np.sign(gait_of(task).target_velocity)
         self._smoothing = min(1.0, self._stepping.cycles_per_step / SMOOTHING_CYCLES)
 

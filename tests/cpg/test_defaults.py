@@ -6,7 +6,7 @@ import pytest
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.selection import law_class, memoryless_preset, presets_of, suited_preset
+from arc_suite.cpg.selection import law, law_class, memoryless_preset, presets_of, suited_preset
 from arc_suite.data import DatasetSettings
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
@@ -55,3 +55,19 @@ def test_all_presets_that_obey_a_command_step():
         presets = presets_of(arc_suite.registry.body_of(name))
         laws = {law_class(presets[preset]).__name__ for preset in ("steered", "surefooted", "braced", "reactive")}
         assert laws == {"Stepping"}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_preset_that_a_task_takes_gets_the_blocks_that_its_law_reads(task):
+    """Those of a law within a law count: `straight` steps, and in `directed` it reads pose and gait."""
+    definition = Setup.of("tick", task).definition
+    environments = Setup.of("tick", task).make_vec(2, num_threads=1)
+    observations, _ = environments.reset(seed=0)
+    blocks = environments.task.split(observations)
+    for name, preset in presets_of(definition.scene.body).items():
+        if set(law_class(preset).reads) <= blocks.keys():
+            fitted_law = law(definition, preset)
+            read_blocks = {block: blocks[block] for block in fitted_law.reads}
+            _, actions = fitted_law(fitted_law.initial(2), read_blocks)
+            assert actions.shape == (2, 18), name
+    environments.close()
