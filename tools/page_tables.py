@@ -1,7 +1,7 @@
-"""Writes the tables of committed studies into docs/benchmark.md, docs/any_body.md and docs/study.md.
+"""Writes the tables of committed studies into pages of docs/.
 
-A table stands between the lines <!-- table --> and <!-- end --> of its page. docs/benchmark.md has another one, which
-says how often intervals hold the expected score: it is simulated. First the scores of the benchmark, in
+A table stands between a line with its name, such as <!-- table -->, and the line <!-- end --> of its page. The table
+`coverage` says how often intervals hold the expected score: it is simulated. First the scores of the benchmark, in
 studies/scores.csv, are made anew from the tables of its studies.
 
 Example:
@@ -16,7 +16,7 @@ from studies.pages import table_writer
 from arc_suite.cli import program
 from arc_suite.learning.studies import benchmark, entries, results
 from arc_suite.learning.studies.divisions import DIVISIONS
-from studies import bodies, catalog, claims, coverage, peers
+from studies import bodies, catalog, claims, coverage, kinds, peers
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -62,6 +62,8 @@ TABLES: dict[tuple[str, str], Callable[[], str]] = {
     ("benchmark", "peers"): lambda: peers.text(STUDIES),
     ("any_body", "table"): lambda: bodies.text(STUDIES / "bodies.csv"),
     ("study", "table"): returns_next_to_the_papers,
+    ("algorithms", "parallel-parts"): lambda: kinds.text(STUDIES, "parallel-parts"),
+    ("algorithms", "parallel"): lambda: kinds.text(STUDIES, "parallel"),
 }
 
 

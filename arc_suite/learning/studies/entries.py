@@ -124,7 +124,7 @@ def _judge_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | N
         "policy_sha256": sha256,
         "first_seed": seeds.start,
         "notes": provenance.UNKNOWN if training_seeds is None else "",
-        "physics_sha256": results.hash_model(place_setup(setup.name, setup.kind.name)),
+        "physics_sha256": results.hash_physics(place_setup(setup.name, setup.kind.name)),
     }
     return Judged(score_lines(facts, lines), lines)
 

@@ -251,14 +251,14 @@ def note_earlier_models(models: Iterable[tuple[Setup, str]]) -> tuple[str, ...]:
     Args:
         models: setup of each run, and the hash of its model; empty if it is unknown.
     """
-    are_earlier = [model not in ("", hash_model(setup)) for setup, model in models]
+    are_earlier = [model not in ("", hash_physics(setup)) for setup, model in models]
     if not any(are_earlier):
         return ()
     return (EARLIER_MODEL if all(are_earlier) else f"{EARLIER_MODEL}: {sum(are_earlier)} of {len(are_earlier)} runs",)
 
 
 @functools.cache
-def hash_model(setup: Setup) -> str:
+def hash_physics(setup: Setup) -> str:
     """Return the hash of the model of a setup, as the code makes it now; empty for several bodies."""
     return setup.provenance().get(PHYSICS, "")
 

@@ -210,7 +210,9 @@ def test_notes_of_scores_stand_in_the_table_once(tmp_path):
 
 def test_runs_of_an_earlier_model_are_noted(tmp_path):
     """A run commits the hash of its model, and the table compares it with that of the code."""
-    (now,) = benchmark.score_results([result([0.1, 0.2])._replace(physics_sha256=results.hash_model(Setup.of("tick")))])
+    (now,) = benchmark.score_results(
+        [result([0.1, 0.2])._replace(physics_sha256=results.hash_physics(Setup.of("tick")))]
+    )
     (earlier,) = benchmark.score_results([result([0.1, 0.2], seed=1)._replace(physics_sha256="0" * 64)])
     unknown = score(("tick", "walk"), 2, 0.2)
     few = "10 of 10 places have fewer than 3 seeds"
