@@ -1,7 +1,6 @@
 """Motions that are simulated: rises, jumps, deaths."""
 
 import itertools
-import math
 
 import mujoco
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips import hard_ground, standing_legs
 from arc_suite.animation.clips.blows import Blow
-from arc_suite.animation.clips.recordings import Recording, samples_to_rest
+from arc_suite.animation.clips.recordings import Recording, stop_at_rest, turns
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_straight, stay_at_end, stay_at_start
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
@@ -39,7 +38,6 @@ _LIMP_DAMPING = 0.02
 _STIFF_FRICTION = 1.0  # dry friction
 _LIMP_DURATION = 6.0
 _STIFFENING_DURATION = 14.0  # after which joints without life have come to rest
-_REST_SECONDS = 0.05  # s at rest in the end, so that the last two frames of a clip show a body at rest
 _LYING_HEIGHT = 0.65  # of the torso's height at rest: a lower torso lies
 _LYING_CLEARANCE = 0.1  # of the torso's height at rest: a torso whose lowest point is nearer to the ground lies
 
@@ -58,7 +56,8 @@ def rise(body: Body, rest: Pose) -> ClipMotion:
     recording = _simulate(body, rest, _bear_weight(body, rest, joints))
     first = sizing.simulation(body).substeps * (sink_steps + hold_steps)
     _check_lies(body, rest, recording.poses[first])
-    return stay_at_end(recording, first)
+    first += int(turns(recording)[first:].argmax())
+    return stay_at_end(stop_at_rest(recording), first)
 
 
 def jump(body: Body, rest: Pose) -> ClipMotion:
@@ -105,10 +104,9 @@ def death(body: Body, rest: Pose, side: str) -> ClipMotion:
         ValueError: the torso does not come to lie on the ground.
     """
     recording = _simulate_limp(body, rest, side)
-    rest_samples = math.ceil(_REST_SECONDS / recording.time_step)
-    samples = min(samples_to_rest(recording) + rest_samples, len(recording.poses) - 1)
-    _check_lies(body, rest, recording.poses[samples])
-    return stay_at_start(recording, first=0, samples=samples)
+    recording = stop_at_rest(recording)
+    _check_lies(body, rest, recording.poses[-1])
+    return stay_at_start(recording, first=0, samples=len(recording.poses) - 1)
 
 
 def _simulate_leap(body: Body, rest: Pose, chosen_leap: leaps.Leap) -> Recording:
@@ -117,7 +115,7 @@ def _simulate_leap(body: Body, rest: Pose, chosen_leap: leaps.Leap) -> Recording
     leap_joints = leaps.leap_targets(body, legs, legs.by_leg(rest.joints), chosen_leap)
     rest_joints = np.tile(rest.joints, (_to_steps(body, _HOLD_DURATION), 1))
     joints = np.concatenate([leap_joints, rest_joints])
-    return _simulate(body, rest, _bear_weight(body, rest, joints))
+    return stop_at_rest(_simulate(body, rest, _bear_weight(body, rest, joints)))
 
 
 def _measure_drift(body: Body, recording: Recording) -> np.ndarray:

@@ -12,6 +12,10 @@ from arc_suite.robots.spec import Body
 
 _CHECKED_TIME_STEP = 1.0 / 240.0  # s between the samples that are checked
 
+# A body of which torso and joints are slower stands still.
+_STILL_SPEED = 0.02  # standing heights a second
+_STILL_TURNING_SPEED = 5.0  # degrees/s, of torso and joints
+
 
 class Measures(NamedTuple):
     """What a motion does over all its samples; lengths in standing heights.
@@ -22,6 +26,7 @@ class Measures(NamedTuple):
         slide: largest diagonal of the way of a foot in one stance.
         last_speed: speed of the fastest joint at the end, degrees/s.
         seconds: duration, s.
+        still_seconds: longest time in which the body stands still, s.
     """
 
     part_depth: float
@@ -29,6 +34,7 @@ class Measures(NamedTuple):
     slide: float
     last_speed: float
     seconds: float
+    still_seconds: float
 
 
 class Bound(NamedTuple):
@@ -52,6 +58,7 @@ SOLE_DEPTH = Bound("sole_depth", 0.03, "a sole is {value:.3f} standing heights i
 SLIDE = Bound("slide", MAX_SLIDE, "a standing foot slides by {value:.3f} standing heights, more than {limit}")
 LAST_SPEED = Bound("last_speed", 2.0, "a joint turns at {value:.1f} degrees/s in the end, more than {limit}")
 SECONDS_OF_TURN = Bound("seconds", 2.0, "it lasts {value:.1f} s, more than {limit}")
+STILL_SECONDS = Bound("still_seconds", 0.9, "nothing moves for {value:.2f} s, more than {limit}")
 
 
 def bounds_of(body: Body, clip: Kind) -> tuple[Bound, ...]:
@@ -65,6 +72,8 @@ def bounds_of(body: Body, clip: Kind) -> tuple[Bound, ...]:
         bounds.append(LAST_SPEED)
     if isinstance(clip, Turn):
         bounds.append(SECONDS_OF_TURN)
+    if is_simulated(clip):
+        bounds.append(STILL_SECONDS)
     return tuple(bounds)
 
 
@@ -77,6 +86,15 @@ def feet_stand(clip: Kind) -> bool:
             return clip.cycles == 0
         case _:
             return isinstance(clip, Turn)
+
+
+def is_simulated(clip: Kind) -> bool:
+    """Return whether a clip is a recording of an action, which ends when the body has come to rest."""
+    match clip:
+        case Acted():
+            return not clip.planted
+        case _:
+            return isinstance(clip, BlowClip)
 
 
 def find_excess(body: Body, clip: Kind, motion: ClipMotion) -> str:
@@ -103,7 +121,20 @@ def measure(body: Body, motion: ClipMotion) -> Measures:
         slide=float(measure_slide(body, ground) / height),
         last_speed=float(last_speed),
         seconds=seconds,
+        still_seconds=_measure_stillness(motion, height),
     )
+
+
+def _measure_stillness(motion: ClipMotion, standing_height: float) -> float:
+    """Return the longest time, s, in which neither torso nor joints move."""
+    poses = motion.poses()
+    changes = abs(np.diff(poses, axis=0)) / motion.time_step
+    changes[:, :3] /= _STILL_SPEED * standing_height
+    changes[:, 3:7] *= 2.0  # of a quaternion, to angles
+    changes[:, 3:] /= np.radians(_STILL_TURNING_SPEED)
+    moving = np.flatnonzero(changes.max(axis=-1) > 1.0)
+    gaps = np.diff([-1, *moving, len(changes)]) - 1
+    return float(gaps.max() * motion.time_step)
 
 
 def _thin_out(motion: ClipMotion) -> ClipMotion:

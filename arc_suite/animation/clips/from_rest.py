@@ -13,7 +13,7 @@ from arc_suite.animation.clips import bounds, on_ground, planting, root_motion, 
 from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, BlowClip, Passage, Turn, clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.recorder import Recorder, TransitionRecording
-from arc_suite.animation.clips.recordings import samples_to_rest
+from arc_suite.animation.clips.recordings import stop_at_rest
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.models import sizing
 from arc_suite.robots.spec import Body
@@ -21,7 +21,8 @@ from arc_suite.robots.spec import Body
 _MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
 _FREE_SOLE_DEPTH = 0.025  # standing heights: soles that are deeper in the ground are raised
 _BLOW_SIZES = tuple(0.15 * 1.4**step for step in range(10))  # that are tried, sqrt(g h): up to 3.1
-_MIN_BLOW_DURATION = 7.0  # sqrt(h / g), of the clip of a blow
+_RETURN_SLOWNESS = 9.0  # sqrt(h / g) that the way back to idle after a blow lasts longer by each rad of a joint
+_MAX_RETURN_DURATION = 2.5  # sqrt(h / g), of this way
 _SINK_BY_TILT = 0.5  # standing heights a rad: how far knees give under a torso that tilts over feet that stay
 _MIN_TILT_APART = math.radians(30.0)  # of the torsos of bodies that lie in different poses
 _MIN_BEND_APART = 0.3  # rad, mean of joints of bodies that lie in different poses
@@ -155,13 +156,13 @@ def _record_blow(recorder: Recorder, clip: BlowClip, size: float, idle: Pose) ->
     tilt = math.degrees(np.arccos(rotations.upright(recording.poses[:, 3:7]).clip(-1.0, 1.0)).max())
     if tilt > clip.max_tilt:
         raise ValueError(f"its torso tilts by {tilt:.0f} degrees, more than {clip.max_tilt:.0f}")
-    min_samples = _to_samples(body, _MIN_BLOW_DURATION, recording.time_step)
-    recording = recording._replace(poses=recording.poses[: max(samples_to_rest(recording), min_samples) + 1])
+    recording = stop_at_rest(recording)
     fading_samples = len(recording.poses) // 3
     if clip.cycles:
         motion = root_motion.advance_straight(recording).meet(idle, -1, fading_samples)
     else:
-        motion = root_motion.stay_at_start(recording, 0, len(recording.poses) - 1).end_with(idle, -1, fading_samples)
+        motion = root_motion.stay_at_start(recording, 0, len(recording.poses) - 1)
+        motion = motion.append(_return_to(body, idle, motion))
     motion = motion.end_with(idle, 0, fading_samples)
     _check_seam(motion, "idle")
     if clip.cycles:
@@ -174,6 +175,15 @@ def _record_blow(recorder: Recorder, clip: BlowClip, size: float, idle: Pose) ->
     if reason:
         raise ValueError(reason)
     return Draft(motion, loops=False, stands=not clip.cycles)
+
+
+def _return_to(body: Body, idle: Pose, motion: ClipMotion) -> ClipMotion:
+    """Return how a body at rest at the end of a motion goes over to idle."""
+    last = motion.pose(-1)
+    seam = root_motion.seam_size(idle.relative(last))
+    duration = min(_RETURN_SLOWNESS * seam, _MAX_RETURN_DURATION)
+    samples = max(1, _to_samples(body, duration, motion.time_step))
+    return standing_legs.hold_pose(last, samples, motion.time_step).end_with(idle, -1, samples)
 
 
 def _stand_on_feet(body: Body, motion: ClipMotion, idle: Pose) -> ClipMotion:

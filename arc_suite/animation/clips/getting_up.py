@@ -7,7 +7,7 @@ import numpy as np
 
 from arc_suite import policies, rotations
 from arc_suite.animation.clips import on_ground, standing_legs
-from arc_suite.animation.clips.recordings import Recording, record, samples_to_rest
+from arc_suite.animation.clips.recordings import Recording, record, samples_to_calm, stop_at
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out, put_on_root
 from arc_suite.envs.setup import Setup
 from arc_suite.motions.ground_poses import ground_poses, relative_pose
@@ -18,7 +18,9 @@ _SECONDS = 4.0  # of getting up, and of standing after it
 _FALLS = 20  # that are tried, of the judges' table
 # By what a body lies on: the least and the largest cosine of the tilt of its torso.
 _TILTS = {"belly": (0.7, 1.0), "side": (-0.4, 0.4), "back": (-1.0, -0.7)}
-_MAX_LAST_SPEED = math.radians(3.0)  # rad/s, of joints of a body that stands
+# A torso that is slower stands.
+_MAX_SPEED = 0.02  # standing heights a second
+_MAX_TURNING_SPEED = math.radians(5.0)  # rad/s
 
 # Steps to the pose at rest.
 _MAX_MISS = 0.01  # standing heights, by which a leg that reaches its place misses it
@@ -58,7 +60,10 @@ def get_up(body: Body, rest: Pose, lies_on: str) -> ClipMotion:
 
 
 def _record_falls(body: Body, lies_on: str) -> Iterator[Recording]:
-    """Yield recordings of falls after which a body stands still, until then."""
+    """Yield recordings of falls after which a body stands, until its torso does.
+
+    Legs that hang in the air may creep for seconds after that. They step to their places next.
+    """
     setup = Setup.of(body, _TASK)
     policy = policies.policy("ppo", body, task=setup.definition)
     least, largest = _TILTS[lies_on]
@@ -67,10 +72,18 @@ def _record_falls(body: Body, lies_on: str) -> Iterator[Recording]:
         recording = record(environment, policy, settle=0, steps=round(_SECONDS / environment.control_timestep()))
         has_got_up = environment.task.progress["up"]
         environment.close()
-        last_speeds = abs(recording.poses[-1, 7:] - recording.poses[-2, 7:]) / recording.time_step
-        stands = has_got_up and last_speeds.max() < _MAX_LAST_SPEED
+        samples = _samples_to_stand(body, recording)
+        stands = has_got_up and samples < len(recording.poses) - 1
         if stands and least <= rotations.upright(recording.poses[0, 3:7]) <= largest:
-            yield recording._replace(poses=recording.poses[: samples_to_rest(recording) + 1])
+            yield stop_at(recording, samples)
+
+
+def _samples_to_stand(body: Body, recording: Recording) -> int:
+    """Return the samples after which the torso of a recording stands still; all of them if it still moves."""
+    changes = abs(np.diff(recording.poses[:, :7], axis=0)) / recording.time_step
+    moves = changes[:, :3].max(axis=-1) > _MAX_SPEED * body.torso.standing_height
+    turns = 2.0 * changes[:, 3:].max(axis=-1) > _MAX_TURNING_SPEED
+    return samples_to_calm(moves | turns, recording.time_step)
 
 
 def _stay_between_feet(body: Body, rest: Pose, recording: Recording) -> ClipMotion:

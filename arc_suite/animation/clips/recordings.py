@@ -1,5 +1,6 @@
 """Recordings of policies at the pace of the physics: every substep, bit-exact."""
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -14,7 +15,10 @@ from arc_suite.simulation.episode_loop import play_episode
 from arc_suite.tasks.readings import pose
 
 _FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_REST_SPEED = np.radians(1.0)  # rad/s: slower joints are at rest
+_REST_SPEED = np.radians(5.0)  # rad/s: slower joints are at rest; what is left fades for seconds
+_REST_ANGLE = np.radians(0.5)  # rad: a body whose joints are nearer to their last angles is at rest though they tremble
+_STOP_SECONDS = 0.1  # s of a recording that are slowed at its end
+_HOLD_SECONDS = 0.05  # s at rest in the end, so that the last two frames of a clip show a body at rest
 
 
 class Recording(NamedTuple):
@@ -95,6 +99,53 @@ def record(
 
 def samples_to_rest(recording: Recording) -> int:
     """Return the samples after which neither joints nor the torso turn any more; all of them if some still do."""
-    speeds = abs(np.diff(recording.poses[:, 3:], axis=0)).max(axis=-1) / recording.time_step
-    moving = np.flatnonzero(speeds > _REST_SPEED)
-    return min(int(moving[-1]) + 2, len(speeds)) if len(moving) else len(speeds)
+    is_far = abs(recording.poses[:-1, 3:] - recording.poses[-1, 3:]).max(axis=-1) > _REST_ANGLE
+    return samples_to_calm(turns(recording) & is_far, recording.time_step)
+
+
+def turns(recording: Recording) -> np.ndarray:
+    """Return whether a joint or the torso turns from each sample to the next one, (samples - 1,)."""
+    return abs(np.diff(recording.poses[:, 3:], axis=0)).max(axis=-1) > _REST_SPEED * recording.time_step
+
+
+def samples_to_calm(moves: np.ndarray, time_step: float) -> int:
+    """Return the samples after which nothing moves any more; all of them if something moves until the end, or nearly.
+
+    Args:
+        moves: (samples - 1,) whether something moves from each sample to the next one.
+        time_step: s between two samples.
+    """
+    moving = np.flatnonzero(moves)
+    if not len(moving) or moving[-1] + 2 + _STOP_SECONDS / time_step > len(moves):
+        return len(moves)
+    return int(moving[-1]) + 2
+
+
+def stop_at_rest(recording: Recording) -> Recording:
+    """Return a recording until nothing turns any more, and a moment of its last pose; all of it if something turns."""
+    samples = samples_to_rest(recording)
+    if samples == len(recording.poses) - 1:
+        return recording
+    poses = stop_at(recording, samples).poses
+    held_poses = np.tile(poses[-1], (math.ceil(_HOLD_SECONDS / recording.time_step), 1))
+    return recording._replace(poses=np.concatenate([poses, held_poses]))
+
+
+def stop_at(recording: Recording, samples: int) -> Recording:
+    """Return the first samples of a recording, the last of which are slowed to a stop.
+
+    The poses are those that were recorded. Their pace falls evenly to 0.
+
+    Args:
+        recording: any.
+        samples: samples until the last pose.
+    """
+    slowed = min(samples, round(_STOP_SECONDS / recording.time_step))
+    steps = np.arange(1, 2 * slowed + 1)
+    last_samples = samples - slowed + steps - steps**2 / max(4.0 * slowed, 1.0)  # fractions of samples
+    fractional = np.concatenate([np.arange(samples - slowed + 1), last_samples])
+    previous = np.minimum(fractional.astype(int), max(samples - 1, 0))
+    share = (fractional - previous)[:, None]
+    poses = (1.0 - share) * recording.poses[previous] + share * recording.poses[previous + 1]
+    poses[:, 3:7] /= np.linalg.norm(poses[:, 3:7], axis=-1, keepdims=True)
+    return recording._replace(poses=poses)

@@ -9,11 +9,11 @@ from refusals import refused
 
 from arc_suite import rotations
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import blows, bounds, from_rest, standing_legs
+from arc_suite.animation.clips import blows, bounds, from_rest, getting_up, standing_legs
 from arc_suite.animation.clips.blows import Blow
 from arc_suite.animation.clips.catalog import CLIPS, is_additive
 from arc_suite.animation.clips.draft import Draft
-from arc_suite.animation.clips.recordings import Recording, samples_to_rest
+from arc_suite.animation.clips.recordings import Recording, samples_to_rest, stop_at, stop_at_rest
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.envs.setup import Setup
 from arc_suite.models.standing import standing_qpos
@@ -59,6 +59,42 @@ def test_rest_begins_where_neither_joints_nor_the_torso_turn():
     assert samples_to_rest(Recording(0.01, 1, poses)) == 21
     poses[40:, 5] = 0.1
     assert samples_to_rest(Recording(0.01, 1, poses)) == 41
+
+
+def test_a_body_that_trembles_is_at_rest_and_one_that_creeps_is_not():
+    poses = np.tile(np.array((0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)), (1000, 1))
+    poses[:500, 7] = np.linspace(-1.0, 0.0, 500)
+    trembling = poses.copy()
+    trembling[500:, 7] = np.radians(0.2) * np.sin(np.arange(500))
+    assert samples_to_rest(Recording(0.002, 1, trembling)) == pytest.approx(500, abs=10)
+    creeping = poses.copy()
+    creeping[500:, 7] = np.radians(10.0) * 0.002 * np.arange(500)
+    assert samples_to_rest(Recording(0.002, 1, creeping)) > 950
+
+
+def test_a_recording_stops_smoothly_where_it_is_cut():
+    poses = np.tile(np.array((0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)), (400, 1))
+    poses[:, 7] = np.radians(50.0) * 0.002 * np.arange(400)
+    stopped = stop_at(Recording(0.002, 1, poses), 300)
+    speeds = np.degrees(np.diff(stopped.poses[:, 7])) / 0.002
+    assert len(stopped.poses) == 351 and stopped.poses[-1, 7] == pytest.approx(poses[300, 7])
+    np.testing.assert_allclose(speeds[:250], 50.0)
+    assert (np.diff(speeds) < 1e-6).all() and 0.0 < speeds[-1] < 0.5
+    np.testing.assert_array_equal(stop_at(Recording(0.002, 1, poses), 0).poses, poses[:1])
+    whole = stop_at_rest(Recording(0.002, 1, poses))  # never rests: nothing hides it
+    np.testing.assert_array_equal(whole.poses, poses)
+
+
+def test_a_rise_ends_when_the_torso_stands_though_a_raised_leg_creeps():
+    """Of a torso that rises for a second, and a joint that goes on at 30 degrees/s."""
+    poses = np.tile(np.append((0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0), np.zeros(len(TICK.joint_names))), (2000, 1))
+    poses[:500, 2] = np.linspace(0.0, 0.1, 500)
+    poses[:, 8] = np.radians(30.0) * 0.002 * np.arange(2000)
+    recording = Recording(0.002, 1, poses)
+    assert samples_to_rest(recording) > 1950
+    assert getting_up._samples_to_stand(TICK, recording) == pytest.approx(500, abs=2)
+    poses[1500:, 4] = 0.1
+    assert getting_up._samples_to_stand(TICK, recording) == pytest.approx(1500, abs=2)
 
 
 def test_poses_of_a_motion_are_those_that_it_was_drawn_by():
@@ -118,6 +154,7 @@ def test_a_light_blow_sways_over_feet_that_stay_and_a_strong_one_makes_feet_step
             for one, other in zip(motion.pose(end), idle, strict=True):
                 np.testing.assert_allclose(one, other, atol=1e-6)
         assert bounds.find_excess(LEAPER, CLIPS[name], motion) == ""
+        assert bounds.measure(LEAPER, motion).still_seconds < 0.4
     hit, stagger, aside = (clips[name].motion.poses() for name in names[1:])
     assert hit[:, 0].min() < hit[0, 0] - 0.02 * height and clips["hit_front"].slide < 0.05 * height
     assert not clips["hit_front"].moves and not clips["hit_front"].foot_contacts

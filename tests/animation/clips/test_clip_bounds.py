@@ -50,7 +50,8 @@ def still(body):
 
 def test_each_bound_has_its_line():
     motion, height = still(TICK), TICK.torso.standing_height
-    assert bounds.find_excess(TICK, STANDS, motion) == bounds.find_excess(TICK, FALLS, motion) == ""
+    assert bounds.find_excess(TICK, STANDS, motion) == ""
+    assert bounds.find_excess(TICK, FALLS, motion) == "nothing moves for 1.00 s, more than 0.9"
     low = motion.lower(0.05 * height)
     assert bounds.find_excess(TICK, STANDS, low) == "a sole is 0.050 standing heights in the ground, more than 0.03"
     aside = np.linspace(0.0, 0.07, 101)[:, None] * height
@@ -59,6 +60,7 @@ def test_each_bound_has_its_line():
         bounds.find_excess(TICK, STANDS, slides) == "a standing foot slides by 0.070 standing heights, more than 0.05"
     )
     assert bounds.find_excess(TICK, FALLS, slides) == ""
+    assert bounds.measure(TICK, slides).still_seconds == 0.0
     glides = motion._replace(root=aside * (0.0, 1.0, 0.0))
     assert "a standing foot slides by 0.070" in bounds.find_excess(TICK, Turn(90.0), glides)
     turns = motion._replace(joints=motion.joints + np.linspace(0.0, 0.1, 101)[:, None])
@@ -66,6 +68,21 @@ def test_each_bound_has_its_line():
     assert bounds.find_excess(TICK, Turn(180.0), motion.stretch_to(2.5)) == "it lasts 2.5 s, more than 2.0"
     lying = motion.lower(motion.positions[0, 2] - 0.2 * height)
     assert bounds.find_excess(TICK, STANDS, lying).startswith("torso or legs are 0.")
+
+
+def test_the_longest_time_without_motion_is_measured():
+    angles = np.concatenate([np.linspace(0.0, 0.2, 31), np.full(50, 0.2), np.linspace(0.2, 0.3, 10), np.full(10, 0.3)])
+    motion = still(TICK)
+    motion = motion._replace(joints=motion.joints + angles[:, None])
+    assert bounds.measure(TICK, motion).still_seconds == pytest.approx(0.51, abs=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", [TICK, QUEEN], ids=lambda body: body.name)
+def test_simulated_actions_begin_and_end_with_motion(body):
+    for name in ("death", "rise", "jump"):
+        motion = played(body, name)
+        assert bounds.measure(body, motion).still_seconds < 0.35, name
 
 
 def test_legs_of_two_joints_may_slide_and_are_measured():

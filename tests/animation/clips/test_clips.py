@@ -15,7 +15,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import foot_contacts, from_rest, getting_up, loops, recordings
+from arc_suite.animation.clips import bounds, foot_contacts, from_rest, getting_up, loops, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.bodies.generator import random_body
 from arc_suite.envs.setup import Setup
@@ -81,6 +81,7 @@ def test_a_robot_gets_up_from_back_side_and_belly_and_steps_to_rest():
         motion = clips[name].motion
         assert least <= rotations.upright(motion.quaternions[0]) <= largest + 1e-9
         assert not clips[name].loops and not clips[name].moves
+        assert bounds.measure(ROBOTS["tick"], motion).still_seconds < 0.25
         assert clips[name].slide <= 0.05 * ROBOTS["tick"].torso.standing_height
         # The middle legs, which the policy holds up, come down.
         feet = {event.foot for event in clips[name].foot_contacts if event.time > motion.seconds - 2.0}
