@@ -16,7 +16,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import other_libraries, zips
 from arc_suite.robots import ROBOTS, palettes, spec_files
-from arc_suite.robots.spec import PALETTES, Body
+from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
@@ -54,7 +54,7 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
         [],
         "Factor on the length of a link of a spec or body made to order: --length lower=1.5, of one leg l1_lower=1.5.",
     )
-    flags.DEFINE_string("palette", None, f"Colors of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
+    flags.DEFINE_string("palette", None, f"Colors of a spec or body made to order: {palettes.HELP}.")
 
 
 def define_arena() -> None:

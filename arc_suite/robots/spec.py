@@ -29,6 +29,8 @@ Vector = tuple[float, float, float]
 DENSITY = 10.0  # kg/m^3, of the published robots
 PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colors`
 MAX_PALETTE_SEED = 2**31 - 1  # of colors that are drawn
+MATERIALS = ("shell", "limb", "glow", "frame", "trim")  # of any body; a palette lists their colors in this order
+COLORS_EXAMPLE = "#3a5f2b,#d8c48a"  # of colors as a palette
 
 MAX_LENGTH = 100.0  # m; far above any creature, far below lengths at which MuJoCo becomes unstable
 MAX_DISTANCE = 1e4  # m, of a camera; more than enough to see any body
@@ -59,6 +61,7 @@ _MAX_TABLE_ERROR = 0.1  # of the nearest line from a table, in largest torques
 _MAX_DELAY = 1.0  # s
 _MAX_DELAY_SUBSTEPS = 1000
 
+_COLOR_PATTERN = re.compile(r"[0-9a-f]{6}")
 _NAME_PATTERN = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
 _SIZE_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}  # numbers in `Solid.size`
 _MAX_PREVIEW = 60  # characters of a value in an error
@@ -123,10 +126,41 @@ def _check_choice(value: Any, choices: Iterable[str]) -> str:
 def _check_palette(value: Any) -> str | int:
     is_seed = isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MAX_PALETTE_SEED
     is_palette = isinstance(value, str) and value in PALETTES
-    if not is_seed and not is_palette:
-        choices = f"{', '.join(PALETTES)}, or a seed from 0 to {MAX_PALETTE_SEED}"
-        raise SpecError(f"expected one of {choices}, got {_preview(value)}")
-    return value
+    if is_seed or is_palette:
+        return value
+    colors = nearest_colors(value)
+    if colors is not None and colors == str(value).lower():
+        return colors
+    names = ", ".join(PALETTES)
+    counted_colors = f"1 to {len(MATERIALS)} colors such as {COLORS_EXAMPLE}"
+    suggestion = f"; did you mean {colors!r}?" if colors else ""
+    raise SpecError(
+        f"expected one of {names}, or a seed from 0 to {MAX_PALETTE_SEED}, or {counted_colors}, "
+        f"got {_preview(value)}{suggestion}"
+    )
+
+
+def nearest_colors(value: Any) -> str | None:
+    """Return the colors that a value writes, as `Body.palette` stores them; None if it writes none.
+
+    Args:
+        value: colors as in CSS, in a text or a list. They may lack `#` or commas, and have 3 digits or a transparency.
+            Colors beyond the number of `MATERIALS` are left out.
+    """
+    texts = value if isinstance(value, (tuple, list)) else [value]
+    if not all(isinstance(text, str) for text in texts):
+        return None
+    colors = []
+    for word in ",".join(texts).lower().replace(",", " ").split()[: len(MATERIALS)]:
+        digits = word.removeprefix("#").removeprefix("0x")
+        if len(digits) in (3, 4):
+            digits = "".join(2 * digit for digit in digits)
+        if len(digits) == 8:
+            digits = digits[:6]
+        if not _COLOR_PATTERN.fullmatch(digits):
+            return None
+        colors.append(f"#{digits}")
+    return ",".join(colors) or None
 
 
 def _check_instance(value: Any, kind: type) -> Any:
@@ -737,7 +771,8 @@ class Body(_Spec):
         density: density of solids, links and feet, kg/m^3.
         simulation: constants of the simulation; None: scaled to the body.
         agility: factor on the gear of motors that are sized; above 1 for bodies that leap.
-        palette: palette of the body's colors, one of `PALETTES` or a seed; None: the robot's own, or gray.
+        palette: palette of the body's colors: one of `PALETTES`, a seed, or colors of the first of `MATERIALS`, such as
+            `COLORS_EXAMPLE`; None: the robot's own, or gray. See `palettes.colors`.
         source: MJCF of an imported body. It has parts and joints of the same names as here, and the standing pose as
             the keyframe `home`; see `arc_suite.models.source`.
         held: joints of an imported body that belong to no leg.

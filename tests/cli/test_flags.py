@@ -16,7 +16,8 @@ from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 
 SPIDER, WORDS = EXAMPLES["spider"], ", ".join(registry.robot_words())
-NO_PALETTE = f"unknown palette 'mos'; did you mean 'moss'? (there are: {', '.join(PALETTES)}, a seed, such as 7)"
+SEEDS_AND_COLORS = "a seed, such as 7, colors, such as #3a5f2b,#d8c48a"
+NO_PALETTE = f"unknown palette 'mos'; did you mean 'moss'? (there are: {', '.join(PALETTES)}, {SEEDS_AND_COLORS})"
 
 
 @pytest.mark.parametrize("program", ["evaluate", "render", "style", "collect"])

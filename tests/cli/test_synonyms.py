@@ -60,6 +60,7 @@ LINES = {
     "evaluate --set exclude_blocks=posture,gait_clock": "exclude_blocks: expected names of blocks, got "
     '\'posture,gait_clock\'; did you mean ["posture", "gait_clock"]?\n',
     "build_model --legs=6 --palette=purple": "unknown palette 'purple' (there are: moss, rust, bone, coral, night, a",
+    "build_model --legs=6 --palette=3a5f2b,#fff": "unknown palette '3a5f2b,#fff'; did you mean '#3a5f2b,#ffffff'? (",
     "evaluate --policy=x.onnx": "policy 'x.onnx': it is for other programs; expected the folder of the run",
     "evaluate --policy=out/x.pt": "policy 'out/x.pt': write a function that loads it, and name it as file.py:",
     "render --policy=config.json -o a.png": "policy 'config.json': it is no policy; expected the folder of a run\n",

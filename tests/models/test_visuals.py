@@ -10,7 +10,7 @@ import arc_suite
 from arc_suite import models
 from arc_suite.models import visuals
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.spec import Solid
+from arc_suite.robots.spec import MATERIALS, Solid
 
 # A body that has no visuals of its own: Tick's legs, four of them askew, under a lying capsule.
 _TICK = ROBOTS["tick"]
@@ -143,3 +143,24 @@ def test_a_palette_colors_the_materials_by_name_or_by_seed():
     for palette in ("mos", -1, 1.5, True):
         with pytest.raises(ValueError, match=r"palette: expected one of moss, rust, bone, coral, night, or a seed"):
             STRANGER.replace(palette=palette)
+
+
+def test_a_palette_of_colors_shows_them_and_others_that_suit_the_first():
+    def seen(palette):
+        model = compiled(STRANGER.replace(palette=palette), True)
+        return {name: (255.0 * model.material(name).rgba[:3]).round().astype(int).tolist() for name in MATERIALS}
+
+    assert seen("#3a5f2b,#D8C48A,#0102ff,#808080,#ffffff") == {
+        "shell": [0x3A, 0x5F, 0x2B],
+        "limb": [0xD8, 0xC4, 0x8A],
+        "glow": [0x01, 0x02, 0xFF],
+        "frame": [0x80, 0x80, 0x80],
+        "trim": [0xFF, 0xFF, 0xFF],
+    }
+    one, two = seen("#3a5f2b"), seen("#3a5f2b,#d8c48a")
+    assert one | {"limb": [0xD8, 0xC4, 0x8A]} == two
+    assert one["shell"] == [0x3A, 0x5F, 0x2B]
+    assert max(one["frame"]) < max(one["limb"]) < max(one["trim"]) < max(one["shell"])  # darker, with a green hue
+    assert one["limb"][1] == max(one["limb"]) and one["trim"][1] == max(one["trim"])
+    assert one["glow"][1] == min(one["glow"])  # of the opposite hue
+    assert seen("#000000")["shell"] == [0, 0, 0] and seen("#ffffff")["shell"] == [255, 255, 255]

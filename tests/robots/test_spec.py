@@ -8,7 +8,7 @@ import sys
 import pytest
 from refusals import refused
 
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import ROBOTS, spec_files
 from arc_suite.robots.spec import (
     MAX_PALETTE_SEED,
     Ballast,
@@ -197,6 +197,41 @@ def test_palettes_are_names_and_seeds():
     tick = ROBOTS["tick"]
     assert tick.replace(palette=MAX_PALETTE_SEED).palette == 2**31 - 1
     names = "moss, rust, bone, coral, night"
-    text = f"Body(tick).palette: expected one of {names}, or a seed from 0 to 2147483647, got 2147483648"
-    with refused(text):
+    choices = f"{names}, or a seed from 0 to 2147483647, or 1 to 5 colors such as #3a5f2b,#d8c48a"
+    with refused(f"Body(tick).palette: expected one of {choices}, got 2147483648"):
         tick.replace(palette=2**31)
+
+
+@pytest.mark.parametrize("colors", ["#3a5f2b", "#3A5F2B,#d8c48a", "#000000,#ffffff,#123456,#abcdef,#808080"])
+def test_palettes_are_one_to_five_colors(colors):
+    body = ROBOTS["tick"].replace(palette=colors)
+    assert body.palette == colors.lower()
+    text = spec_files.body_to_json(body)
+    assert f'"palette": "{colors.lower()}"' in text and spec_files.body_from_json(text) == body
+
+
+@pytest.mark.parametrize(
+    ("value", "suggestion"),
+    [
+        ("3a5f2b,d8c48a", "; did you mean '#3a5f2b,#d8c48a'?"),
+        ("#3a5f2b, #d8c48a", "; did you mean '#3a5f2b,#d8c48a'?"),
+        ("#3a5f2b,", "; did you mean '#3a5f2b'?"),
+        ("#abc", "; did you mean '#aabbcc'?"),
+        ("0x3A5F2BFF", "; did you mean '#3a5f2b'?"),
+        (["#3a5f2b", "#d8c48a"], "; did you mean '#3a5f2b,#d8c48a'?"),
+        (",".join(6 * ["#111111"]), f"; did you mean '{','.join(5 * ['#111111'])}'?"),
+        ("#3a5f2", ""),
+        ("#3a5f2g", ""),
+        ("#", ""),
+        ("", ""),
+        (",", ""),
+        ((0.2, 0.4, 0.1), ""),
+        ("٣٣٣٣٣٣", ""),
+    ],
+)
+def test_other_colors_are_refused_with_the_nearest(value, suggestion):
+    with pytest.raises(SpecError) as caught:
+        ROBOTS["tick"].replace(palette=value)
+    line = str(caught.value)
+    assert line.startswith("Body(tick).palette: expected one of moss, ") and "\n" not in line
+    assert line.partition(", got ")[2].partition("; did")[2] == suggestion.partition("; did")[2]

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from arc_suite import registry
 from arc_suite.envs.setup import Setup
 from arc_suite.simulation.model_hash import hash_physics
 
@@ -46,6 +47,15 @@ def test_last_bits_and_pictures_do_not_change_it(model):
     changed.cam_pos += 1.0
     changed.geom_rgba[:] = 0.5
     assert hash_physics(changed) == hash_physics(model)
+
+
+@pytest.mark.parametrize("name", ["tick", "varied:0", "random:3"])
+def test_colors_do_not_change_it(name):
+    body = registry.body_of(name)
+    palettes = (body.palette, "moss", 7, "#3a5f2b", "#3a5f2b,#d8c48a,#ffffff,#000000,#808080")
+    records = [Setup.of(body.replace(palette=palette)).provenance() for palette in palettes]
+    assert len({record["body_sha256"] for record in records}) == len(palettes)
+    assert len({record["physics_sha256"] for record in records}) == 1
 
 
 @pytest.mark.parametrize("name", ["actuator_gear", "body_mass", "geom_size", "qpos0", "pair_friction", "jnt_range"])

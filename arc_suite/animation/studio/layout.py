@@ -20,7 +20,7 @@ from arc_suite.bodies import generator, torsos
 from arc_suite.cpg.selection import preset_names
 from arc_suite.policies import POLICIES
 from arc_suite.robots import gaits
-from arc_suite.robots.spec import PALETTES
+from arc_suite.robots.spec import COLORS_EXAMPLE, MATERIALS, PALETTES
 from arc_suite.tasks import TASKS
 
 MAX_LINK_SLIDERS = 8
@@ -84,6 +84,7 @@ def add_shape(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
         widgets[field] = gui.add_slider(label, min=low, max=high, step=step, initial_value=value)
     palettes = PictureButtons(gui, "palettes", "Palette", (DEFAULT_CHOICE, *PALETTES), columns=6, height=16)
     palettes.show_pictures({palette: palette_picture(palette) for palette in PALETTES})
+    palettes.add_text_field("Colors", f"A palette, a seed, or colors of {', '.join(MATERIALS)}: {COLORS_EXAMPLE}")
     palettes.show_choice(sketch.palette)
     widgets["palette"] = palettes
     return widgets

@@ -13,6 +13,7 @@ class PictureButtons:
 
     Attributes:
         buttons: the group, whose value is the button that was pressed last.
+        text_field: shows the choice, and takes choices without a button; None: there is no such field.
     """
 
     def __init__(self, gui: viser.GuiApi, key: str, label: str, options: Sequence[str], columns: int, height: int):
@@ -33,6 +34,8 @@ class PictureButtons:
         self._pictures: Mapping[str, str] = {}
         self._style = gui.add_html("")  # right before the buttons, where its rules look for them
         self.buttons = gui.add_button_group(label, tuple(options))
+        self.text_field: viser.GuiTextHandle | None = None
+        self._gui = gui
         self._update_style()
 
     @property
@@ -43,10 +46,21 @@ class PictureButtons:
     @visible.setter
     def visible(self, visible: bool) -> None:
         self.buttons.visible = visible
+        if self.text_field is not None:
+            self.text_field.visible = visible
+
+    def add_text_field(self, label: str, hint: str) -> None:
+        """Add a text field for choices without a button, to the present container of the page."""
+        self.text_field = self._gui.add_text(label, self._choice, hint=hint)
 
     def on_update(self, call: Callable[[viser.GuiEvent], Any]) -> None:
-        """Have a function called when a visitor presses a button; see `viser.GuiButtonGroupHandle.on_click`."""
+        """Have a function called when a visitor presses a button, or changes the text field.
+
+        See `viser.GuiButtonGroupHandle.on_click`.
+        """
         self.buttons.on_click(call)
+        if self.text_field is not None:
+            self.text_field.on_update(call)
 
     def offer(self, options: Sequence[str]) -> None:
         """Offer other buttons."""
@@ -63,6 +77,8 @@ class PictureButtons:
         if choice != self._choice:
             self._choice = choice
             self._update_style()
+        if self.text_field is not None and self.text_field.value != choice:
+            self.text_field.value = choice
 
     def _update_style(self) -> None:
         pictures = [self._pictures.get(option, "none") for option in self.buttons.options]

@@ -41,7 +41,7 @@ class Sketch:
         scale, length, width, thickness, fan, torso, head, tail: see `shaping.Shape`.
         lengths: pairs of a link's name and the factor of its length. Links that the body lacks are ignored.
         ends: pairs of a part's name and the link's end, see `shaping.Shape`. Parts that the body lacks are ignored.
-        palette: a name of `spec.PALETTES`, a seed in digits, or `DEFAULT_CHOICE`.
+        palette: as `palettes.parse` takes it, or `DEFAULT_CHOICE`.
         task: name of the task.
         gait: name of the gait, or `DEFAULT_CHOICE`.
         speed: target velocity, as a multiple of the body's own; demonstrators go in a gait that suits it.

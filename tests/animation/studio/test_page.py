@@ -142,7 +142,14 @@ def test_a_slider_changes_the_creature(served, tab):
     served.until(lambda: dict(served.session.creature.sketch.lengths)["lower"] == pytest.approx(1.2))
     press_picture(tab, "moss")
     served.until(lambda: served.session.creature.setup.body.palette == "moss")
+    colors = field(tab, "Colors").get_by_role("textbox")
+    served.until(lambda: colors.input_value() == "moss")
+    colors.fill("#3a5f2b,#d8c48a")
+    served.until(lambda: served.session.creature.setup.body.palette == "#3a5f2b,#d8c48a")
+    colors.fill("3a5f2b")
+    tab.get_by_role("alert").get_by_text("did you mean '#3a5f2b'?").wait_for()
     press_picture(tab, "own")
+    served.until(lambda: colors.input_value() == "own" and not served.session.error)
 
 
 def test_a_bad_combination_stands_in_the_page_and_the_creature_walks_on(served, tab):

@@ -34,7 +34,7 @@ SKETCHES = {
     "shaped": Sketch(legs=6, scale=2.0, fan=5.0, lengths=(("lower", 1.3), ("upper", 1.0)), speed=0.8),
     "dragged": Sketch(legs=6, links=2, ends=(("l1_lower", (0.0, 0.3, -0.3)), ("r9_lower", (1.0, 0.0, 0.0)))),
     "robot": Sketch(source="queen", ground="bumps", kicks=0.5, task="walk", preset="tuned"),
-    "shaped robot": Sketch(source="tick", width=1.2, palette="moss"),
+    "shaped robot": Sketch(source="tick", width=1.2, palette="#3A5F2B,#d8c48a"),
     "example": Sketch(source="spider", task="stairs", settings='{"difficulty": 0.5}'),
     "random": Sketch(source=RANDOM, seed=7, policy="zero", palette="7"),
     "file": Sketch(source=FILE, file=body_to_json(HIGH)),

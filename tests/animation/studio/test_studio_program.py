@@ -33,6 +33,9 @@ def test_flags(tmp_path):
         ("--legs=4", "--length=lower=1.5", "--palette=7"): Sketch(
             legs=4, lengths=(("lower", 1.5),), palette="7", task="directed"
         ),
+        ("--spec=spider", "--palette=#3a5f2b,#d8c48a"): Sketch(
+            source="spider", palette="#3a5f2b,#d8c48a", task="directed"
+        ),
         ("--spec=spider", "--set=arena=bumps", "--set=kicks=0.5", "--set=friction=0.7"): Sketch(
             source="spider", task="directed", ground="bumps", kicks=0.5, settings='{"friction": 0.7}'
         ),
