@@ -63,6 +63,7 @@ TABLES: dict[tuple[str, str], Callable[[], str]] = {
     ("any_body", "table"): lambda: bodies.text(STUDIES / "bodies.csv"),
     ("study", "table"): returns_next_to_the_papers,
     ("algorithms", "parallel-parts"): lambda: kinds.text(STUDIES, "parallel-parts"),
+    ("algorithms", "legs"): lambda: kinds.text(STUDIES, "legs"),
     ("algorithms", "parallel"): lambda: kinds.text(STUDIES, "parallel"),
 }
 

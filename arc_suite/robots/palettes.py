@@ -26,7 +26,7 @@ def colors(palette: str | int) -> dict[str, Color]:
     """Return the colors of the materials by name.
 
     Args:
-        palette: as `Body.palette`, but for None. With a seed the shell gets a random hue, the glow a nearly opposite
+        palette: as `Body.palette`, without None. With a seed the shell gets a random hue, the glow a nearly opposite
             one. Colors are those of the first of `spec.MATERIALS`; the others suit the color of the shell.
     """
     if not isinstance(palette, str):

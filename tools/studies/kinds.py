@@ -1,9 +1,12 @@
 """Table of a study's scores, with a line for each place and a column for each kind of runs."""
 
-import itertools
+from collections.abc import Sequence
 from pathlib import Path
 
-from arc_suite.learning.studies import benchmark, results
+import numpy as np
+
+from arc_suite.learning.studies import report, results
+from arc_suite.learning.studies.results import RunResult
 from arc_suite.learning.studies.text_tables import table
 from studies import catalog
 
@@ -15,13 +18,25 @@ def text(studies: Path, name: str) -> str:
         ValueError: an unknown study, or a damaged table of it.
         OSError: a table cannot be read.
     """
-    run_results = results.read_results(catalog.study(name).runs, studies / name)
-    results_by_cell: dict[tuple[str, str], list[results.RunResult]] = {}
-    for result in run_results:
-        results_by_cell.setdefault((result.run.place, result.run.kind), []).append(result)
-    places, kinds = (dict.fromkeys(names) for names in zip(*results_by_cell, strict=True))
-    cells = {
-        (place, kind): benchmark.place_text(benchmark.score_results(results_by_cell.get((place, kind), [])))
-        for place, kind in itertools.product(places, kinds)
-    }
-    return table(("score", *kinds), [(place, *(cells[place, kind] for kind in kinds)) for place in places])
+    published = studies / name
+    demonstrators = results.read_demonstrators(published)
+    groups = results.group_by_place(results.read_results(catalog.study(name).runs, published))
+    kinds = dict.fromkeys(kind for results_by_kind in groups.values() for kind in results_by_kind)
+    lines = []
+    for place, results_by_kind in groups.items():
+        cells = [_score_text(results_by_kind.get(kind, ()), demonstrators) for kind in kinds]
+        lines.append((place, *cells))
+    return table(("score", *kinds), lines)
+
+
+def _score_text(seeds: Sequence[RunResult], demonstrators) -> str:
+    """Return the mean score of the latest policies as text, then that of each seed; a dash without runs."""
+    if not seeds:
+        return "-"
+    scores = []
+    for result in seeds:
+        scale = report.anchors_of(result, result.seeds, demonstrators)
+        if scale is None:
+            raise ValueError(f"run {result.run.name}: expected a place with anchors, got {result.run.place}")
+        scores.append(float(scale.score(result.final)))
+    return f"{np.mean(scores):z.2f} ({', '.join(f'{score:z.2f}' for score in scores)})"

@@ -228,7 +228,7 @@ def _result_cells(groups: Groups) -> list[str]:
         f"{' '.join(lowest_place)} {mean_scores[lowest_place]:z.2f}",
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
         *(f"{_mean_style(name, nonempty_groups):.3f}" for name in STYLE),
-        *(place_text(scores) for scores in groups.values()),
+        *(_place_text(scores) for scores in groups.values()),
         _notes_text(groups),
     ]
 
@@ -239,7 +239,7 @@ def _total_text(groups: Groups) -> str:
     return f"{mean:.3f} [{low:.3f}, {high:.3f}]" if np.isfinite(low) else f"{mean:.3f}"
 
 
-def place_text(scores: Sequence[RunScore]) -> str:
+def _place_text(scores: Sequence[RunScore]) -> str:
     """Return the mean score in a place as text, and the score of each seed if there are several."""
     if not scores:
         return NOT_RUN
