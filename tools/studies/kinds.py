@@ -7,7 +7,7 @@ import numpy as np
 
 from arc_suite.learning.studies import report, results
 from arc_suite.learning.studies.results import RunResult
-from arc_suite.learning.studies.text_tables import table
+from arc_suite.learning.studies.text_tables import score_of_seeds, table
 from studies import catalog
 
 
@@ -23,20 +23,17 @@ def text(studies: Path, name: str) -> str:
     groups = results.group_by_place(results.read_results(catalog.study(name).runs, published))
     kinds = dict.fromkeys(kind for results_by_kind in groups.values() for kind in results_by_kind)
     lines = []
-    for place, results_by_kind in groups.items():
-        cells = [_score_text(results_by_kind.get(kind, ()), demonstrators) for kind in kinds]
-        lines.append((place, *cells))
+    for robot_and_task, results_by_kind in groups.items():
+        cells = [_score_cell(results_by_kind.get(kind, ()), demonstrators) for kind in kinds]
+        lines.append((robot_and_task, *cells))
     return table(("score", *kinds), lines)
 
 
-def _score_text(seeds: Sequence[RunResult], demonstrators) -> str:
-    """Return the mean score of the latest policies as text, then that of each seed; a dash without runs."""
+def _score_cell(seeds: Sequence[RunResult], demonstrators) -> str:
+    """Return the scores of the latest policies of a kind as text; a dash without runs."""
     if not seeds:
         return "-"
-    scores = []
-    for result in seeds:
-        scale = report.anchors_of(result, result.seeds, demonstrators)
-        if scale is None:
-            raise ValueError(f"run {result.run.name}: expected a place with anchors, got {result.run.place}")
-        scores.append(float(scale.score(result.final)))
-    return f"{np.mean(scores):z.2f} ({', '.join(f'{score:z.2f}' for score in scores)})"
+    scores = report.scores_of(seeds, demonstrators)
+    if np.isnan(scores).any():
+        raise ValueError(f"run {seeds[0].run.name}: expected a place with anchors, got {seeds[0].run.place}")
+    return score_of_seeds(scores)

@@ -16,7 +16,7 @@ from arc_suite.evaluation import anchors
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING, place_setup
 from arc_suite.learning.studies.results import RunResult
-from arc_suite.learning.studies.text_tables import table
+from arc_suite.learning.studies.text_tables import score_of_seeds, table
 
 SCORES = "scores.csv"
 MAX_OVERRUN = 1.05  # largest share of the steps of a division that a run may make, as slices end a little later
@@ -243,9 +243,8 @@ def _place_text(scores: Sequence[RunScore]) -> str:
     """Return the mean score in a place as text, and the score of each seed if there are several."""
     if not scores:
         return NOT_RUN
-    mean = f"{np.mean([score.score for score in scores]):z.2f}"
     by_seed = sorted(scores, key=lambda score: score.seed)
-    return f"{mean} ({', '.join(f'{score.score:z.2f}' for score in by_seed)})" if len(scores) > 1 else mean
+    return score_of_seeds([score.score for score in by_seed])
 
 
 def _mean_style(name: str, groups: Groups) -> float:

@@ -191,10 +191,16 @@ def score_text(seeds: Sequence[RunResult], demonstrators) -> str:
         seeds: results in a place.
         demonstrators: see `results.read_demonstrators`.
     """
-    scales = [anchors_of(result, result.seeds, demonstrators) for result in seeds]
-    if None in scales:
-        return "-"
-    return _format_score(np.mean([scale.score(result.final) for scale, result in zip(scales, seeds, strict=True)]))
+    return _format_score(np.mean(scores_of(seeds, demonstrators)))
+
+
+def scores_of(seeds: Sequence[RunResult], demonstrators) -> list[float]:
+    """Return the score of the latest policy of each seed in a place; NaN without anchors; see `score_text`."""
+    scores = []
+    for result in seeds:
+        scale = anchors_of(result, result.seeds, demonstrators)
+        scores.append(np.nan if scale is None else float(scale.score(result.final)))
+    return scores
 
 
 def anchors_of(result: RunResult, seeds: Sequence[int], demonstrators) -> Anchors | None:
