@@ -79,12 +79,14 @@ class BlowClip(NamedTuple):
     Attributes:
         side: side from which the blow comes; see `blows.DIRECTIONS`.
         max_tilt: degrees, by which the blow tilts the torso at most; it is the strongest that does not tilt it more.
+        min_tilt: degrees, by which the torso is to tilt; a blow that tilts it less comes higher. 0 for the lowest blow.
         cycles: gait cycles in which it steps after the blow; 0 for feet that stay where they are. Without steps the
             clip is added to others, as its difference from the first pose of idle.
     """
 
     side: str
     max_tilt: float
+    min_tilt: float = 0.0
     cycles: int = 0
 
 
@@ -152,7 +154,7 @@ CLIPS: dict[str, Kind] = {
     "look_down": Acted(functools.partial(gestures.turn_torso, number="pitch", sign=1.0), BOTH_ENDS),
     "limp_walk": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "limp": Difference(loop="limp_walk", base="walk"),
-    **{f"hit_{side}": BlowClip(side, max_tilt=10.0) for side in DIRECTIONS},
+    **{f"hit_{side}": BlowClip(side, max_tilt=10.0, min_tilt=5.0) for side in DIRECTIONS},
     **{f"stagger_{side}": BlowClip(side, max_tilt=30.0, cycles=2) for side in DIRECTIONS},
     "attack": Acted(gestures.strike, BOTH_ENDS, steps=True),
     "rise": Acted(acting.rise, ends=(-1,), planted=False),

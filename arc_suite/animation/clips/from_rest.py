@@ -13,14 +13,16 @@ from arc_suite.animation.clips import bounds, on_ground, planting, root_motion, 
 from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, BlowClip, Passage, Turn, clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.recorder import Recorder, TransitionRecording
-from arc_suite.animation.clips.recordings import stop_at_rest
+from arc_suite.animation.clips.recordings import Recording, stop_at_rest
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.models import sizing
 from arc_suite.robots.spec import Body
 
 _MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
 _FREE_SOLE_DEPTH = 0.025  # standing heights: soles that are deeper in the ground are raised
-_BLOW_SIZES = tuple(0.15 * 1.4**step for step in range(10))  # that are tried, sqrt(g h): up to 3.1
+_BLOW_SIZES = tuple(0.15 * 1.4 ** (0.5 * step) for step in range(-4, 19))  # that are tried, sqrt(g h): 0.08 to 3.1
+_BLOW_LEVERS = (0.5, 1.0, 2.0, 4.0)  # standing heights, that are tried: higher blows turn wide bodies more
+_MAX_SWAYS = (0.4, 0.25, 0.12)  # standing heights, of a torso over feet that stay, which are tried
 _RETURN_SLOWNESS = 9.0  # sqrt(h / g) that the way back to idle after a blow lasts longer by each rad of a joint
 _MAX_RETURN_DURATION = 2.5  # sqrt(h / g), of this way
 _SINK_BY_TILT = 0.5  # standing heights a rad: how far knees give under a torso that tilts over feet that stay
@@ -123,81 +125,130 @@ def _find_likeness(name: str, drafts: Mapping[str, Draft]) -> str:
 
 
 def _take_blow(recorder: Recorder, clip: BlowClip, idle: Pose) -> Draft:
-    """Return how a body takes the strongest blow that suits it, from idle to idle.
+    """Return how a body takes the blow that suits it, from idle to idle.
+
+    Of the lowest blows that tilt the torso enough, it is the strongest; if none does, that which tilts it most.
 
     Raises:
         ValueError: no blow suits it.
     """
+    drafts: list[Draft] = []
+    first_reason = ""
+    for lever in _BLOW_LEVERS:
+        draft, reason = _take_strongest_blow(recorder, clip, lever, idle)
+        first_reason = first_reason or reason
+        if draft is not None:
+            drafts.append(draft)
+        if drafts and (not clip.min_tilt or _measure_tilt(drafts[-1].motion.quaternions) >= clip.min_tilt):
+            return drafts[-1]
+    if not drafts:
+        raise ValueError(first_reason)
+    return max(drafts, key=lambda draft: _measure_tilt(draft.motion.quaternions))
+
+
+def _take_strongest_blow(recorder: Recorder, clip: BlowClip, lever: float, idle: Pose) -> tuple[Draft | None, str]:
+    """Return how a body takes the strongest blow of a lever, and why the weakest does not suit it, if it does not."""
     drafts = {}
     reasons = {}
 
     def is_too_strong(size: float) -> bool:
         try:
-            drafts[size] = _record_blow(recorder, clip, size, idle)
+            drafts[size] = _record_blow(recorder, clip, size, lever, idle)
         except ValueError as error:
             reasons[size] = str(error)
         return size in reasons
 
     bisect.bisect_left(_BLOW_SIZES, True, key=is_too_strong)
-    if not drafts:
-        size = min(reasons)
-        raise ValueError(f"under a blow of {size:g} sqrt(g h), {reasons[size]}")
-    return drafts[max(drafts)]
+    if drafts:
+        return drafts[max(drafts)], ""
+    size = min(reasons)
+    return None, f"under a blow of {size:.2g} sqrt(g h), {reasons[size]}"
 
 
-def _record_blow(recorder: Recorder, clip: BlowClip, size: float, idle: Pose) -> Draft:
-    """Return how a body takes a blow of a size, from idle to idle.
+def _measure_tilt(quaternions: np.ndarray) -> float:
+    """Return the largest angle, degrees, by which a torso tilts from its first pose; quaternions (samples, 4)."""
+    up = rotations.matrix(quaternions)[:, :, 2]
+    return math.degrees(np.arccos((up @ up[0]).clip(-1.0, 1.0)).max())
+
+
+def _record_blow(recorder: Recorder, clip: BlowClip, size: float, lever: float, idle: Pose) -> Draft:
+    """Return how a body takes a blow of a size and a lever, from idle to idle.
 
     Raises:
         ValueError: the body falls, tilts too far or stands in another pose after it, or a bound breaks.
     """
     body = recorder.body
-    recording, cycle, _ = recorder.record_blow(clip.side, size, clip.cycles)
-    tilt = math.degrees(np.arccos(rotations.upright(recording.poses[:, 3:7]).clip(-1.0, 1.0)).max())
+    recording, cycle, _ = recorder.record_blow(clip.side, size, lever, clip.cycles)
+    tilt = _measure_tilt(recording.poses[:, 3:7])
     if tilt > clip.max_tilt:
         raise ValueError(f"its torso tilts by {tilt:.0f} degrees, more than {clip.max_tilt:.0f}")
     recording = stop_at_rest(recording)
-    fading_samples = len(recording.poses) // 3
     if clip.cycles:
-        motion = root_motion.advance_straight(recording).meet(idle, -1, fading_samples)
+        motion = _step_after_blow(body, recording, cycle, idle)
     else:
-        motion = root_motion.stay_at_start(recording, 0, len(recording.poses) - 1)
-        motion = motion.append(_return_to(body, idle, motion))
-    motion = motion.end_with(idle, 0, fading_samples)
-    _check_seam(motion, "idle")
-    if clip.cycles:
-        motion = planting.plant_feet(body, _raise_out_of_ground(body, motion, BOTH_ENDS), cycle, loops=False)
-        for end in BOTH_ENDS:
-            motion = motion.end_with(idle, end, fading_samples)
-    else:
-        motion = _stand_on_feet(body, motion, idle)
+        motion = _stand_on_feet(body, root_motion.stay_at_start(recording, 0, len(recording.poses) - 1), idle)
     reason = bounds.find_excess(body, clip, motion)
     if reason:
         raise ValueError(reason)
     return Draft(motion, loops=False, stands=not clip.cycles)
 
 
-def _return_to(body: Body, idle: Pose, motion: ClipMotion) -> ClipMotion:
-    """Return how a body at rest at the end of a motion goes over to idle."""
+def _step_after_blow(body: Body, recording: Recording, cycle: float, idle: Pose) -> ClipMotion:
+    """Return a blow and the steps after it from idle to idle; a ValueError if the body stands otherwise there."""
+    fading_samples = len(recording.poses) // 3
+    motion = root_motion.advance_straight(recording).meet(idle, -1, fading_samples).end_with(idle, 0, fading_samples)
+    _check_seam(motion, "idle")
+    motion = planting.plant_feet(body, _raise_out_of_ground(body, motion, BOTH_ENDS), cycle, loops=False)
+    for end in BOTH_ENDS:
+        motion = motion.end_with(idle, end, fading_samples)
+    return motion
+
+
+def _return_to(body: Body, first: Pose, motion: ClipMotion) -> ClipMotion:
+    """Return how a body at rest at the end of a motion goes over to its first pose."""
     last = motion.pose(-1)
-    seam = root_motion.seam_size(idle.relative(last))
+    seam = root_motion.seam_size(first.relative(last))
     duration = min(_RETURN_SLOWNESS * seam, _MAX_RETURN_DURATION)
     samples = max(1, _to_samples(body, duration, motion.time_step))
-    return standing_legs.hold_pose(last, samples, motion.time_step).end_with(idle, -1, samples)
+    return standing_legs.hold_pose(last, samples, motion.time_step).end_with(first, -1, samples)
 
 
 def _stand_on_feet(body: Body, motion: ClipMotion, idle: Pose) -> ClipMotion:
-    """Return the motion of a torso from idle to idle over feet that stay, as large as legs can follow.
+    """Return how a torso moves from idle, as in a motion from its first pose, over feet that stay, and returns.
+
+    It is as large as legs can follow.
 
     Raises:
         ValueError: the legs leave no room for it.
     """
+    first = motion.pose(0)
+    motion = motion.append(_return_to(body, first, motion))
     samples = round(motion.seconds / standing_legs.time_step(body))
     motion = motion.sample_at(np.linspace(0.0, motion.seconds, samples + 1))
-    poses = standing_legs.poses_of_motion(body, idle, motion)
+    poses = standing_legs.poses_of_motion(body, first, motion)
+    poses[:, standing_legs.HEIGHT] = poses[:, standing_legs.HEIGHT].clip(max=0.0)  # feet that stay hold it down
     poses[:, standing_legs.HEIGHT] -= _SINK_BY_TILT * np.linalg.norm(poses[:, 3:5], axis=-1)  # of roll and pitch
-    standing_motion = standing_legs.follow_with_legs(body, idle, poses, action="sway")
-    return standing_motion._replace(time_step=motion.time_step, seam=motion.seam)
+    return _follow_sway(body, idle, poses)._replace(time_step=motion.time_step)
+
+
+def _follow_sway(body: Body, idle: Pose, poses: np.ndarray) -> ClipMotion:
+    """Return a motion of the torso (samples, 6) with as much of its tilt as legs can follow; it may sway less.
+
+    Raises:
+        ValueError: the legs leave no room for it.
+    """
+    sway = np.linalg.norm(poses[:, 1:3], axis=-1).max()  # ahead and aside
+    motions = []
+    for max_sway in _MAX_SWAYS:
+        share = min(1.0, max_sway / max(sway, 1e-9))
+        swaying_poses = poses * (1.0, share, share, 1.0, 1.0, 1.0)
+        try:
+            motions.append(standing_legs.follow_with_legs(body, idle, swaying_poses, action="sway"))
+        except ValueError as error:
+            reason = error
+    if not motions:
+        raise reason
+    return max(motions, key=lambda motion: round(_measure_tilt(motion.quaternions), 1))  # of equal ones the first
 
 
 def _raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[int]) -> ClipMotion:

@@ -27,7 +27,6 @@ _CYCLES_AFTER_START = 4
 _STANDING_STEPS = 60  # control steps before a blow, at least
 _CYCLES_AFTER_BLOW = 3  # gait cycles in which a body comes to rest after a blow, and after its steps
 _STEPPING_COMMAND = (1e-6, 0.0, 0.0)  # so slow that a body steps on the spot
-_BLOW_LEVER = 0.5  # standing heights
 _BLOW_FRICTION = 4.0  # of feet that do not skid, so that the torso goes over them
 _CROUCH_ROOM_SHARE = 0.7  # of the room that legs leave the torso: as deep as a body crouches
 _MIN_CROUCH = 0.05  # standing heights
@@ -213,12 +212,13 @@ class Recorder:
             delay=delay,
         )
 
-    def record_blow(self, side: str, size: float, cycles: int) -> GaitRecording:
+    def record_blow(self, side: str, size: float, lever: float, cycles: int) -> GaitRecording:
         """Return a recording of a body that stands, from the blow on until it stands again.
 
         Args:
             side: see `blows.Blow`.
             size: see `blows.Blow`.
+            lever: see `blows.Blow`.
             cycles: gait cycles in which it steps on the spot after the blow; 0 for feet that stay.
 
         Raises:
@@ -230,7 +230,7 @@ class Recorder:
         stop_step = standing_steps + round(cycles * steps_in_cycle)
         commands = [(0, (0.0, 0.0, 0.0)), (standing_steps, _STEPPING_COMMAND), (stop_step, (0.0, 0.0, 0.0))]
         steps = round((cycles + _CYCLES_AFTER_BLOW) * steps_in_cycle)
-        blow = Blow(side, size, _BLOW_LEVER, _BLOW_FRICTION)
+        blow = Blow(side, size, lever, _BLOW_FRICTION)
         return GaitRecording(self._record(self._setup, standing_steps, steps, commands, blow), clock.cycle)
 
     def _setup_with_pose_command(self) -> Setup:

@@ -16,6 +16,7 @@ from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.recordings import Recording, samples_to_rest, stop_at, stop_at_rest
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.envs.setup import Setup
+from arc_suite.models import posture
 from arc_suite.models.standing import standing_qpos
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compile_model
@@ -124,19 +125,49 @@ def test_a_death_that_lies_as_another_is_left_out_with_its_line():
     assert likeness("death", drafts) == likeness("walk", drafts) == likeness("death_left", drafts) == ""
 
 
-def test_the_strongest_blow_counts_that_suits_the_body(monkeypatch):
-    def record(limit, recorder, clip, size, idle):
-        if size > limit:
-            raise ValueError("its torso tilts by 40 degrees, more than 30")
-        return size
+def fake_recorder(max_size, tilt_per_lever=0.0):
+    """A stand-in for `_record_blow` that refuses larger blows. Others tilt by degrees a lever, bent by their size."""
 
+    def record(recorder, clip, size, lever, idle):
+        if size > max_size:
+            raise ValueError("its torso tilts by 40 degrees, more than 30")
+        tilted = still(np.radians(tilt_per_lever * lever), size)
+        quaternions = np.stack([REST.quaternion, *tilted.motion.quaternions[1:]])
+        return tilted._replace(motion=tilted.motion._replace(quaternions=quaternions))
+
+    return record
+
+
+def test_the_strongest_blow_counts_that_suits_the_body(monkeypatch):
     clip = CLIPS["stagger_left"]
-    for limit, taken in ((0.5, 0.4116), (9.0, 3.0991)):
-        monkeypatch.setattr(from_rest, "_record_blow", lambda *of, limit=limit: record(limit, *of))
-        assert from_rest._take_blow(None, clip, REST) == pytest.approx(taken, abs=1e-3)
-    monkeypatch.setattr(from_rest, "_record_blow", lambda *of: record(0.0, *of))
-    with refused("under a blow of 0.15 sqrt(g h), its torso tilts by 40 degrees, more than 30"):
+    for limit, size in ((0.5, 0.487), (9.0, 3.0991)):
+        monkeypatch.setattr(from_rest, "_record_blow", fake_recorder(limit))
+        taken = from_rest._take_blow(None, clip, REST)
+        assert taken.motion.joints[0, 0] == pytest.approx(size, abs=1e-3)
+    monkeypatch.setattr(from_rest, "_record_blow", fake_recorder(0.0))
+    with refused("under a blow of 0.077 sqrt(g h), its torso tilts by 40 degrees, more than 30"):
         from_rest._take_blow(None, clip, REST)
+
+
+@pytest.mark.parametrize(("tilt_per_lever", "tilt"), [(11.0, 5.5), (3.0, 6.0), (1.3, 5.2), (0.2, 0.8)])
+def test_a_light_blow_comes_higher_until_the_torso_tilts_by_5_degrees(monkeypatch, tilt_per_lever, tilt):
+    monkeypatch.setattr(from_rest, "_record_blow", fake_recorder(9.0, tilt_per_lever))
+    draft = from_rest._take_blow(None, CLIPS["hit_front"], REST)
+    assert from_rest._measure_tilt(draft.motion.quaternions) == pytest.approx(tilt)
+
+
+def test_a_sway_that_legs_cannot_follow_is_smaller_and_its_tilt_stays():
+    """Of Tick's torso, which is pushed back by 0.8 standing heights and tilts by 5 degrees."""
+    rest_pose = posture.find_rest_pose(TICK)
+    idle = REST._replace(joints=rest_pose.legs.by_joint(rest_pose.joint_angles))
+    shares = np.sin(np.linspace(0.0, np.pi, 100))
+    poses = shares[:, None] * (0.1, -0.8, 0.0, 0.0, -np.radians(5.0), 0.0)
+    motion = standing_legs.pose_motion(TICK, idle, poses, np.tile(idle.joints, (100, 1)))
+    standing_motion = from_rest._stand_on_feet(TICK, motion, idle)
+    drawn = standing_legs.poses_of_motion(TICK, idle, standing_motion)
+    assert np.degrees(np.ptp(drawn[:, 4])) == pytest.approx(5.0, abs=0.1)
+    assert 0.1 < np.ptp(drawn[:, 1]) <= 0.4
+    assert drawn[:, 0].max() <= 1e-9 and drawn[:, 0].min() < -0.04
 
 
 def test_light_blows_are_added_to_other_clips_and_strong_ones_are_not():
