@@ -12,6 +12,7 @@ from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
 from arc_suite.animation.clips.standing_legs import (
     HEIGHT,
     feet_from_torso,
+    follow_foot,
     follow_with_legs,
     keep_feet_in_place,
     pose_motion,
@@ -52,8 +53,18 @@ _STRIKE_TORSO_TRACKS = {
     "pitch": ((0.3, 0.0), (2.2, -0.14), (3.0, -0.15), (3.8, 0.12), (4.6, 0.1), (7.5, 0.0)),
     "height": ((0.3, 0.0), (2.0, -0.03), (3.0, 0.0), (3.8, -0.08), (4.6, -0.06), (7.5, 0.0)),
 }
-_STRIKE_FOOT_FORWARD_TRACK = ((0.8, 0.0), (2.4, 0.1), (3.0, 0.12), (3.8, 0.4), (4.8, 0.4), (6.6, 0.0))
+_STRIKE_REACH = 0.4  # h
+_STRIKE_FOOT_FORWARD_TRACK = (
+    (0.8, 0.0),
+    (2.4, 0.1),
+    (3.0, 0.12),
+    (3.8, _STRIKE_REACH),
+    (4.8, _STRIKE_REACH),
+    (6.6, 0.0),
+)
 _STRIKE_FOOT_UP_TRACK = ((0.8, 0.0), (2.4, 0.7), (3.0, 0.72), (3.8, 0.0), (4.8, 0.0), (5.7, 0.15), (6.6, 0.0))
+_STRIKE_SHARE = 0.25  # of the way from the torso to its front foot, by which a long body strikes further
+_MAX_REACH_SIZE = 1.5  # of the reach of others
 
 # A turn of the torso.
 _MAX_TURN = 0.2  # rad
@@ -147,10 +158,12 @@ def strike(body: Body, rest: Pose) -> ClipMotion:
     feet = feet_from_torso(body, rest)
     front_leg = int(feet[:, 0].argmax())
     lifts = np.zeros((len(times), len(feet), 3))
-    lifts[:, front_leg, 0] = _track_values(times, _STRIKE_FOOT_FORWARD_TRACK)
+    foot_ahead = feet[front_leg, 0] / body.torso.standing_height
+    reach_size = np.clip(_STRIKE_SHARE * foot_ahead / _STRIKE_REACH, 1.0, _MAX_REACH_SIZE)
+    lifts[:, front_leg, 0] = reach_size * _track_values(times, _STRIKE_FOOT_FORWARD_TRACK)
     lifts[:, front_leg, 2] = _track_values(times, _STRIKE_FOOT_UP_TRACK)
     poses = _poses_of_tracks(times, _STRIKE_TORSO_TRACKS)
-    return follow_with_legs(body, rest, poses, action="strike", lifts=lifts)
+    return follow_foot(body, rest, poses, lifts, action="strike")
 
 
 def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> ClipMotion:

@@ -29,9 +29,11 @@ _SOLE_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a sole: legs of two 
 # more, as stretched legs cannot follow a tilt.
 _SIZES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)
 _SINK_FACTORS = (1.0, 1.6, 2.4)
+_DIPS = (0.0, 0.1, 0.2)  # h, by which a torso that follows a foot sinks where it moves most
 
 # What a standing foot may miss, h.
 _MAX_SINK = 0.01
+_MAX_SMOOTH_SINK = 0.025  # of any foot, after joints are smooth
 _MAX_SLIDE = 0.04
 _MAX_SLIDE_OF_FEW_JOINTS = 0.16
 _FREE_JOINTS = 3  # joints of a leg whose foot can stay under a torso that moves in any direction
@@ -128,6 +130,38 @@ def follow_with_legs(
     raise ValueError(f"the legs leave the torso no room to {action}")
 
 
+def follow_foot(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray, action: str) -> ClipMotion:
+    """Return a motion of the torso over its feet in which the way of lifted feet is as large as legs can follow.
+
+    The torso moves less than its feet, or sinks, where standing legs ask for it.
+
+    Args:
+        body: the spec.
+        rest: pose from which the torso moves.
+        poses: see `follow_with_legs`.
+        lifts: see `follow_with_legs`.
+        action: see `follow_with_legs`.
+
+    Raises:
+        ValueError: the legs cannot follow the smallest size.
+    """
+    motion = follow_exactly(body, rest, poses, lifts)
+    if motion is not None:
+        return motion
+    movement = np.linalg.norm(poses[:, HEIGHT + 1 :], axis=-1)
+    dip = movement / max(movement.max(), 1e-9)
+    sized_poses = [
+        size * poses - depth * dip[:, None] * np.eye(6)[HEIGHT] for size, depth in itertools.product(_SIZES, _DIPS)
+    ]
+    smallest_lifts = _SIZES[-1] * lifts
+    standing_poses = [sized for sized in sized_poses if follow_exactly(body, rest, sized, smallest_lifts) is not None]
+    for lift_size, standing in itertools.product(_SIZES, standing_poses):
+        motion = follow_exactly(body, rest, standing, lift_size * lifts)
+        if motion is not None:
+            return motion
+    raise ValueError(f"the legs leave the torso no room to {action}")
+
+
 def follow_exactly(
     body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray, smoothing_rounds: int = _SMOOTHING_ROUNDS
 ) -> ClipMotion | None:
@@ -144,7 +178,19 @@ def follow_exactly(
     sinks = abs(standing_misses[..., 2])
     if slides.max() > max_slide or sinks.max() > _MAX_SINK:
         return None
-    return pose_motion(body, rest, poses, joints)
+    motion = pose_motion(body, rest, poses, joints)
+    if _measure_depth(body, motion) > _MAX_SMOOTH_SINK * standing_height:
+        return None
+    return motion
+
+
+def _measure_depth(body: Body, motion: ClipMotion) -> float:
+    """Return how deep a foot sinks below its height in the first sample, m."""
+    legs = Legs.of(body, used=1.0).to_foot_centers()
+    feet, _ = legs.soles(legs.by_leg(motion.joints))  # in the torso's frame
+    up = rotations.matrix(motion.quaternions)[:, 2]  # (samples, 3) the vertical in this frame
+    heights = motion.positions[:, [2]] + (feet @ up[..., None])[..., 0]  # (samples, legs)
+    return float((heights[0] - heights).max())
 
 
 def pose_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> ClipMotion:

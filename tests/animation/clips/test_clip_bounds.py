@@ -144,7 +144,31 @@ def test_an_attack_of_a_large_body_is_over_soon():
     motion = played(QUEEN, "attack")
     assert 1.4 < motion.seconds < 1.5
     assert np.ptp(motion.positions[:, 0]) > 0.1 * QUEEN.torso.standing_height
+    assert reach_of(QUEEN, motion) == pytest.approx(0.4, abs=0.01)
     assert bounds.find_excess(QUEEN, CLIPS["attack"], motion) == ""
+
+
+def reach_of(body, motion):
+    """How far the foot that rises most strikes ahead of where it stood, standing heights."""
+    ground = on_ground.measure_ground(body, motion)
+    foot = ground.soles.max(axis=0).argmax()
+    return np.ptp(ground.feet[:, foot, 0]) / body.torso.standing_height
+
+
+def test_a_motion_is_as_deep_as_its_deepest_foot():
+    motion = still(TICK)
+    assert standing_legs._measure_depth(TICK, motion) == pytest.approx(0.0, abs=1e-12)
+    lower = motion._replace(positions=motion.positions - np.linspace(0.0, 0.01, 101)[:, None] * (0.0, 0.0, 1.0))
+    assert standing_legs._measure_depth(TICK, lower) == pytest.approx(0.01)
+
+
+@pytest.mark.long
+def test_an_attack_of_a_wide_body_reaches_by_its_length():
+    """Of eleven legs, whose front foot stands 2.3 standing heights ahead; it reached 0.16."""
+    body = sound_body(0)
+    motion = played(body, "attack")
+    assert reach_of(body, motion) == pytest.approx(0.58, abs=0.02)
+    assert bounds.find_excess(body, CLIPS["attack"], motion) == ""
 
 
 @pytest.mark.slow
