@@ -1,10 +1,11 @@
 """Weight: the torso of walks, starts and stops moves as on a damped spring, and feet stay where they were.
 
-In a gait the torso sinks after touchdowns, twice a cycle, and rolls towards the feet that stand. It banks in turns, and
-pitches into the acceleration of starts and stops. It moves back before a start, a jump and a strike, and swings on
-after a stop, a landing and a strike; see `transients`. Legs follow by inverse kinematics about the feet of each sample.
-What they do not allow is made smaller. The sway of a gait is a function of its phase, and all else is 0 at both ends of
-a clip. So loops close and clips connect as without weight.
+In a gait the torso sinks after touchdowns, twice a cycle, and rolls towards the feet that stand. The faster it is than
+a walk, the more it sinks, and leans ahead. It banks in turns, and pitches into the acceleration of starts and stops. It
+moves back before a start, a jump and a strike, and swings on after a stop, a landing and a strike; see `transients`.
+Legs follow by inverse kinematics about the feet of each sample. What they do not allow is made smaller. The sway of a
+gait is a function of its phase, and all else is 0 at both ends of a clip. So loops close and clips connect as without
+weight.
 
 Lengths are in standing heights h, times in sqrt(h / g).
 """
@@ -25,6 +26,7 @@ from arc_suite.animation.clips.root_motion import fade_out
 from arc_suite.animation.clips.standing_legs import HEIGHT, has_free_feet, tilt
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
+from arc_suite.robots.gaits import PACES
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compile_model
 
@@ -39,6 +41,9 @@ _SIZES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)
 _SINKS = (0.0, 0.05, 0.1)  # h
 _PITCH_SIZES = (1.0, 0.8, 0.6, 0.4, 0.2)
 _DIPS = (0.0, 0.06)  # h, further, while a body pitches in a start or a stop
+_SINKS_OF_RUN = (*_SINKS, -0.05, -0.1)  # h: a body with knees that are folded as far as they go rises
+_LEAN_SINKS = (0.0, 0.05, 0.1, 0.15, -0.025, -0.05, -0.1)  # h, further, of a body that leans
+_BOB_OF_RUN = 2.3  # times that of a walk
 _MAX_TILT = np.radians(8.0)  # rad, of the pitch in starts and stops, and of the bank
 
 _FRONT_SHARE = 0.3  # by which the foremost feet count more for the side that stands, as those of a trot
@@ -58,6 +63,7 @@ _MAX_MISS_OF_FEW_JOINTS = 0.03  # h
 _MAX_SWING_MISS = 0.08  # h
 _MAX_MORE_SLIP = 0.02  # m a meter, that a loop has more than without weight
 _MAX_SPEED_RATIO = 1.5  # of the fastest joint, with and without weight
+_MAX_SPEED_RATIO_OF_RUN = 2.0
 
 
 class Character(NamedTuple):
@@ -68,6 +74,7 @@ class Character(NamedTuple):
         roll: amplitude of its roll in a gait, rad.
         pitch: rad, for an acceleration of g.
         bank: share of the roll at which weight acts along the torso's vertical in a turn.
+        lean: pitch ahead in a run, rad.
         frequency: frequency of the spring, rad / sqrt(h / g).
         damping: damping ratio of the spring.
         size: multiple of all offsets of the torso.
@@ -77,6 +84,7 @@ class Character(NamedTuple):
     roll: float
     pitch: float
     bank: float
+    lean: float
     frequency: float
     damping: float
     size: float = 1.0
@@ -99,11 +107,11 @@ class Character(NamedTuple):
         return np.fft.irfft(spectrum, padded)[: len(path)]
 
 
-USUAL = Character(bob=0.035, roll=0.03, pitch=0.9, bank=1.0, frequency=5.0, damping=0.5)
+USUAL = Character(bob=0.035, roll=0.03, pitch=0.9, bank=1.0, lean=0.14, frequency=5.0, damping=0.5)
 CHARACTERS = {
-    "heavy": Character(bob=0.05, roll=0.045, pitch=1.2, bank=0.7, frequency=3.5, damping=0.4),
-    "nervous": Character(bob=0.025, roll=0.02, pitch=1.1, bank=1.5, frequency=9.0, damping=0.3),
-    "old": Character(bob=0.03, roll=0.06, pitch=0.6, bank=0.3, frequency=4.0, damping=0.9),
+    "heavy": Character(bob=0.05, roll=0.045, pitch=1.2, bank=0.7, lean=0.12, frequency=3.5, damping=0.4),
+    "nervous": Character(bob=0.025, roll=0.02, pitch=1.1, bank=1.5, lean=0.17, frequency=9.0, damping=0.3),
+    "old": Character(bob=0.03, roll=0.06, pitch=0.6, bank=0.3, lean=0.07, frequency=4.0, damping=0.9),
 }
 
 
@@ -114,20 +122,26 @@ class Sway(NamedTuple):
         bob: amplitude of the height, twice a cycle, h.
         roll: amplitude of the roll, once a cycle, rad.
         bank: roll that stays, rad.
+        lean: pitch that stays, rad; as much of it as legs allow is added to the rest.
         sink: height by which the torso is lower, h.
     """
 
     bob: complex
     roll: complex
     bank: float
+    lean: float = 0.0
     sink: float = 0.0
 
     def resize(self, size: float, sink: float) -> Self:
         """Return a multiple of the sway, of a torso that sinks."""
-        return self._replace(bob=size * self.bob, roll=size * self.roll, bank=size * self.bank, sink=sink)
+        bob, roll, bank, lean = (size * number for number in (self.bob, self.roll, self.bank, self.lean))
+        return Sway(bob, roll, bank, lean, sink)
 
     def poses(self, phases: np.ndarray) -> np.ndarray:
-        """Return offsets (samples, 6) at phases (samples,), in cycles; see `posture`. The torso is never higher."""
+        """Return offsets (samples, 6) at phases (samples,), in cycles, without the lean; see `posture`.
+
+        The torso is never higher, unless its sink is negative.
+        """
         turns = np.exp(2.0j * np.pi * phases)
         poses = np.zeros((len(phases), 6))
         poses[:, HEIGHT] = (self.bob * turns**2).real - abs(self.bob) - self.sink
@@ -182,7 +196,7 @@ def _weigh_action(body: Body, name: str, draft: Draft, character: Character) -> 
 
 def _weigh_gait(body: Body, name: str, loop: Draft, passages, character: Character) -> dict[str, Draft]:
     """Return a loop, and the starts and stops that connect to it, with the largest sway that all of them can follow."""
-    full_sway = find_sway(body, loop, character)
+    full_sway = find_sway(body, loop, character, _measure_haste(name))
     transient_of_passage = {
         passage_name: _plan_transient(body, passage_name, passage, character)
         for passage_name, passage in passages.items()
@@ -195,8 +209,24 @@ def _weigh_gait(body: Body, name: str, loop: Draft, passages, character: Charact
                 clip: _move_torso(body, clip, drafts[clip], movement.poses) for clip, movement in plan.items()
             }
             if plan and None not in weighted_drafts.values():
+                if full_sway.lean:
+                    leaning_loop = _lean_ahead(body, name, loop, plan[name].poses, full_sway.lean)
+                    weighted_drafts[name] = leaning_loop or weighted_drafts[name]
                 return {clip: weighted_drafts[clip]._replace(weight=plan[clip].share) for clip in plan}
     return {clip: draft._replace(weight=0.0) for clip, draft in drafts.items()}
+
+
+def _lean_ahead(body: Body, name: str, loop: Draft, poses: np.ndarray, lean: float) -> Draft | None:
+    """Return a loop with offsets (samples, 6) of the torso and the largest lean, rad, that legs can follow."""
+    for share, depth in itertools.product(_PITCH_SIZES, _LEAN_SINKS):
+        leaning_poses = poses.copy()
+        leaning_poses[:, _PITCH] += share * lean
+        leaning_poses[:, HEIGHT] -= depth
+        if _can_follow(body, name, loop, leaning_poses):
+            leaning_loop = _move_torso(body, name, loop, leaning_poses)
+            if leaning_loop is not None:
+                return leaning_loop
+    return None
 
 
 class _Movement(NamedTuple):
@@ -210,7 +240,7 @@ def _plan_gait(
     body: Body, name: str, drafts: Mapping[str, Draft], full_sway: Sway, transient_of_passage, share: float
 ) -> dict[str, _Movement]:
     """Return movements of all drafts of a gait with a share of its sway; none if legs cannot follow."""
-    for sink in _SINKS:
+    for sink in _SINKS_OF_RUN if full_sway.lean else _SINKS:
         sway = full_sway.resize(share, sink)
         loop_poses = sway.poses(_loop_phases(drafts[name]))
         if not _can_follow(body, name, drafts[name], loop_poses):
@@ -289,10 +319,24 @@ def _follow_acceleration(body: Body, clip: Passage, draft: Draft, character: Cha
     return character.size * away_from_ends * character.follow(body, pitch.clip(lowest, highest), motion.time_step)
 
 
-def find_sway(body: Body, loop: Draft, character: Character) -> Sway:
+def _measure_haste(name: str) -> float:
+    """Return how far a clip is from a walk, 0, to a run, 1, by its speed."""
+    clip = clip_of(name)
+    if not isinstance(clip, WalkLoop) or clip.pace is None:
+        return 0.0
+    return float(np.clip((clip.pace.speed - 1.0) / (PACES["run"].speed - 1.0), 0.0, 1.0))
+
+
+def find_sway(body: Body, loop: Draft, character: Character, haste: float) -> Sway:
     """Return the offsets with which the torso of a loop moves as its character says.
 
     The range of the height is that of the character, what the loop has included.
+
+    Args:
+        body: the spec.
+        loop: loop of a gait.
+        character: how the body carries its weight.
+        haste: 0 for a walk, 1 for a run.
     """
     intervals = len(loop.motion.joints) - 1
     phases = _loop_phases(loop)[:-1]
@@ -303,7 +347,8 @@ def find_sway(body: Body, loop: Draft, character: Character) -> Sway:
     frequency = 2.0 * np.pi / loop.cycle  # rad/s
 
     fall = _direction(np.exp(-4.0j * np.pi * touchdowns).sum(), _MIN_COHERENCE * len(samples), default=1.0)
-    bob = -0.5 * character.bob * fall * character.direction(body, 2.0 * frequency)
+    size_of_bob = 1.0 + haste * (_BOB_OF_RUN - 1.0)
+    bob = -0.5 * size_of_bob * character.bob * fall * character.direction(body, 2.0 * frequency)
     present_bob = 2.0 * (loop.motion.positions[:-1, 2] * np.exp(-4.0j * np.pi * phases)).mean()
     bob -= present_bob / body.torso.standing_height
 
@@ -315,7 +360,7 @@ def find_sway(body: Body, loop: Draft, character: Character) -> Sway:
 
     forward, _, turning = loop.motion.twist
     bank = -character.bank * math.atan(forward * turning / sizing.GRAVITY)
-    sway = Sway(bob, roll, float(np.clip(bank, -_MAX_TILT, _MAX_TILT)))
+    sway = Sway(bob, roll, float(np.clip(bank, -_MAX_TILT, _MAX_TILT)), haste * character.lean)
     return sway.resize(character.size, sink=0.0)
 
 
@@ -359,7 +404,8 @@ def _move_torso(body: Body, name: str, draft: Draft, poses: np.ndarray) -> Draft
     soles = motion.positions[:, None, 2] + feet[..., 2] - foot_radii
     max_misses = np.where(soles > _SWING_HEIGHT * standing_height, _MAX_SWING_MISS, max_stance_miss)
     joints = legs.by_joint(moved_angles)
-    max_joint_step = _MAX_SPEED_RATIO * abs(np.diff(motion.joints, axis=0)).max()
+    speed_ratio = _MAX_SPEED_RATIO_OF_RUN if _measure_haste(name) else _MAX_SPEED_RATIO
+    max_joint_step = speed_ratio * abs(np.diff(motion.joints, axis=0)).max()
     if (misses > max_misses).any() or abs(np.diff(joints, axis=0)).max() > max_joint_step:
         return None
     up, forward, left = (poses[:, [column]] for column in range(3))

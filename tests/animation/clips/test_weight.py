@@ -18,7 +18,7 @@ from arc_suite.models import posture
 from arc_suite.robots import ROBOTS
 
 TICK = ROBOTS["tick"]
-NAMES = ["walk", "turn_left", "start", "stop", "idle", "attack", "jump"]
+NAMES = ["walk", "run", "turn_left", "start", "stop", "idle", "attack", "jump"]
 
 
 @functools.cache
@@ -53,6 +53,25 @@ def test_a_walk_bobs_and_rolls_towards_standing_feet():
     sides = np.array([1.0 if leg.side == "left" else -1.0 for leg in TICK.legs])
     stands_left = soles @ sides
     assert np.corrcoef(roll, stands_left)[0, 1] < -0.3  # a roll that is negative lowers the left side
+
+
+@pytest.mark.long
+def test_a_run_bounces_more_than_a_walk_and_leans_ahead():
+    bobs = {name: np.ptp(drafts_of(1.0)[name].motion.positions[:, 2]) / TICK.torso.standing_height for name in NAMES}
+    assert bobs["run"] > 1.8 * bobs["walk"] and bobs["run"] > 0.08
+    leans = {
+        name: (tilt_of(drafts_of(1.0)[name].motion) - tilt_of(drafts_of(0.0)[name].motion))[:, 1] for name in NAMES
+    }
+    np.testing.assert_allclose(leans["run"], np.degrees(weight.USUAL.lean), atol=0.2)
+    assert drafts_of(1.0)["run"].weight == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "haste"),
+    [("run", 1.0), ("fast", 1.0 / 3.0), ("slow", 0.0), ("walk", 0.0), ("turn_left", 0.0), ("stop", 0.0)],
+)
+def test_haste_grows_from_a_walk_to_a_run(name, haste):
+    assert weight._measure_haste(name) == pytest.approx(haste)
 
 
 @pytest.mark.long
@@ -95,7 +114,7 @@ def test_the_torso_draws_back_before_an_action_and_swings_on_after_it():
 @pytest.mark.long
 def test_feet_seams_and_joins_stay():
     light, heavy = drafts_of(0.0), drafts_of(1.0)
-    for name in ("walk", "turn_left"):
+    for name in ("walk", "run", "turn_left"):
         assert planting.slip(TICK, heavy[name].motion) < planting.slip(TICK, light[name].motion) + 0.03
         np.testing.assert_array_equal(heavy[name].motion.poses()[0, 7:], heavy[name].motion.poses()[-1, 7:])
     for name, end, neighbor in (("start", 0, "idle"), ("start", -1, "walk"), ("stop", 0, "walk"), ("stop", -1, "idle")):
@@ -142,6 +161,11 @@ def test_a_sway_only_lowers_the_torso():
     np.testing.assert_allclose([poses[:, 0].max(), poses[:, 0].min()], [-0.03, -0.05], atol=1e-9)
     np.testing.assert_allclose([poses[:, 3].max(), poses[:, 3].min()], [0.03, -0.01], atol=1e-9)
     np.testing.assert_allclose(poses[0], poses[-1], atol=1e-12)
+
+
+def test_half_a_sway_is_half_of_all_but_its_sink():
+    sway = weight.Sway(bob=0.02j, roll=0.04, bank=0.02, lean=0.1, sink=0.3)
+    assert sway.resize(0.5, 0.05) == weight.Sway(bob=0.01j, roll=0.02, bank=0.01, lean=0.05, sink=0.05)
 
 
 @pytest.mark.parametrize(
