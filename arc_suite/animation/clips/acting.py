@@ -52,7 +52,7 @@ def rise(body: Body, rest: Pose) -> ClipMotion:
     hold_steps = _to_steps(body, _HOLD_DURATION)
     sinking = _ease_in(sink_steps)
     depth_shares = np.concatenate([sinking, np.ones(hold_steps), sinking[::-1], np.zeros(hold_steps)])
-    joints = standing_legs.lower_torso(body, rest, depth_shares * _belly_height(body, rest))
+    joints = standing_legs.lower_torso(body, rest, depth_shares * standing_legs.measure_belly_height(body, rest))
     recording = _simulate(body, rest, _bear_weight(body, rest, joints))
     first = sizing.simulation(body).substeps * (sink_steps + hold_steps)
     _check_lies(body, rest, recording.poses[first])
@@ -125,12 +125,6 @@ def _measure_drift(body: Body, recording: Recording) -> np.ndarray:
     soles, _ = legs.soles(legs.by_leg(ends[:, 7:]))  # in the torso's frame
     feet = soles @ rotations.matrix(ends[:, 3:7]).swapaxes(-1, -2) + ends[:, None, :3]
     return (feet[1] - feet[0])[:, :2].mean(axis=0) / body.torso.standing_height
-
-
-def _belly_height(body: Body, rest: Pose) -> float:
-    """Return the height of the torso's lowest point over the ground at rest, m."""
-    lowest_corner, _ = torso_box(body)  # in the torso's frame, m
-    return rest.position[2] + lowest_corner[2]
 
 
 def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:

@@ -15,6 +15,7 @@ from arc_suite.animation.clips.standing_legs import (
     follow_foot,
     follow_with_legs,
     keep_feet_in_place,
+    measure_belly_height,
     pose_motion,
     sample_times,
 )
@@ -23,13 +24,18 @@ from arc_suite.robots.spec import Body
 
 _LEFT = posture.POSE_NAMES.index("left")
 _ROLL = posture.POSE_NAMES.index("roll")
+_PITCH = posture.POSE_NAMES.index("pitch")
 
 # A breath, and weight that shifts to either side once in two breaths.
-_BREATH_DEPTH = 0.012  # h
+_BREATH_DEPTH = 0.065  # h
+_BREATH_PITCH = 0.03  # rad, ahead, of a torso that has sunk
+_MAX_BREATH_SHARE = 0.4  # of the height of the belly
+_SMALL_BREATH_DEPTH = 0.012  # h, beside other movements
 _BREATH_PERIOD = 12.0
 _SWAY = 0.02  # h, to the left
 _SWAY_ROLL = 0.012  # rad
-_MAX_IDLE_MISS = 0.0055  # h, by which a sole may miss its goal in idle at full size
+_SWAY_SIZES = (1.0, 0.6, 0.3, 0.1, 0.0)  # that are tried
+_MAX_IDLE_SLIDE = 0.035  # h, of a sole in idle
 
 # A look around.
 _LOOK_DURATION = 24.0
@@ -98,19 +104,30 @@ def idle(body: Body, rest: Pose) -> ClipMotion:
     """Return a standing body as a loop that begins with the pose at rest: two breaths, and weight that shifts.
 
     The torso sinks and rises, and goes to either side, while joints bend so that the soles stay where they are; less
-    where legs have too few joints for that.
+    where legs have too few joints for that, to either side first.
     """
     times = sample_times(body, 2.0 * _BREATH_PERIOD)
     phase = 2.0 * np.pi * times / times[-1]
     sway = np.sin(phase) * np.sin(0.5 * phase) ** 2  # at rest at both ends
-    poses = _poses_of_tracks(times, {}) + _breathe(times)
-    poses[:, _LEFT] = _SWAY * sway
-    poses[:, _ROLL] = -_SWAY_ROLL * sway
-    _, misses = keep_feet_in_place(body, rest, poses)
-    max_miss = _MAX_IDLE_MISS * body.torso.standing_height
-    poses *= min(1.0, max_miss / max(abs(misses).max(), 1e-9))
+    max_depth = _MAX_BREATH_SHARE * measure_belly_height(body, rest) / body.torso.standing_height
+    breaths = _breathe(times, np.clip(max_depth, 0.0, _BREATH_DEPTH))
+    breaths *= min(1.0, _MAX_IDLE_SLIDE / max(_measure_idle_slide(body, rest, breaths), 1e-9))
+    sways = np.zeros_like(breaths)
+    sways[:, _LEFT] = _SWAY * sway
+    sways[:, _ROLL] = -_SWAY_ROLL * sway
+    sways[:, _PITCH] = -_BREATH_PITCH / _BREATH_DEPTH * breaths[:, HEIGHT]
+    for size in _SWAY_SIZES:
+        poses = breaths + size * sways
+        if _measure_idle_slide(body, rest, poses) <= _MAX_IDLE_SLIDE:
+            break
     joints, _ = keep_feet_in_place(body, rest, poses)
     return _close_loop(pose_motion(body, rest, poses, joints))
+
+
+def _measure_idle_slide(body: Body, rest: Pose, poses: np.ndarray) -> float:
+    """Return how far a sole slides under a torso that moves (samples, 6), standing heights."""
+    _, misses = keep_feet_in_place(body, rest, poses)
+    return float(np.linalg.norm(np.ptp(misses, axis=0), axis=-1).max() / body.torso.standing_height)
 
 
 def glance(body: Body, rest: Pose) -> ClipMotion:
@@ -120,7 +137,7 @@ def glance(body: Body, rest: Pose) -> ClipMotion:
         ValueError: the legs leave no room for it.
     """
     times = sample_times(body, _LOOK_DURATION)
-    poses = _poses_of_tracks(times, _LOOK_TRACKS) + _breathe(times)
+    poses = _poses_of_tracks(times, _LOOK_TRACKS) + _breathe(times, _SMALL_BREATH_DEPTH)
     return _close_loop(follow_with_legs(body, rest, poses, action="look around"))
 
 
@@ -132,7 +149,7 @@ def settle(body: Body, rest: Pose) -> ClipMotion:
     """
     times = sample_times(body, _SETTLE_DURATION)
     feet = feet_from_torso(body, rest)
-    poses = _breathe(times)
+    poses = _breathe(times, _SMALL_BREATH_DEPTH)
     lifts = np.zeros((len(times), len(feet), 3))
     first_leg = 0
     farthest_leg = int(np.linalg.norm(feet - feet[first_leg], axis=-1).argmax())
@@ -190,11 +207,11 @@ def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> ClipMotion:
     return follow_with_legs(body, rest, poses, action=number)
 
 
-def _breathe(times: np.ndarray) -> np.ndarray:
-    """Return poses (samples, 6) of a torso that sinks and rises in each breath."""
-    depths = 0.5 - 0.5 * np.cos(2.0 * np.pi * times / _BREATH_PERIOD)
+def _breathe(times: np.ndarray, depth: float) -> np.ndarray:
+    """Return poses (samples, 6) of a torso that sinks by a depth, standing heights, and rises in each breath."""
+    shares = 0.5 - 0.5 * np.cos(2.0 * np.pi * times / _BREATH_PERIOD)
     height_only = np.eye(6)[HEIGHT]
-    return -_BREATH_DEPTH * depths[:, None] * height_only
+    return -depth * shares[:, None] * height_only
 
 
 def _close_loop(motion: ClipMotion) -> ClipMotion:

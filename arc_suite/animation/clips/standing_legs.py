@@ -13,6 +13,7 @@ from arc_suite import rotations
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
+from arc_suite.models.outline import torso_box
 from arc_suite.robots.spec import Body
 
 HEIGHT = posture.POSE_NAMES.index("height")
@@ -56,6 +57,12 @@ class LegMotion(NamedTuple):
 def has_free_feet(body: Body) -> bool:
     """Return whether every foot of a body can stay in place while the torso moves: its leg has three joints or more."""
     return min(len(leg.joints) for leg in body.legs) >= _FREE_JOINTS
+
+
+def measure_belly_height(body: Body, rest: Pose) -> float:
+    """Return the height of the torso's lowest point over the ground at rest, m."""
+    lowest_corner, _ = torso_box(body)  # in the torso's frame, m
+    return rest.position[2] + lowest_corner[2]
 
 
 def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
