@@ -103,7 +103,9 @@ _NUMBER = r"-?\d{1,20}(?:\.\d{0,20})?(?:e-?\d\d?)?"
 _TWO_NUMBERS = re.compile(rf"\D{{0,3}}?({_NUMBER})(?:, *| +|-|:|\.\.)({_NUMBER})\D?", re.IGNORECASE)
 
 
-def name(value, valid: Iterable[str], kind: str, suggestions: Iterable[str] = ()) -> str:
+def name(
+    value, valid: Iterable[str], kind: str, suggestions: Iterable[str] = (), descriptions: Iterable[str] = ()
+) -> str:
     """Return the value if it is a valid name.
 
     Args:
@@ -111,6 +113,7 @@ def name(value, valid: Iterable[str], kind: str, suggestions: Iterable[str] = ()
         valid: all names that pass this check.
         kind: what the names stand for, such as "robot"; errors contain it.
         suggestions: names that the caller has already handled; errors list them as valid, too.
+        descriptions: what else is valid, in words; errors list them last.
 
     Raises:
         ValueError: the name is not valid. The message suggests a similar valid name and lists all of them.
@@ -119,7 +122,8 @@ def name(value, valid: Iterable[str], kind: str, suggestions: Iterable[str] = ()
     if isinstance(value, Hashable) and value in valid_names:  # arrays, which are not hashable, compare by element
         return value
     listed_names = [*valid_names, *suggestions]
-    list_text = f"there are: {', '.join(listed_names)}" if listed_names else "there are none"
+    choices = [*listed_names, *descriptions]
+    list_text = f"there are: {', '.join(choices)}" if choices else "there are none"
     raise ValueError(f"unknown {kind} {preview(value)}{hint(value, listed_names)} ({list_text})")
 
 

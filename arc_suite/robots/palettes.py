@@ -50,8 +50,9 @@ def parse(text: str) -> str | int:
     colors = nearest_colors(text)
     if colors == text.lower():
         return colors
-    suggestions = ["a seed, such as 7", colors or f"colors, such as {COLORS_EXAMPLE}"]
-    return checks.name(text, PALETTES, "palette", suggestions=suggestions)
+    suggestions = [colors] if colors else []
+    descriptions = ["a seed, such as 7", f"colors, such as {COLORS_EXAMPLE}"]
+    return checks.name(text, PALETTES, "palette", suggestions, descriptions)
 
 
 def _complete_colors(text: str) -> tuple[Color, ...]:

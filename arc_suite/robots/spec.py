@@ -144,14 +144,14 @@ def nearest_colors(value: Any) -> str | None:
     """Return the colors that a value writes, as `Body.palette` stores them; None if it writes none.
 
     Args:
-        value: colors as in CSS, in a text or a list. They may lack `#` or commas, and have 3 digits or a transparency.
-            Colors beyond the number of `MATERIALS` are left out.
+        value: colors as in CSS, in a text or a list. They may lack `#` or commas, have semicolons, 3 digits or a
+            transparency. Colors beyond the number of `MATERIALS` are left out.
     """
     texts = value if isinstance(value, (tuple, list)) else [value]
     if not all(isinstance(text, str) for text in texts):
         return None
     colors = []
-    for word in ",".join(texts).lower().replace(",", " ").split()[: len(MATERIALS)]:
+    for word in ",".join(texts).lower().replace(",", " ").replace(";", " ").split()[: len(MATERIALS)]:
         digits = word.removeprefix("#").removeprefix("0x")
         if len(digits) in (3, 4):
             digits = "".join(2 * digit for digit in digits)

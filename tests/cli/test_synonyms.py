@@ -61,6 +61,7 @@ LINES = {
     '\'posture,gait_clock\'; did you mean ["posture", "gait_clock"]?\n',
     "build_model --legs=6 --palette=purple": "unknown palette 'purple' (there are: moss, rust, bone, coral, night, a",
     "build_model --legs=6 --palette=3a5f2b,#fff": "unknown palette '3a5f2b,#fff'; did you mean '#3a5f2b,#ffffff'? (",
+    "build_model --legs=6 --palette=#3A5F2B;#D8C48A": "unknown palette '#3A5F2B;#D8C48A'; did you mean '#3a5f2b,#d8c",
     "evaluate --policy=x.onnx": "policy 'x.onnx': it is for other programs; expected the folder of the run",
     "evaluate --policy=out/x.pt": "policy 'out/x.pt': write a function that loads it, and name it as file.py:",
     "render --policy=config.json -o a.png": "policy 'config.json': it is no policy; expected the folder of a run\n",

@@ -84,7 +84,8 @@ def add_shape(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
         widgets[field] = gui.add_slider(label, min=low, max=high, step=step, initial_value=value)
     palettes = PictureButtons(gui, "palettes", "Palette", (DEFAULT_CHOICE, *PALETTES), columns=6, height=16)
     palettes.show_pictures({palette: palette_picture(palette) for palette in PALETTES})
-    palettes.add_text_field("Colors", f"A palette, a seed, or colors of {', '.join(MATERIALS)}: {COLORS_EXAMPLE}")
+    hint = f"A palette, a seed, or colors of {', '.join(MATERIALS)}: {COLORS_EXAMPLE}"
+    palettes.add_text_field("Colors", hint, default=DEFAULT_CHOICE)
     palettes.show_choice(sketch.palette)
     widgets["palette"] = palettes
     return widgets

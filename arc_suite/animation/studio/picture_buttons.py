@@ -1,6 +1,6 @@
 """Buttons with pictures, in a grid: each has its picture above its name."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from typing import Any
 
 import viser
@@ -31,6 +31,7 @@ class PictureButtons:
         self._columns = columns
         self._height = height
         self._choice = ""
+        self._default = ""
         self._pictures: Mapping[str, str] = {}
         self._style = gui.add_html("")  # right before the buttons, where its rules look for them
         self.buttons = gui.add_button_group(label, tuple(options))
@@ -49,18 +50,31 @@ class PictureButtons:
         if self.text_field is not None:
             self.text_field.visible = visible
 
-    def add_text_field(self, label: str, hint: str) -> None:
-        """Add a text field for choices without a button, to the present container of the page."""
-        self.text_field = self._gui.add_text(label, self._choice, hint=hint)
+    def add_text_field(self, label: str, hint: str, default: str) -> None:
+        """Add a text field for choices without a button, to the present container of the page.
 
-    def on_update(self, call: Callable[[viser.GuiEvent], Any]) -> None:
+        Args:
+            label: label that visitors see.
+            hint: text that visitors see while the pointer rests on the field.
+            default: choice of a visitor who empties the field.
+        """
+        self.text_field = self._gui.add_text(label, self._choice, hint=hint)
+        self._default = default
+
+    def on_update(self, call: Callable[[viser.GuiEvent], Coroutine[Any, Any, None]]) -> None:
         """Have a function called when a visitor presses a button, or changes the text field.
 
         See `viser.GuiButtonGroupHandle.on_click`.
         """
         self.buttons.on_click(call)
+
+        async def read_text_field(event: viser.GuiEvent) -> None:
+            if not event.target.value.strip():
+                event.target.value = self._default
+            await call(event)
+
         if self.text_field is not None:
-            self.text_field.on_update(call)
+            self.text_field.on_update(read_text_field)
 
     def offer(self, options: Sequence[str]) -> None:
         """Offer other buttons."""

@@ -18,8 +18,14 @@ _BUTTON_STYLE = (  # that of viser's outlined buttons
 )
 # viser's sheet of widgets leaves a third of a phone's width and takes most of its height. Its controls are 7 to 26 px
 # high.
+# An error is at the top of the window, next to the sheet, as the sheet may be scrolled down to the wrong value.
 _STYLE_SHEET = """
+.studio-error {
+  position: fixed; inset: 0 24em auto 0; z-index: 1000; margin: 0; padding: 0.8em; background: #b3261e; color: white;
+  overflow-wrap: anywhere
+}
 @media (max-width: 36em) {
+  .studio-error { right: 0 }
   [style*="width: 20em"] { width: 100% !important }
   [style*="max-height: 60%"] { max-height: 34% !important }
 }
@@ -74,7 +80,7 @@ def status(session: Session) -> str:
     lines = [_element("tr", _element("td", name), _element("td", value)) for name, value in rows.items()]
     beat = str(round(time.monotonic()))  # by which the page knows that the studio runs
     table = _element("table", *lines, id="status", **{"data-beat": beat})
-    errors = [_element("p", session.error, role="alert", style="color:#b3261e")] if session.error else []
+    errors = [_element("p", session.error, role="alert", **{"class": "studio-error"})] if session.error else []
     return _html(_element("div", *errors, table, style=f"{_SMALL_STYLE};padding:0 1em 0.6em"))
 
 
@@ -133,7 +139,7 @@ def picture_styles(key: str, pictures: Sequence[str], choice: int | None, column
         f"{group} button {{ flex: 0 0 calc({100.0 / columns:g}% - 6px) !important; min-width: 0 !important;"
         f" padding: {height + 3}px 0 0 !important; height: {height + 22}px !important;"
         f" background: center 3px / auto {height}px no-repeat }}",
-        f"{group} button .mantine-Button-label {{ font-size: 10px; letter-spacing: -0.6px }}",
+        f"{group} button .mantine-Button-label {{ font-size: 10px; letter-spacing: -0.8px }}",
     ]
     for number, image in enumerate(pictures, start=1):
         rules.append(f"{group} button:nth-child({number}) {{ background-image: {image} }}")

@@ -147,8 +147,12 @@ def test_a_slider_changes_the_creature(served, tab):
     colors.fill("#3a5f2b,#d8c48a")
     served.until(lambda: served.session.creature.setup.body.palette == "#3a5f2b,#d8c48a")
     colors.fill("3a5f2b")
-    tab.get_by_role("alert").get_by_text("did you mean '#3a5f2b'?").wait_for()
-    press_picture(tab, "own")
+    error = tab.get_by_role("alert").get_by_text("did you mean '#3a5f2b'?")
+    error.wait_for()
+    edges, edges_of_field = error.bounding_box(), colors.bounding_box()
+    assert edges_of_field["y"] > 300.0  # the sheet is scrolled down, and the error is in sight next to it
+    assert edges["y"] == 0.0 and 0.0 < edges["x"] + edges["width"] < edges_of_field["x"]
+    colors.fill("")
     served.until(lambda: colors.input_value() == "own" and not served.session.error)
 
 
