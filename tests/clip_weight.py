@@ -2,11 +2,11 @@
 
 python tests/clip_weight.py BODY ...
 
-A body is a robot, an example, a file, or random:SEED. Prints for each body the range of the torso's height in the walk,
-standing heights, its roll, degrees, and the slip of its feet, without and with weight; the largest pitch that weight
-adds into the acceleration of a start and a stop, degrees; how far it moves the torso back, down and ahead in starts,
-stops, strikes and jumps, standing heights, with the share that legs allow; and for each pace its speed and cadence, as
-multiples of the walk, its duty factor, and the height of its steps, standing heights.
+A body is a robot, an example, a file, or random:SEED. Prints for each body the range of the torso's height in the walk
+and the run, standing heights, its roll and mean pitch, degrees, and the slip of its feet, without and with weight; the
+largest pitch that weight adds into the acceleration of a start and a stop, degrees; how far it moves the torso back,
+down and ahead in starts, stops, strikes and jumps, standing heights, with the share that legs allow; and for each pace
+its speed and cadence, as multiples of the walk, its duty factor, and the height of its steps, standing heights.
 """
 
 import functools
@@ -40,13 +40,14 @@ def tilts(draft) -> np.ndarray:
     return np.degrees(np.stack([roll, -np.arcsin(matrices[:, 2, 0])], axis=-1))
 
 
-def walk_numbers(body, walk) -> str:
-    """Return range of the height, amplitude of the roll at the frequency of the gait, and slip."""
+def gait_numbers(body, walk) -> str:
+    """Return range of the height, amplitude of the roll at the frequency of the gait, mean pitch, and slip."""
     samples = len(walk.motion.joints) - 1
     turns = np.exp(-2.0j * np.pi * walk.cycles * np.arange(samples) / samples)
     bob = np.ptp(walk.motion.positions[:, 2]) / body.torso.standing_height
     roll = 2.0 * abs((tilts(walk)[:-1, 0] * turns).mean())
-    return f"bob {bob:.3f}, roll {roll:.1f}, slip {planting.slip(body, walk.motion):.3f}"
+    pitch = tilts(walk)[:-1, 1].mean()
+    return f"bob {bob:.3f}, roll {roll:.1f}, pitch {pitch:.1f}, slip {planting.slip(body, walk.motion):.3f}"
 
 
 def main(*names: str) -> None:
@@ -59,10 +60,10 @@ def main(*names: str) -> None:
         light, heavy = (
             make_drafts(recorder, clips, iter, left_out, character=weight.choose_character(size)) for size in (0.0, 1.0)
         )
-        lines = [
-            f"without weight: {walk_numbers(body, light['walk'])}",
-            f"with it: {walk_numbers(body, heavy['walk'])}",
-        ]
+        lines = []
+        for clip in [clip for clip in ("walk", "run") if clip in heavy]:
+            lines.append(f"{clip} without weight: {gait_numbers(body, light[clip])}")
+            lines.append(f"{clip} with it: {gait_numbers(body, heavy[clip])}")
         for clip, sign in (("start", 1.0), ("stop", -1.0)):
             if clip in heavy:
                 lines.append(f"pitch in {clip} {(sign * (tilts(heavy[clip]) - tilts(light[clip]))[:, 1]).max():.1f}")

@@ -12,7 +12,7 @@ from arc_suite import rotations
 from arc_suite.animation.clips import bounds, on_ground, planting, root_motion, standing_legs, turning
 from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, BlowClip, Passage, Turn, clip_of
 from arc_suite.animation.clips.draft import Draft
-from arc_suite.animation.clips.recorder import Recorder, TransitionRecording
+from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording
 from arc_suite.animation.clips.recordings import Recording, stop_at_rest
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.models import sizing
@@ -148,17 +148,29 @@ def _take_blow(recorder: Recorder, clip: BlowClip, idle: Pose) -> Draft:
 
 def _take_strongest_blow(recorder: Recorder, clip: BlowClip, lever: float, idle: Pose) -> tuple[Draft | None, str]:
     """Return how a body takes the strongest blow of a lever, and why the weakest does not suit it, if it does not."""
+    recordings = {}
     drafts = {}
     reasons = {}
 
-    def is_too_strong(size: float) -> bool:
+    def falls(size: float) -> bool:
         try:
-            drafts[size] = _record_blow(recorder, clip, size, lever, idle)
+            recordings[size] = _record_blow(recorder, clip, size, lever)
         except ValueError as error:
             reasons[size] = str(error)
         return size in reasons
 
-    bisect.bisect_left(_BLOW_SIZES, True, key=is_too_strong)
+    def is_too_strong(size: float) -> bool:
+        try:
+            if size not in recordings:  # bisection skipped it
+                recordings[size] = _record_blow(recorder, clip, size, lever)
+            drafts[size] = _draw_blow(recorder.body, clip, recordings[size], idle)
+        except ValueError as error:
+            reasons[size] = str(error)
+        return size in reasons
+
+    sizes = _BLOW_SIZES[: bisect.bisect_left(_BLOW_SIZES, True, key=falls)]
+    if sizes and is_too_strong(sizes[-1]):
+        bisect.bisect_left(sizes[:-1], True, key=is_too_strong)
     if drafts:
         return drafts[max(drafts)], ""
     size = min(reasons)
@@ -171,20 +183,28 @@ def _measure_tilt(quaternions: np.ndarray) -> float:
     return math.degrees(np.arccos((up @ up[0]).clip(-1.0, 1.0)).max())
 
 
-def _record_blow(recorder: Recorder, clip: BlowClip, size: float, lever: float, idle: Pose) -> Draft:
-    """Return how a body takes a blow of a size and a lever, from idle to idle.
+def _record_blow(recorder: Recorder, clip: BlowClip, size: float, lever: float) -> GaitRecording:
+    """Return a recording of a body that takes a blow of a size and a lever.
 
     Raises:
-        ValueError: the body falls, tilts too far or stands in another pose after it, or a bound breaks.
+        ValueError: the body falls or tilts too far.
     """
-    body = recorder.body
-    recording, cycle, _ = recorder.record_blow(clip.side, size, lever, clip.cycles)
-    tilt = _measure_tilt(recording.poses[:, 3:7])
+    gait = recorder.record_blow(clip.side, size, lever, clip.cycles)
+    tilt = _measure_tilt(gait.recording.poses[:, 3:7])
     if tilt > clip.max_tilt:
         raise ValueError(f"its torso tilts by {tilt:.0f} degrees, more than {clip.max_tilt:.0f}")
-    recording = stop_at_rest(recording)
+    return gait._replace(recording=stop_at_rest(gait.recording))
+
+
+def _draw_blow(body: Body, clip: BlowClip, gait: GaitRecording, idle: Pose) -> Draft:
+    """Return a recording of a blow from idle to idle.
+
+    Raises:
+        ValueError: the body stands in another pose after it, the legs leave no room for it, or a bound breaks.
+    """
+    recording = gait.recording
     if clip.cycles:
-        motion = _step_after_blow(body, recording, cycle, idle)
+        motion = _step_after_blow(body, recording, gait.cycle, idle)
     else:
         motion = _stand_on_feet(body, root_motion.stay_at_start(recording, 0, len(recording.poses) - 1), idle)
     reason = bounds.find_excess(body, clip, motion)

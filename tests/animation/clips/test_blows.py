@@ -1,6 +1,7 @@
 """Blows, the steps after them, and falls."""
 
 import math
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -125,34 +126,47 @@ def test_a_death_that_lies_as_another_is_left_out_with_its_line():
     assert likeness("death", drafts) == likeness("walk", drafts) == likeness("death_left", drafts) == ""
 
 
-def fake_recorder(max_size, tilt_per_lever=0.0):
-    """A stand-in for `_record_blow` that refuses larger blows. Others tilt by degrees a lever, bent by their size."""
+def fake_blows(monkeypatch, max_size, tilt_per_lever=0.0, max_drawn_size=9.0):
+    """Blows are taken up to a size, and drawn up to another; they tilt by degrees a lever and bend by their size."""
 
-    def record(recorder, clip, size, lever, idle):
+    def record(recorder, clip, size, lever):
         if size > max_size:
             raise ValueError("its torso tilts by 40 degrees, more than 30")
+        return size, lever
+
+    def draw(body, clip, blow, idle):
+        size, lever = blow
+        if size > max_drawn_size:
+            raise ValueError("the legs leave the torso no room to sway")
         tilted = still(np.radians(tilt_per_lever * lever), size)
         quaternions = np.stack([REST.quaternion, *tilted.motion.quaternions[1:]])
         return tilted._replace(motion=tilted.motion._replace(quaternions=quaternions))
 
-    return record
+    monkeypatch.setattr(from_rest, "_record_blow", record)
+    monkeypatch.setattr(from_rest, "_draw_blow", draw)
+
+
+RECORDER = SimpleNamespace(body=TICK)
 
 
 def test_the_strongest_blow_counts_that_suits_the_body(monkeypatch):
     clip = CLIPS["stagger_left"]
-    for limit, size in ((0.5, 0.487), (9.0, 3.0991)):
-        monkeypatch.setattr(from_rest, "_record_blow", fake_recorder(limit))
-        taken = from_rest._take_blow(None, clip, REST)
+    for limit, drawn, size in ((0.5, 9.0, 0.487), (9.0, 9.0, 3.0991), (9.0, 0.5, 0.487), (0.5, 0.1, 0.0906)):
+        fake_blows(monkeypatch, limit, max_drawn_size=drawn)
+        taken = from_rest._take_blow(RECORDER, clip, REST)
         assert taken.motion.joints[0, 0] == pytest.approx(size, abs=1e-3)
-    monkeypatch.setattr(from_rest, "_record_blow", fake_recorder(0.0))
+    fake_blows(monkeypatch, 0.0)
     with refused("under a blow of 0.077 sqrt(g h), its torso tilts by 40 degrees, more than 30"):
-        from_rest._take_blow(None, clip, REST)
+        from_rest._take_blow(RECORDER, clip, REST)
+    fake_blows(monkeypatch, 0.5, max_drawn_size=0.0)
+    with refused("under a blow of 0.077 sqrt(g h), the legs leave the torso no room to sway"):
+        from_rest._take_blow(RECORDER, clip, REST)
 
 
 @pytest.mark.parametrize(("tilt_per_lever", "tilt"), [(11.0, 5.5), (3.0, 6.0), (1.3, 5.2), (0.2, 0.8)])
 def test_a_light_blow_comes_higher_until_the_torso_tilts_by_5_degrees(monkeypatch, tilt_per_lever, tilt):
-    monkeypatch.setattr(from_rest, "_record_blow", fake_recorder(9.0, tilt_per_lever))
-    draft = from_rest._take_blow(None, CLIPS["hit_front"], REST)
+    fake_blows(monkeypatch, 9.0, tilt_per_lever)
+    draft = from_rest._take_blow(RECORDER, CLIPS["hit_front"], REST)
     assert from_rest._measure_tilt(draft.motion.quaternions) == pytest.approx(tilt)
 
 
