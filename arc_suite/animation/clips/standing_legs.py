@@ -24,6 +24,7 @@ _SMOOTHING_ROUNDS = 3  # of a mean over three samples
 # Inverse kinematics.
 _STAGES = 8  # in which poses grow from rest, so that no leg folds the other way
 _ITERATIONS_PER_STAGE = 6
+_PROBE_STRIDE = 8  # samples, of which one is solved first: most motions that legs cannot follow show it there
 _SOLE_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a sole: legs of two joints slide rather than sink
 
 # A motion that the legs cannot follow is made smaller. Each size is tried as it is, then with a torso that sinks
@@ -173,22 +174,29 @@ def follow_exactly(
     body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray, smoothing_rounds: int = _SMOOTHING_ROUNDS
 ) -> ClipMotion | None:
     """Return a motion of torso (samples, 6) and feet (samples, legs, 3) from rest; None if legs cannot follow it."""
+    probe = slice(None, None, _PROBE_STRIDE)
+    _, misses = keep_feet_in_place(body, rest, poses[probe], lifts[probe])
+    if not _feet_stay(body, misses, lifts[probe]):
+        return None
     standing_height = body.torso.standing_height
     joints, misses = keep_feet_in_place(body, rest, poses, lifts)
     joints = _smooth(joints, smoothing_rounds)
     max_joint_step = _MAX_JOINT_SPEED * math.sqrt(sizing.GRAVITY / standing_height) * time_step(body)
-    if abs(np.diff(joints, axis=0)).max() > max_joint_step:
-        return None
-    max_slide = _MAX_SLIDE if has_free_feet(body) else _MAX_SLIDE_OF_FEW_JOINTS
-    standing_misses = np.where(lifts[..., 2:] > _MAX_SINK, 0.0, misses / standing_height)
-    slides = np.linalg.norm(np.ptp(standing_misses[..., :2], axis=0), axis=-1)
-    sinks = abs(standing_misses[..., 2])
-    if slides.max() > max_slide or sinks.max() > _MAX_SINK:
+    if abs(np.diff(joints, axis=0)).max() > max_joint_step or not _feet_stay(body, misses, lifts):
         return None
     motion = pose_motion(body, rest, poses, joints)
     if _measure_depth(body, motion) > _MAX_SMOOTH_SINK * standing_height:
         return None
     return motion
+
+
+def _feet_stay(body: Body, misses: np.ndarray, lifts: np.ndarray) -> bool:
+    """Return whether feet with misses (samples, legs, 3), m, stay where they stand; see `keep_feet_in_place`."""
+    max_slide = _MAX_SLIDE if has_free_feet(body) else _MAX_SLIDE_OF_FEW_JOINTS
+    standing_misses = np.where(lifts[..., 2:] > _MAX_SINK, 0.0, misses / body.torso.standing_height)
+    slides = np.linalg.norm(np.ptp(standing_misses[..., :2], axis=0), axis=-1)
+    sinks = abs(standing_misses[..., 2])
+    return bool(slides.max() <= max_slide and sinks.max() <= _MAX_SINK)
 
 
 def _measure_depth(body: Body, motion: ClipMotion) -> float:
