@@ -242,7 +242,7 @@ check-agents check-agents-release: RUN = $(PYTEST) $(PARALLEL) -m "$(MARKS)" tes
 check-agents: MARKS := not long and not release
 check-agents-release: MARKS := long or release
 
-check-bodies: RUN = $(PYTEST) $(PARALLEL) tests/envs/test_bodies.py tests/models/test_families.py && \
+check-bodies: RUN = $(PYTEST) $(PARALLEL) tests/bodies/test_environments.py tests/bodies/test_families.py && \
 	$(PYTHON) tools/survey.py --family varied --count 120
 check-robots: RUN = $(PYTHON) tests/robots_of_others/zoo.py out/robots && \
 	$(PYTHON) tests/robots_of_others/check.py out/robots

@@ -49,6 +49,14 @@ def test_a_command_of_a_workflow_is_understood(command):
     programs.passed(programs.run(*command.split(), "--version", cwd=ROOT))
 
 
-def test_tests_that_workflows_name_exist():
-    named = re.findall(r"\btests/\S+\.py", WORKFLOWS)
-    assert named and all((ROOT / name).exists() for name in named)
+@pytest.mark.parametrize("name", ["Makefile", ".github/workflows/tests.yml"])
+def test_tests_and_tools_that_a_file_runs_exist(name):
+    paths = re.findall(r"(?<![\w./-])(?:tests|tools|examples)/[\w./-]*\w", (ROOT / name).read_text())
+    assert paths and [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_pages_name_targets_that_exist():
+    makefile = (ROOT / "Makefile").read_text()
+    named = {name for path in ROOT.glob("docs/*.md") for name in re.findall(r"`make ([a-z-]+)`", path.read_text())}
+    assert "test" in named
+    assert [name for name in named if not re.search(rf"^([\w-]+ )*{name}( [\w-]+)*:", makefile, re.MULTILINE)] == []
