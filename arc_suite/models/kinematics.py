@@ -9,10 +9,8 @@ from arc_suite.robots.spec import Body
 _JOINT_RANGE_SHARE = 0.95  # of a joint's range, about its middle, that targets may use
 _RELAXING_ITERATIONS = 50
 _MIN_PATH_LENGTH = 1e-9  # of the path of a foot that moves
-# Cross products with the unit vectors, as matrices.
-_CROSS = np.array(
-    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]]
-)
+# (3, 9) of which each row has the matrix of the cross product with a unit vector.
+_CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], float)
 _VERTICAL = (0.0, 0.0, 1.0)
 
 
@@ -102,11 +100,9 @@ class Legs(NamedTuple):
         Args:
             angles: (..., legs, links) rad.
         """
-        xp = angles.__array_namespace__()
-        axes_and_anchors, end = self._follow_links(angles)
+        axes, anchors, end = self._follow_links(angles)
         sole = end - self.radii[:, None] * _VERTICAL
-        jacobian = xp.stack([xp.cross(axis, sole - anchor) for axis, anchor in axes_and_anchors], axis=-1)
-        return sole, jacobian
+        return sole, _cross(axes, sole[..., None, :] - anchors)
 
     def places(self, angles) -> tuple[np.ndarray, np.ndarray]:
         """Return where links begin and feet are, (..., legs, links + 1, 3), m, and the axes of joints there.
@@ -117,22 +113,25 @@ class Legs(NamedTuple):
             angles: (..., legs, links) rad.
         """
         xp = angles.__array_namespace__()
-        axes_and_anchors, end = self._follow_links(angles)
-        axes = [xp.broadcast_to(axis, end.shape) for axis, _ in axes_and_anchors]
-        anchors = [xp.broadcast_to(anchor, end.shape) for _, anchor in axes_and_anchors]
-        return xp.stack([*anchors, end], axis=-2), xp.stack([*axes, xp.zeros_like(end)], axis=-2)
+        axes, anchors, end = self._follow_links(angles)
+        foot = end[..., None, :]
+        return xp.concatenate([anchors, foot], axis=-2), xp.concatenate([axes, xp.zeros_like(foot)], axis=-2)
 
-    def _follow_links(self, angles) -> tuple[list, np.ndarray]:
-        """Return pairs of the axis and the beginning (..., legs, 3) of each link, and the ends of legs, alike."""
+    def _follow_links(self, angles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return axes and beginnings (..., legs, links, 3) of links, and the ends (..., legs, 3) of legs."""
+        xp = angles.__array_namespace__()
+        link_rotations = _rotations(self.axes, angles)
         orientation = self.mount_rotations
-        position = self.mounts
-        axes_and_anchors = []
+        position = xp.broadcast_to(self.mounts, (*angles.shape[:-1], 3))
+        axes = []
+        anchors = []
         for link in range(angles.shape[-1]):
             axis = (orientation @ self.axes[:, link, :, None])[..., 0]
-            axes_and_anchors.append((axis, position))
-            orientation = orientation @ _rotations(self.axes[:, link], angles[..., link])
+            axes.append(xp.broadcast_to(axis, position.shape))
+            anchors.append(position)
+            orientation = orientation @ link_rotations[..., link, :, :]
             position = position + (orientation @ self.ends[:, link, :, None])[..., 0]
-        return axes_and_anchors, position
+        return xp.stack(axes, axis=-2), xp.stack(anchors, axis=-2), position
 
     def solve_joint_angles(self, angles, goals, weights, damping: float, steps: int) -> np.ndarray:
         """Return the angles (..., legs, links) that bring soles near goals, by damped least squares.
@@ -210,10 +209,19 @@ def _rotations(axes, angles) -> np.ndarray:
     An axis of 0 gives no rotation.
     """
     xp = angles.__array_namespace__()
-    cross = sum(axes[..., i, None, None] * _CROSS[i] for i in range(3))
+    cross = (axes @ _CROSS).reshape(*axes.shape, 3)
     sine = xp.sin(angles)[..., None, None]
     cosine = xp.cos(angles)[..., None, None]
     return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
+def _cross(first, second):
+    """Return the cross products (..., 3, n) of vectors (..., n, 3), in half of the time of `numpy.cross`."""
+    xp = second.__array_namespace__()
+    x, y, z = (first[..., i] for i in range(3))
+    other_x, other_y, other_z = (second[..., i] for i in range(3))
+    components = (y * other_z - z * other_y, z * other_x - x * other_z, x * other_y - y * other_x)
+    return xp.stack(components, axis=-2)
 
 
 def point_velocities(motion, points):
