@@ -11,6 +11,7 @@ _RELAXING_ITERATIONS = 50
 _MIN_PATH_LENGTH = 1e-9  # of the path of a foot that moves
 # (3, 9) of which each row has the matrix of the cross product with a unit vector.
 _CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], float)
+_IDENTITY = np.eye(3)
 _VERTICAL = (0.0, 0.0, 1.0)
 
 
@@ -121,13 +122,12 @@ class Legs(NamedTuple):
         """Return axes and beginnings (..., legs, links, 3) of links, and the ends (..., legs, 3) of legs."""
         xp = angles.__array_namespace__()
         link_rotations = _rotations(self.axes, angles)
-        orientation = self.mount_rotations
+        orientation = xp.broadcast_to(self.mount_rotations, (*angles.shape[:-1], 3, 3))
         position = xp.broadcast_to(self.mounts, (*angles.shape[:-1], 3))
         axes = []
         anchors = []
         for link in range(angles.shape[-1]):
-            axis = (orientation @ self.axes[:, link, :, None])[..., 0]
-            axes.append(xp.broadcast_to(axis, position.shape))
+            axes.append((orientation @ self.axes[:, link, :, None])[..., 0])
             anchors.append(position)
             orientation = orientation @ link_rotations[..., link, :, :]
             position = position + (orientation @ self.ends[:, link, :, None])[..., 0]
@@ -153,7 +153,7 @@ class Legs(NamedTuple):
             is_stuck = (angles <= self.low) & (change < 0.0) | (angles >= self.high) & (change > 0.0)
             free_jacobian = xp.where(is_stuck[..., None, :], 0.0, weighted_jacobian)
             change = least_changes(free_jacobian, error, damping)
-            angles = (angles + change).clip(self.low, self.high)
+            angles = xp.minimum(xp.maximum(angles + change, self.low), self.high)
         return angles
 
     def relaxed_joint_angles(self, goals, weights, damping: float) -> np.ndarray:
@@ -182,7 +182,7 @@ def least_changes(jacobian, missing, damping: float) -> np.ndarray:
     """
     xp = jacobian.__array_namespace__()
     transposed = jacobian.swapaxes(-1, -2)
-    damped_square = jacobian @ transposed + damping**2 * np.eye(3)
+    damped_square = jacobian @ transposed + damping**2 * _IDENTITY
     return (transposed @ xp.linalg.solve(damped_square, missing))[..., 0]
 
 
@@ -212,7 +212,7 @@ def _rotations(axes, angles) -> np.ndarray:
     cross = (axes @ _CROSS).reshape(*axes.shape, 3)
     sine = xp.sin(angles)[..., None, None]
     cosine = xp.cos(angles)[..., None, None]
-    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    return _IDENTITY + sine * cross + (1.0 - cosine) * (cross @ cross)
 
 
 def _cross(first, second):
