@@ -28,7 +28,14 @@ def walk(environment, policy, forward, steps=240):
     return np.quantile(heights[steps // 3 :], 0.98, axis=0).mean() / body.torso.standing_height
 
 
-@pytest.mark.parametrize("body", [ROBOTS["queen"], ROBOTS["tick"], imports.quadruped()], ids=lambda body: body.name)
+@pytest.mark.parametrize(
+    "body",
+    [
+        ROBOTS["tick"],
+        *(pytest.param(body, marks=pytest.mark.release) for body in (ROBOTS["queen"], imports.quadruped())),
+    ],
+    ids=lambda body: body.name,
+)
 def test_feet_rise_with_the_speed(body):
     environment = Setup.of(body, "directed").load(seed=0)
     policy = paced_demonstrator(environment.task.definition)

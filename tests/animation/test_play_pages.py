@@ -113,7 +113,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
         pytest.param("quadruped_15_kg", "braced", 64, marks=pytest.mark.release),
         ("quadruped_15_kg", "steered", 100),
         pytest.param("hexapod_2kg", "steered", 80, marks=pytest.mark.release),
-        ("with_arm", "steered", 100),
+        pytest.param("with_arm", "steered", 100, marks=pytest.mark.release),
         pytest.param("on_its_floor", "steered", 60, marks=pytest.mark.release),
     ],
 )
@@ -130,7 +130,9 @@ def test_walks_of_ten_seconds_are_those_of_python(script, name):
 
 @pytest.mark.slow
 @nodes.needs_node
-@pytest.mark.parametrize(("name", "speed", "plays"), [("tick", 0.0, "jump"), ("queen", 1.0, "leap")])
+@pytest.mark.parametrize(
+    ("name", "speed", "plays"), [("tick", 0.0, "jump"), pytest.param("queen", 1.0, "leap", marks=pytest.mark.release)]
+)
 def test_leaps_follow_the_keyframes_of_python(script, name, speed, plays):
     """Standing still a body jumps, walking it leaps; actions are those of the drive towards Python's targets."""
     body, pressed = ROBOTS[name], 60

@@ -54,7 +54,7 @@ def test_costs_of_transport_of_strong_motors_have_a_footnote(robot, strength):
     assert last == line if strength else last.startswith(robot)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_papers_returns_stand_beside_medium_alone(tmp_path):
     path = tmp_path / "a.json"
     head, _, *rows = evaluated("--robot=all", "--preset=medium", "--episodes=1", f"--json={path}")

@@ -17,9 +17,9 @@ COMMANDS = {
     "e.json": "evaluate --robot tick --episodes 1 --set time_limit=0.1 --json e.json",
     "b.json": f"import {GO2} --output b.json",
     "the output": "evaluate --help",
-}
-PICTURES = {
     "a.png": "render --robot tick --steps 0 --output a.png",
+}
+FILMS = {
     "a.gif": "render --robot tick --steps 2 --output a.gif",
     "a.mp4": "render --robot tick --steps 6 --output a.mp4",
 }
@@ -40,7 +40,7 @@ def run_in_little_room(command, folder):
 @pytest.mark.skipif(sys.platform != "linux", reason="counts blocks as bash does on Linux")
 @pytest.mark.parametrize(
     ("file", "command"),
-    [*COMMANDS.items(), *(pytest.param(*pair, marks=pytest.mark.slow) for pair in PICTURES.items())],
+    [*COMMANDS.items(), *(pytest.param(*pair, marks=pytest.mark.release) for pair in FILMS.items())],
 )
 def test_a_file_that_is_too_large_is_one_line_with_its_name(file, command, tmp_path):
     if file == "a.mp4":

@@ -34,7 +34,7 @@ BOUNDS = {
 }
 NOT_NUMBERS = ("gait", "gaits", "start", "curriculum", "scan", "motion", "both_sides")
 LEVEL = ("steer", "directed", "shoved", "limp")
-FEW = ("walk", "steer", "rough", "navigate")
+FEW = ("walk", "rough")
 
 
 def values(task, name):
@@ -47,7 +47,9 @@ def values(task, name):
     return [{name: value, **({"curriculum": True, **wider} if name == "level" else {})} for value in bounds]
 
 
-@pytest.mark.parametrize("task", [pytest.param(task, marks=() if task in FEW else pytest.mark.long) for task in TASKS])
+@pytest.mark.parametrize(
+    "task", [pytest.param(task, marks=() if task in FEW else pytest.mark.release) for task in TASKS]
+)
 def test_bounds_are_finite(task):
     for name in (*TASKS[task].names(), "time_limit", *BOUNDS.keys() & modifiers.MODIFIERS.keys()):
         for settings in values(task, name) if name not in NOT_NUMBERS else ():
