@@ -21,10 +21,14 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "algo": ("algorithm",),
     "animation": ("clips",),
     "animations": ("clips",),
+    "armature": ("skin",),
     "ant": ("leaper",),
+    "back": ("tracking",),
     "batch_size": ("minibatch", "batch"),
     "behavior_cloning": ("bc",),
+    "bones": ("skin",),
     "character": ("robot",),
+    "chase": ("tracking",),
     "checkpoint": ("policy", "run"),
     "cheetah": ("leaper",),
     "ckpt": ("policy", "run"),
@@ -38,8 +42,13 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "env": ("robot",),
     "env_id": ("robot",),
     "exclude_current_positions_from_observation": ("exclude_blocks",),
+    "false": ("in_place",),
     "fetch": ("navigate",),
+    "first_person": ("eye",),
+    "follow": ("tracking",),
     "forward_reward_weight": ("weights",),
+    "fpv": ("eye",),
+    "front": ("portrait",),
     "gamma": ("discount",),
     "half_cheetah": ("leaper",),
     "halfcheetah": ("leaper",),
@@ -63,11 +72,14 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "n_steps": ("horizon", "n_step", "steps"),
     "net_arch": ("hidden",),
     "num_legs": ("legs",),
+    "none": ("in_place",),
     "num_workers": ("threads", "jobs"),
+    "off": ("in_place",),
+    "on": ("moving",),
     "out": ("output", "json", "results"),
-    "output": ("json", "results"),
+    "output": ("json", "results", "id"),
     "output_dir": ("output", "results"),
-    "policy": ("run",),
+    "policy": ("run", "algorithm"),
     "ppo2": ("ppo",),
     "quadruped": ("leaper",),
     "reset_noise_scale": ("base_noise",),
@@ -76,7 +88,10 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "run": ("walk", "policy"),
     "save": ("output", "json"),
     "seed": ("random",),
+    "side": ("profile",),
     "size": ("width", "scale"),
+    "skeleton": ("skin",),
+    "skinned": ("skin",),
     "speed": ("target_velocity",),
     "stand": ("walk",),
     "standup": ("recover",),
@@ -85,11 +100,13 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "timesteps": ("steps",),
     "total_timesteps": ("steps",),
     "tqc": ("sac",),
+    "true": ("moving",),
     "trpo": ("ppo",),
     "velocity": ("target_velocity", "steer"),
     "walker": ("leaper",),
     "walker2d": ("leaper",),
 }
+_GAP_BETWEEN_NAMES = re.compile(r"[\s;+|]+")  # in place of commas
 _VERSION = re.compile(r"-v\d{1,3}$")  # of Gymnasium's names
 
 # Lower bounds between 0 and this number only exclude 0, so errors say "above 0" in place of the bound.
@@ -161,6 +178,9 @@ def hint(value, valid: Iterable[str]) -> str:
     """
     valid_names = list(valid)
     text = preview(value).strip("'")
+    words = _GAP_BETWEEN_NAMES.split(text)
+    if len(words) > 1 and set(words) <= set(valid_names):
+        return _suggest(repr(",".join(words)))
     lower_text = _VERSION.sub("", text).lower()
     synonyms = [synonym for synonym in SYNONYMS.get(lower_text, ()) if synonym in valid_names]
     same_letters = [name for name in valid_names if str(name).lower() == lower_text]

@@ -23,6 +23,7 @@ except ImportError:  # Windows
     import msvcrt
 
 MAX_JSON = 1 << 24  # bytes
+ADDRESS_CURE = "it is an address: download the file, and name its path"
 
 # Errors of a disk that is full, of limits on the size of files and of a broken disk; they name no file.
 _STORAGE_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
@@ -32,6 +33,7 @@ _LOCK_RETRY_INTERVAL = 0.1  # s
 _MIN_AGE = 3600.0  # s, of a temporary file of another target
 _MAX_ENTRIES = 1000  # of a folder, among which a similar name is sought
 _LEAST_SIMILARITY = 0.75  # of a name that an error suggests, up to 1
+_ADDRESS = re.compile(r"[a-z][a-z0-9+.-]{1,15}:/", re.IGNORECASE)  # at the start; the drive of a path is one letter
 _MAX_STEM = 32  # characters of a target's name in the names of its temporary files
 
 
@@ -68,9 +70,9 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
         OSError: the target cannot be written.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f"{_temporary_prefix(target)}{os.getpid()}{target.suffix}")
+    temporary = target.parent / f"{_temporary_prefix(target)}{os.getpid()}{target.suffix}"
     try:
-        if target.is_dir():
+        if target.is_dir() or not target.name:
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -237,6 +239,11 @@ def reading(path: str | os.PathLike[str]) -> Iterator[None]:
         raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}{cure}") from None
 
 
+def is_address(text: str) -> bool:
+    """Return whether a text begins as addresses of the internet do, such as https://example.com/spider.json."""
+    return _ADDRESS.match(text) is not None
+
+
 def is_folder(text: str) -> bool:
     """Return whether a text is the path of a folder; many a text is no path."""
     try:
@@ -246,7 +253,12 @@ def is_folder(text: str) -> bool:
 
 
 def suggest_path(path: str | os.PathLike[str]) -> str:
-    """Return the part of an error on a missing path that suggests one of a similar name; "" for none."""
+    """Return the part of an error on a missing path that suggests one of a similar name; "" for none.
+
+    For an address of the internet it suggests a download.
+    """
+    if is_address(os.fspath(path)):
+        return f"; {ADDRESS_CURE}"
     path = Path(path)
     try:
         names = [entry.name for entry in itertools.islice(path.parent.iterdir(), _MAX_ENTRIES)]

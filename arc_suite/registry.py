@@ -65,6 +65,7 @@ MAX_BODIES = 1 << 16  # the most bodies that one text may name
 _SAME_WORD = 0.8  # least similarity of a misspelled name, up to 1
 _MAX_QUOTE = 80  # characters of a name in an error
 _SEED_OR_RANGE = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")  # "7" or "0-9"
+_GYMNASIUM_ID = re.compile(r"(?:arc_suite/)?(\w{1,40})-(\w{1,40})-v\d{1,3}")
 _GROUND_FILE = re.compile(r"(.*?\.[a-zA-Z]\w{0,4})(?::([\d.][\d.ex+-]{0,100}))?", re.DOTALL)  # a path, and its scale
 _MARK_OF_SEVERAL_BODIES = re.compile(r",|:\d+-\d+$")  # a comma, or a range of seeds at the end
 
@@ -202,7 +203,7 @@ def _generate_bodies(robot, suggestions: Iterable[str]) -> Iterator[Body]:
         yield body_from_json(text)
     elif is_example:
         yield load_body(EXAMPLES[text])
-    elif _is_path(robot):
+    elif _is_path(robot) and not _GYMNASIUM_ID.fullmatch(text):
         yield _read_file(Path(robot))
     elif "," in text:
         for part in text.split(","):
@@ -216,14 +217,24 @@ def _generate_bodies(robot, suggestions: Iterable[str]) -> Iterator[Body]:
 
 
 def _refuse_other_words(text: str) -> None:
-    """Raise ValueError for a word that names a task or a folder in place of a body."""
+    """Raise ValueError for a word that names a task, a folder or an address in place of a body."""
     if text in ROBOTS:
         return
+    _refuse_gymnasium_id("robot", text)
+    if files.is_address(text):
+        raise ValueError(f"robot {checks.preview(text)}: {files.ADDRESS_CURE}")
     if text in TASKS:
         raise ValueError(f"robot {text!r}: it is a task; robots are {', '.join(ROBOTS)}")
     if files.is_folder(text):
         extensions = ", ".join((".json", *READERS))
         raise ValueError(f"robot {checks.preview(text)}: it is a folder; expected a name, or a file {extensions}")
+
+
+def _refuse_gymnasium_id(kind: str, text: str) -> None:
+    """Raise ValueError for an id of Gymnasium in place of a robot or a task."""
+    match = _GYMNASIUM_ID.fullmatch(text)
+    if match and match[1] in robot_words() and match[2] in TASKS:
+        raise ValueError(f"{kind} {text!r}: it is an id of Gymnasium; its robot is {match[1]}, its task {match[2]}")
 
 
 def _family_words() -> list[str]:
@@ -252,7 +263,7 @@ def _is_path(robot) -> bool:
 
 
 def _read_file(path: Path) -> Body:
-    if path.stem in robot_words() and not path.exists():
+    if path.stem in robot_words() and not path.exists() and not files.is_address(str(path)):
         raise FileNotFoundError(f"cannot read {path}: no such file or directory; did you mean {path.stem}?")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -302,6 +313,8 @@ def task_of(name: str) -> type[Task]:
     """
     if isinstance(name, str) and name not in TASKS and name in robot_words():
         raise ValueError(f"task {name!r}: it is a robot; tasks are {', '.join(TASKS)}")
+    if isinstance(name, str):
+        _refuse_gymnasium_id("task", name)
     return _look_up(name, TASKS, "task")
 
 

@@ -12,6 +12,7 @@ from absl import flags
 from arc_suite import checks, policies, registry
 from arc_suite.arenas import ARENAS
 from arc_suite.bodies import generator, shaping
+from arc_suite.cli import program
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import other_libraries, zips
@@ -22,6 +23,8 @@ from arc_suite.tasks import TASKS
 FLAGS = flags.FLAGS
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+_SEVERAL_SETTINGS = re.compile(r"\w+=[^,]*(?:, *[a-z_]+=[^,]*)+")  # such as "mass=1.2,friction=0.5"
 
 MAX_COUNT = 100_000  # episodes, or bodies: more than anyone waits for
 DEFAULT_LINKS = 3  # of each leg of a body made to order
@@ -137,7 +140,9 @@ def custom_body() -> Body | None:
     if FLAGS.links is not None and FLAGS.legs is None:
         raise ValueError(f"--links={FLAGS.links}: goes with --legs")
     if FLAGS.spec is None and FLAGS.legs is None:
-        refuse_flags(("length", "palette"), "goes with --spec or --legs")
+        robot = getattr(FLAGS, "robot", None)
+        hint = f"; did you mean --spec={robot}?" if robot in spec_files.EXAMPLES else ""
+        refuse_flags(("length", "palette"), f"goes with --spec or --legs{hint}")
         return None
     if FLAGS.spec is not None:
         return adjust_body(registry.body_of(FLAGS.spec))
@@ -390,14 +395,31 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
                 f"; did you mean {checks.quote(f'{name_before_colon}={value_behind}')}?" if colon and not equals else ""
             )
             raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value{cure}")
+        _refuse_flag_as_name(flag, name, value)
         mapping, dot, key = name.partition(".")
         if dot and "." not in key and ":" not in name:
             cure = checks.quote(f'{mapping}={{"{key}": {value}}}')
             raise ValueError(f"--{flag} {checks.quote(text)}: expected a name without a dot; did you mean '{cure}'?")
         if name in values:
             raise ValueError(f"--{flag} {checks.quote(text)}: {checks.quote(name)} has a value already")
-        values[name] = _parse_value(value)
+        parsed_value = _parse_value(value)
+        if isinstance(parsed_value, str) and _SEVERAL_SETTINGS.fullmatch(text):
+            cure = " ".join(f"--{flag} {part.strip()}" for part in text.split(","))
+            raise ValueError(
+                f"--{flag} {checks.quote(text)}: expected one name=value; did you mean {checks.quote(cure)}?"
+            )
+        values[name] = parsed_value
     return values
+
+
+def _refuse_flag_as_name(flag: str, name: str, value: str) -> None:
+    """Raise ValueError for a flag of the program that stands as a name in another flag, such as --set steps=100."""
+    is_flag = len(name) > 1 and name in FLAGS and "absl" not in FLAGS.find_module_defining_flag(name).split(".")
+    is_name = name in registry.setting_names() or (flag == "hp" and name in program.hyperparameter_words())
+    if is_flag and not is_name and name != "seed":
+        raise ValueError(
+            f"--{flag} {checks.quote(f'{name}={value}')}: it is a flag; did you mean --{name}={checks.quote(value)}?"
+        )
 
 
 def _parse_value(text: str) -> Any:

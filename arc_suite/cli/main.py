@@ -54,6 +54,9 @@ def _program_of_another_package(name: str) -> ModuleType:
         entry_points = installed_programs()
         if name.startswith("-"):
             raise ValueError(f"{name}: expected a program before its flags, such as arc-suite evaluate {name}")
+        for flag, words in (("robot", registry.robot_words()), ("task", registry.TASKS)):
+            if name in words:
+                raise ValueError(f"{name}: expected a program first, such as arc-suite evaluate --{flag}={name}")
         if name in FORMER_PROGRAMS:
             raise ValueError(f"{name} is no program any more; {FORMER_PROGRAMS[name]}")
         if name in entry_points:

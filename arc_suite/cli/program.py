@@ -26,9 +26,11 @@ from arc_suite.cli.version import describe_suite
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
 
+_DASHES = "-\u2013\u2014"  # also those that word processors write in place of two
+_POLICY_EXTENSIONS = (".npz", ".zip")
 _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
-_EXPECTED_ERRORS = (flags.Error, ValueError, OSError, RenderingUnavailable, PhysicsError)
+_EXPECTED_ERRORS = (flags.Error, ValueError, OSError, MemoryError, RenderingUnavailable, PhysicsError)
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 # Answers to flags of other programs, which no flag of this suite replaces.
@@ -127,9 +129,9 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
 def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     """Call `work` and exit the process with the status that it returns.
 
-    - A wrong flag, a ValueError, an OSError, a RenderingUnavailable and a PhysicsError, of a body that cannot be
-      simulated, become one line on standard error and exit status 1. Ctrl-C becomes one line and exit status 130,
-      SIGTERM one line and 143.
+    - A wrong flag, a ValueError, an OSError, a MemoryError, a RenderingUnavailable and a PhysicsError, of a body that
+      cannot be simulated, become one line on standard error and exit status 1. Ctrl-C becomes one line and exit status
+      130, SIGTERM one line and 143.
     - Any other exception is a mistake of the suite, and keeps its traceback.
     - A warning becomes one line on standard error.
     - Where nobody reads the output any more, as in `program | head`, the work goes on without it, so that its files are
@@ -222,7 +224,7 @@ def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> N
     """Raise ValueError for a flag that is the name of a setting or of a hyperparameter, with the flag that takes it."""
     words_of_flags = {
         "set": registry.setting_names() - {"random"},  # programs seed episodes by flags of their own
-        "hp": set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flag_names else set(),
+        "hp": hyperparameter_words(),
     }
     meanings = checks.meanings(name)
     if any(meaning in flag_names for meaning in meanings):
@@ -237,6 +239,11 @@ def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> N
         raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {' or '.join(suggestions)}?")
 
 
+def hyperparameter_words() -> set[str]:
+    """Return the names of hyperparameters, as the help of --hp lists them; none without that flag."""
+    return set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flags.FLAGS else set()
+
+
 def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -> None:
     """Raise ValueError for a flag that is the name of an argument without a flag."""
     if any(meaning in parameters for meaning in checks.meanings(name)):
@@ -246,10 +253,16 @@ def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -
 
 def _suggest_flag(argument: str) -> str:
     """Return a question for the flag that an argument may be the value of; "" if the program has no such flag."""
+    name, equals, value = argument.lstrip(_DASHES).partition("=")
+    if name in flags.FLAGS and (equals or argument[0] in _DASHES):
+        return f"did you mean --{name}{equals}{value}? "
+    extension = os.path.splitext(argument)[1].lower()
     flag_takes_argument = {
         "robot": argument in registry.robot_words(),
         "task": argument in TASKS,
-        "policy": argument in policies.POLICIES or os.path.exists(argument),
+        "spec": extension in (".json", *registry.READERS),
+        "policy": argument in policies.POLICIES or os.path.isdir(argument) or extension in _POLICY_EXTENSIONS,
+        "output": extension != "" and not os.path.exists(argument),
     }
     for flag, takes_argument in flag_takes_argument.items():
         if takes_argument and flag in flags.FLAGS:

@@ -46,8 +46,7 @@ def save(folder: str | os.PathLike[str], network: Network) -> list[str]:
         OSError: a file cannot be written.
     """
     facts = describe_machine(network)
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = files.folder(folder)
     onnx_path, json_path, runner_path = (folder / name for name in FILES)
     onnx_file.save(onnx_path, network)
     with files.writing(json_path) as temporary:

@@ -36,6 +36,8 @@ def refuse_other_files(name: str | os.PathLike[str]) -> None:
     Raises:
         OSError: a file of Python cannot be read.
     """
+    if files.is_address(os.fspath(name)):
+        raise ValueError(f"policy {checks.preview(os.fspath(name))}: {files.ADDRESS_CURE}")
     path = Path(name)
     extension = path.suffix.lower()
     if extension == ".py":

@@ -316,6 +316,7 @@ def load_network(name: str | os.PathLike[str]) -> Network:
         ValueError: a damaged file, a zip that does not hold its setup, or a network of other layers.
         OSError: a file cannot be read.
     """
+    hints.refuse_other_files(name)
     policy_file = other_libraries.find(name)
     if policy_file is None:
         policy_network = network.load(name)

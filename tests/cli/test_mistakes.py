@@ -83,10 +83,64 @@ MISPLACED = {
     "render --robot=tick -o missing/a.png": "cannot write missing/a.png: no such file or directory\n",
     "collect --robot=tick --policy=refined": "policy 'refined': it is a preset; expected as preset, next to a policy",
 }
-LINES = CURED | OTHERS | MISPLACED
+DOWNLOAD = "it is an address: download the file, and name its path\n"
+ID = "it is an id of Gymnasium; its robot is tick, its task"
+ONE = "expected one name=value; did you mean"
+RIGS = "(there are: skin, nodes)\n"
+MOTION = "expected a name, or a motion, .npz; arc-suite motion makes one of a .glb, a .bvh or a table\n"
+# What people type who come from Gymnasium, an animation program or a page of the internet.
+FIRST_HOUR = {
+    "evaluate --robot https://example.com/go2": f"robot 'https://example.com/go2': {DOWNLOAD}",
+    "evaluate --spec=https://example.com/spider.json": "cannot read https:/example.com/spider.json: no such file or "
+    f"directory; {DOWNLOAD}",
+    "import package://go2/go2.urdf": f"cannot read package:/go2/go2.urdf: no such file or directory; {DOWNLOAD}",
+    "motion https://example.com/a.bvh": f"cannot read https:/example.com/a.bvh: no such file or directory; {DOWNLOAD}",
+    "evaluate --robot=tick --policy=hf://a/b": f"policy 'hf://a/b': {DOWNLOAD}",
+    "export https://example.com/run": f"policy 'https://example.com/run': {DOWNLOAD}",
+    "evaluate --robot=tick --json=/": "cannot write /: is a directory\n",
+    "build_model --robot=tick --output=/": "cannot write /: is a directory\n",
+    "evaluate --robot=tick --json=..": "cannot write ..: is a directory\n",
+    "evaluate robot=tick": "unexpected argument 'robot=tick'; did you mean --robot=tick? see --help\n",
+    "evaluate –robot tick": "unexpected argument '–robot'; did you mean --robot? see --help\n",
+    "evaluate —robot=tick": "unexpected argument '—robot=tick'; did you mean --robot=tick? see --help\n",
+    "evaluate --robot=arc_suite/tick-walk-v0": f"robot 'arc_suite/tick-walk-v0': {ID} walk\n",
+    "evaluate --robot=tick-walk-v0": f"robot 'tick-walk-v0': {ID} walk\n",
+    "evaluate --task=tick-steer-v0": f"task 'tick-steer-v0': {ID} steer\n",
+    "evaluate --set gait=trot,kicks=1": f"--set gait=trot,kicks=1: {ONE} --set gait=trot --set kicks=1?\n",
+    "build_model --spec=spider --length=upper=1.2,lower=2": f"--length upper=1.2,lower=2: {ONE} --length upper=1.2 --",
+    "evaluate --set episodes=5": "--set episodes=5: it is a flag; did you mean --episodes=5?\n",
+    "evaluate --set robot=queen": "--set robot=queen: it is a flag; did you mean --robot=queen?\n",
+    "evaluate --robot=spider --length=upper=1.2": "--length: goes with --spec or --legs; did you mean --spec=spider?\n",
+    "evaluate --robot=tick;queen": f"unknown robot 'tick;queen'; did you mean 'tick,queen'? {ROBOTS}",
+    "animate --clips=walk+run -o a.glb": "unknown clip 'walk+run'; did you mean 'walk,run'? (there are: walk, slow, ",
+    "animate --clips=note.txt -o a.glb": f"clip 'note.txt': {MOTION}",
+    "animate --clips=dance.bvh -o a.glb": f"clip 'dance.bvh': {MOTION}",
+    "animate --rig=bones -o a.glb": f"unknown rig 'bones'; did you mean 'skin'? {RIGS}",
+    "animate --rig=armature -o a.glb": f"unknown rig 'armature'; did you mean 'skin'? {RIGS}",
+    "animate --root_motion=false -o a.glb": "unknown root_motion 'false'; did you mean 'in_place'? (there are: both, ",
+    "render --camera=side -o a.png": "unknown camera 'side'; did you mean 'profile'? (there are: tracking, portrait, ",
+    "animate spider.json": "unexpected argument 'spider.json'; did you mean --spec=spider.json? see --help\n",
+    "build_model go2.urdf": "unexpected argument 'go2.urdf'; did you mean --spec=go2.urdf? see --help\n",
+    "animate clip.glb": "unexpected argument 'clip.glb'; see --help\n",
+    "render tick.mp4": "unexpected argument 'tick.mp4'; did you mean --output=tick.mp4? see --help\n",
+    "render folder": "unexpected argument 'folder'; did you mean --policy=folder? see --help\n",
+    "collect --policy=cpg --output=data": "unknown flag 'output'; did you mean 'id'? (there are: arena, author, ",
+    "train --policy=ppo": "unknown flag 'policy'; did you mean 'algorithm'? (there are: algorithm, arena, ",
+    "train --hp steps=100": "--hp steps=100: it is a flag; did you mean --steps=100?\n",
+    "train --algorithm=dagger --hp num_envs=9999999": "num_envs: expected an integer from 2 to 1048576, got 9999999",
+    "train --hp hidden=1000000000": "hidden: expected an integer from 1 to 65536, got 1000000000\n",
+    "train --hp num_envs=1000000000": "num_envs: expected an integer from 1 to 1048576, got 1000000000\n",
+    "export runs": "policy 'runs': it has runs in it; did you mean 'runs/tick'?\n",
+    "export runs/tick/config.json": "policy 'runs/tick/config.json': it is no policy; expected the folder of a run\n",
+    "card runs": "runs: no folder of a run; did you mean runs/tick?\n",
+    "card runs/tick/policy.npz": "runs/tick/policy.npz: no folder of a run; did you mean runs/tick?\n",
+    "tick": "arc-suite: tick: expected a program first, such as arc-suite evaluate --robot=tick\n",
+    "walk": "arc-suite: walk: expected a program first, such as arc-suite evaluate --task=walk\n",
+}
+LINES = CURED | OTHERS | MISPLACED | FIRST_HOUR
 
 
-@pytest.mark.parametrize("command", tiers(LINES, CURED.__contains__))
+@pytest.mark.parametrize("command", tiers(LINES, CURED.__contains__, list(FIRST_HOUR)[::3].__contains__))
 def test_a_mistake_is_one_line(command, tmp_path):
     (tmp_path / "note.txt").write_text("hello")
     (tmp_path / "body.json").write_text('{"name": "x"}')
@@ -94,10 +148,13 @@ def test_a_mistake_is_one_line(command, tmp_path):
     (tmp_path / "model.onnx").write_bytes(b"\x08")
     (tmp_path / "broken.py").write_text("def make(:\n")
     (tmp_path / "folder").mkdir()
+    (tmp_path / "runs" / "tick").mkdir(parents=True)
+    for name in ("config.json", "policy.npz"):
+        (tmp_path / "runs" / "tick" / name).write_text("{}")
     np.savez(tmp_path / "arrays.npz", zeros=np.zeros(3))
     np.save(tmp_path / "array.npy", np.zeros(3))
     files = sorted(tmp_path.iterdir())
     program, *_ = command.split()
-    line = LINES[command] if program.startswith("-") else f"arc-suite {program}: {LINES[command]}"
+    line = LINES[command] if LINES[command].startswith("arc-suite: ") else f"arc-suite {program}: {LINES[command]}"
     programs.refused(programs.arc_suite(*command.split(), cwd=tmp_path), line)
     assert sorted(tmp_path.iterdir()) == files

@@ -35,7 +35,8 @@ RAISES = flags.DEFINE_string("raises", None, "What goes wrong.")
 OUTPUT = flags.DEFINE_string("output", None, "File to write after many lines.")
 
 def main():
-    kinds = {"value": ValueError, "os": OSError, "gl": RenderingUnavailable, "key": KeyError, "int": KeyboardInterrupt}
+    kinds = {"value": ValueError, "os": OSError, "gl": RenderingUnavailable, "key": KeyError, "int": KeyboardInterrupt,
+        "memory": MemoryError}
     if RAISES.value == "signal":
         signal.raise_signal(signal.SIGINT)
     for _ in program.progress(range(COUNT.value), "counting"):
@@ -78,7 +79,7 @@ def test_run_calls_main_with_flags_parsed(tool):
     assert programs.passed(tool("--count=3")) == "counted 3\n"
 
 
-@pytest.mark.parametrize("kind", ["value", "os", "gl"])
+@pytest.mark.parametrize("kind", ["value", "os", "gl", "memory"])
 def test_expected_errors_are_one_line(tool, kind):
     programs.refused(tool(f"--raises={kind}"), "count.py: a b\n")
 

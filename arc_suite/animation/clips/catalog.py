@@ -3,9 +3,10 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NamedTuple, get_args
 
-from arc_suite import registry
+from arc_suite import checks, registry
 from arc_suite.animation.clips import acting, gestures, getting_up
 from arc_suite.animation.clips.blows import DIRECTIONS
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
@@ -188,6 +189,9 @@ def clip_of(name: str) -> Kind:
     Raises:
         ValueError: an unknown name, or no clip.
     """
+    if name not in clip_names() and ":" not in name and Path(name).suffix:
+        cure = "arc-suite motion makes one of a .glb, a .bvh or a table"
+        raise ValueError(f"clip {checks.preview(name)}: expected a name, or a motion, .npz; {cure}")
     clip = registry.find("clip", name, CLIPS)
     if not isinstance(clip, Kind):
         kinds = ", ".join(kind.__name__ for kind in get_args(Kind))

@@ -5,9 +5,11 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from arc_suite import checks, registry
+from arc_suite.envs.base_vector import MAX_ENVS
 from arc_suite.motions import motion_text
 
 _POSITIVE_RANGE = (1e-6, 1e3)  # of numbers that must not be 0
+_RANGES_OF_ALL = {"num_envs": (1, MAX_ENVS), "hidden": (1, 1 << 16)}  # of all algorithms
 # Blocks that networks do not see by default. Contact forces are 114 to 150 numbers; learners that act are better
 # without them: docs/algorithms.md.
 BLOCKS_LEFT_OUT = ("contact_forces",)
@@ -212,7 +214,7 @@ class DAgger:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        _check_numbers(self, {"num_envs": (2,), "left_out": (0,), "noise": (0.0, 10.0)})
+        _check_numbers(self, {"num_envs": (2, MAX_ENVS), "left_out": (0,), "noise": (0.0, 10.0)})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -341,7 +343,7 @@ def _check_numbers(hp, ranges: Mapping[str, tuple]) -> None:
         name = field.name
         value = getattr(hp, name)
         if field.type is int:
-            checks.integer(name, value, *ranges.get(name, (1,)))
+            checks.integer(name, value, *ranges.get(name, _RANGES_OF_ALL.get(name, (1,))))
         elif field.type is float:
             checks.number(name, value, *ranges.get(name, ()))
             if name not in ranges and not 0.0 < value < 1.0:

@@ -138,6 +138,13 @@ def open_run(
         yield run_files
 
 
+def _suggest_run(path: Path) -> str:
+    """Return the part of an error that suggests the run which a file is of, or one that a folder has; "" for none."""
+    configs = [path.parent / CONFIG] if path.is_file() else sorted(path.glob(f"*/{CONFIG}"))
+    runs = [config.parent for config in configs if config.exists()]
+    return f"; did you mean {runs[0]}?" if runs else ""
+
+
 def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the record of the configuration in a run's folder.
 
@@ -145,7 +152,7 @@ def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
         ValueError: no folder of a run.
     """
     if not (Path(path) / CONFIG).exists():
-        raise ValueError(f"{path}: no folder of a run")
+        raise ValueError(f"{path}: no folder of a run{_suggest_run(Path(path))}")
     with parsers.guard(f"{path}: no folder of a run"):
         config = files.read_json(Path(path) / CONFIG)
     if not isinstance(config, dict):
