@@ -57,7 +57,7 @@ def test_any_body_as_rigid_parts(tmp_path):
         (("-o", "a.png", "--rig=nodes"), "rig: it is for .glb, not for .png"),
         (("-o", "a.mp4", "--clips=all"), "clips: expected one for .mp4, got all"),
         (("-o", "a.gif", "--clips=walk"), "fps: expected at most 50 for a GIF, got 60"),
-        (("-o", "a.glb", "--rig=bones"), "unknown rig 'bones'; did you mean 'nodes'?"),
+        (("-o", "a.glb", "--rig=bones"), "unknown rig 'bones'; did you mean 'skin'?"),
         (("-o", "a.glb", "--root_motion=none"), "unknown root_motion 'none'"),
         (("-o", "a.glb", "--clips=walk,fly"), "unknown clip 'fly'"),
         (("-o", "a.glb", "--robot=all"), "--robot=all: expected one robot"),
