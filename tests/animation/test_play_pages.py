@@ -309,7 +309,7 @@ def test_bodies_walk_from_their_start(script, ground):
     assert not any(walked["falls"]) and lain["falls"][-1]
 
 
-@pytest.mark.long
+@pytest.mark.release
 @nodes.needs_node
 def test_the_largest_kick_fells_queen_in_half_of_the_tries(script):
     """As it walks, over eight directions and five phases of the gait: it lies until it would get up."""

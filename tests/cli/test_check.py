@@ -184,7 +184,7 @@ def test_imported_robots_walk_for_20_seconds_and_get_no_advice(path):
     )
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_every_task_is_walked_by_the_preset_that_suits_it():
     done = check("--tasks", "spider")
     assert done.returncode == 0  # its progress is told every half minute

@@ -109,7 +109,7 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_half_done(program, seconds,
     interrupt(program, seconds, number, tmp_path.resolve() / "work")
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.skipif(not os.path.exists("/proc/self/cwd"), reason="reads Linux's /proc")
 def test_interrupts_at_random_moments_of_all_programs(tmp_path):
     for index, (program, seconds, number) in enumerate(cases(len(COMMANDS))):

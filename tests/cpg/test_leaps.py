@@ -65,7 +65,7 @@ def test_a_leap_begins_when_feet_stand_though_they_swing_at_the_ends_of_cycles()
     assert step[0] == 1
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_bastion_leaps_over_trenches():
     height = ROBOTS["bastion"].torso.standing_height
     environment = VectorEnv("bastion", "leap", 40, 1, "Disabled", task_kwargs={"width": 0.8 * height})

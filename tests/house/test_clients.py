@@ -58,7 +58,7 @@ def test_the_spider_of_the_first_steps(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.long
+@pytest.mark.release
 def test_the_notebook_of_the_first_steps(monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     exec(compile(STEPS["A notebook"].blocks[0].text, "docs/first_steps.md", "exec"), {})

@@ -38,7 +38,7 @@ def test_tracks():
     assert style.report(tracks)["metrics"]["duty_factor"]["robot"][0] == pytest.approx(0.585, abs=1e-3)
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_search_for_bodies_goes_on(tmp_path):
     folder = saved_files.unpack("design", tmp_path)
     if json.loads((folder / "design.json").read_text())["versions"] != versions.dependency_versions():

@@ -6,10 +6,9 @@ import damages
 import fuzz
 import pytest
 
-# Tables of damage that take no time, by kind of file, and one of each further table and reader; `make check-release`
-# has the others of runs and studies.
+# Kinds of files whose damage takes no time, and those that `make check-release` damages.
 QUICK = ("robot in MJCF", "robot in URDF", "mesh in STL", "journal of a search")
-LONG = (
+OTHERS = (
     *("imported body", "policy", "tracks", "motion", "motion in glTF", "JSON of a motion in glTF", "motion in BVH"),
     "motion in CSV",
     *("mesh in OBJ", "header of a policy", "zip of another library", "snapshot", "journal of a design"),
@@ -25,7 +24,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("label", [*QUICK, *(pytest.param(label, marks=pytest.mark.long) for label in LONG)])
+@pytest.mark.parametrize("label", [*QUICK, *(pytest.param(label, marks=pytest.mark.release) for label in OTHERS)])
 def test_every_kind_of_damage_is_read_or_one_line(label, folder, capfd):
     kind = fuzz.KINDS[label]
     outcomes = fuzz.fuzz(kind, cases=3, seed=5, label=label)

@@ -128,7 +128,7 @@ def test_links_that_sphinx_can_follow():
     assert sources.resolve_links(text, docs) == front
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_the_command_line_has_every_program():
     page = reference.commands_page()
     assert re.findall("^## `(.*)`$", page, re.MULTILINE) == list(PROGRAMS)

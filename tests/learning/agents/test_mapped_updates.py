@@ -64,7 +64,7 @@ def check_close(found, expected, updates):
         assert difference <= 1e-5 * updates / STEPS * (1.0 + np.linalg.norm(np.asarray(array, float))), name
 
 
-@pytest.mark.parametrize("name", tiers(NAMES, lambda name: name == "speq"))
+@pytest.mark.parametrize("name", tiers(NAMES, lambda name: name == "sac"))
 def test_two_runs_in_one_program_are_those_alone(name, prior, tmp_path):
     """After 200 updates of the policy, and those of phases, which end at updates of their own."""
     changes = UNIFORM | ({"utd_ratio": 2} if name == "droq" else {})  # 20 updates of a step make much of rounding

@@ -30,7 +30,7 @@ def networks(monkeypatch):
     return registry.ADDITIONS["network"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_guide(tmp_path):
     """A network of another package learns, plays without its package, and is learned from again."""
     (tmp_path / "deepening.py").write_text(DEEPENING)

@@ -20,7 +20,7 @@ def check_policy(folder):
 
 
 # One of each kind of learner; the others differ from them by hyperparameters.
-OFTEN = ("sope", "xqc", "ppo", "finetune", "dagger", "dagger_bodies", "bc")
+OFTEN = ("sac_parallel", "ppo", "finetune", "dagger", "dagger_bodies", "bc")
 
 
 @pytest.mark.parametrize("algorithm", tiers(saved_files.HYPERPARAMETERS, OFTEN.__contains__))

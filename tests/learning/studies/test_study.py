@@ -197,7 +197,7 @@ def test_prior_data_are_those_of_the_study(tmp_path, monkeypatch):
         runner.prepare([each], tmp_path / "runs", 1)
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_run_is_judged_without_its_settings_of_training(tmp_path):
     own = {"task_kwargs": tiny_studies.SHORT, "training": {"curriculum": True, "level": 3}}
     each = run("tick", "tiny_studies:climb", 100, task="gaps", evaluate_every=100, **own)
