@@ -1,6 +1,6 @@
 """Policies: one protocol of acting, and policies by name."""
 
-from arc_suite.policies.hints import refuse_other_words
+from arc_suite.policies.hints import refuse_other_files, refuse_other_words
 from arc_suite.policies.named import (
     HELP,
     POLICIES,
@@ -24,6 +24,7 @@ __all__ = [
     "policy",
     "POLICIES",
     "preset_names",
+    "refuse_other_files",
     "refuse_other_words",
     "load_network",
     "setup_of",

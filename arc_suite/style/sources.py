@@ -59,6 +59,8 @@ def source(name: str, preset: str | None = None) -> Source:
     if re.search(r"-v\d+$", name):
         return _replay_source(name)
     if "/" not in name:
+        policies.refuse_other_files(name)
+        policies.refuse_other_words(name, policies.POLICIES)
         checks.name(name, policies.POLICIES, "policy")
     elif not Path(name).exists():
         raise OSError(f"cannot read {name}: no such file; the id of a dataset ends in a version, such as {name}-v0")

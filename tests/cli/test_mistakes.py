@@ -134,6 +134,8 @@ FIRST_HOUR = {
     "export runs/tick/config.json": "policy 'runs/tick/config.json': it is no policy; expected the folder of a run\n",
     "card runs": "runs: no folder of a run; did you mean runs/tick?\n",
     "card runs/tick/policy.npz": "runs/tick/policy.npz: no folder of a run; did you mean runs/tick?\n",
+    "style --compare=clip.glb": "policy 'clip.glb': it is no policy; expected the folder of a run\n",
+    "style --compare=tick": "policy 'tick': it is a robot; expected as robot, next to a policy such as cpg\n",
     "tick": "arc-suite: tick: expected a program first, such as arc-suite evaluate --robot=tick\n",
     "walk": "arc-suite: walk: expected a program first, such as arc-suite evaluate --task=walk\n",
 }
