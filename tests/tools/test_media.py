@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from media import stage, views
 from PIL import Image
+from tiers import tiers
 from website import robots, tasks
 
 from arc_suite.envs.setup import Setup
@@ -113,13 +114,7 @@ def steps_of(name):
 QUICK = ("steer", "navigate", "shoved", "mimic")  # films of other tasks are made for a release
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        name if name in QUICK else pytest.param(name, marks=pytest.mark.release)
-        for name in TASKS.keys() - {"walk", "limp"}
-    ],
-)
+@pytest.mark.parametrize("name", tiers([name for name in TASKS if name not in ("walk", "limp")], QUICK.__contains__))
 def test_a_film_of_a_task_shows_what_the_task_is_about(name):
     run = steps_of(name)
     assert len(run) == 67 and not run[-1][2].get("fell")
