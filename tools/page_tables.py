@@ -65,6 +65,7 @@ TABLES: dict[tuple[str, str], Callable[[], str]] = {
     ("algorithms", "parallel-parts"): lambda: kinds.text(STUDIES, "parallel-parts"),
     ("algorithms", "legs"): lambda: kinds.text(STUDIES, "legs"),
     ("algorithms", "parallel"): lambda: kinds.text(STUDIES, "parallel"),
+    ("algorithms", "few-steps"): lambda: kinds.text(STUDIES, "samples-xqc", "samples-sac_parallel", "samples-ppo"),
 }
 
 

@@ -1,4 +1,4 @@
-"""Table of a study's scores, with a line for each place and a column for each kind of runs."""
+"""Table of scores of studies, with a line for each place and a column for each kind of runs."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,32 +7,41 @@ import numpy as np
 
 from arc_suite.learning.studies import report, results
 from arc_suite.learning.studies.results import RunResult
+from arc_suite.learning.studies.tables import Study
 from arc_suite.learning.studies.text_tables import score_of_seeds, table
 from studies import catalog
 
 
-def text(studies: Path, name: str) -> str:
-    """Return the table of a committed study in Markdown: mean scores, then the score of each seed.
+def text(studies: Path, *names: str) -> str:
+    """Return the table of committed studies in Markdown: mean scores, then the score of each seed.
+
+    Args:
+        studies: folder of the committed studies.
+        *names: names of studies. Lines are places of the first one.
 
     Raises:
         ValueError: an unknown study, or a damaged table of it.
         OSError: a table cannot be read.
     """
-    published = studies / name
+    columns_of_studies = [_cells_by_kind(studies / name, catalog.study(name)) for name in names]
+    places = dict.fromkeys(place for cells in columns_of_studies[0].values() for place in cells)
+    columns = {kind: cells for columns in columns_of_studies for kind, cells in columns.items()}
+    lines = [(place, *(cells.get(place, "-") for cells in columns.values())) for place in places]
+    return table(("score", *columns), lines)
+
+
+def _cells_by_kind(published: Path, study: Study) -> dict[str, dict[str, str]]:
+    """Return a cell for each place of a study, by kind of runs."""
     demonstrators = results.read_demonstrators(published)
-    groups = results.group_by_place(results.read_results(catalog.study(name).runs, published))
-    kinds = dict.fromkeys(kind for results_by_kind in groups.values() for kind in results_by_kind)
-    lines = []
-    for robot_and_task, results_by_kind in groups.items():
-        cells = [_score_cell(results_by_kind.get(kind, ()), demonstrators) for kind in kinds]
-        lines.append((robot_and_task, *cells))
-    return table(("score", *kinds), lines)
+    cells: dict[str, dict[str, str]] = {}
+    for place, results_by_kind in results.group_by_place(results.read_results(study.runs, published)).items():
+        for kind, seeds in results_by_kind.items():
+            cells.setdefault(kind, {})[place] = _score_cell(seeds, demonstrators)
+    return cells
 
 
 def _score_cell(seeds: Sequence[RunResult], demonstrators) -> str:
-    """Return the scores of the latest policies of a kind as text; a dash without runs."""
-    if not seeds:
-        return "-"
+    """Return the scores of the latest policies of a kind as text."""
     scores = report.scores_of(seeds, demonstrators)
     if np.isnan(scores).any():
         raise ValueError(f"run {seeds[0].run.name}: expected a place with anchors, got {seeds[0].run.place}")
