@@ -1,5 +1,7 @@
 """Table of scores of studies, with a line for each place and a column for each kind of runs."""
 
+import functools
+import operator
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,9 +25,9 @@ def text(studies: Path, *names: str) -> str:
         ValueError: an unknown study, or a damaged table of it.
         OSError: a table cannot be read.
     """
-    columns_of_studies = [_cells_by_kind(studies / name, catalog.study(name)) for name in names]
-    places = dict.fromkeys(place for cells in columns_of_studies[0].values() for place in cells)
-    columns = {kind: cells for columns in columns_of_studies for kind, cells in columns.items()}
+    first_columns, *other_columns = (_cells_by_kind(studies / name, catalog.study(name)) for name in names)
+    places = dict.fromkeys(place for cells in first_columns.values() for place in cells)
+    columns = functools.reduce(operator.or_, other_columns, first_columns)
     lines = [(place, *(cells.get(place, "-") for cells in columns.values())) for place in places]
     return table(("score", *columns), lines)
 

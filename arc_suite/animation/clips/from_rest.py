@@ -3,7 +3,7 @@
 import bisect
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -148,29 +148,26 @@ def _take_blow(recorder: Recorder, clip: BlowClip, idle: Pose) -> Draft:
 
 def _take_strongest_blow(recorder: Recorder, clip: BlowClip, lever: float, idle: Pose) -> tuple[Draft | None, str]:
     """Return how a body takes the strongest blow of a lever, and why the weakest does not suit it, if it does not."""
-    recordings = {}
     drafts = {}
     reasons = {}
 
-    def falls(size: float) -> bool:
+    @functools.cache
+    def record(size: float) -> GaitRecording:
+        return _record_blow(recorder, clip, size, lever)
+
+    def draw(size: float) -> None:
+        drafts[size] = _draw_blow(recorder.body, clip, record(size), idle)
+
+    def fails(attempt: Callable[[float], object], size: float) -> bool:
         try:
-            recordings[size] = _record_blow(recorder, clip, size, lever)
+            attempt(size)
         except ValueError as error:
             reasons[size] = str(error)
         return size in reasons
 
-    def is_too_strong(size: float) -> bool:
-        try:
-            if size not in recordings:  # bisection skipped it
-                recordings[size] = _record_blow(recorder, clip, size, lever)
-            drafts[size] = _draw_blow(recorder.body, clip, recordings[size], idle)
-        except ValueError as error:
-            reasons[size] = str(error)
-        return size in reasons
-
-    sizes = _BLOW_SIZES[: bisect.bisect_left(_BLOW_SIZES, True, key=falls)]
-    if sizes and is_too_strong(sizes[-1]):
-        bisect.bisect_left(sizes[:-1], True, key=is_too_strong)
+    sizes = _BLOW_SIZES[: bisect.bisect_left(_BLOW_SIZES, True, key=functools.partial(fails, record))]
+    if sizes and fails(draw, sizes[-1]):
+        bisect.bisect_left(sizes[:-1], True, key=functools.partial(fails, draw))
     if drafts:
         return drafts[max(drafts)], ""
     size = min(reasons)
