@@ -22,7 +22,7 @@
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them
 #   robots              robots of others, in wheels (320 MB): they come in, with the same bits, and walk; minutes
-#   bodies, survey, following, directing, leaps, clip-sets    many bodies: bit-equality, walks, commands, clips; half an hour
+#   bodies, survey, following, directing, leaps, clip-sets    many bodies: bit-equality, walks, commands, clips; half an hour to two
 #   soak, fuzz, loopholes, mutants    memory over two million steps; damaged files; policies that cheat; planted mistakes (hours)
 #   absurd              ten thousand absurd values of settings: each is refused, or has an effect; minutes
 

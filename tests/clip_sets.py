@@ -1,6 +1,9 @@
-"""All clips of robots, examples and random bodies: `make check-clip-sets`, an hour or two.
+"""All clips of robots, examples and random bodies: `make check-clip-sets`, two hours on two cores.
 
-python tests/clip_sets.py [NUMBER OF RANDOM BODIES]
+python tests/clip_sets.py [NUMBER OF RANDOM BODIES] [FOLDER]
+
+Bodies are measured in as many processes as there are cores. The folder, `out/clip_sets`, holds a file for each body:
+a run that was interrupted goes on. Remove it when clips change.
 
 Prints for each body the cycles of its loops and the largest seam, how far its start and stop are from walk and idle
 before they are made to meet, the slip of its walk as it is and planted, and what was left out. Lengths are in standing
@@ -10,9 +13,13 @@ fewer than 85 % of the bodies stop from a pose within 0.08 of the walk's.
 """
 
 import collections
+import concurrent.futures
 import functools
+import json
+import os
 import re
 import sys
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -34,11 +41,12 @@ ONE_CYCLE, CONNECTED, APART = 0.85, 0.85, 0.08  # legs of two joints often stop 
 LOW = 0.01  # of a sole that slips
 
 
-class Kept(Recorder):
-    """A recorder that records each walk and each passage once."""
-
-    record_walk = functools.cache(Recorder.record_walk)
-    record_transition = functools.cache(Recorder.record_transition)
+def make_recorder(body) -> Recorder:
+    """Return a recorder that records each walk and each passage once."""
+    recorder = Recorder(Setup.of(body, "steer"), "cpg", None)
+    recorder.record_walk = functools.cache(recorder.record_walk)
+    recorder.record_transition = functools.cache(recorder.record_transition)
+    return recorder
 
 
 def apart(body, one, other) -> float:
@@ -77,7 +85,7 @@ def broken(body, made) -> dict[str, str]:
 
 def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     """Return numbers of the clips of a body by name, and the reasons of those that are left out."""
-    recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
+    recorder, left_out = make_recorder(body), {}
     made = make_drafts(recorder, list(CLIPS), iter, left_out)
     light = make_drafts(recorder, ["walk", "idle"], iter, {}, character=weight.choose_character(0.0))
     loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], WalkLoop)]
@@ -97,35 +105,61 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     return found, left_out
 
 
+def measure_once(name: str, folder: Path) -> tuple[dict[str, float], dict[str, str]]:
+    """Return what `measured` returns for a robot, an example or `random_SEED`, from its file if there is one."""
+    file = folder / f"{name}.json"
+    if not file.exists():
+        try:
+            numbers, left_out = measured(load_body(name))
+        except ValueError as error:
+            numbers, left_out = {"clips": 0}, dict.fromkeys(CLIPS, str(error))
+        new_file = file.with_suffix(f".{os.getpid()}")
+        new_file.write_text(json.dumps([{key: float(value) for key, value in numbers.items()}, left_out]))
+        new_file.replace(file)
+    numbers, left_out = json.loads(file.read_text())
+    return numbers, left_out
+
+
+def load_body(name: str):
+    """Return the body of a robot, an example or `random_SEED`."""
+    if name in ROBOTS:
+        return ROBOTS[name]
+    return sound_body(int(name.removeprefix("random_"))) if name.startswith("random_") else spec_files.load_body(name)
+
+
 def table(left_out_of_body: dict[str, dict[str, str]], others) -> str:
-    """Return a table in Markdown: how many bodies have each clip, and the line that leaves it out most often."""
-    lines = ["| clip | robots and examples | random bodies | most frequent line |", "|---|---|---|---|"]
+    """Return a table in Markdown: how many bodies have clips, and the lines that leave them out most often."""
+    clips_of_row = collections.defaultdict(list)
     for clip in CLIPS:
         counts = []
         for is_other in (True, False):
             reasons = [left_out for name, left_out in left_out_of_body.items() if (name in others) == is_other]
             counts.append(f"{sum(clip not in left_out for left_out in reasons)} of {len(reasons)}")
-        lines_of_clip = [left_out[clip] for left_out in left_out_of_body.values() if clip in left_out]
-        kinds = collections.Counter(re.sub(r"-?\d+(\.\d+)?", "n", line) for line in lines_of_clip)
-        ((kind, number),) = kinds.most_common(1) or [("", 0)]
-        lines.append(f"| `{clip}` | {' | '.join(counts)} | {f'{kind} ({number})' if number else '-'} |")
-    return "\n".join(lines)
+        lines = [left_out[clip] for left_out in left_out_of_body.values() if clip in left_out]
+        kinds = collections.Counter(re.sub(r"-?\d+(\.\d+)?", "n", line) for line in lines)
+        cells = *counts, "; ".join(f"{kind} ({number})" for kind, number in kinds.most_common(2)) or "-"
+        clips_of_row[cells].append(f"`{clip}`")
+    rows = [f"| {' | '.join([', '.join(clips), *cells])} |" for cells, clips in clips_of_row.items()]
+    return "\n".join(["| clip | robots and examples | random bodies | left out, as |", "|---|---|---|---|", *rows])
 
 
-def main(count: str = "100") -> int:
+def main(count: str = "100", folder: str = "out/clip_sets") -> int:
     """Measure the bodies, and return the exit status."""
-    bodies = {f"random_{seed}": sound_body(seed) for seed in range(int(count))}
-    others = dict(ROBOTS) | {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
-    numbers, left_out_of_body = {}, {}
-    for name, body in tqdm((others | bodies).items(), disable=None, unit="body"):
-        try:
-            numbers[name], left_out = measured(body)
-        except ValueError as error:
-            numbers[name], left_out = {"clips": 0}, dict.fromkeys(CLIPS, str(error))
-        left_out_of_body[name] = left_out
-        told = ", ".join(f"{key} {value:.3g}" for key, value in numbers[name].items())
-        missing = [f"no {clip}: {reason}" for clip, reason in left_out.items()]
-        print("; ".join([f"{name}: {told}", *missing]), flush=True)
+    bodies = [f"random_{seed}" for seed in range(int(count))]
+    others = [*ROBOTS, *spec_files.EXAMPLES]
+    names = others + bodies
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    with concurrent.futures.ProcessPoolExecutor() as pool:
+        measurements = pool.map(functools.partial(measure_once, folder=Path(folder)), names)
+        measurement_of_body = dict(
+            zip(names, tqdm(measurements, total=len(names), disable=None, unit="body"), strict=True)
+        )
+    numbers = {name: numbers for name, (numbers, _) in measurement_of_body.items()}
+    left_out_of_body = {name: left_out for name, (_, left_out) in measurement_of_body.items()}
+    for name in names:
+        values_of_body = ", ".join(f"{key} {value:.3g}" for key, value in numbers[name].items())
+        missing = [f"no {clip}: {reason}" for clip, reason in left_out_of_body[name].items()]
+        print("; ".join([f"{name}: {values_of_body}", *missing]))
 
     def values(key, names):
         return np.array([numbers[name].get(key, np.nan) for name in names])

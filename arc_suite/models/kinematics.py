@@ -80,6 +80,10 @@ class Legs(NamedTuple):
         """Return the legs with the centers of feet for soles."""
         return self._replace(radii=np.zeros_like(self.radii))
 
+    def choose(self, indices: np.ndarray) -> Self:
+        """Return the legs with these indices (legs,)."""
+        return self._make(values[indices] for values in self)
+
     def widen_ranges(self, angles: np.ndarray) -> Self:
         """Return the legs with joint ranges that hold angles (samples, legs, links); limits in the physics are soft."""
         low = np.minimum(self.low, angles.min(axis=0))

@@ -19,7 +19,9 @@ _LANDING_SHARE = 0.05  # of a swing: its height is corrected only so near its en
 # Inverse kinematics.
 _FOOT_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a foot: legs of two joints slide rather than sink
 _DAMPING = 0.005  # standing heights
-_ITERATIONS = 30
+_ITERATIONS = 6  # of a round
+_MAX_ROUNDS = 5
+_STILL_CHANGE = 1e-9  # rad; the last round changes no joint by more
 
 # A leg follows a correction that it can: else a smaller share of it on the ground is tried.
 _CORRECTION_SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)
@@ -185,25 +187,33 @@ def _solve_joint_angles(
     """
     torso_rotations = rotations.matrix(poses[:, 3:7])[:, None]
     torso_positions = poses[:, None, :3]
-    legs_to_centers = legs.to_foot_centers()
     start_angles = legs.by_leg(poses[:, 7:])
-    angles = start_angles
-    is_unsolved = np.ones(len(legs.radii), bool)
+    angles = start_angles.copy()
+    unsolved = np.arange(len(legs.radii))
     for share in _CORRECTION_SHARES:
-        goals = feet + corrections * (share, share, 1.0)
-        goals[..., 2] = np.maximum(goals[..., 2], legs.radii)
+        centers = legs.choose(unsolved).to_foot_centers()
+        goals = feet[:, unsolved] + corrections[:, unsolved] * (share, share, 1.0)
+        goals[..., 2] = np.maximum(goals[..., 2], legs.radii[unsolved])
         goals_in_torso = (torso_rotations.swapaxes(-1, -2) @ (goals - torso_positions)[..., None])[..., 0]
-        candidates = legs_to_centers.solve_joint_angles(
-            start_angles, goals_in_torso, _FOOT_WEIGHTS, _DAMPING * standing_height, _ITERATIONS
-        )
-        misses_in_torso = legs_to_centers.soles(candidates)[0] - goals_in_torso
+        candidates = _bring_near(centers, start_angles[:, unsolved], goals_in_torso, _DAMPING * standing_height)
+        misses_in_torso = centers.soles(candidates)[0] - goals_in_torso
         height_misses = abs((torso_rotations @ misses_in_torso[..., None])[..., 2, 0]).max(axis=0)
         is_near = height_misses <= _MAX_SINK * standing_height
-        is_slow = _largest_joint_steps(candidates) <= max_joint_steps
-        is_solved = is_unsolved & is_near & is_slow
-        angles = np.where(is_solved[:, None], candidates, angles)
-        is_unsolved &= ~is_solved
-        if not is_unsolved.any():
+        is_slow = _largest_joint_steps(candidates) <= max_joint_steps[unsolved]
+        is_solved = is_near & is_slow
+        angles[:, unsolved[is_solved]] = candidates[:, is_solved]
+        unsolved = unsolved[~is_solved]
+        if not len(unsolved):
+            break
+    return angles
+
+
+def _bring_near(legs: Legs, angles: np.ndarray, goals: np.ndarray, damping: float) -> np.ndarray:
+    """Return the angles (samples, legs, links), rad, that bring feet near goals (samples, legs, 3) in the torso, m."""
+    for _ in range(_MAX_ROUNDS):
+        previous_angles = angles
+        angles = legs.solve_joint_angles(angles, goals, _FOOT_WEIGHTS, damping, _ITERATIONS)
+        if abs(angles - previous_angles).max() < _STILL_CHANGE:
             break
     return angles
 

@@ -15,7 +15,9 @@ from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.policies import check_preset
 from arc_suite.policies import policy as named_policy
+from arc_suite.policies.protocol import Policy
 from arc_suite.robots.gaits import Pace
+from arc_suite.tasks import Task
 from arc_suite.tasks.fitting import velocity_units
 
 _SETTLE_STEPS = 200  # control steps, after which starts and changes of command are forgotten
@@ -114,6 +116,7 @@ class Recorder:
         self.body = setup.body
         self._policy = policy
         self._preset = preset
+        self._policies: dict[tuple[Setup, float], Policy] = {}  # by setup and lift: to fit a law takes long
         self.has_command = task.commands.get("command") == 3 and task.parameters is not None
         self.velocity_units = None
         if self.has_command:
@@ -290,13 +293,17 @@ class Recorder:
             lift: multiple of the height of a demonstrator's feet in mid-swing, where its law has one.
         """
         environment = setup.load(seed=0)
-        task = environment.task.definition
-        policy = named_policy(self._policy, self.body, self._preset, task=task)
+        if (setup, lift) not in self._policies:
+            self._policies[setup, lift] = self._make_policy(environment.task.definition, lift)
+        return record(environment, self._policies[setup, lift], settle, steps, commands, blow, **fixed_commands)
+
+    def _make_policy(self, task: Task, lift: float) -> Policy:
+        """Return the policy in a task; if it is a demonstrator that has one, with another lift."""
         if lift != 1.0:
             preset = preset_of(self.body, self._preset or suited_preset(task))
             if isinstance(preset, SteppingParameters):
-                policy = Demonstrator(task, preset._replace(lift=lift * preset.lift))
-        return record(environment, policy, settle, steps, commands, blow, **fixed_commands)
+                return Demonstrator(task, preset._replace(lift=lift * preset.lift))
+        return named_policy(self._policy, self.body, self._preset, task=task)
 
 
 def _find_gait(recording: Recording) -> GaitRecording:
