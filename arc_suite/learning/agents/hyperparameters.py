@@ -9,7 +9,18 @@ from arc_suite.envs.base_vector import MAX_ENVS
 from arc_suite.motions import motion_text
 
 _POSITIVE_RANGE = (1e-6, 1e3)  # of numbers that must not be 0
-_RANGES_OF_ALL = {"num_envs": (1, MAX_ENVS), "hidden": (1, 1 << 16)}  # of all algorithms
+_MAX_STEPS = 1 << 16  # control steps of an environment, or passes, between which a run neither saves nor stops
+_MAX_BATCH = 1 << 24
+_RANGES_OF_ALL = {  # of all algorithms
+    "num_envs": (1, MAX_ENVS),
+    "hidden": (1, 1 << 16),
+    "horizon": (1, _MAX_STEPS),
+    "round": (1, _MAX_STEPS),
+    "n_step": (1, _MAX_STEPS),
+    "epochs": (1, _MAX_STEPS),
+    "batch": (1, _MAX_BATCH),
+    "minibatch": (1, _MAX_BATCH),
+}
 # Blocks that networks do not see by default. Contact forces are 114 to 150 numbers; learners that act are better
 # without them: docs/algorithms.md.
 BLOCKS_LEFT_OUT = ("contact_forces",)

@@ -258,7 +258,8 @@ def test_columns_stay_in_the_order_of_each_task():
         ([], "expected a study: module:attribute, or <division>-<algorithm>; see --help"),
         (
             ["paper"],
-            "study 'paper': expected module:attribute, a Study on Python's path, or <division>-<algorithm> of ",
+            "study 'paper': expected module:attribute, a Study on Python's path, or <division>-<algorithm> of the "
+            "benchmark, such as top-ppo; tools/study.py of a clone runs those of its folder studies\n",
         ),
         (["top-pppo"], "unknown algorithm 'pppo'; did you mean 'ppo'?"),
         (["top-ppo", "--shard=4/4"], "--shard=4/4: expected i/n with i from 0 to n - 1, such as 0/4"),
