@@ -24,6 +24,7 @@ html_theme = "furo"
 html_title = "arc_suite"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_favicon = "_static/icon.svg"
 html_extra_path = [str(Path(__file__).parents[1] / "out" / "docs" / "extra")]
 html_show_copyright = html_show_sphinx = False
 html_copy_source = False
