@@ -7,8 +7,9 @@
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
 nothing up, none that can step. An imported body stands for a second; a line tells whether its joints buzz.
-With --walk the demonstrator walks it for 100 control steps. Where it falls, drags its torso, or stays below
-0.7 of the target speed, the line names the fields to leave out, which are then sized to suit the body. With
+With --walk its default demonstrator walks it for 100 control steps, an imported robot for 1000. Where it falls,
+drags its torso, or stays below 0.7 of the target speed, the demonstrator `medium` tries. Where that fails, too, a
+line names the fields to leave out, which are then sized to suit the body. With
 --tasks the demonstrator of each task walks it, too, in four episodes of 200 control steps; a line for each
 task names the preset, its metric and how many episodes ended upright.
 
@@ -23,6 +24,7 @@ from absl import flags
 from arc_suite import registry
 from arc_suite.cli import program
 from arc_suite.cli.flags import ROBOT_HELP, define_task, refuse_flags, task_from_flags
+from arc_suite.cpg.selection import suited_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance, cures, suitability
 from arc_suite.models.soundness import flaws
@@ -87,18 +89,26 @@ def _check_stillness(spec: str, body: Body) -> bool:
 
 
 def _check_walk(spec: str, body: Body) -> bool:
-    """Print how the demonstrator walks a body, and what would help; return whether it walks well."""
-    walk = cures.walk(body)
-    if walk.quality == _GOOD_QUALITY:
-        print(f"{spec}: {_describe_walk(walk)}")
-        return True
-    if walk.verdict.fell:
-        problem = f"falls after {walk.length} control steps"
-    else:
-        failures = " and ".join(_FAILURE_TEXTS[failure] for failure in walk.verdict.failures)
-        problem = f"{failures}: {_describe_walk(walk)}"
-    print(f"{spec}: {body.name} {problem}{_advice(body, walk)}")
+    """Print how the default demonstrator of a body walks it, or another, and what would help; return whether one does.
+
+    All bodies have the demonstrator of `cures`, which may walk a body where the default one fails.
+    """
+    presets = dict.fromkeys((suited_preset(Setup.of(body, "walk").definition), cures.PRESET))
+    for preset in presets:
+        walk = cures.walk(body, preset)
+        if walk.quality == _GOOD_QUALITY:
+            print(f"{spec}: {_describe_walk(walk)} by {preset}")
+            return True
+        advice = _advice(body, walk) if preset == cures.PRESET else ""
+        print(f"{spec}: {body.name} {_describe_problem(walk)} by {preset}{advice}")
     return False
+
+
+def _describe_problem(walk: cures.FirstWalk) -> str:
+    if walk.verdict.fell:
+        return f"falls after {walk.length} control steps"
+    failures = " and ".join(_FAILURE_TEXTS[failure] for failure in walk.verdict.failures)
+    return f"{failures}: {_describe_walk(walk)}"
 
 
 def _try_tasks(spec: str, body: Body) -> None:

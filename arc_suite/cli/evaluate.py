@@ -3,7 +3,8 @@
 Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. IQM is
 the interquartile mean of the return, with a stratified bootstrap interval. `zero` is the return of standing
 still in the first ten of the episodes. The score is 0 for standing still and 1 for the best demonstrator; that of
-another body, or of other settings, is measured in these ten, too. With --preset medium, which is the paper's
+another body, or of other settings, is measured in these ten, too. Where it earns less than a tenth more than standing
+still, a line says so in place of a score. With --preset medium, which is the paper's
 demonstrator, the table ends with the paper's return. A policy that learned from the episodes is refused. The JSON holds
 every episode, and hashes of policy, body, model and task.
 
@@ -44,6 +45,9 @@ def main() -> None:
     with files.writing_json(FLAGS.json) as json_content:
         reports_of_robots = print_reports(players, seeds)
         any_report = reports_of_robots[0]  # all are of one task
+        for report in reports_of_robots:
+            if report.flaw:
+                print(f"{report.label}: no score: {report.flaw}")
         if "cost_of_transport" in any_report.progress:
             footnote = transport_footnote(report.setup.body for report in reports_of_robots)
             if footnote:

@@ -19,15 +19,17 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import parsers, policies
-from arc_suite.cpg.selection import suited_preset, suited_presets
+from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset, suited_presets
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import judging, protocol
 from arc_suite.evaluation.judging import Level
 from arc_suite.robots import is_robot
+from arc_suite.tasks import Task
 
 TABLE = Path(__file__).with_name("anchors.csv")
 HEADS = ("place", "policy", "seed", "return")
 ZERO = "zero"  # the policy that stands still
+_MIN_GAIN = 0.1  # of the return of standing still: by less a demonstrator that does not walk may earn more
 
 Returns = Mapping[str, np.ndarray]  # (episodes,) by policy: `zero`, or a preset of the demonstrator
 
@@ -52,20 +54,30 @@ class Anchors(NamedTuple):
     def score(self, returns):
         """Return (return - standing still) / (best demonstrator - standing still), or NaN.
 
-        It is NaN where the demonstrator has no higher return than standing still.
+        It is NaN where returns have no scores, see `flaw`.
 
         Args:
             returns: (...) returns, or means of several.
         """
-        if self.demonstrator is None or self.demonstrator <= self.zero:
+        if self.flaw:
             return np.full_like(returns, np.nan, dtype=float)
         return (np.asarray(returns, float) - self.zero) / (self.demonstrator - self.zero)
 
     def at(self, score: float) -> float:
         """Return the return of a score; infinite where returns have no scores."""
-        if self.demonstrator is None or self.demonstrator <= self.zero:
+        if self.flaw:
             return np.inf
         return self.zero + score * (self.demonstrator - self.zero)
+
+    @property
+    def flaw(self) -> str:
+        """Why returns have no scores: no demonstrator, or none that earns a tenth more than standing still; or ""."""
+        if self.demonstrator is None:
+            return "no demonstrator suits body and task"
+        if self.demonstrator - self.zero < _MIN_GAIN * abs(self.zero):
+            returns = f"{self.demonstrator:.1f}, and standing still {self.zero:.1f}"
+            return f"the best demonstrator, {self.preset}, earns {returns}"
+        return ""
 
 
 def of_returns(returns_by_policy: Returns, seeds: Sequence[int] = ()) -> Anchors:
@@ -144,27 +156,15 @@ def committed_returns(setup: Setup) -> Returns | None:
 
 
 @functools.lru_cache(maxsize=16)
-def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES) -> Returns:
-    """Return the returns of standing still and of all presets that suit the task, from seed 0 on; see `anchors`."""
-    return _measure_presets(setup, suited_presets(setup.definition), range(episodes))
+def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES, first_seed: int = 0) -> Returns:
+    """Return the returns of standing still and of demonstrators that suit the task, from a seed on; see `anchors`.
 
-
-def measure_suited_preset(setup: Setup, seeds: Sequence[int]) -> Anchors:
-    """Return the anchors of standing still and of the preset that suits task and body, measured in some episodes.
-
-    Where no preset suits them, the anchors have no demonstrator.
-
-    Args:
-        setup: robot, task and settings.
-        seeds: seeds of the episodes.
+    Demonstrators that refuse the body are left out.
     """
-    return of_returns(_measure_presets(setup, suited_presets(setup.definition)[:1], seeds))
-
-
-def _measure_presets(setup: Setup, presets: Sequence[str], seeds: Sequence[int]) -> Returns:
-    """Return the returns of standing still and of presets; those that refuse the body are left out."""
     returns_by_policy = {}
-    for name in tqdm((ZERO, *presets), desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
+    seeds = range(first_seed, first_seed + episodes)
+    names = (ZERO, *_presets_to_measure(setup.definition))
+    for name in tqdm(names, desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
         try:
             returns_by_policy[name] = play_returns(setup, name, seeds)
         except ValueError:
@@ -172,6 +172,15 @@ def _measure_presets(setup: Setup, presets: Sequence[str], seeds: Sequence[int])
                 raise
             # Another preset may take a body that one preset refuses, such as one whose feet hang in the air.
     return returns_by_policy
+
+
+def _presets_to_measure(task: Task) -> tuple[str, ...]:
+    """Return the presets that suit a task and read all its commands, or where none does, all that suit it."""
+    names = suited_presets(task)
+    obedient_names = tuple(
+        name for name in names if not ignored_commands(task, law(task, preset_of(task.scene.body, name)))
+    )
+    return obedient_names or names
 
 
 def play_returns(setup: Setup, name: str, seeds: Sequence[int]) -> np.ndarray:

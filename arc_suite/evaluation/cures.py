@@ -11,6 +11,7 @@ from arc_suite.robots.spec import Body, Link
 
 _STEPS = 100  # control steps; 5 s of the four robots, of which the first 2 s are the start
 _STEPS_OF_IMPORTED = 1000  # control steps, as some imported robots fall late
+PRESET = "medium"  # of the demonstrator that walks: all bodies have it
 FIELDS = ("motor", "damping", "armature")  # of joints; where a spec leaves them out, they are sized
 
 
@@ -40,8 +41,12 @@ class FirstWalk(NamedTuple):
         return 2 if self.verdict.walks else 1
 
 
-def walk(body: Body) -> FirstWalk:
-    """Let the demonstrator `medium` walk a body.
+def walk(body: Body, preset: str = PRESET) -> FirstWalk:
+    """Let a demonstrator walk a body.
+
+    Args:
+        body: any.
+        preset: of the demonstrator.
 
     Raises:
         ValueError: a body that no demonstrator can walk.
@@ -49,7 +54,7 @@ def walk(body: Body) -> FirstWalk:
     environment = Setup.of(body, "walk", {"on_divergence": "truncate"}).load()
     steps = _STEPS_OF_IMPORTED if body.source else _STEPS
     watcher = WalkWatcher(environment)
-    protocol.run(environment, Demonstrator(environment, "medium"), 0, steps, [watcher])
+    protocol.run(environment, Demonstrator(environment, preset), 0, steps, [watcher])
     target = environment.task.definition.parameters.target_velocity
     return FirstWalk(watcher.length, watcher.verdict(steps), target)
 

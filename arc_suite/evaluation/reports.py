@@ -49,8 +49,8 @@ class Report(NamedTuple):
         preset: preset of the demonstrator; None for another policy.
         returns: over the episodes.
         zero: mean return of standing still.
-        score: 0 for standing still, 1 for the best demonstrator where its returns are committed, elsewhere for the
-            preset that suits task and body; None where it earns no more than standing still.
+        score: 0 for standing still, 1 for the best demonstrator; None where `flaw` says why there is none.
+        flaw: see `anchors.Anchors.flaw`.
         length: control steps.
         progress: the task's metrics by name.
         expert: return of the paper's demonstrator; None for other setups than the paper's.
@@ -62,6 +62,7 @@ class Report(NamedTuple):
     returns: Summary
     zero: float
     score: float | None
+    flaw: str
     length: Summary
     progress: Mapping[str, Summary]
     expert: float | None
@@ -110,6 +111,7 @@ class Report(NamedTuple):
             "expert_return": self.expert,
             "return": self.returns,
             "score": self.score,
+            "no_score": self.flaw,
             "length": self.length,
             **self.progress,
             "episodes": self.episodes,
@@ -196,7 +198,7 @@ def report(
     first_seeds = seeds[:CURVE_EPISODES]
     anchor_returns = anchors.committed_returns(setup)
     if anchor_returns is None:
-        scale = anchors.measure_suited_preset(setup, first_seeds)
+        scale = anchors.of_returns(anchors.measure_returns(setup, len(first_seeds), first_seeds[0]))
         zero = scale.zero
     else:
         scale = anchors.of_returns(anchor_returns, seeds)
@@ -209,6 +211,7 @@ def report(
         returns=returns,
         zero=zero,
         score=score if math.isfinite(score) else None,
+        flaw=scale.flaw,
         length=statistics.summary([episode.length for episode in episodes]),
         progress={name: statistics.summary([episode.progress[name] for episode in episodes]) for name in metrics},
         expert=protocol.expert_return(setup),

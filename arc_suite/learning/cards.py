@@ -113,8 +113,10 @@ def _describe(run: Configuration, folder: Path, returns: np.ndarray, episodes_te
     yield "algorithm, seed", f"{run.algorithm}, {run.seed}"
     yield "steps", f"{int(run_folder.read_progress(folder)['evaluated']):,} of {run.steps:,}"
     yield "return", f"{mean:.1f}, 95 % interval {_interval_text(interval, '.1f')}, {returns.size} {episodes_text}"
-    score_ends = scale.score(np.array(interval))
-    if np.isfinite(scale.score(mean)):
+    if scale.flaw:
+        yield "score", f"none: {scale.flaw}"
+    else:
+        score_ends = scale.score(np.array(interval))
         yield "score", f"{scale.score(mean):.2f}, 95 % interval {_interval_text(score_ends, '.2f')}"
         yield "score 0, standing still", f"{scale.zero:.1f}"
         yield "score 1, demonstrator", f"`{scale.preset}`, {scale.demonstrator:.1f}"

@@ -15,14 +15,13 @@ def return_of_score(run: Configuration, score: float) -> float:
     """Return the mean return that has a score in the evaluations of a run.
 
     Raises:
-        ValueError: a score that is no number, or a task without a demonstrator that earns more than standing still.
+        ValueError: a score that is no number, or returns without scores; see `anchors.Anchors.flaw`.
     """
     checks.number("score", score)
-    mean_return = anchors.anchors(run.validation).at(score)
-    if not np.isfinite(mean_return):
-        what = "expected a task with a demonstrator that earns more than standing still"
-        raise ValueError(f"score {score:g}: {what}, got {run.validation}")
-    return mean_return
+    scale = anchors.anchors(run.validation)
+    if scale.flaw:
+        raise ValueError(f"score {score:g}: {run.validation} has no scores: {scale.flaw}")
+    return scale.at(score)
 
 
 def first_step_above(folder: Path, threshold: float) -> int | None:
@@ -70,7 +69,9 @@ def _describe_returns(run: Configuration, returns: np.ndarray) -> str:
     levels = f"standing still {scale.zero:.1f}{zero_error}"
     if scale.blind is not None:
         levels += f", blind walker {scale.blind:.1f}"
-    if scale.demonstrator is not None:
+    if scale.flaw:
+        levels += f", no score: {scale.flaw}"
+    else:
         score = f"score {scale.score(mean_return):z.2f}"
         demonstrator = f"demonstrator {scale.preset} {scale.demonstrator:.1f}{demonstrator_error}"
         levels = f"{score} ({levels}, {demonstrator}, over other seeds)"

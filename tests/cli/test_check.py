@@ -109,10 +109,10 @@ def _quadruped(**joint):
 def test_a_body_that_falls_is_told_what_to_leave_out(path):
     path.write_text(_quadruped(motor={"gear": 198.0}, armature=0.01, damping=0.1))
     done = check("--walk", path)
-    stands, falls = done.stdout.splitlines()
+    stands, *_, falls = done.stdout.splitlines()
     assert (done.returncode, stands) == (1, f"{path}: quadruped stands and can take steps")
     found = re.fullmatch(
-        rf"{path}: quadruped falls after (\d+) control steps: leave out (.*) of its joints: "
+        rf"{path}: quadruped falls after (\d+) control steps by medium: leave out (.*) of its joints: "
         r"it then walks 100 control steps at [\d.]+ m/s \([\d.]+ of the target 0\.37\)",
         falls,
     )
@@ -121,7 +121,7 @@ def test_a_body_that_falls_is_told_what_to_leave_out(path):
 
 def test_a_walk_is_judged_by_its_share_of_the_target_speed():
     done = check("--walk", "spider")
-    line = r"spider: walks 100 control steps at 0\.\d\d m/s \((0\.9|1\.[0-3])\d of the target 0\.31\)"
+    line = r"spider: walks 100 control steps at 0\.\d\d m/s \((0\.9|1\.[0-3])\d of the target 0\.31\) by straight"
     assert done.returncode == 0 and re.fullmatch(line, done.stdout.splitlines()[1])
 
 
@@ -135,8 +135,8 @@ def test_a_slow_body_is_told_what_to_leave_out(path):
     done = check("--walk", path)
     walks = r"walks 100 control steps at -?0\.\d\d m/s \({} of the target 0\.31\)"
     slow, fast = walks.format(r"-?0\.[0-6]\d"), walks.format(r"(0\.9|1\.[0-3])\d")
-    line = rf"{path}: spider is slow: {slow}: leave out damping of its joints: it then {fast}"
-    assert done.returncode == 1 and re.fullmatch(line, done.stdout.splitlines()[1])
+    line = rf"{path}: spider is slow: {slow} by medium: leave out damping of its joints: it then {fast}"
+    assert done.returncode == 1 and re.fullmatch(line, done.stdout.splitlines()[-1])
 
 
 def test_a_weak_body_is_told_and_walked_all_the_same(path):
@@ -145,12 +145,13 @@ def test_a_weak_body_is_told_and_walked_all_the_same(path):
         leg["links"][0]["joint"]["motor"] = {"gear": 0.01}
     path.write_text(json.dumps(spec))
     done = check("--walk", path)
-    weak, walked = done.stdout.splitlines()
+    weak, *walks = done.stdout.splitlines()
     assert done.returncode == 1
     assert re.fullmatch(
         rf"{path}: weak: reaches about 0\.\d of the target speed, as the motor of \w+ lacks .*: gear .* fits", weak
     )
-    assert walked.startswith(f"{path}: spider is slow: walks 100 control steps at ")
+    for line, preset in zip(walks, ("straight", "medium"), strict=True):
+        assert re.match(rf"{path}: spider is slow: walks 100 control steps at .*\) by {preset}", line)
 
 
 def test_a_body_that_drags_its_torso_is_told(path):
@@ -160,13 +161,24 @@ def test_a_body_that_drags_its_torso_is_told(path):
     path.write_text(json.dumps(spec))
     done = check("--walk", path)
     assert done.returncode == 1
-    assert done.stdout.splitlines()[1].startswith(f"{path}: spider drags its torso: walks 100 control steps at ")
+    assert done.stdout.splitlines()[-1].startswith(f"{path}: spider drags its torso: walks 100 control steps at ")
+
+
+def test_another_demonstrator_walks_where_the_default_one_falls(path):
+    robot = imports.FILES / "go2_like.xml"
+    program_of_specs = ("build_model", "--spec", robot, "--length", "link3=1.4", "--json", "-o", path)
+    assert programs.arc_suite(*program_of_specs, cwd=path.parent).returncode == 0
+    done = check("--walk", path)
+    falls, walks = done.stdout.splitlines()[1:]
+    assert done.returncode == 0
+    assert re.fullmatch(rf"{path}: quadruped_15_kg_shaped falls after \d+ control steps by straight", falls)
+    assert re.fullmatch(rf"{path}: walks 1000 control steps at 0\.3\d m/s \(1\.\d\d of .*\) by medium", walks)
 
 
 def test_imported_robots_walk_for_20_seconds_and_get_no_advice(path):
     robot = imports.FILES / "go2_like.xml"
     done = check("--walk", robot)
-    walks = r"walks 1000 control steps at 0\.\d\d m/s \((0\.[89]|1\.[01])\d of the target 0\.34\)"
+    walks = r"walks 1000 control steps at 0\.\d\d m/s \((0\.[89]|1\.[01])\d of the target 0\.34\) by straight"
     assert done.returncode == 0 and re.fullmatch(f"{robot}: {walks}", done.stdout.splitlines()[1])
     body = imports.quadruped()
     servo = body.legs[0].joints[0].servo
@@ -180,7 +192,7 @@ def test_imported_robots_walk_for_20_seconds_and_get_no_advice(path):
     assert done.returncode == 1
     assert "leav" not in done.stdout
     assert re.search(
-        rf"{path}: quadruped_15_kg (falls after \d+ control steps|is slow: walks .*\))$", done.stdout.strip()
+        rf"{path}: quadruped_15_kg (falls after \d+ control steps|is slow: walks .*\)) by medium$", done.stdout.strip()
     )
 
 

@@ -79,7 +79,17 @@ def test_the_preset_is_the_one_that_suits_task_and_body(tmp_path):
     ):
         lines = evaluated(*arguments, "--episodes=1", "--set=time_limit=0.5", f"--json={path}")
         ((name, report),) = json.loads(path.read_text())["robots"].items()
-        assert lines[-1].startswith(f"{name}, {preset} ") and report["preset"] == preset
+        assert lines[2].startswith(f"{name}, {preset} ") and report["preset"] == preset
+
+
+def test_a_demonstrator_that_earns_what_standing_still_does_gives_no_score(tmp_path):
+    path = tmp_path / "a.json"
+    place = ("--robot=leaper", "--task=rough", "--episodes=1", "--set=time_limit=0.5", f"--json={path}")
+    *_, row, line = evaluated(*place)
+    reason = r"the best demonstrator, \w+, earns -?\d+\.\d, and standing still \d+\.\d"
+    assert " - " in row and re.fullmatch(f"leaper, climbing: no score: {reason}", line)
+    report = json.loads(path.read_text())["robots"]["leaper"]
+    assert report["score"] is None and re.fullmatch(reason, report["no_score"])
 
 
 @pytest.mark.slow

@@ -19,9 +19,29 @@ def test_a_score_is_0_for_standing_and_1_for_the_demonstrator():
     assert scale.at(0.5) == 2000.0
 
 
-@pytest.mark.parametrize("scale", [Anchors(1000.0), Anchors(1000.0, 900.0, "medium")])
-def test_there_is_no_score_without_a_better_demonstrator(scale):
-    assert np.isnan(scale.score(2000.0)) and scale.at(0.5) == np.inf
+@pytest.mark.parametrize(
+    ("scale", "flaw"),
+    [
+        (Anchors(1000.0), "no demonstrator suits body and task"),
+        (Anchors(1000.0, 900.0, "medium"), "the best demonstrator, medium, earns 900.0, and standing still 1000.0"),
+        (
+            Anchors(1900.0, 1918.0, "straight"),
+            "the best demonstrator, straight, earns 1918.0, and standing still 1900.0",
+        ),
+    ],
+)
+def test_there_is_no_score_without_a_better_demonstrator(scale, flaw):
+    assert np.isnan(scale.score(2000.0)) and scale.at(0.5) == np.inf and scale.flaw == flaw
+
+
+def test_committed_anchors_have_scores():
+    assert not any(anchors.of_returns(returns).flaw for returns in TABLE.values())
+
+
+def test_anchors_are_the_best_of_the_presets_that_read_all_commands():
+    spider = Setup.of("spider", "steer", {"time_limit": 1.0})
+    assert suited_presets(spider.definition) == ("steered", "straight", "medium")
+    assert list(anchors.measure_returns(spider, 1)) == ["zero", "steered"]
 
 
 def test_the_best_demonstrator_is_the_one_that_earns_most():

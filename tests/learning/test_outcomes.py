@@ -18,8 +18,7 @@ def test_the_return_of_a_score():
 
 def test_a_task_without_a_demonstrator_has_no_scores(monkeypatch):
     monkeypatch.setattr(anchors, "anchors", lambda *_: anchors.Anchors(1628.0))
-    what = "expected a task with a demonstrator that earns more than standing still"
-    with refused(f"score 0.9: {what}, got tick, walk"):
+    with refused("score 0.9: tick, walk has no scores: no demonstrator suits body and task"):
         outcomes.return_of_score(Configuration.of(Setup.of("tick", "walk")), 0.9)
 
 
