@@ -16,9 +16,9 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks, files
+from arc_suite import checks, evaluation, files
 from arc_suite.cli.flags import refuse_flags
-from arc_suite.cli.program import progress, resumable
+from arc_suite.cli.program import progress, resumable, say
 from arc_suite.learning.studies import benchmark, entries, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.simulation.cores import usable_cores
@@ -58,7 +58,7 @@ def _check_flags(division: str | None) -> None:
     if division is None:
         refuse_flags((*_FLAGS_OF_RUNS, "policies", "name"), "goes with a division, such as samples")
     elif FLAGS.policies:
-        refuse_flags(_FLAGS_OF_RUNS, "goes without --policies, which stand in place of runs")
+        refuse_flags(_FLAGS_OF_RUNS, "goes without --policies, whose names have places and seeds")
     else:
         refuse_flags(["name"], "goes with --policies")
 
@@ -102,11 +102,17 @@ def score_policies(division: str) -> None:
     name = FLAGS.name or folder.resolve().name
     benchmark.check_name(name)
     files.check_folder(FLAGS.results)
-    judged = entries.score_policies(folder, progress)
+    judged = entries.score_policies(folder, announce)
     studies = Path(FLAGS.results)
     lines_by_run = {entries.run_name(policy.score): policy.lines for policy in judged}
     publication.write_finals(studies / f"{division}-{name}", lines_by_run)
     benchmark.write(studies, division, name, [policy.score for policy in judged])
+
+
+def announce(policies, desc: str, **options):
+    """Print how many policies are judged, as that takes minutes, and return their progress bar."""
+    say(f"{desc}: {len(policies)} of the {SEEDS * len(PLACES)} policies of an entry, {evaluation.EPISODES} episodes each")
+    return progress(policies, desc=desc, **options)
 
 
 def _is_selected(run: tables.Run, places: list[str]) -> bool:

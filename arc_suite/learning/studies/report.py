@@ -44,7 +44,7 @@ def write(name: str, study: Study, published: Path, further: Sections | None = N
     demonstrators = results.read_demonstrators(published)
     sections: dict[str, Sequence[str]] = {
         f"Study {name}": [_title(study, study_results), _progress_table(study_results)],
-        "Curves": [_ABOUT_CURVES, f"![Returns over environment steps]({CURVES})"],
+        "Curves": [_describe_curves(groups), f"![Returns over environment steps]({CURVES})"],
         "Final returns": [_ABOUT_FINALS, _finals_table(groups, demonstrators)],
         "Sample efficiency": [_ABOUT_EFFICIENCY, _efficiency_table(groups, demonstrators)],
     }
@@ -59,9 +59,10 @@ def write(name: str, study: Study, published: Path, further: Sections | None = N
 
 # First paragraphs of the sections.
 _ABOUT_CURVES = (
-    "Mean over seeds, with its 95 % interval (Student's t) if there are three or more. Dashed: standing still and "
-    "demonstrators. Dotted: the paper's returns at the last step, from 50,000 on."
+    "Mean over seeds, with its 95 % interval (Student's t) if there are three or more; it may leave the range of "
+    "returns. Dashed: standing still and demonstrators."
 )
+_ABOUT_PAPER = " Dotted: the paper's returns at the last step, from 50,000 on."
 _ABOUT_FINALS = (
     "Mean over 100 seeded episodes of the latest policy, unless noted. Over three seeds or more it has a 95 % interval "
     "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same episodes or "
@@ -146,6 +147,12 @@ def _plot_curves(groups: Groups, demonstrators):
         returns_by_policy = _anchor_returns(first_kind[0], demonstrators)
         levels_by_place[place] = {_policy_label(name): returns.mean() for name, returns in returns_by_policy.items()}
     return plots.plot_study(curves_by_place, levels_by_place, paper_returns_by_place)
+
+
+def _describe_curves(groups: Groups) -> str:
+    """Return what the curves of a study show; the paper's returns only where a run has any."""
+    has_paper_returns = any(_paper_return(seeds[0], max(seeds[0].steps)) != "-" for _, _, seeds in by_kind(groups))
+    return _ABOUT_CURVES + _ABOUT_PAPER * has_paper_returns
 
 
 def by_kind(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:

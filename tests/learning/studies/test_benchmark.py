@@ -332,7 +332,8 @@ def test_policies_of_others_are_scored(tmp_path):
     assert (found.robot, found.task, found.seed) == ("tick", "walk", 1)
     assert found.score == pytest.approx(scale().score(found.result)) and found.score > 0.9
     assert np.isnan(found.minutes) and found.gait_compliance > 0.95 and found.heading_error < 0.2
-    assert done.stdout == f"{benchmark.text(tmp_path / 'studies')}\n"
+    first_line = "theirs: 1 of the 30 policies of an entry, 100 episodes each"
+    assert done.stdout == f"{first_line}\n{benchmark.text(tmp_path / 'studies')}\n"
     assert row(done.stdout, "theirs")[4:6] == ["tick walk 1.01", "-"]  # the lowest place, and minutes that nobody knows
 
 
