@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.bodies import imported_variants
 from arc_suite.models import imported_sizes
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
@@ -263,8 +264,11 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
 def deformation_count(body: Body) -> int:
     """Return how many changes `deform_legs` takes.
 
-    Each leg together with its mirror images takes one for each link, and one more.
+    Each leg together with its mirror images takes one for each link, and one more; of imported bodies only links with
+    a length of their own count.
     """
+    if body.source:
+        return imported_variants.count_changes(body)
     return sum(len(leg.links) + 1 for leg, _ in _legs_with_images(body))
 
 
@@ -274,14 +278,17 @@ def deform_legs(body: Body, changes: np.ndarray) -> Body:
     Args:
         body: body to change.
         changes: (deformations,) for each of these legs the logarithm of the factor of each link, and the turn of the
-            leg about the vertical, rad.
+            leg about the vertical, rad. Legs of imported bodies do not turn; see `imported_variants`.
 
     Returns:
-        The body, `<name>_mutated`, to be sized anew.
+        The body, `<name>_mutated`, to be sized anew; an imported body keeps its motors.
 
     Raises:
         ValueError: a length grown out of range.
     """
+    if body.source:
+        variant = imported_variants.deform_imported_legs(body, changes)
+        return variant.replace(name=_changed_name(body, "mutated"))
     deformed_legs = {}
     first = 0  # index of the leg's changes
     for leg, image_names in _legs_with_images(body):

@@ -55,7 +55,7 @@ def change_link_ends(body: Body, ends: Mapping[str, Sequence[float]]) -> Body:
     """Return an imported body whose links have other ends; its lowest foot stands on the floor.
 
     A link turns to its new end and stretches along it, with all that it carries up to the next joint: colliders, visual
-    meshes and mass of the same density. Motors and the axes of joints stay.
+    meshes and mass of the same density. Motors and the axes of joints stay. Without new ends, this is the body itself.
 
     Args:
         body: with a source.
@@ -80,6 +80,8 @@ def change_link_ends(body: Body, ends: Mapping[str, Sequence[float]]) -> Body:
                 stretches[part] = _stretch_between(np.array(link.end), np.array(end))
             links.append(link.replace(end=end))
         new_legs.append(leg.replace(links=tuple(links)))
+    if not stretches:
+        return body
     drop = max(leg.foot_depth for leg in new_legs) - max(leg.foot_depth for leg in body.legs)  # m, of the lowest foot
     torso = body.torso.replace(standing_height=body.torso.standing_height + drop)
     new_source = _stretch_source(legs, stretches, drop)

@@ -1,5 +1,6 @@
 """Imported bodies of other sizes and with links of other lengths."""
 
+import math
 import pathlib
 import re
 import tempfile
@@ -221,3 +222,28 @@ def test_a_changed_robot_stands_and_walks(links):
         timestep = environment.step(policy(timestep))
         assert not timestep.last()
     assert environment.physics.data.qpos[0] > 0.5
+
+
+@by_name
+def test_variants_keep_feet_level_motors_and_torso(body):
+    count = generator.deformation_count(body)
+    assert bool(count) == bool(parts_with_lengths(body))
+    if not count:
+        return
+    assert generator.mutated(body, 1, amount=0.0) == body.replace(name=f"{body.name}_mutated")
+    variant = generator.deform_legs(body, np.linspace(-0.2, 0.2, count))
+    depths = [[leg.foot_depth for leg in legs] for legs in (body.legs, variant.legs)]
+    assert np.allclose(np.ptp(np.subtract(*depths)), 0.0, atol=1e-9) and not np.allclose(*depths)
+    assert [joint.servo for joint in variant.joints] == [joint.servo for joint in body.joints]
+    assert not flaws(variant)
+
+
+def test_legs_that_are_mirror_images_change_alike():
+    body = imports.quadruped()
+    longer = generator.deform_legs(body, np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]))
+    is_same = {part: end == link_ends(body)[part] for part, end in link_ends(longer).items()}
+    pairs = [(part, f"r{part[1:]}") for part in is_same if part.startswith("l")]
+    assert all(is_same[left] == is_same[right] for left, right in pairs)
+    lengths = [math.hypot(*link_ends(each)["l1_link2"]) for each in (body, longer)]
+    assert lengths[1] > lengths[0]
+    assert measure_standing(longer).mass > measure_standing(body).mass

@@ -6,6 +6,7 @@ a table of all bodies, a picture and pages into a folder. Interrupted at any mom
   arc-suite design --goal transport --bodies 260 --output gallery
   arc-suite design --goal progress --task stairs --set rise=0.12 --set width=0.3 --bodies 300 --output gallery
   arc-suite design --around tick --bodies 100 --output ticks
+  arc-suite design --around go2.xml --goal tracking --bodies 100 --output go2s
 """
 
 import collections
@@ -97,22 +98,28 @@ flags.DEFINE_string("output", None, "Folder to write to, made if need be. Requir
 def budget_from_flags(around: Body | None) -> Budget:
     """Return what bodies may spend.
 
-    Unless flags say otherwise, variants weigh as much as their creature and are no larger.
+    Unless flags say otherwise, variants weigh as much as their creature and are no larger. Those of an imported robot
+    differ in the lengths of their links: their masses follow, and they may be of any size.
 
     Args:
         around: creature whose variants are searched; None for a search of all bodies.
 
     Raises:
-        ValueError: a number out of range.
+        ValueError: a number out of range, or a mass for variants of an imported robot.
     """
+    limits: dict[str, float]
     if around is None:
         limits = {"mass": DEFAULT_MASS, "span": DEFAULT_SPAN}
+    elif around.source:
+        refuse_flags(["mass"], f"goes without --around {around.name}: links of an imported robot weigh what they weigh")
+        limits = {}
     else:
         limits = {"mass": measure_standing(around).mass, "span": float(extent(around).max())}
     for name in Budget._fields:
         if FLAGS[name].value is not None:
             limits[name] = FLAGS[name].value
-    return Budget(**{name: checks.number(name, value, *_BUDGET_BOUNDS[name]) for name, value in limits.items()})
+    checked_limits = {name: checks.number(name, value, *_BUDGET_BOUNDS[name]) for name, value in limits.items()}
+    return Budget(**{"mass": None, **checked_limits})
 
 
 @contextlib.contextmanager

@@ -22,14 +22,14 @@ class Budget(NamedTuple):
     """What a body may spend.
 
     Attributes:
-        mass: mass of every body, kg; its density follows.
+        mass: mass of every body, kg; its density follows. None: bodies weigh what their parts weigh.
         span: greatest extent of the standing body along x, y or z, m.
         height: greatest standing height, m.
         power: greatest mean of the motors' positive power over a walk, W/kg.
     """
 
-    mass: float
-    span: float
+    mass: float | None
+    span: float = math.inf
     height: float = math.inf
     power: float = math.inf
 
@@ -108,10 +108,19 @@ class ProportionGenes:
 
 
 class VariantGenes:
-    """Genes of the variants of a body, whose legs have other lengths and headings, as those of `generator.mutated`."""
+    """Genes of the variants of a body, whose legs have other lengths and headings, as those of `generator.mutated`.
+
+    Legs of imported robots keep their headings.
+    """
 
     def __init__(self, body: Body, amount: float):
-        """Take the body, and the standard deviation of logarithms of lengths and of headings in rad."""
+        """Take the body, and the standard deviation of logarithms of lengths and of headings in rad.
+
+        Raises:
+            ValueError: an imported body without a link that can change.
+        """
+        if not generator.deformation_count(body):
+            raise ValueError(f"{body.name}: no link has a length that can change; loops close between them")
         self._body = body
         self._amount = amount
         self.names = tuple(f"deformation_{number}" for number in range(1, generator.deformation_count(body) + 1))
@@ -139,6 +148,8 @@ def extent(body: Body) -> np.ndarray:
 def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: str) -> Body:
     """Return the body of genes, with the scale and the density that keep a budget.
 
+    Without a mass in the budget, the body keeps its scale and density: only links of imported robots change.
+
     Args:
         budget: budget to keep.
         space: space that makes bodies of genes.
@@ -146,9 +157,12 @@ def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: st
         name: name of the body.
 
     Raises:
-        ValueError: a length or density out of range.
+        ValueError: a length or density out of range, or a body of given mass that exceeds the budget.
     """
     shape = space.shape(genes)
+    if budget.mass is None:
+        _check_within(budget, shape)
+        return shape.replace(name=name)
     size_share = space.size_share(genes)
     largest_factor = min(budget.span / float(extent(shape).max()), budget.height / shape.torso.standing_height)
     factor = min(largest_factor, 1.0) if size_share is None else size_share * largest_factor
@@ -160,3 +174,12 @@ def body_within_budget(budget: Budget, space: Genes, genes: np.ndarray, name: st
     if factor != 1.0:
         body = generator.scaled(body, factor)
     return body.replace(name=name)
+
+
+def _check_within(budget: Budget, body: Body) -> None:
+    """Raise ValueError for a body that is larger than the budget."""
+    sizes = {"span": float(extent(body).max()), "height": body.torso.standing_height}
+    for name, size in sizes.items():
+        limit = getattr(budget, name)
+        if size > limit:
+            raise ValueError(f"{name}: {size:.4g} m, more than {limit:.4g}")

@@ -211,19 +211,20 @@ def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: in
     heat = energy.heat(body)
     work = energy.start(len(body.joint_names))  # of the motors, divided by weight, m
     for timestep in evaluation.rollout(environment, policy, seed, steps):
-        joint_angles = data.qpos[7:]  # after the position and the quaternion of the torso
+        readings = task.read(data)
         if timestep.first():
-            start_x = data.qpos[0]
+            start_x = float(readings.torso_position[0])
             steps_taken = 0
             fell = False
-            work = energy.begin(work, joint_angles)
+            work = energy.begin(work, readings.joint_angles)
         else:
             steps_taken += 1
             has_diverged = environment.physics.divergence is not None
             fell |= has_diverged or walking.has_fallen(timestep.discount == 0.0, data.qpos[3:7])
-            work = energy.after(work, torques, heat, data.ctrl[: len(torques)], joint_angles)
+            efforts = readings.effort(data.ctrl[: len(torques)])
+            work = energy.after(work, torques, heat, efforts, readings.joint_angles)
     progress = environment.task.progress  # the task's metrics of the episode
-    displacement = data.qpos[0] - start_x
+    displacement = float(readings.torso_position[0]) - start_x
     seconds = steps * control_timestep  # of an episode without a fall
     tracking = progress.get("tracking", math.nan) * steps_taken / steps
     if "distance" in progress or math.isnan(tracking):

@@ -5,6 +5,7 @@ import json
 import sys
 
 import imageio.v3 as imageio
+import imports
 import programs
 import pytest
 
@@ -100,6 +101,24 @@ def test_another_search_is_refused_and_left_alone(found):
 def test_bad_arguments_are_one_line(tmp_path, arguments, message):
     programs.refused(design(*arguments, f"--output={tmp_path / 'gallery'}"), f"arc-suite design: {message}")
     assert not (tmp_path / "gallery").exists()
+
+
+def test_an_imported_robot_has_no_mass_to_choose(tmp_path):
+    done = design(f"--around={imports.FILES / 'hexapod.urdf'}", "--mass=3", f"--output={tmp_path / 'gallery'}")
+    programs.refused(done, "arc-suite design: --mass: goes without --around hexapod_2kg")
+
+
+@pytest.mark.release
+@pytest.mark.parametrize("name", ["go2_like.xml", "hexapod.urdf"])
+def test_variants_of_an_imported_robot(name, tmp_path):
+    done = design(f"--around={imports.FILES / name}", "--goal=speed", "--bodies=20", f"--output={tmp_path / 'gallery'}")
+    if "cannot render" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0
+    paths = list((tmp_path / "gallery" / "bodies").iterdir())
+    heights = {load_body(path).torso.standing_height for path in paths}
+    assert len(heights) == len(paths) > 1
+    assert imports.body(name).torso.standing_height not in heights
 
 
 def test_a_folder_is_required():

@@ -2,12 +2,15 @@
 
 import math
 
+import imports
 import numpy as np
 import pytest
+import sprung_robots
 
 from arc_suite.animation.design.axes import AXES, Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, body_within_budget, extent
 from arc_suite.bodies.generator import deformation_count, mutated, random_body
+from arc_suite.importing import import_robot
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
@@ -63,6 +66,26 @@ def test_variants_differ_are_no_larger_and_in_the_middle_are_the_creature():
     many = bodies(VariantGenes(tick, 0.2), budget, 20)
     assert max(extent(body).max() for body in many) <= budget.span + 1e-9
     assert len({body.legs for body in many}) == 20
+
+
+def test_variants_of_an_imported_robot_keep_its_scale_and_are_no_larger_than_the_budget():
+    body = imports.quadruped()
+    space = VariantGenes(body, 0.2)
+    middle = np.full(len(space.names), 0.5)
+    assert body_within_budget(Budget(None), space, middle, "dog_0") == body.replace(name="dog_0")
+    variants = bodies(space, Budget(None), 8)
+    heights = {variant.torso.standing_height for variant in variants}
+    assert len(heights) == 8 and {variant.torso.solids for variant in variants} == {body.torso.solids}
+    with pytest.raises(ValueError, match=r"^height: 0\.\d+ m, more than 0\.1$"):
+        body_within_budget(Budget(None, height=0.1), space, middle, "dog_0")
+    with pytest.raises(ValueError, match=r"^span: 0\.\d+ m, more than 0\.2$"):
+        body_within_budget(Budget(None, span=0.2), space, middle, "dog_0")
+
+
+def test_a_robot_whose_links_all_stand_in_loops_has_no_variants(tmp_path):
+    path = sprung_robots.write(tmp_path, **sprung_robots.CASES["rods that connections close"])
+    with pytest.raises(ValueError, match="no link has a length that can change"):
+        VariantGenes(import_robot(path).body, 0.1)
 
 
 def test_a_budget_that_no_body_keeps_is_one_line():

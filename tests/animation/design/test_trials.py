@@ -2,10 +2,11 @@
 
 import math
 
+import imports
 import pytest
 
 from arc_suite.animation.design.genes import Budget
-from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, evaluate, exclusion_reason, measure_walk
+from arc_suite.animation.design.trials import GOALS, Round, Trial, WalkMeans, evaluate, exclusion_reason, measure_walk
 from arc_suite.bodies.generator import generate
 
 BUDGET = Budget(12.0, 1.5)
@@ -52,6 +53,12 @@ def test_a_body_walks_and_challenges_an_elite():
     assert evaluate(trial, "no body: too large", 0.0) == ("no body: too large", None, None)
     high = body.replace(torso=body.torso.replace(standing_height=0.7))
     assert evaluate(trial, high, 0.0).reason.startswith("unsound: feet hang")
+
+
+def test_the_power_of_servos_is_that_of_their_torques():
+    body = imports.with_arm()  # whose held joint stands between those of the legs
+    walk = measure_walk(body, "walk", Round({}, (0,), 100), GOALS["transport"])
+    assert math.isclose(walk.power, 9.81 * walk.speed * walk.cost_of_transport, rel_tol=0.05)
 
 
 def test_tracking_counts_steps_after_a_fall_as_nothing():
