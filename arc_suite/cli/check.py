@@ -6,10 +6,12 @@
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
-nothing up, none that can step. An imported body stands for a second; a line tells whether its joints buzz.
+nothing up, none that can step. An imported body stands for a second; a line tells whether its motors are too
+weak to hold it, or its joints buzz.
 With --walk its default demonstrator walks it for 100 control steps, an imported robot for 1000. Where it falls,
 drags its torso, or stays below 0.7 of the target speed, the demonstrator `medium` tries. Where that fails, too, a
-line names the fields to leave out, which are then sized to suit the body. With
+line names the fields to leave out, which are then sized to suit the body; of an imported robot, it says whether
+stronger motors help. With
 --tasks the demonstrator of each task walks it, too, in four episodes of 200 control steps; a line for each
 task names the preset, its metric and how many episodes ended upright.
 
@@ -18,6 +20,8 @@ the line names the terms, metrics and blocks that differ.
 
 Exit status 1 if there is any flaw, fall, slow walk or difference.
 """
+
+from collections.abc import Sequence
 
 from absl import flags
 
@@ -28,8 +32,8 @@ from arc_suite.cpg.selection import suited_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance, cures, suitability
 from arc_suite.models.soundness import flaws
-from arc_suite.robots.spec import Body
-from arc_suite.simulation.stillness import calming_armature, measure_stillness
+from arc_suite.robots.spec import Body, Joint
+from arc_suite.simulation.stillness import Stillness, calming_armature, measure_stillness
 from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
@@ -40,6 +44,8 @@ flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}
 
 _SEEDS = suitability.SEEDS[:4]  # of the episodes of each task
 _STEPS = 200  # control steps of each of them
+_MAX_NAMES = 4  # of joints in one line
+_SAME_ARMATURE = 0.99  # of what fits; a file rounds numbers
 _GOOD_QUALITY = 2  # of a walk that counts as walking; see `cures.FirstWalk`
 _FAILURE_TEXTS = {"touch": "drags its torso", "slow": "is slow"}  # by the failures of a walk, except falls
 
@@ -63,9 +69,11 @@ def _check_body(spec: str) -> bool:
     body_flaws = flaws(body)
     for flaw in body_flaws:
         print(f"{spec}: {flaw.text}")
-    if not body_flaws:
+    stillness = measure_stillness(body) if body.source else None
+    is_held = stillness is None or not stillness.overloaded.any()
+    if not body_flaws and is_held:
         print(f"{spec}: {body.name} stands and can take steps")
-    stands_still = _check_stillness(spec, body)
+    stands_still = stillness is None or _check_stillness(spec, body, stillness)
     walks_well = True
     can_walk = not any(flaw.hopeless for flaw in body_flaws)
     if FLAGS.walk and can_walk:
@@ -75,17 +83,45 @@ def _check_body(spec: str) -> bool:
     return walks_well and stands_still and not body_flaws
 
 
-def _check_stillness(spec: str, body: Body) -> bool:
-    """Print whether the joints of a body with servos buzz as it stands; return whether they are still."""
-    if not body.source:
-        return True
-    stillness = measure_stillness(body)
+def _check_stillness(spec: str, body: Body, stillness: Stillness) -> bool:
+    """Print whether motors hold an imported body, and whether its joints buzz; return whether it stands still."""
+    if stillness.overloaded.any():
+        print(f"{spec}: {body.name} {_describe_overload(body, stillness)}")
+        return False
     if stillness.buzzes:
-        stiffness = max(joint.servo.stiffness for joint in body.joints)
-        armature = calming_armature(stiffness, body.simulation.timestep)
-        problem = f"buzzes as it stands: its joints shake at {stillness.joint_speed:.2g} rad/s"
-        print(f"{spec}: {body.name} {problem}: an armature of {armature:.2g} kg m^2 at each joint of its file fits")
+        print(f"{spec}: {body.name} buzzes as it stands: {_describe_buzz(body, stillness)}")
     return not stillness.buzzes
+
+
+def _describe_overload(body: Body, stillness: Stillness) -> str:
+    """Return which motors are too weak to hold a body, and which torque does."""
+    weak_joints = [joint for joint, is_weak in zip(body.joints, stillness.overloaded, strict=True) if is_weak]
+    names = ", ".join(joint.alias or joint.name for joint in weak_joints[:_MAX_NAMES])
+    problem = f"sinks as it stands: {len(weak_joints)} motors give their largest torque all the time ({names})"
+    cure = cures.find_strong_enough(body, lambda stronger_body: not measure_stillness(stronger_body).overloaded.any())
+    if cure is None:
+        return f"{problem}; {cures.FACTORS[-1]:g} times their torque does not hold it either"
+    factor, _ = cure
+    return f"{problem}; {factor:g} times their torque holds it, {_torque_range(weak_joints, factor)}"
+
+
+def _torque_range(joints: Sequence[Joint], factor: float) -> str:
+    """Return the least and the greatest limit of joints with servos, times a factor."""
+    limits = [factor * joint.servo.limit for joint in joints]
+    low = f"{min(limits):.3g}"
+    high = f"{max(limits):.3g}"
+    return f"{low} N m" if low == high else f"{low} to {high} N m"
+
+
+def _describe_buzz(body: Body, stillness: Stillness) -> str:
+    """Return how joints of an imported body shake, and what calms them."""
+    stiffness = max(joint.servo.stiffness for joint in body.joints)
+    armature = calming_armature(stiffness, body.simulation.timestep)
+    problem = f"its joints shake at {stillness.joint_speed:.2g} rad/s"
+    least_armature = min(joint.armature or 0.0 for joint in body.joints)
+    if least_armature < _SAME_ARMATURE * armature:
+        return f"{problem}: an armature of {armature:.2g} kg m^2 at each joint of its file fits"
+    return f"{problem} despite an armature of {least_armature:.2g} kg m^2: lower gains or a shorter time step may fit"
 
 
 def _check_walk(spec: str, body: Body) -> bool:
@@ -120,7 +156,13 @@ def _try_tasks(spec: str, body: Body) -> None:
 
 
 def _advice(body: Body, walk: cures.FirstWalk) -> str:
-    """Return which fields of the joints to leave out, so that the body walks better; empty if it has none of them."""
+    """Return what would make a body walk: fields of its joints to leave out, or motors of an imported robot.
+
+    Returns:
+        Empty if it has none of these fields, and is not imported.
+    """
+    if body.source:
+        return _advice_on_motors(body)
     fields = cures.given_fields(body)
     cure = cures.left_out(body, walk.quality)
     if cure is not None:
@@ -129,6 +171,16 @@ def _advice(body: Body, walk: cures.FirstWalk) -> str:
     if fields:
         return f": leaving out {', '.join(fields)} of its joints does not help"
     return ""
+
+
+def _advice_on_motors(body: Body) -> str:
+    """Return which multiple of the motors' torques and gains makes an imported robot walk."""
+    cure = cures.find_strong_enough(body, lambda stronger_body: cures.walk(stronger_body).quality == _GOOD_QUALITY)
+    if cure is None:
+        return f": motors of {cures.FACTORS[-1]:g} times the torques and gains do not help"
+    factor, stronger_body = cure
+    motors = f"with {factor:g} times the torques and gains of its motors ({_torque_range(body.joints, factor)})"
+    return f": its motors are weak: {motors} it {_describe_walk(cures.walk(stronger_body))}"
 
 
 def _describe_walk(walk: cures.FirstWalk) -> str:

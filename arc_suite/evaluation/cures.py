@@ -1,6 +1,7 @@
-"""First walks of bodies: whether the demonstrator can walk a body, and which fields of its spec to leave out if not."""
+"""First walks of bodies: whether the demonstrator can walk a body, and what would help if not."""
 
 import itertools
+from collections.abc import Callable
 from typing import NamedTuple
 
 from arc_suite.cpg import Demonstrator
@@ -13,6 +14,7 @@ _STEPS = 100  # control steps; 5 s of the four robots, of which the first 2 s ar
 _STEPS_OF_IMPORTED = 1000  # control steps, as some imported robots fall late
 PRESET = "medium"  # of the demonstrator that walks: all bodies have it
 FIELDS = ("motor", "damping", "armature")  # of joints; where a spec leaves them out, they are sized
+FACTORS = (1.25, 1.5, 2.0, 3.0, 5.0)  # of the torques and gains of motors, that are tried
 
 
 class FirstWalk(NamedTuple):
@@ -89,6 +91,37 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
         return first_walk.quality, -len(names), first_walk.speed
 
     return max(better_walks.items(), key=rank, default=None)
+
+
+def find_strong_enough(body: Body, is_cured: Callable[[Body], bool]) -> tuple[float, Body] | None:
+    """Return the least factor of motors with which an imported body is cured, and that body; None if none helps.
+
+    Args:
+        body: any; None is returned unless it is imported.
+        is_cured: whether a body has the problem no more.
+    """
+    if not body.source:
+        return None
+    for factor in FACTORS:
+        stronger_body = multiply_motors(body, factor)
+        if is_cured(stronger_body):
+            return factor, stronger_body
+    return None
+
+
+def multiply_motors(body: Body, factor: float) -> Body:
+    """Return an imported body whose motors have a multiple of their torques and gains."""
+
+    def strengthen(link: Link) -> Link:
+        if link.joint is None:
+            return link
+        servo = link.joint.servo
+        changes = {name: factor * getattr(servo, name) for name in ("limit", "stiffness", "damping")}
+        if servo.stall is not None:
+            changes["stall"] = factor * servo.stall
+        return link.replace(joint=link.joint.replace(servo=servo.replace(**changes)))
+
+    return body.replace(legs=tuple(leg.replace(links=tuple(map(strengthen, leg.links))) for leg in body.legs))
 
 
 def _leave_out(body: Body, names: tuple[str, ...]) -> Body:

@@ -9,6 +9,7 @@ import programs
 import pytest
 
 from arc_suite.bodies import generator
+from arc_suite.evaluation import cures
 from arc_suite.robots import spec_files
 from arc_suite.tasks import TASKS
 
@@ -175,25 +176,36 @@ def test_another_demonstrator_walks_where_the_default_one_falls(path):
     assert re.fullmatch(rf"{path}: walks 1000 control steps at 0\.3\d m/s \(1\.\d\d of .*\) by medium", walks)
 
 
-def test_imported_robots_walk_for_20_seconds_and_get_no_advice(path):
+def test_imported_robots_walk_for_20_seconds_and_get_no_advice():
     robot = imports.FILES / "go2_like.xml"
     done = check("--walk", robot)
     walks = r"walks 1000 control steps at 0\.\d\d m/s \((0\.[89]|1\.[01])\d of the target 0\.34\) by straight"
     assert done.returncode == 0 and re.fullmatch(f"{robot}: {walks}", done.stdout.splitlines()[1])
-    body = imports.quadruped()
-    servo = body.legs[0].joints[0].servo
-    soft = servo.replace(stiffness=0.1 * servo.stiffness, limit=0.3 * servo.limit)
-    legs = tuple(
-        leg.replace(links=tuple(link.replace(joint=link.joint.replace(servo=soft)) for link in leg.links))
-        for leg in body.legs
-    )
-    spec_files.save_body(body.replace(legs=legs), path)
+
+
+def test_weak_motors_of_an_imported_robot_are_told_with_torques_that_fit(path):
+    """The motors can hold the robot, and are too weak to walk it."""
+    spec_files.save_body(cures.multiply_motors(imports.quadruped(), 0.22), path)
     done = check("--walk", path)
     assert done.returncode == 1
-    assert "leav" not in done.stdout
-    assert re.search(
-        rf"{path}: quadruped_15_kg (falls after \d+ control steps|is slow: walks .*\)) by medium$", done.stdout.strip()
-    )
+    stands, first, second = done.stdout.splitlines()
+    assert stands == f"{path}: quadruped_15_kg stands and can take steps"
+    slow = r"quadruped_15_kg (is slow: walks .*\)|falls after \d+ control steps)"
+    assert re.fullmatch(rf"{path}: {slow} by straight", first)
+    cure = r"with (1\.25|1\.5|2|3) times the torques and gains of its motors \([\d.]+ to [\d.]+ N m\) it walks 1000 .*"
+    assert re.fullmatch(rf"{path}: {slow} by medium: its motors are weak: {cure}", second), second
+
+
+def test_motors_that_do_not_hold_an_imported_robot_are_named_and_an_armature_is_not(path):
+    spec_files.save_body(cures.multiply_motors(imports.quadruped(), 0.15), path)
+    done = check(path)
+    assert done.returncode == 1
+    (line,) = done.stdout.splitlines()
+    problem = r"sinks as it stands: 2 motors give their largest torque all the time \(RL_calf_joint, RR_calf_joint\)"
+    cure = r"1\.25 times their torque holds it, 8\.5\d N m"
+    assert re.fullmatch(rf"{path}: quadruped_15_kg {problem}; {cure}", line), line
+    spec_files.save_body(cures.multiply_motors(imports.quadruped(), 0.15 * 1.25), path)
+    assert check(path).returncode == 0
 
 
 @pytest.mark.release

@@ -8,10 +8,11 @@ import numpy as np
 import programs
 import pytest
 
+from arc_suite.cli import check
 from arc_suite.evaluation import cures
 from arc_suite.importing import import_robot
 from arc_suite.robots.spec import SpecError
-from arc_suite.simulation.stillness import measure_stillness
+from arc_suite.simulation.stillness import Stillness, calming_armature, measure_stillness
 
 FOLDER = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"
 GO2, A1, HEXAPOD = (FOLDER / name for name in ("go2_like.xml", "a1_like.urdf", "hexapod.urdf"))
@@ -52,6 +53,15 @@ def lightest_urdf(tmp_path):
     path = tmp_path / "lightest.urdf"
     path.write_text(scale_links(A1.read_text(), r"\w\w_(calf|foot)", 0.01))
     return path
+
+
+def change_armatures(body, armature):
+    """Return a body whose joints have an armature."""
+    legs = []
+    for leg in body.legs:
+        links = tuple(link.replace(joint=link.joint.replace(armature=armature)) for link in leg.links)
+        legs.append(leg.replace(links=links))
+    return body.replace(legs=tuple(legs))
 
 
 def armature_note(notes):
@@ -115,6 +125,25 @@ def test_check_tells_buzzing_and_an_armature_that_calms_it(light_mjcf, tmp_path)
     assert re.search(words, problem), problem
     programs.passed(programs.arc_suite("import", light_mjcf, "--armature=0.0091", "-o", path))
     programs.passed(programs.arc_suite("check", path))
+
+
+def test_an_armature_that_is_there_is_not_advised():
+    """Stiff servos shake a joint despite the armature."""
+    body = import_robot(GO2, armature=0.0).body
+    shaking = Stillness(0.4, True, False, np.zeros(len(body.joints), bool))
+    assert "an armature of " in check._describe_buzz(body, shaking)
+    stiffness = max(joint.servo.stiffness for joint in body.joints)
+    armature = calming_armature(stiffness, body.simulation.timestep)
+    assert "fits" in check._describe_buzz(change_armatures(body, 0.9 * armature), shaking)
+    text = check._describe_buzz(change_armatures(body, armature), shaking)
+    assert text.startswith("its joints shake at 0.4 rad/s despite an armature of ") and "lower gains" in text
+
+
+def test_a_motor_that_gives_its_limit_one_way_is_overloaded_and_one_that_swings_is_not(light_mjcf):
+    buzzing = measure_stillness(import_robot(light_mjcf, armature=0.0).body)
+    assert buzzing.buzzes and not buzzing.overloaded.any()
+    weak = measure_stillness(cures.multiply_motors(import_robot(GO2).body, 0.1))
+    assert weak.overloaded.any() and not weak.buzzes
 
 
 def test_a_robot_that_falls_does_not_buzz():

@@ -111,7 +111,9 @@ def score_policies(division: str) -> None:
 
 def announce(policies, desc: str, **options):
     """Print how many policies are judged, as that takes minutes, and return their progress bar."""
-    say(f"{desc}: {len(policies)} of the {SEEDS * len(PLACES)} policies of an entry, {evaluation.EPISODES} episodes each")
+    say(
+        f"{desc}: {len(policies)} of the {SEEDS * len(PLACES)} policies of an entry, {evaluation.EPISODES} episodes each"
+    )
     return progress(policies, desc=desc, **options)
 
 

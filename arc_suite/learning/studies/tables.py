@@ -157,7 +157,9 @@ def study(name: str) -> Study:
     if ":" not in name:
         expected = "expected module:attribute, a Study on Python's path, or <division>-<algorithm> of the benchmark"
         clone_studies = "tools/study.py of a clone runs those of its folder studies"
-        raise ValueError(f"study {checks.preview(name)}: {expected}, such as {next(iter(DIVISIONS))}-ppo; {clone_studies}")
+        raise ValueError(
+            f"study {checks.preview(name)}: {expected}, such as {next(iter(DIVISIONS))}-ppo; {clone_studies}"
+        )
     imported = checks.import_object(name, "study")
     if not isinstance(imported, Study):
         raise ValueError(f"study {checks.preview(name)}: expected a Study, got {type(imported).__name__}")
