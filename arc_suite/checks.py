@@ -7,6 +7,7 @@ import operator
 import os
 import pkgutil
 import re
+import sys
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "env_id": ("robot",),
     "exclude_current_positions_from_observation": ("exclude_blocks",),
     "false": ("in_place",),
+    "file": ("spec", "robot"),
     "fetch": ("navigate",),
     "first_person": ("eye",),
     "follow": ("tracking",),
@@ -65,6 +67,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "max_episode_steps": ("time_limit",),
     "max_grad_norm": ("gradient_norm",),
     "model": ("policy", "run"),
+    "mjcf": ("spec", "robot"),
     "model_path": ("policy", "run"),
     "n_envs": ("num_envs",),
     "n_epochs": ("epochs",),
@@ -72,6 +75,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "n_steps": ("horizon", "n_step", "steps"),
     "net_arch": ("hidden",),
     "num_legs": ("legs",),
+    "nod": ("pitch",),
     "none": ("in_place",),
     "num_workers": ("threads", "jobs"),
     "off": ("in_place",),
@@ -102,6 +106,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "tqc": ("sac",),
     "true": ("moving",),
     "trpo": ("ppo",),
+    "urdf": ("spec", "robot"),
     "velocity": ("target_velocity", "steer"),
     "walker": ("leaper",),
     "walker2d": ("leaper",),
@@ -429,5 +434,23 @@ def import_object(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.
     except SyntaxError as error:
         raise ValueError(f"{kind} {path[:_MAX_PATH]!r}: {describe_syntax_error(error)}") from None
     except (ImportError, ValueError, AttributeError) as error:
-        suggestion = hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
+        suggestion = describe_other_module(path.partition(":")[0])
+        if not suggestion and isinstance(error, AttributeError):
+            suggestion = hint(error.name, dir(error.obj))
         raise ValueError(f"{kind} {path[:_MAX_PATH]!r}: {quote(error)}{suggestion}") from None
+
+
+def describe_other_module(module: str) -> str:
+    """Return the part of an error that says which file was imported in place of one of the current folder; else "".
+
+    Args:
+        module: name of the module, such as "wave", which Python itself has.
+    """
+    path = Path(f"{module[:_MAX_PATH]}.py")
+    if module not in sys.modules or not path.is_file():
+        return ""
+    file = getattr(sys.modules[module], "__file__", None)
+    if file is not None and path.resolve() == Path(file).resolve():
+        return ""
+    origin = "Python's own" if file is None else file
+    return f"; {origin} was read, as the name of ./{path} is taken: give that file another name"

@@ -12,7 +12,7 @@ import os
 import platform
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -250,6 +250,15 @@ def is_folder(text: str) -> bool:
         return text != "" and Path(text).is_dir()
     except (OSError, ValueError):  # it is too long, or has a null character
         return False
+
+
+def suggest_extension(text: str, extensions: Iterable[str]) -> str:
+    """Return the part of an error on a name that suggests a file of this name with an extension; "" for none."""
+    for extension in extensions:
+        with contextlib.suppress(OSError, ValueError):  # the text is too long, or has a null character
+            if Path(f"{text}{extension}").is_file():
+                return f"; did you mean {text}{extension}?"
+    return ""
 
 
 def suggest_path(path: str | os.PathLike[str]) -> str:

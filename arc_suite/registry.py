@@ -225,6 +225,7 @@ def _refuse_other_words(text: str) -> None:
         raise ValueError(f"robot {checks.preview(text)}: {files.ADDRESS_CURE}")
     if text in TASKS:
         raise ValueError(f"robot {text!r}: it is a task; robots are {', '.join(ROBOTS)}")
+    _refuse_name_of_file("robot", text, (".json", *READERS))
     if files.is_folder(text):
         extensions = ", ".join((".json", *READERS))
         raise ValueError(f"robot {checks.preview(text)}: it is a folder; expected a name, or a file {extensions}")
@@ -235,6 +236,13 @@ def _refuse_gymnasium_id(kind: str, text: str) -> None:
     match = _GYMNASIUM_ID.fullmatch(text)
     if match and match[1] in robot_words() and match[2] in TASKS:
         raise ValueError(f"{kind} {text!r}: it is an id of Gymnasium; its robot is {match[1]}, its task {match[2]}")
+
+
+def _refuse_name_of_file(kind: str, text: str, extensions: Iterable[str]) -> None:
+    """Raise ValueError for a word that is the name of a file without its extension."""
+    cure = files.suggest_extension(text, extensions)
+    if cure:
+        raise ValueError(f"unknown {kind} {checks.preview(text)}{cure}")
 
 
 def _family_words() -> list[str]:
@@ -354,7 +362,11 @@ def arena_maker(arena: str) -> Callable[[Body], Arena]:
         OSError: the file cannot be read.
     """
     word = arena_word(arena)
-    return ground_text.fit(word) if ground_text.is_text(word) else _look_up(word, ARENAS, "arena")
+    if ground_text.is_text(word):
+        return ground_text.fit(word)
+    if isinstance(word, str) and word not in ARENAS:
+        _refuse_name_of_file("arena", word, GROUND_READERS)
+    return _look_up(word, ARENAS, "arena")
 
 
 def arena_word(arena: str) -> str:
@@ -548,7 +560,7 @@ def _look_up(name, table: Mapping, kind: str, suggestions: Iterable[str] = ()):
         ValueError: an unknown name, a module that cannot be imported, or a module that does not register the name.
     """
     if not (isinstance(name, str) and ":" in name):
-        return table[checks.name(name, table, kind, suggestions)]
+        return table[checks.name(name, table, kind, suggestions, ("module:name",))]
 
     module, _, key = name.rpartition(":")
     if not all(part.isidentifier() for part in module.split(".")):
@@ -557,7 +569,7 @@ def _look_up(name, table: Mapping, kind: str, suggestions: Iterable[str] = ()):
     import_module(module, f"{kind} {shown_key}")
     if key not in table:
         names_of_module = [entry for entry in table if MODULE_OF_NAME.get((kind, entry)) == module]
-        hint = checks.hint(key, names_of_module)
+        hint = checks.describe_other_module(module) or checks.hint(key, names_of_module)
         raise ValueError(f"{kind} {shown_key}: {module} registers no such {kind} by arc_suite.register{hint}")
     if (kind, key) not in MODULE_OF_NAME:
         raise ValueError(f"{kind} '{module}:{key}': {key} is the suite's own, expected without a module")

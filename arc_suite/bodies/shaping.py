@@ -77,7 +77,8 @@ def shaped(body: Body, **changes) -> Body:
     link_factors = {}
     for name, factor in shape.links.items():
         if name not in body_ends:  # of one leg
-            checks.name(name, link_names(body), "link")
+            of_one_leg = f"of one leg, as {next(iter(body_ends))}"
+            checks.name(name, link_names(body), "link", descriptions=(of_one_leg,))
         link_factors[name] = checks.number(f"links[{name!r}]", factor, *FACTOR_RANGE)
     ends = {checks.name(name, body_ends, "part"): end for name, end in shape.ends.items()}
     length = checks.number("length", shape.length, *FACTOR_RANGE)

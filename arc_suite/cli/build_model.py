@@ -34,7 +34,7 @@ from arc_suite.cli.flags import (
 from arc_suite.cli.summary import body_summary
 from arc_suite.envs.setup import Setup
 from arc_suite.models.standing import standing_qpos
-from arc_suite.robots import spec_files
+from arc_suite.robots import ROBOTS, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
 
@@ -49,6 +49,7 @@ flags.DEFINE_enum(
     "Pairs, left and right, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
 )
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE_RANGE)
+flags.DEFINE_string("name", None, "Name of the body, of letters a to z, digits and underscores.")
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
 flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")
 flags.DEFINE_bool("no_arena", False, "Leave floor and free joint to the scene that takes the model.")
@@ -131,15 +132,19 @@ def _body_from_flags() -> Body:
         for name in ("links", "layout"):
             if FLAGS[name].value is not None:
                 raise ValueError(f"--{name}={FLAGS[name].value}: goes with --legs or --seed, not with --{sources[0]}")
-        body = custom_body() or registry.body_of(FLAGS.robot)
+        body = custom_body() or adjust_body(registry.body_of(FLAGS.robot))
     elif "seed" in sources:
         body = adjust_body(sound_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout))
     else:
         links = DEFAULT_LINKS if FLAGS.links is None else FLAGS.links
         body = adjust_body(generator.generate(FLAGS.legs, links, FLAGS.layout))
-    if FLAGS.scale is None:
+    if FLAGS.scale is not None:
+        body = generator.scaled(body, FLAGS.scale)
+    if FLAGS.name is None:
         return body
-    return generator.scaled(body, FLAGS.scale)
+    if FLAGS.name in ROBOTS:
+        raise ValueError(f"--name={FLAGS.name}: it is a robot of the suite, whose numbers go with its name")
+    return body.replace(name=FLAGS.name)
 
 
 def _arena_from_flags(body: Body) -> Arena:

@@ -55,9 +55,9 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     flags.DEFINE_multi_string(
         "length",
         [],
-        "Factor on the length of a link of a spec or body made to order: --length lower=1.5, of one leg l1_lower=1.5.",
+        "Factor on the length of a link: --length lower=1.5, of one leg --length l1_lower=1.5.",
     )
-    flags.DEFINE_string("palette", None, f"Colors of a spec or body made to order: {palettes.HELP}.")
+    flags.DEFINE_string("palette", None, f"Colors of the body: {palettes.HELP}.")
 
 
 def define_arena() -> None:
@@ -132,7 +132,8 @@ def custom_body() -> Body | None:
     """Return the body of --spec or --legs, as --length and --palette change it; None without these flags.
 
     Raises:
-        ValueError: both are given, or --links, --length or --palette without them, or no body in the file.
+        ValueError: both are given, or --links without --legs, or --length or --palette where no flag names a body, or
+            no body in the file.
         OSError: the file cannot be read.
     """
     if FLAGS.spec is not None and FLAGS.legs is not None:
@@ -140,9 +141,8 @@ def custom_body() -> Body | None:
     if FLAGS.links is not None and FLAGS.legs is None:
         raise ValueError(f"--links={FLAGS.links}: goes with --legs")
     if FLAGS.spec is None and FLAGS.legs is None:
-        robot = getattr(FLAGS, "robot", None)
-        hint = f"; did you mean --spec={robot}?" if robot in spec_files.EXAMPLES else ""
-        refuse_flags(("length", "palette"), f"goes with --spec or --legs{hint}")
+        if not FLAGS["robot"].present:
+            refuse_flags(("length", "palette"), "goes with --robot, --spec or --legs")
         return None
     if FLAGS.spec is not None:
         return adjust_body(registry.body_of(FLAGS.spec))
@@ -180,8 +180,8 @@ def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy
 def bodies_from_flags(suggestions: Iterable[str] = ("all",)) -> dict[str, Body]:
     """Return bodies by name: the body of `custom_body`, or those that --robot names, which may be "all".
 
-    For names see `registry.bodies_of`. Warnings name the flaws of a body of --spec or --length, such as feet in the
-    floor, as `arc-suite check` does.
+    For names see `registry.bodies_of`. --length and --palette change each body. Warnings name the flaws of a body of
+    --spec or --length, such as feet in the floor, as `arc-suite check` does.
 
     Args:
         suggestions: other values of --robot that an unknown robot may mean.
@@ -194,18 +194,24 @@ def bodies_from_flags(suggestions: Iterable[str] = ("all",)) -> dict[str, Body]:
     if body is not None:
         if FLAGS["robot"].present:
             raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected no robot with --spec or --legs")
-        may_have_flaws = FLAGS.spec is not None or FLAGS.length
-        if may_have_flaws:
-            for flaw in flaws(body):
-                warnings.warn(f"{checks.quote(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=2)
-        return {registry.distinct_name(body): body}
-    if FLAGS.robot == "all":
-        return dict(ROBOTS)
-    bodies = registry.bodies_of(FLAGS.robot, suggestions)
+        bodies = (body,)
+    elif FLAGS.robot == "all":
+        bodies = tuple(adjust_body(robot) for robot in ROBOTS.values())
+    else:
+        bodies = tuple(adjust_body(robot) for robot in registry.bodies_of(FLAGS.robot, suggestions))
+    if FLAGS.spec is not None or FLAGS.length:
+        _warn_of_flaws(bodies)
     bodies_by_name = {registry.distinct_name(body): body for body in bodies}
     if len(bodies_by_name) < len(bodies):
         raise ValueError(f"--robot={checks.quote(FLAGS.robot)}: expected a name for each body, got two of one name")
     return bodies_by_name
+
+
+def _warn_of_flaws(bodies: Iterable[Body]) -> None:
+    """Warn of the flaws of bodies that users made."""
+    for body in bodies:
+        for flaw in flaws(body):
+            warnings.warn(f"{checks.quote(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=3)
 
 
 def only_body() -> Body:

@@ -29,9 +29,16 @@ from arc_suite.tasks import TASKS
 _DASHES = "-\u2013\u2014"  # also those that word processors write in place of two
 _POLICY_EXTENSIONS = (".npz", ".zip")
 _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
+_SEVERAL = re.compile(r"\bcommas\b|\ball\b|\bseveral\b")  # in the help of a flag whose text may be a list
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
 _EXPECTED_ERRORS = (flags.Error, ValueError, OSError, MemoryError, RenderingUnavailable, PhysicsError)
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
+
+# What shows files that no program of the suite shows, by extension.
+_VIEWERS = {
+    ".glb": "Blender, Godot and other programs show a .glb: see docs/engines.md",
+    ".html": "a browser shows a page",
+}
 
 # Answers to flags of other programs, which no flag of this suite replaces.
 _RESUME = "the same command goes on where it was interrupted"
@@ -42,6 +49,7 @@ _CURES = {
     "cuda": _DEVICE,
     "device": _DEVICE,
     "gpu": _DEVICE,
+    "name": "arc-suite build_model --name NAME --json writes a spec with a name of its own",
     "format": "the extension of the output is its format",
 }
 
@@ -119,7 +127,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
             return None
         if len(positional_arguments) > len(parameters):
             unexpected = positional_arguments[len(parameters)]
-            suggestion = _suggest_flag(unexpected)
+            suggestion = _suggest_list(arguments, positional_arguments, len(parameters)) or _suggest_flag(unexpected)
             raise ValueError(f"unexpected argument {checks.preview(unexpected)}; {suggestion}see --help")
         return main(*positional_arguments)
 
@@ -251,12 +259,50 @@ def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -
         raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {argument}, without a flag?")
 
 
+def _suggest_list(arguments: Sequence[str], positional_arguments: Sequence[str], parameter_count: int) -> str:
+    """Return a question for a flag whose several values have spaces between them, such as --clips walk idle.
+
+    Args:
+        arguments: those of the command line.
+        positional_arguments: those of them that are no flags and no values of flags, by absl.
+        parameter_count: number of arguments without a flag that the program takes.
+
+    Returns:
+        "" where no flag with several values comes before the first argument that is too many.
+    """
+    end = start = arguments.index(positional_arguments[parameter_count])
+    while start > 0 and arguments[start - 1][:1] not in _DASHES:
+        start -= 1
+    while end < len(arguments) and arguments[end][:1] not in _DASHES:
+        end += 1
+    name, equals, value = arguments[start - 1].lstrip("-").replace("-", "_").partition("=")
+    if start == 0 or name not in flags.FLAGS or flags.FLAGS[name].boolean:
+        return ""
+    values = [value] * bool(equals) + list(arguments[start:end])
+    arguments_elsewhere = len(positional_arguments) - (len(values) - 1)
+    arguments_behind = max(0, parameter_count - arguments_elsewhere)
+    return _join_values(flags.FLAGS[name], values[: len(values) - arguments_behind])
+
+
+def _join_values(flag: flags.Flag, values: Sequence[str]) -> str:
+    """Return a question for several values of a flag; "" if it takes one value."""
+    if isinstance(flag, flags.MultiFlag):
+        is_list_of_settings = all("=" in text for text in values)
+        return f"did you mean {' '.join(f'--{flag.name} {text}' for text in values)}? " if is_list_of_settings else ""
+    if not isinstance(flag.parser, flags.ListParser) and _SEVERAL.search(flag.help) is None:
+        return ""
+    list_text = ",".join(text.strip(",") for text in values if text.strip(","))
+    return f"did you mean --{flag.name}={list_text}? a list has commas and no spaces; "
+
+
 def _suggest_flag(argument: str) -> str:
     """Return a question for the flag that an argument may be the value of; "" if the program has no such flag."""
     name, equals, value = argument.lstrip(_DASHES).partition("=")
     if name in flags.FLAGS and (equals or argument[0] in _DASHES):
         return f"did you mean --{name}{equals}{value}? "
     extension = os.path.splitext(argument)[1].lower()
+    if extension in _VIEWERS and os.path.exists(argument):
+        return f"{_VIEWERS[extension]}; "
     flag_takes_argument = {
         "robot": argument in registry.robot_words(),
         "task": argument in TASKS,

@@ -240,5 +240,6 @@ def read_blocks(observation, names: Iterable[str], joints: int, parts: int | Non
         raise ValueError(f"observation: expected contact forces of {parts} rigid bodies, got {forces}")
     for name in names:
         if name not in observation:
-            raise ValueError(f"observation: expected a block {name}, as the task {_EXAMPLES.get(name, 'steer')} has")
+            example = _EXAMPLES.get(name, "steer")
+            raise ValueError(f"observation: expected a block {name}, as the task {example} has (--task {example})")
     return {name: np.asarray(observation[name], dtype=float) for name in names}

@@ -109,7 +109,9 @@ def _check_feet(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     if is_high.any() and not few_legs_are_deep:
         names = _join_names(body, is_high)
         largest = max(soles) - min(soles)
-        text = f"feet of {names} end up to {largest:.3g} m above the lowest foot: legs longer by that fit"
+        most_are_high = 2 * is_high.sum() > len(body.legs)
+        alternative = f", or {_join_names(body, ~is_high)} shorter" if most_are_high else ""
+        text = f"feet of {names} end up to {largest:.3g} m above the lowest foot: legs longer by that fit{alternative}"
         yield Flaw(text, False, _lengthen_legs(body, heights_above_lowest))
 
 

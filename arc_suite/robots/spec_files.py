@@ -22,6 +22,24 @@ MAX_IMPORTED = MAX_BYTES + 2 * MAX_SOURCE  # bytes of a file with a source; its 
 # Paths of the bodies that the package contains, by name.
 EXAMPLES = {path.stem: path for path in sorted(Path(__file__).with_name("examples").glob("*.json"))}
 
+# Files of other kinds, by extension, and JSON of other kinds, by a key that it has.
+_KINDS_OF_FILES = {
+    ".glb": "clips",
+    ".fbx": "clips",
+    ".bvh": "a motion",
+    ".html": "a page",
+    **dict.fromkeys((".png", ".jpg", ".gif", ".webp", ".mp4"), "a picture or a film"),
+    ".npz": "arrays, such as a policy or a motion",
+    ".onnx": "a policy",
+    ".zip": "an archive",
+}
+_KINDS_OF_JSON = {
+    "sketch": "a design: open it in arc-suite studio, and save its spec",
+    "clips": "what arc-suite animate tells of clips",
+    "frames": "what arc-suite animate tells of a sheet of sprites",
+    "algorithm": "the configuration of a run",
+}
+
 _MAX_QUOTE = 40  # characters of a key in an error
 _MAX_DIGITS = 20  # of an integer that is read as such; longer ones are read as floats
 _LIST_OF_NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
@@ -42,6 +60,7 @@ def load_body(path: str | os.PathLike[str]) -> Body:
     if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
         path = EXAMPLES[checks.name(path, EXAMPLES, "spec", suggestions=("FILE.json",))]
     data = files.read_bytes(path, MAX_IMPORTED)
+    check_kind(path)
     max_bytes = MAX_IMPORTED if b'"source"' in data else MAX_BYTES
     try:
         if len(data) > max_bytes:
@@ -49,6 +68,13 @@ def load_body(path: str | os.PathLike[str]) -> Body:
         return body_from_json(data)
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
+
+
+def check_kind(path: str | os.PathLike[str]) -> None:
+    """Raise SpecError for the name of a file of another kind, such as clips, which holds no body."""
+    suffix = Path(path).suffix.lower()
+    if suffix in _KINDS_OF_FILES:
+        raise SpecError(f"{path}: expected a body, .json, .xml or .urdf; a {suffix} holds {_KINDS_OF_FILES[suffix]}")
 
 
 def save_body(body: Body, path: str | os.PathLike[str]) -> None:
@@ -88,6 +114,8 @@ def body_from_json(text: str | bytes) -> Body:
         raise SpecError("expected a body in JSON, got too many brackets within brackets") from None
     except ValueError as error:
         raise SpecError(f"expected a body in JSON: {error}") from None
+    for key in _KINDS_OF_JSON.keys() & (fields if isinstance(fields, dict) else {}):
+        raise SpecError(f"expected a body in JSON, got {_KINDS_OF_JSON[key]}")
     return sources.check(_make_spec(Body, fields, path=""))
 
 

@@ -96,7 +96,10 @@ def test_any_body_can_be_shaped_and_loaded(body):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"links": {"lowr": 1.5}}, "unknown link 'lowr'; did you mean 'lower'? (there are: upper, middle, lower)"),
+        (
+            {"links": {"lowr": 1.5}},
+            "unknown link 'lowr'; did you mean 'lower'? (there are: upper, middle, lower, of one leg, as l1_upper)",
+        ),
         ({"links": {"lower": 20.0}}, "links['lower']: expected a number from 0.1 to 10, got 20.0"),
         ({"width": 0.0}, "width: expected a number from 0.1 to 10, got 0.0"),
         ({"fan": 91.0}, "fan: expected a number from -90 to 90, got 91.0"),

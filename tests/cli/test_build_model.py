@@ -13,10 +13,12 @@ from arc_suite import models, registry
 from arc_suite.arenas import FLAT
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
+from arc_suite.bodies.shaping import shaped
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 from arc_suite.simulation.physics import Physics
 
+ROBOT_WORDS = ", ".join(registry.robot_words())
 SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"
 
 
@@ -55,6 +57,8 @@ def test_visuals_dump_and_reload_bit_for_bit():
         (["--seed=11"], sound_body(11)),
         (["--seed=11", "--legs=4", "--links=1"], sound_body(11, 4, 1)),
         (["--spec", EXAMPLES["spider"]], load_body("spider")),
+        (["--robot", EXAMPLES["spider"], "--length=upper=1.2"], shaped(load_body("spider"), links={"upper": 1.2})),
+        (["--robot=tick", "--scale=2", "--name=flea"], generator.scaled(ROBOTS["tick"], 2.0).replace(name="flea")),
     ],
 )
 def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(arguments, body):
@@ -95,7 +99,7 @@ def test_summary_prints_the_figures_alone():
         (["--legs=6", "--links=0"], "flag --links=0: expected an integer in the range [1, 4]"),
         (
             ["--robot=quen"],
-            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.robot_words())})",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {ROBOT_WORDS}, module:name)",
         ),
         (["--robot=varied:0-1"], "robot 'varied:0-1': expected one body, got several"),
         (["--robot=queen", "--links=2"], "--links=2: goes with --legs or --seed, not with --robot"),
@@ -114,6 +118,8 @@ def test_summary_prints_the_figures_alone():
         (["--legs=4", "--render=x.txt"], "unknown extension '.txt' (there are: .png)"),
         (["--legs=4", "--render=x"], "x: expected a name that ends in .png"),
         (["--legs=4", "--output=x.json"], "--output=x.json: a model is .xml; --json writes the spec"),
+        (["--legs=4", "--name=Flea"], "Body.name: expected 1 to 32 characters out of [a-z0-9_], got 'Flea'"),
+        (["--legs=4", "--name=tick"], "--name=tick: it is a robot of the suite, whose numbers go with its name"),
         (["--spec=missing.json"], "cannot read missing.json: no such file or directory"),
     ],
 )

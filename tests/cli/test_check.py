@@ -13,6 +13,7 @@ from arc_suite.evaluation import cures
 from arc_suite.robots import spec_files
 from arc_suite.tasks import TASKS
 
+TASK_NAMES = f"(there are: {', '.join(TASKS)}, module:name)"
 ROOT = Path(__file__).parents[2]
 
 
@@ -49,7 +50,7 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
     ("arguments", "message"),
     [
         ((), "expected a spec file or --task; see --help"),
-        (("--task=wlak",), "unknown task 'wlak'; did you mean 'walk'? (there are: " + ", ".join(TASKS) + ")"),
+        (("--task=wlak",), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
         (("--task=walk", "--walk"), "--walk: expected a spec file, got --task"),
         (("--task=walk", "--tasks"), "--tasks: expected a spec file, got --task"),
         (("missing.json",), "cannot read missing.json: no such file or directory"),

@@ -16,6 +16,7 @@ from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 
 SPIDER, WORDS = EXAMPLES["spider"], ", ".join(registry.robot_words())
+FAMILY_WORDS, ONE_LEG = ", ".join(FAMILIES), "of one leg, as l1_upper"
 SEEDS_AND_COLORS = "a seed, such as 7, colors, such as #3a5f2b,#d8c48a"
 NO_PALETTE = f"unknown palette 'mos'; did you mean 'moss'? (there are: {', '.join(PALETTES)}, {SEEDS_AND_COLORS})"
 
@@ -28,12 +29,15 @@ NO_PALETTE = f"unknown palette 'mos'; did you mean 'moss'? (there are: {', '.joi
         (["--spec=a.json", "--legs=4"], "expected one of --spec and --legs, got both"),
         (["--links=4"], "--links=4: goes with --legs"),
         (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
-        (["--length=lower=2"], "--length: goes with --spec or --legs"),
-        (["--legs=4", "--length=shin=2"], "unknown link 'shin' (there are: upper, middle, lower)"),
+        (["--length=lower=2"], "--length: goes with --robot, --spec or --legs"),
+        (["--legs=4", "--length=shin=2"], f"unknown link 'shin' (there are: upper, middle, lower, {ONE_LEG})"),
         (["--legs=4", "--palette=mos"], NO_PALETTE),
         (["--legs=2"], "flag --legs=2: expected an integer in the range [4, 12]"),
-        (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {WORDS}, all)"),
-        (["--robot=vried:7"], f"unknown family 'vried'; did you mean 'varied'? (there are: {', '.join(FAMILIES)})"),
+        (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {WORDS}, all, module:name)"),
+        (
+            ["--robot=vried:7"],
+            f"unknown family 'vried'; did you mean 'varied'? (there are: {FAMILY_WORDS}, module:name)",
+        ),
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(preset_names())})"),
     ],

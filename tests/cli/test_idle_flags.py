@@ -17,7 +17,7 @@ SET = "set task arena"
 COMMON = f"{BODY} {SET} policy vecnormalize preset"
 # Flags by program: each has an effect with any others, or is refused as in a case below or in test_flags.py.
 ALWAYS = {
-    "build_model": "robot spec legs links length output summary render scale seed",
+    "build_model": "robot spec legs links length palette name output summary render scale seed",
     "import": "armature forward output home scale",
     "check": "task tasks walk",
     "render": f"{COMMON} seed steps output".replace(" preset", ""),
@@ -68,7 +68,7 @@ CASES = [
     ("build_model", "--robot=tick --render=a.png --visuals", f"--visuals: {NO_MODEL}"),
     ("build_model", "--robot=tick --summary --json", f"--json: {NO_MODEL}"),
     ("build_model", "--robot=tick --layout=radial", "--layout=radial: goes with --legs or --seed, not with --robot"),
-    ("build_model", "--robot=tick --palette=moss", "--palette: goes with --spec or --legs"),
+    ("train", "--robot=varied:0-1 --palette=moss", "--palette: goes with one body, not with several"),
     ("build_model", "--seed=4 --palette=nonsense", "unknown palette 'nonsense' (there are: "),
     ("build_model", "--seed=4 --length=shin=2", "unknown link 'shin'"),
     ("check", "spider --robot=tick", "--robot: goes with --task, not with a spec file"),
@@ -169,7 +169,7 @@ def test_colors_and_lengths_of_generated_bodies_have_an_effect():
     def spec(*arguments):
         return programs.passed(programs.arc_suite("build_model", "--json", *arguments))
 
-    for body in ("--legs=4", "--seed=4"):
+    for body in ("--legs=4", "--seed=4", "--robot=tick"):
         assert len({spec(body), spec(body, "--palette=rust"), spec(body, "--length=upper=1.5")}) == 3
 
 

@@ -1,9 +1,13 @@
 """Mistakes at the command line: one line each, with the cure where one is near."""
 
+import wave
+
 import numpy as np
 import programs
 import pytest
 from tiers import tiers
+
+from arc_suite.tasks import TASKS
 
 ROBOTS = "(there are: queen, bastion, tick, leaper, "
 # What follows the name of the program; those of the first part have a cure that was missing once.
@@ -51,6 +55,8 @@ OTHERS = {
     "completion powershell": "unknown shell 'powershell' (there are: bash, zsh, fish)\n",
     "doctor --fix": "unknown flag 'fix' (there are: help, version)\n",
 }
+BODY = "expected a body, .json, .xml or .urdf"
+WAVE = f"{wave.__file__} was read, as the name of ./wave.py is taken: give that file another name\n"
 # Files and words in the place of others.
 MISPLACED = {
     "evaluate --robot=tick --policy=folder": "cannot read folder/policy.npz: no such file; a run writes it",
@@ -62,7 +68,17 @@ MISPLACED = {
     "evaluate --robot=tick --policy=tick": "policy 'tick': it is a robot; expected as robot, next to a policy",
     "evaluate --policy=foldr": "unknown policy 'foldr'; did you mean folder?\n",
     "evaluate --robot=folder": "robot 'folder': it is a folder; expected a name, or a file .json, .xml, ",
-    "evaluate --spec=clip.glb": "clip.glb: expected a body in JSON, got a file that is no text\n",
+    "evaluate --spec=clip.glb": f"clip.glb: {BODY}; a .glb holds clips\n",
+    "evaluate --robot=page.html": f"page.html: {BODY}; a .html holds a page\n",
+    "import arrays.npz": f"arrays.npz: {BODY}; a .npz holds arrays, such as a policy or a motion\n",
+    "animate --spec=my_design.json": "my_design.json: expected a body in JSON, got a design: open it in arc-suite ",
+    "animate --spec=my.clips.json": "my.clips.json: expected a body in JSON, got what arc-suite animate tells of clips",
+    "check my": "unknown robot 'my'; did you mean my.json?\n",
+    "evaluate --robot=my": "unknown robot 'my'; did you mean my.json?\n",
+    "evaluate --arena=ground": "unknown arena 'ground'; did you mean ground.png?\n",
+    "animate --clips=arrays -o a.glb": "unknown clip 'arrays'; did you mean arrays.npz?\n",
+    "animate --clips=wave:bow -o a.glb": f"clip 'bow': wave registers no such clip by arc_suite.register; {WAVE}",
+    "evaluate --policy=wave:make": f"policy 'wave:make': module 'wave' has no attribute 'make'; {WAVE}",
     "evaluate --spec=boddy.json": "cannot read boddy.json: no such file or directory; did you mean body.json?\n",
     "evaluate --robot=spider.json": "cannot read spider.json: no such file or directory; did you mean spider?\n",
     "evaluate --robot=tick --task=queen": "task 'queen': it is a robot; tasks are walk, steer, ",
@@ -73,7 +89,7 @@ MISPLACED = {
     "evaluate --robot=tick --set weights.forward=2": (
         "--set weights.forward=2: expected a name without a dot; did you mean 'weights={\"forward\": 2}'?\n"
     ),
-    "check clip.glb": "clip.glb: expected a body in JSON, got a file that is no text\n",
+    "check clip.glb": f"clip.glb: {BODY}; a .glb holds clips\n",
     "build_model --robot=tick --output=tick.urdf": "unknown extension '.urdf' (there are: .xml)\n",
     "build_model --robot=tick --json --output=tick.xml": "unknown extension '.xml' (there are: .json)\n",
     "motion clip.glb --robot=tick -o a.npz": "clip.glb: expected a binary glTF file",
@@ -86,6 +102,7 @@ MISPLACED = {
 DOWNLOAD = "it is an address: download the file, and name its path\n"
 ID = "it is an id of Gymnasium; its robot is tick, its task"
 ONE = "expected one name=value; did you mean"
+LIST = "a list has commas and no spaces; see --help\n"
 RIGS = "(there are: skin, nodes)\n"
 MOTION = "expected a name, or a motion, .npz; arc-suite motion makes one of a .glb, a .bvh or a table\n"
 # What people type who come from Gymnasium, an animation program or a page of the internet.
@@ -110,7 +127,21 @@ FIRST_HOUR = {
     "build_model --spec=spider --length=upper=1.2,lower=2": f"--length upper=1.2,lower=2: {ONE} --length upper=1.2 --",
     "evaluate --set episodes=5": "--set episodes=5: it is a flag; did you mean --episodes=5?\n",
     "evaluate --set robot=queen": "--set robot=queen: it is a flag; did you mean --robot=queen?\n",
-    "evaluate --robot=spider --length=upper=1.2": "--length: goes with --spec or --legs; did you mean --spec=spider?\n",
+    "animate --clips walk idle -o a.glb": f"unexpected argument 'idle'; did you mean --clips=walk,idle? {LIST}",
+    "animate -o a.glb --clips=walk, idle": f"unexpected argument 'idle'; did you mean --clips=walk,idle? {LIST}",
+    "import --feet a b go2.xml": f"unexpected argument 'go2.xml'; did you mean --feet=a,b? {LIST}",
+    "import go2.xml --feet a b": f"unexpected argument 'b'; did you mean --feet=a,b? {LIST}",
+    "evaluate --robot queen tick": f"unexpected argument 'tick'; did you mean --robot=queen,tick? {LIST}",
+    "animate --robot queen tick": "unexpected argument 'tick'; did you mean --robot=tick? see --help\n",
+    "evaluate --set kicks=1 gait=trot": "unexpected argument 'gait=trot'; did you mean --set kicks=1 --set gait=trot? ",
+    "animate --robot=tick --weight=slow -o a.glb": "unknown weight 'slow' (there are: heavy, nervous, old, a number fr",
+    "build_model --legs=4 --length=front=2": "unknown link 'front' (there are: upper, middle, lower, of one leg, as l",
+    "animate --palette=moss -o a.glb": "--palette: goes with --robot, --spec or --legs\n",
+    "animate --name=krabbo": "unknown flag 'name'; arc-suite build_model --name NAME --json writes a spec with a name",
+    "evaluate --robot=tick --preset=steered": "observation: expected a block command, as the task steer has (--task ",
+    "import --urdf=go2.urdf": "unknown flag 'urdf'; did you mean go2.urdf, without a flag?\n",
+    "evaluate --urdf=go2.urdf": "unknown flag 'urdf'; did you mean 'spec'? (there are: ",
+    "evaluate --robot=tick --task=patrol": f"unknown task 'patrol' (there are: {', '.join(TASKS)}, module:name)\n",
     "evaluate --robot=tick;queen": f"unknown robot 'tick;queen'; did you mean 'tick,queen'? {ROBOTS}",
     "animate --clips=walk+run -o a.glb": "unknown clip 'walk+run'; did you mean 'walk,run'? (there are: walk, slow, ",
     "animate --clips=note.txt -o a.glb": f"clip 'note.txt': {MOTION}",
@@ -121,7 +152,8 @@ FIRST_HOUR = {
     "render --camera=side -o a.png": "unknown camera 'side'; did you mean 'profile'? (there are: tracking, portrait, ",
     "animate spider.json": "unexpected argument 'spider.json'; did you mean --spec=spider.json? see --help\n",
     "build_model go2.urdf": "unexpected argument 'go2.urdf'; did you mean --spec=go2.urdf? see --help\n",
-    "animate clip.glb": "unexpected argument 'clip.glb'; see --help\n",
+    "render clip.glb": "unexpected argument 'clip.glb'; Blender, Godot and other programs show a .glb: see docs/",
+    "view page.html": "unexpected argument 'page.html'; a browser shows a page; see --help\n",
     "render tick.mp4": "unexpected argument 'tick.mp4'; did you mean --output=tick.mp4? see --help\n",
     "render folder": "unexpected argument 'folder'; did you mean --policy=folder? see --help\n",
     "collect --policy=cpg --output=data": "unknown flag 'output'; did you mean 'id'? (there are: arena, author, ",
@@ -151,6 +183,11 @@ LINES = CURED | OTHERS | MISPLACED | FIRST_HOUR
 def test_a_mistake_is_one_line(command, tmp_path):
     (tmp_path / "note.txt").write_text("hello")
     (tmp_path / "body.json").write_text('{"name": "x"}')
+    (tmp_path / "my.json").write_text("{}")
+    (tmp_path / "my_design.json").write_text('{"sketch": {}, "command": []}')
+    (tmp_path / "my.clips.json").write_text('{"body": "x", "clips": []}')
+    for name in ("ground.png", "page.html", "wave.py"):
+        (tmp_path / name).touch()
     (tmp_path / "clip.glb").write_bytes(b"\x89glTF")
     (tmp_path / "model.onnx").write_bytes(b"\x08")
     (tmp_path / "broken.py").write_text("def make(:\n")

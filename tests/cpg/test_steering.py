@@ -15,6 +15,7 @@ from arc_suite.models.overlap import overlaps_in_poses
 from arc_suite.robots import ROBOTS
 
 # In the body's own units.
+NEEDS_COMMAND = "a block command, as the task steer has (--task steer)"
 COMMANDS = np.transpose(
     [
         (1.0, 0.4, -0.7, 0.0, 0.0, 0.0, 0.0, 0.7, 0.6, 0.0),  # forward
@@ -137,9 +138,9 @@ def test_who_sees_crosses_trenches(robot):
 @pytest.mark.parametrize(
     ("task", "presets", "needs"),
     [
-        ("steer", ["sighted"], "a block scan, as the task rough has"),
-        ("steer", ["planned"], "a block goal, as the task navigate has"),
-        ("walk", ["steered", "surefooted", "sighted", "planned", "balanced"], "a block command, as the task steer has"),
+        ("steer", ["sighted"], "a block scan, as the task rough has (--task rough)"),
+        ("steer", ["planned"], "a block goal, as the task navigate has (--task navigate)"),
+        ("walk", ["steered", "surefooted", "sighted", "planned", "balanced"], NEEDS_COMMAND),
     ],
 )
 def test_what_a_preset_needs_is_one_line(task, presets, needs):

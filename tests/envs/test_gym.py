@@ -347,8 +347,11 @@ def there(names):
             {"task_kwargs": WRONG},
             f"unknown term of weights 'controll'; did you mean 'control'? ({there(Walk.weights)})",
         ),
-        ({"domain_name": "quen"}, f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.robot_words())})"),
-        ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)})"),
+        (
+            {"domain_name": "quen"},
+            f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.robot_words())}, module:name)",
+        ),
+        ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)}, module:name)"),
     ],
 )
 def test_bad_arguments_are_one_line(kwargs, message):

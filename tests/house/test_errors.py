@@ -23,8 +23,9 @@ EIGHTEEN = {"posture": np.zeros((2, 17)), "velocities": np.zeros((2, 24))}  # ve
 MODES, TRUNCATE = "(there are: NextStep, SameStep, Disabled)", "(there are: truncate)"
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
-TASK_NAMES = f"(there are: {', '.join(TASKS)})"
-DOMAINS = f"(there are: {', '.join(registry.robot_words())})"
+TASK_NAMES = f"(there are: {', '.join(TASKS)}, module:name)"
+ARENA_NAMES = f"(there are: {', '.join(ARENAS)}, module:name)"
+DOMAINS = f"(there are: {', '.join(registry.robot_words())}, module:name)"
 PRESETS = (
     "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, "
     "sighted, leaping, planned, tracked, rising, crossing)"
@@ -249,7 +250,7 @@ CASES = [
         load("queen", "walk", None, {"time_limit": 5}),
         "environment setting 'time_limit': it is a setting of the task: task_kwargs={'time_limit': seconds}",
     ),
-    (walk(arena="bumpy"), f"unknown arena 'bumpy'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
+    (walk(arena="bumpy"), f"unknown arena 'bumpy'; did you mean 'bumps'? {ARENA_NAMES}"),
     (envs(num_envs=2.5), "num_envs: expected an integer from 1 to 1048576, got 2.5"),
     (envs(num_envs="4"), "num_envs: expected an integer from 1 to 1048576, got '4'"),
     (envs(num_envs=10**12), "num_envs: expected an integer from 1 to 1048576, got 1000000000000"),

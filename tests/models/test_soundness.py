@@ -8,6 +8,7 @@ from refusals import refused
 import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
+from arc_suite.bodies.shaping import shaped
 from arc_suite.cpg import Demonstrator
 from arc_suite.evaluation import cures
 from arc_suite.models.overlap import overlaps
@@ -134,6 +135,10 @@ DOUBTFUL = [
     (generator.generate(6, 1), "no joint lifts a foot: a second joint in each leg, about axis [-1, 0, 0], fits"),
     (lifted("l2", -0.1), "feet of l2 stand 0.1 m in the floor: legs shorter by that fit"),
     (lifted("l2", 0.1), "feet of l2 end up to 0.1 m above the lowest foot: legs longer by that fit"),
+    (
+        shaped(BODY, links={"l1_lower": 1.5, "r1_lower": 1.5}),
+        "feet of l2, l3, r2, r3 end up to 0.141 m above the lowest foot: legs longer by that fit, or l1, r1 shorter",
+    ),
     (with_gear(WEAK), "the motor of l1_knee lacks 0.0422 of the 0.0922 N m that hold the body up: gear 5.99 fits"),
     (
         with_gear(0.01, ("knee", "ankle"), ALL),

@@ -23,6 +23,7 @@ GENERAL = (
     "tracked, rising"
 )
 
+ROBOT_WORDS = ", ".join(registry.robot_words())
 JOINTS = "expected a body named 'queen' to have the 18 joints of queen"
 
 
@@ -79,7 +80,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (
             ("zero", "quen"),
-            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.robot_words())})",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {ROBOT_WORDS}, module:name)",
         ),
         (("cpg", "queen", "midium"), f"unknown preset 'midium'; did you mean 'medium'? (there are: {ALL})"),
         (("cpg", generate(4, 2), "tuned"), f"unknown preset 'tuned' (there are: {GENERAL}, posed)"),

@@ -165,6 +165,7 @@ def test_an_environment_is_bit_equal_to_a_single_environment(task_name, body, se
     assert episodes >= 3
 
 
+ARENA_NAMES = f"(there are: {', '.join(ARENAS)}, module:name)"
 SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take the place of
 
 
@@ -174,7 +175,7 @@ def test_settings_check_themselves(task_name):
     for settings, message in (
         ({"weigths": {}}, f"unknown setting of {task_name} 'weigths'; did you mean 'weights'?"),
         ({"weights": {"contrl": 1.0}}, "unknown term of weights 'contrl'; did you mean 'control'?"),
-        ({"arena": "bump"}, own or f"unknown arena 'bump'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
+        ({"arena": "bump"}, own or f"unknown arena 'bump'; did you mean 'bumps'? {ARENA_NAMES}"),
         ({"time_limit": 0}, "time_limit: expected a number above 0, at most 1e+06, got 0"),
     ):
         with refused(message, begins=True):

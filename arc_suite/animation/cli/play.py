@@ -20,6 +20,7 @@ from absl import flags
 from arc_suite import checks, files
 from arc_suite.animation import pages, play_pages
 from arc_suite.cli.flags import (
+    adjust_body,
     bodies_from_flags,
     choose_bodies,
     custom_body,
@@ -64,5 +65,5 @@ def main() -> None:
 def _bodies_from_flags() -> dict[str, Body]:
     """Return the bodies of the page by name."""
     if FLAGS.robot == play_pages.WALKERS and custom_body() is None:
-        return {body.name: body for body in play_pages.walkers()}
+        return {body.name: adjust_body(body) for body in play_pages.walkers()}
     return bodies_from_flags(suggestions=("all", play_pages.WALKERS))

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple, get_args
 
-from arc_suite import checks, registry
+from arc_suite import checks, files, registry
 from arc_suite.animation.clips import acting, gestures, getting_up
 from arc_suite.animation.clips.blows import DIRECTIONS
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.motions import motion_files
 from arc_suite.robots.gaits import PACES, Pace
 from arc_suite.robots.spec import Body
 
@@ -189,9 +190,13 @@ def clip_of(name: str) -> Kind:
     Raises:
         ValueError: an unknown name, or no clip.
     """
-    if name not in clip_names() and ":" not in name and Path(name).suffix:
+    is_unknown = name not in clip_names() and ":" not in name
+    if is_unknown and Path(name).suffix:
         cure = "arc-suite motion makes one of a .glb, a .bvh or a table"
         raise ValueError(f"clip {checks.preview(name)}: expected a name, or a motion, .npz; {cure}")
+    file_cure = files.suggest_extension(name, (motion_files.EXTENSION,)) if is_unknown else ""
+    if file_cure:
+        raise ValueError(f"unknown clip {checks.preview(name)}{file_cure}")
     clip = registry.find("clip", name, CLIPS)
     if not isinstance(clip, Kind):
         kinds = ", ".join(kind.__name__ for kind in get_args(Kind))

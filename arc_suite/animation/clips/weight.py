@@ -156,7 +156,9 @@ def choose_character(weight: float | str) -> Character:
         ValueError: neither a name nor a number from 0 to `MAX_WEIGHT`.
     """
     if isinstance(weight, str):
-        return CHARACTERS[checks.name(weight, CHARACTERS, "weight")]
+        return CHARACTERS[
+            checks.name(weight, CHARACTERS, "weight", descriptions=(f"a number from 0 to {MAX_WEIGHT:g}",))
+        ]
     return USUAL._replace(size=checks.number("weight", weight, 0.0, MAX_WEIGHT))
 
 

@@ -336,6 +336,8 @@ def configurations_from_flags() -> list[Configuration]:
     hyperparameters = named_values("hp", FLAGS.hp)
     training = named_values("train_set", FLAGS.train_set)
     several_bodies = registry.names_several_bodies(FLAGS.robot) and custom_body() is None
+    if several_bodies:
+        refuse_flags(("length", "palette"), "goes with one body, not with several")
     task, settings = task_from_flags()
     _refuse_hyperparameters(settings)
     setup = Setup.of(FLAGS.robot if several_bodies else only_body(), task, settings)

@@ -171,7 +171,7 @@ def test_half_a_sway_is_half_of_all_but_its_sink():
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("hevy", "unknown weight 'hevy'; did you mean 'heavy'? (there are: heavy, nervous, old)"),
+        ("hevy", "unknown weight 'hevy'; did you mean 'heavy'? (there are: heavy, nervous, old, a number from 0 to 2)"),
         (2.5, "weight: expected a number from 0 to 2, got 2.5"),
         (float("nan"), "weight: expected a number from 0 to 2, got nan"),
     ],

@@ -206,7 +206,7 @@ def test_legs_that_overlap_are_moved_apart():
             Sketch(task="walk", preset="antigravity:x"),
             "law 'antigravity:x': files import nothing; import 'antigravity'",
         ),
-        (Sketch(preset="sighted"), "observation: expected a block scan, as the task rough has"),
+        (Sketch(preset="sighted"), "observation: expected a block scan, as the task rough has (--task rough)"),
         (Sketch(policy="ppo"), "policy ppo: none for walker_8x3-directed"),
     ],
 )

@@ -59,7 +59,8 @@ def test_a_function_that_makes_no_architecture_is_one_line(networks):
         architectures.of(task, "mine")
     with refused("network 'lost': cannot import nowhere:Deep.of: No module named 'nowhere'"):
         architectures.of(task, "lost")
-    with refused("unknown network 'lost_'; did you mean 'lost'? (there are: perceptron, legs, mine, lost, half)"):
+    names = "(there are: perceptron, legs, mine, lost, half, module:name)"
+    with refused(f"unknown network 'lost_'; did you mean 'lost'? {names}"):
         architectures.of(task, "lost_")
 
 
