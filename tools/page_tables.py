@@ -66,6 +66,7 @@ TABLES: dict[tuple[str, str], Callable[[], str]] = {
     ("algorithms", "legs"): lambda: kinds.text(STUDIES, "legs"),
     ("algorithms", "parallel"): lambda: kinds.text(STUDIES, "parallel"),
     ("algorithms", "few-steps"): lambda: kinds.text(STUDIES, "samples-xqc", "samples-sac_parallel", "samples-ppo"),
+    ("algorithms", "schedules"): lambda: kinds.text(STUDIES, "samples-ppo", "schedules", "top-ppo"),
 }
 
 

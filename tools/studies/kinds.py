@@ -1,7 +1,6 @@
 """Table of scores of studies, with a line for each place and a column for each kind of runs."""
 
-import functools
-import operator
+import collections
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,17 +16,25 @@ from studies import catalog
 def text(studies: Path, *names: str) -> str:
     """Return the table of committed studies in Markdown: mean scores, then the score of each seed.
 
+    A column has the name of a kind of runs, or of a study whose kind another study has, too.
+
     Args:
         studies: folder of the committed studies.
-        *names: names of studies. Lines are places of the first one.
+        *names: names of studies. Lines are places that all of them have.
 
     Raises:
         ValueError: an unknown study, or a damaged table of it.
         OSError: a table cannot be read.
     """
-    first_columns, *other_columns = (_cells_by_kind(studies / name, catalog.study(name)) for name in names)
-    places = dict.fromkeys(place for cells in first_columns.values() for place in cells)
-    columns = functools.reduce(operator.or_, other_columns, first_columns)
+    kinds_of_studies = {name: _cells_by_kind(studies / name, catalog.study(name)) for name in names}
+    counts = collections.Counter(kind for kinds in kinds_of_studies.values() for kind in kinds)
+    columns = {}
+    places_of_studies = []
+    for name, kinds in kinds_of_studies.items():
+        columns |= {kind if counts[kind] == 1 else name: cells for kind, cells in kinds.items()}
+        places_of_studies.append({place: None for cells in kinds.values() for place in cells})
+    first_places, *other_places = places_of_studies
+    places = [place for place in first_places if all(place in study_places for study_places in other_places)]
     lines = [(place, *(cells.get(place, "-") for cells in columns.values())) for place in places]
     return table(("score", *columns), lines)
 
