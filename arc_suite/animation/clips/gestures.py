@@ -4,14 +4,18 @@ A gesture is a table of tracks. A track has keys of time and value; between keys
 standing heights h, times in sqrt(h / g). Numbers of the torso's pose are those of `posture.POSE_NAMES`.
 """
 
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
 
+from arc_suite import checks
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
 from arc_suite.animation.clips.standing_legs import (
     HEIGHT,
     feet_from_torso,
+    follow_at_largest_size,
+    follow_exactly,
     follow_foot,
     follow_with_legs,
     keep_feet_in_place,
@@ -25,6 +29,8 @@ from arc_suite.robots.spec import Body
 _LEFT = posture.POSE_NAMES.index("left")
 _ROLL = posture.POSE_NAMES.index("roll")
 _PITCH = posture.POSE_NAMES.index("pitch")
+
+_SMALL_SIZES = (0.1, 0.05, 0.02)  # of a gesture that is left out, which are tried for its error
 
 # A breath, and weight that shifts to either side once in two breaths.
 _BREATH_DEPTH = 0.065  # h
@@ -84,20 +90,55 @@ _TURN_HOLD_DURATION = 4.0
 
 
 def torso_gesture(body: Body, rest: Pose, tracks: Mapping[str, tuple], duration: float) -> ClipMotion:
-    """Return a torso that moves over standing feet, as far as the legs can follow.
+    """Return a torso that moves over standing feet, as far as the legs can follow; a warning says what is left of it.
 
     Args:
         body: the spec.
         rest: pose from which it moves.
-        tracks: by a number of the pose, see `posture.POSE_NAMES`: pairs of a time, sqrt(h / g), and a value, standing
-            heights or rad.
+        tracks: by a number of the pose, see `posture.POSE_NAMES`: pairs of a time, sqrt(h / g), in ascending order from
+            0 to the duration, and a value, standing heights or rad.
         duration: sqrt(h / g).
 
     Raises:
-        ValueError: the legs leave no room for it.
+        ValueError: an unknown number of the pose, a time out of range or order, or legs that leave no room for it.
     """
+    _check_tracks(tracks, duration)
     poses = _poses_of_tracks(sample_times(body, duration), tracks)
-    return follow_with_legs(body, rest, poses, action="move so")
+    try:
+        motion, size = follow_at_largest_size(body, rest, poses, action="move so")
+    except ValueError as error:
+        raise ValueError(f"{error}: {_describe_fitting_size(body, rest, poses)}") from None
+    if size < 1.0:
+        names = ", ".join(tracks)
+        warnings.warn(f"{body.name}: legs follow {size:g} of a gesture of {names}, which is made smaller", stacklevel=2)
+    return motion
+
+
+def _check_tracks(tracks: Mapping[str, tuple], duration: float) -> None:
+    """Raise ValueError for tracks that `torso_gesture` cannot take."""
+    duration = checks.number("duration", duration, 0.0)
+    for name, keys in tracks.items():
+        checks.name(name, posture.POSE_NAMES, "track")
+        if not (isinstance(keys, tuple | list) and keys and all(np.shape(key) == (2,) for key in keys)):
+            raise ValueError(f"track {name}: expected pairs of a time and a value, got {checks.preview(keys)}")
+        previous_time = 0.0
+        for time, value in keys:
+            time = checks.number(f"track {name}: time", time, 0.0, duration)
+            if time < previous_time:
+                raise ValueError(
+                    f"track {name}: expected times in ascending order, got {time:g} after {previous_time:g}"
+                )
+            previous_time = time
+            checks.number(f"track {name}: value", value)
+
+
+def _describe_fitting_size(body: Body, rest: Pose, poses: np.ndarray) -> str:
+    """Return which size of a gesture (samples, 6) legs can follow that is too small to be made of it."""
+    lifts = np.zeros((len(poses), len(body.legs), 3))
+    for size in _SMALL_SIZES:
+        if follow_exactly(body, rest, size * poses, lifts) is not None:
+            return f"{size:g} of it fits"
+    return f"not even {_SMALL_SIZES[-1]:g} of it fits"
 
 
 def idle(body: Body, rest: Pose) -> ClipMotion:

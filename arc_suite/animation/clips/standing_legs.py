@@ -114,7 +114,15 @@ def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndar
 def follow_with_legs(
     body: Body, rest: Pose, poses: np.ndarray, action: str, lifts: np.ndarray | None = None
 ) -> ClipMotion:
-    """Return a motion of the torso over its feet that is as large as standing legs can follow.
+    """Return the motion of `follow_at_largest_size`."""
+    motion, _ = follow_at_largest_size(body, rest, poses, action, lifts)
+    return motion
+
+
+def follow_at_largest_size(
+    body: Body, rest: Pose, poses: np.ndarray, action: str, lifts: np.ndarray | None = None
+) -> tuple[ClipMotion, float]:
+    """Return a motion of the torso over its feet that is as large as standing legs can follow, and its size, up to 1.
 
     Args:
         body: the spec.
@@ -134,7 +142,7 @@ def follow_with_legs(
         sized_poses[:, HEIGHT] *= sink_factor
         motion = follow_exactly(body, rest, sized_poses, size * lifts)
         if motion is not None:
-            return motion
+            return motion, size
     raise ValueError(f"the legs leave the torso no room to {action}")
 
 

@@ -9,9 +9,17 @@ from arc_suite import registry
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import gestures
 from arc_suite.animation.clips.catalog import Acted, Difference, Showcase, Turn, WalkLoop, clip_names
+from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.envs.setup import Setup
+from arc_suite.models.posture import find_rest_pose
 
 TICK = Setup.of("tick", "steer")
+REST_ANGLES = find_rest_pose(TICK.body)
+REST = Pose(
+    np.array((0.0, 0.0, -REST_ANGLES.sole_positions[:, 2].min())),
+    np.array((1.0, 0.0, 0.0, 0.0)),
+    REST_ANGLES.legs.by_joint(REST_ANGLES.joint_angles),
+)
 KINDS = "WalkLoop, Passage, Turn, Acted, BlowClip, Difference, Showcase"
 
 
@@ -40,6 +48,46 @@ def test_motions_loops_and_turns_are_made_as_the_suites_are(register):
     assert low[0] == pytest.approx(low[-1]) and low.min() < low[0] - 0.02 * TICK.body.torso.standing_height
     assert made["creep"].motion.twist[0] == pytest.approx(0.35 * made["walk"].motion.twist[0], rel=0.2)
     assert made["around"].motion.root[-1, 2] == pytest.approx(np.pi / 2.0)
+
+
+PITCH = ((0.0, 0.0), (2.0, 0.2), (4.0, 0.0))
+
+
+NUMBERS = "(there are: height, forward, left, roll, pitch, yaw)"
+
+
+@pytest.mark.parametrize(
+    ("tracks", "duration", "message"),
+    [
+        ({"nod": PITCH}, 4.0, f"unknown track 'nod'; did you mean 'pitch'? {NUMBERS}"),
+        ({"hight": PITCH}, 4.0, f"unknown track 'hight'; did you mean 'height'? {NUMBERS}"),
+        ({"pitch": PITCH}, 3.0, "track pitch: time: expected a number from 0 to 3, got 4.0"),
+        ({"yaw": PITCH[::-1]}, 4.0, "track yaw: expected times in ascending order, got 2 after 4"),
+        ({"yaw": ((0.0, "a"),)}, 4.0, "track yaw: value: expected a finite number, got 'a'"),
+        ({"yaw": (0.0, 1.0)}, 4.0, "track yaw: expected pairs of a time and a value, got (0.0, 1.0)"),
+        ({"yaw": ()}, 4.0, "track yaw: expected pairs of a time and a value, got ()"),
+        ({"yaw": PITCH}, -1.0, "duration: expected a finite number of at least 0, got -1.0"),
+    ],
+)
+def test_tracks_that_would_have_no_effect_are_refused(tracks, duration, message):
+    with refused(message):
+        gestures.torso_gesture(TICK.body, REST, tracks, duration)
+
+
+def scaled(size):
+    return {"pitch": tuple((time, size * value) for time, value in PITCH)}
+
+
+def test_a_gesture_that_is_made_smaller_says_its_share():
+    line = "^tick: legs follow 0.8 of a gesture of pitch, which is made smaller$"
+    with pytest.warns(UserWarning, match=line):
+        motion = gestures.torso_gesture(TICK.body, REST, scaled(1.5), 4.0)
+    full = gestures.torso_gesture(TICK.body, REST, scaled(1.2), 4.0)  # without a warning
+    np.testing.assert_allclose(motion.quaternions, full.quaternions, atol=1e-12)
+    with refused("the legs leave the torso no room to move so: 0.1 of it fits"):
+        gestures.torso_gesture(TICK.body, REST, scaled(9.0), 4.0)
+    with refused("the legs leave the torso no room to move so: not even 0.02 of it fits"):
+        gestures.torso_gesture(TICK.body, REST, scaled(400.0), 4.0)
 
 
 @pytest.mark.slow
