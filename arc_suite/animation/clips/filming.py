@@ -38,11 +38,13 @@ class Sheet(NamedTuple):
         picture: (height, width, 3 or 4) uint8, of square cells: a row for each direction, a column for each frame.
         cell_size: width and height of a cell, pixels.
         ground_line: where the ground below the torso is in each cell, pixels from its top.
+        pixels_per_meter: scale of the body at the vertical axis below the torso; each sheet has its own.
     """
 
     picture: np.ndarray
     cell_size: int
     ground_line: float
+    pixels_per_meter: float
 
 
 class _SwingingGeom(NamedTuple):
@@ -76,11 +78,13 @@ class _Stage(NamedTuple):
         drawing: with the free camera on all of the body.
         swinging_geoms: geoms that swing.
         ground_line: where the ground below the torso is in a picture, as a share of its height from the top.
+        view_height: height that a picture shows at the vertical axis of the body, m.
     """
 
     drawing: pictures.Decorated
     swinging_geoms: Sequence[_SwingingGeom]
-    ground_line: float
+    ground_line: float = 0.0
+    view_height: float = 1.0
 
     def pose(self, pose: _Pose) -> None:
         """Take a pose."""
@@ -147,7 +151,7 @@ def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent
     sheet_rows = []
     for first in range(0, len(squares), columns):
         sheet_rows.append(np.concatenate(squares[first : first + columns], axis=1))
-    return Sheet(np.concatenate(sheet_rows), size, size * stage.ground_line)
+    return Sheet(np.concatenate(sheet_rows), size, size * stage.ground_line, size / stage.view_height)
 
 
 def _count_frames(clip: Clip) -> int:
@@ -187,7 +191,7 @@ def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _St
     else:
         drawing = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
     model = drawing.model.ptr
-    stage = _Stage(drawing, _list_swinging_geoms(body, model), ground_line=0.0)
+    stage = _Stage(drawing, _list_swinging_geoms(body, model))
     radius, height = _bounding_cylinder(stage, poses)
     camera = model.vis.global_
     camera.azimuth = _AZIMUTH
@@ -200,7 +204,10 @@ def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _St
     # The ground is half a height below the point that the camera looks at.
     depth = distance - 0.5 * height * math.sin(math.radians(_ELEVATION))
     drop = 0.5 * height * math.cos(math.radians(_ELEVATION))
-    return stage._replace(ground_line=0.5 + 0.5 * drop / (depth * math.tan(half_view)))
+    return stage._replace(
+        ground_line=0.5 + 0.5 * drop / (depth * math.tan(half_view)),
+        view_height=2.0 * distance * math.tan(half_view),
+    )
 
 
 def _list_swinging_geoms(body: Body, model: mujoco.MjModel) -> list[_SwingingGeom]:

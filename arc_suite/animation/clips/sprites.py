@@ -40,6 +40,7 @@ def describe_sheet(image_name: str, clip: Clip, sheet: Sheet) -> dict[str, Any]:
             "rows": rows,
             "fps": round(1.0 / clip.motion.time_step, 6),
             "ground_line": round(sheet.ground_line, 2),
+            "pixels_per_meter": round(sheet.pixels_per_meter, 4),
         },
     }
 

@@ -9,6 +9,7 @@ from arc_suite import animation
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import filming
 from arc_suite.envs.setup import Setup
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
 
 BODY, SIZE = ROBOTS["tick"], 48
@@ -30,6 +31,9 @@ def test_a_sheet_has_a_row_for_each_direction(idle):
         assert 0.1 < (row[..., 3] > 0).mean() < 0.7 and not row[[0, -1], :, 3].any() and not row[:, [0, -1], 3].any()
     lowest = [np.flatnonzero(row[..., 3].any(axis=1)).max() for row in rows]  # of feet nearer than the torso
     assert made.ground_line < min(lowest) < made.ground_line + 0.2 * SIZE
+    # Feet, and what is nearer to the camera or reaches further ahead.
+    width = np.ptp(np.flatnonzero((rows[0][..., 3] > 0).any(axis=0))) / made.pixels_per_meter
+    assert 1.2 < width / np.ptp(measure_standing(BODY).soles[:, 0]) < 1.8
     # Seen from either side the outline is the same, mirrored.
     assert abs(rows[0][..., 3].astype(int) - rows[2][:, ::-1, 3]).mean() < 25.0
     assert abs(rows[0][..., 3].astype(int) - rows[1][..., 3]).mean() > 5.0
@@ -63,4 +67,5 @@ def test_an_importer_reads_where_cells_are(tmp_path):
     ]
     milliseconds = sum(frame["duration"] for frame in frames[:columns])
     assert milliseconds == round(1000.0 * columns / meta["fps"]) and "repeat" not in meta["frameTags"][0]
+    assert meta["pixels_per_meter"] == pytest.approx(38.093 * 32 / SIZE, rel=1e-3)  # of the same clip in SIZE
     assert frames[-1]["anchor"] == {"x": 0.5, "y": pytest.approx(meta["ground_line"] / 32, abs=1e-3)}
