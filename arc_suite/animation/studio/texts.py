@@ -112,6 +112,9 @@ def lines_to_copy(sketch: Sketch) -> str:
     """Return the Python lines and the command line that make the same creature, with buttons to copy them, as HTML."""
     texts = {"Python": sketches.python_lines(sketch), "command": sketches.command_line(sketch)}
     elements = []
+    spec_file = sketches.spec_file_name(sketches.make_body(sketch))
+    if any(spec_file in text for text in texts.values()):
+        elements.append(_element("p", f"Save the spec first: these lines read {spec_file}.", style=_SMALL_STYLE))
     for name, text in texts.items():
         elements.append(_element("button", f"Copy {name}", onclick=_COPY_SCRIPT, style=_BUTTON_STYLE))
         elements.append(_element("pre", text, style=f"white-space:pre-wrap;overflow-wrap:anywhere;{_SMALL_STYLE}"))

@@ -13,7 +13,7 @@ from refusals import refused
 
 from arc_suite import registry
 from arc_suite.animation.studio import sketch as sketches
-from arc_suite.animation.studio import states
+from arc_suite.animation.studio import states, texts
 from arc_suite.animation.studio.creature import open_creature
 from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
@@ -141,6 +141,9 @@ def test_command_lines():
     assert "--spec spider" in sketches.command_line(SKETCHES["example"])
     assert "--spec tick_shaped.json" in sketches.command_line(SKETCHES["shaped robot"])
     assert sketches.command_line(SKETCHES["random"]).endswith("--spec random_7.json --task directed --policy zero")
+    note = "Save the spec first: these lines read random_7.json."
+    assert note in texts.lines_to_copy(SKETCHES["random"])
+    assert "Save the spec first" not in texts.lines_to_copy(SKETCHES["robot"])
 
 
 def test_ground_of_a_file_stays_with_the_sketch(tmp_path):
