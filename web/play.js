@@ -22,6 +22,9 @@ import { View } from "./view.js";
 const RESTART = 1.5; // s that a fallen body lies
 const GIVE_UP = 8; // s that a body has for getting up
 const BUSY = 20; // ms of a picture's time for physics: a slower machine shows slow motion
+const BUSY_SHARE = 0.5; // of the time since the last picture, which physics may take where pictures are slow
+const AWAY = 2; // s between two pictures after which the page was hidden, and goes on as it was
+const PACE_SECONDS = 0.33; // s over which the pace is averaged
 const LIFTED = 1.3; // standing heights of a torso, from which the camera follows it up
 
 const TINTS = ["#ffffff", "#5f8dcf"]; // of the player's body and of the other
@@ -95,7 +98,7 @@ class Play {
   }
 
   // Steps through some seconds of real time, as far as some milliseconds allow.
-  advance(seconds, asked, budget = BUSY) {
+  advance(seconds, asked, budget = Math.max(BUSY, 1000 * BUSY_SHARE * seconds)) {
     const { simulation, body } = this, began = performance.now();
     this.debt += seconds;
     let stepped = 0;
@@ -105,7 +108,8 @@ class Play {
       stepped += body.timestep;
     }
     if (this.debt >= body.timestep) this.debt = 0;
-    if (seconds > 0) this.pace += 0.05 * (Math.min(stepped / seconds, 1) - this.pace);
+    const share = 1 - Math.exp(-seconds / PACE_SECONDS); // of the new pace in the mean
+    if (seconds > 0) this.pace += share * (Math.min(stepped / seconds, 1) - this.pace);
     if (!simulation.pull) {
       this.goals.advance(stepped, simulation.task.place);
       if (this.ring?.advance(simulation.minds.map(({ task }) => task.place))) this.place();
@@ -340,7 +344,8 @@ async function main() {
 
   let last = null;
   const frame = (now) => {
-    const seconds = last === null ? 0 : Math.min(now - last, 100) / 1000;
+    const since = last === null ? 0 : (now - last) / 1000;
+    const seconds = since > AWAY ? 0 : since;
     last = now;
     const asked = panel.asked(inputs.command, inputs.pose, inputs.runs);
     for (const name of inputs.pushes()) actions[name]();

@@ -12,6 +12,7 @@ from arc_suite.bodies import generator
 from arc_suite.robots import ROBOTS, gaits
 
 ASKED = "play.panel.asked(play.inputs.command, play.inputs.pose, play.inputs.runs)"
+STEP = f"play.state.play.advance({{}}, {ASKED})"
 SIZES = [(1440, 900), (390, 844), (844, 390), (320, 256)]
 
 
@@ -80,6 +81,18 @@ def test_keys_walk_and_turn(tab):
     tab.keyboard.down("q")
     assert tab.evaluate("play.inputs.command") == [0, 0.5, 0]
     tab.keyboard.up("q")
+
+
+def test_slow_pictures_leave_physics_its_time_and_the_pace_is_that_of_the_clock(tab):
+    tab.evaluate("(() => { let calls = 0; performance.now = () => (calls += 1); })()")  # 1 ms a substep
+    timestep = tab.evaluate("play.state.play.body.timestep")
+    start, end = (tab.evaluate(f"{step}, play.state.play.simulation.data.time") for step in ("0", STEP.format(0.4)))
+    tab.evaluate("delete performance.now")
+    assert end - start == pytest.approx(min(0.4, 200 * timestep), abs=3 * timestep)
+    tab.evaluate(f"play.state.play.advance(1.0, {ASKED}, Infinity)")
+    assert tab.evaluate("play.state.play.pace") > 0.9
+    tab.evaluate(f"play.state.play.advance(1.0, {ASKED}, 0)")  # a picture of a second, and no time for physics
+    assert tab.evaluate("play.state.play.pace") < 0.1
 
 
 def test_keys_kick_restart_and_pause(tab):
