@@ -30,6 +30,18 @@ flags.DEFINE_float(
     "Rotor inertia, kg m^2, of each joint for which the file has none. [default: a small one where joints buzz]",
     lower_bound=0.0,
 )
+flags.DEFINE_float(
+    "stiffness",
+    None,
+    "Kp, N m/rad, of each joint for which the file has no gains. [default: sized by loads]",
+    lower_bound=0.0,
+)
+flags.DEFINE_float(
+    "damping",
+    None,
+    "Kd, N m s/rad, of each joint for which the file has no gains. [default: sized by inertias]",
+    lower_bound=0.0,
+)
 flags.DEFINE_enum(
     "forward",
     None,
@@ -53,7 +65,16 @@ def main(robot: str | None = None) -> None:
         if FLAGS.output is not None:
             checks.extension(FLAGS.output, [".json"])
             output_path = stack.enter_context(files.writing(FLAGS.output))
-        body, notes = import_robot(robot, FLAGS.home, FLAGS.feet, FLAGS.armature, FLAGS.forward, FLAGS.scale)
+        body, notes = import_robot(
+            robot,
+            FLAGS.home,
+            FLAGS.feet,
+            FLAGS.armature,
+            FLAGS.forward,
+            FLAGS.scale,
+            FLAGS.stiffness,
+            FLAGS.damping,
+        )
         if output_path is not None:
             output_path.write_text(body_to_json(body), encoding="utf-8")
     print(f"{robot}: {body.name}")

@@ -81,6 +81,8 @@ class _Choices(NamedTuple):
     armature: float | None = None
     forward: str | None = None
     scale: float = 1.0
+    stiffness: float | None = None
+    damping: float | None = None
 
 
 class _StandingRobot(NamedTuple):
@@ -98,6 +100,8 @@ def import_robot(
     armature: float | None = None,
     forward: str | None = None,
     scale: float = 1.0,
+    stiffness: float | None = None,
+    damping: float | None = None,
 ) -> ImportedRobot:
     """Return the legged robot of an MJCF or URDF file.
 
@@ -110,6 +114,8 @@ def import_robot(
         forward: axis of the file's torso that points ahead, out of `facing.AXES`; None for x, or for another one where
             names and hinges of the legs say so.
         scale: factor of all lengths: 0.01 for a file in cm.
+        stiffness: of each servo for which the file has no gains, N m/rad; None to size it.
+        damping: of each servo for which the file has no gains, N m s/rad; None to size it.
 
     Raises:
         SpecError: it cannot come in; one line that names the file.
@@ -120,7 +126,8 @@ def import_robot(
     min_scale, max_scale = units.SCALE_RANGE
     if not min_scale <= scale <= max_scale:
         raise SpecError(f"{path}: scale: expected a number from {min_scale:g} to {max_scale:g}, got {scale:g}")
-    imported_robot, _ = _import_file(Path(path), _Choices(home, tuple(feet), armature, forward, scale))
+    choices = _Choices(home, tuple(feet), armature, forward, scale, stiffness, damping)
+    imported_robot, _ = _import_file(Path(path), choices)
     return imported_robot
 
 
@@ -156,18 +163,18 @@ def _import_file(path: Path, choices: _Choices) -> tuple[ImportedRobot, tuple[Pa
     with warnings.catch_warnings(), parsers.guard(str(path), passes=(OSError,), raises=SpecError):
         warnings.simplefilter("ignore")  # MuJoCo warns about attributes that are dropped here
         file, robot, stance = _find_standing_robot(path, choices)
-        return _describe_robot(path, file, robot, stance, choices.armature), file.parts
+        return _describe_robot(path, file, robot, stance, choices), file.parts
 
 
-def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, armature: float | None) -> ImportedRobot:
+def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, choices: _Choices) -> ImportedRobot:
     """Return the body of a robot that stands, and notes."""
     _check_world(robot)
     _check_hinges(robot, stance)
     unit_notes = units.unit_notes(robot, stance)
     armature_notes: tuple[str, ...] = ()
-    if armature is not None:
-        robot, armature_notes = armatures.add_armature(robot, armature)
-    servos, motor_notes = motors.find_motors(robot, stance, file.speeds)
+    if choices.armature is not None:
+        robot, armature_notes = armatures.add_armature(robot, choices.armature)
+    servos, motor_notes = motors.find_motors(robot, stance, file.speeds, choices.stiffness, choices.damping)
     names = choose_names(robot, stance.legs)
     order = _order_joints(robot, stance, file.order)
 
@@ -185,7 +192,7 @@ def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, a
         return sources.check(body)
 
     body = write_body(robot)
-    if armature is None:
+    if choices.armature is None:
         body, armature_notes = armatures.calm(body, robot, servos, write_body)
     first_notes = notes.import_notes(robot, stance, names, order)
     last_notes = notes.omission_notes(file, robot, stance, names)

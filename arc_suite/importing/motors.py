@@ -63,6 +63,12 @@ class _Gains(NamedTuple):
     stiffness: float
     damping: float
 
+    def choose(self, stiffness: float | None, damping: float | None) -> Self:
+        """Return gains in which those that a user chose, not None, replace these."""
+        chosen_stiffness = self.stiffness if stiffness is None else stiffness
+        chosen_damping = self.damping if damping is None else damping
+        return type(self)(chosen_stiffness, chosen_damping)
+
 
 class _Limit(NamedTuple):
     """A torque limit.
@@ -89,13 +95,21 @@ class _Limit(NamedTuple):
         return cls(float(low), float(high), origin)
 
 
-def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Motors:
+def find_motors(
+    robot: Robot,
+    stance: Stance,
+    speeds: Mapping[str, float],
+    stiffness: float | None = None,
+    damping: float | None = None,
+) -> Motors:
     """Return the servos of a robot's joints, without those that are passive.
 
     Args:
         robot: robot of the file.
         stance: stance in which it stands.
         speeds: speeds, rad/s, at which joints get no torque, by name in the file.
+        stiffness: of each servo for which the file has no gains, N m/rad; None to size it.
+        damping: the same, N m s/rad.
     """
     inertias, loads = _mechanics(robot, stance)
     gains_of_file = _find_gains(robot)
@@ -115,6 +129,7 @@ def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Mo
             if gains is None:
                 joint_damping = float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
                 gains = _gains_by_rule(load, inertias[joint], limit.torque, joint_damping)
+                gains = gains.choose(stiffness, damping)
             speed = speeds.get(robot.joint_name(joint))
             servos[joint] = Servo(
                 stiffness=gains.stiffness,
@@ -131,7 +146,7 @@ def find_motors(robot: Robot, stance: Stance, speeds: Mapping[str, float]) -> Mo
         *_mirror_notes(robot, stance.joints),
         *_range_notes(robot, gains_of_file),
         *_delay_notes(stance.joints, servos),
-        _gain_note(stance.joints, gains_of_file),
+        _gain_note(stance.joints, gains_of_file, stiffness, damping),
     )
     return Motors(servos, all_notes)
 
@@ -333,10 +348,20 @@ def format_span(low: float, high: float) -> str:
     return f"{low_text} to {high_text}"
 
 
-def _gain_note(joints_of_legs: Sequence[int], gains_of_file: dict[int, _Gains]) -> str:
-    """Return a line on where the gains of the legs' servos come from."""
+def _gain_note(
+    joints_of_legs: Sequence[int],
+    gains_of_file: dict[int, _Gains],
+    stiffness: float | None,
+    damping: float | None,
+) -> str:
+    """Return a line on where the gains of the legs' servos come from; gains that a user chose are not None."""
     count = sum(joint in gains_of_file for joint in joints_of_legs)
-    return (
-        f"gains: {count} of {len(joints_of_legs)} servos have those of the file's position actuators, "
-        "the others are sized"
-    )
+    others_text = "the others are sized"
+    chosen_texts = []
+    if stiffness is not None:
+        chosen_texts.append(f"a stiffness of {stiffness:g} N m/rad")
+    if damping is not None:
+        chosen_texts.append(f"a damping of {damping:g} N m s/rad")
+    if chosen_texts:
+        others_text = f"the others have {' and '.join(chosen_texts)}"
+    return f"gains: {count} of {len(joints_of_legs)} servos have those of the file's position actuators, {others_text}"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arc_suite import evaluation, files, policies
+from arc_suite import evaluation, files, policies, registry
 from arc_suite.evaluation import anchors, statistics
 from arc_suite.learning import finals
 from arc_suite.learning.agents import run_folder
@@ -67,8 +67,7 @@ def text(run: Configuration, folder: Path) -> str:
         "`config.json` has all settings and hyperparameters.",
         table(("hash or version", "value"), _describe_origin(folder)),
         "## License",
-        "Apache-2.0, as the suite. The creature and its looks are the suite's; bodies from files of others have "
-        "licenses of their own.",
+        _license_text(run),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -83,7 +82,7 @@ def _metadata(run: Configuration, mean_return: float) -> str:
         "metrics": [metric],
     }
     fields = {
-        "license": "apache-2.0",
+        "license": "apache-2.0" if _is_of_suite(run) else "other",
         "library_name": "arc_suite",
         "pipeline_tag": "reinforcement-learning",
         "tags": ["reinforcement-learning", "legged-locomotion", "mujoco", run.setup.kind.name, run.algorithm],
@@ -91,6 +90,20 @@ def _metadata(run: Configuration, mean_return: float) -> str:
     }
     lines = [f"{name}: {json.dumps(value)}" for name, value in fields.items()]
     return "\n".join(["---", *lines, "---"])
+
+
+def _is_of_suite(run: Configuration) -> bool:
+    """Return whether the bodies are the suite's; those of others have licenses of their own."""
+    return run.setup.several or run.setup.name in registry.robot_words()
+
+
+def _license_text(run: Configuration) -> str:
+    if _is_of_suite(run):
+        return "Apache-2.0, as the suite. The creature and its looks are the suite's."
+    return (
+        f"The code that trained it is under Apache-2.0. `{run.setup.name}` is no robot of the suite: its license is "
+        "that of the body's author. Set `license` at the head of this card to yours."
+    )
 
 
 def _read_returns(folder: Path) -> tuple[np.ndarray, str]:

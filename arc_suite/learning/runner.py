@@ -6,7 +6,7 @@
 
 `read()` returns `Sensors`, and `write(output)` hands an `Output` to the motors. Both have the order of `motors` in
 policy.json. `command()` returns the desired velocity: forward and left, m/s, and turning left, rad/s; a policy without
-commands ignores it. `python run.py` prints the motors.
+commands ignores it. `python run.py` prints the motors, for which NumPy is enough.
 """
 
 import json
@@ -58,6 +58,11 @@ class Output(NamedTuple):
     limits: np.ndarray
 
 
+def read_facts(folder: str | Path = Path(__file__).parent) -> dict:
+    """Return the content of policy.json."""
+    return json.loads((Path(folder) / "policy.json").read_text(encoding="utf-8"))
+
+
 class Policy:
     """A policy with its memory: clock, latest action and history."""
 
@@ -80,8 +85,7 @@ class Policy:
         import onnxruntime
 
         session = onnxruntime.InferenceSession(Path(folder) / "policy.onnx", providers=["CPUExecutionProvider"])
-        facts = json.loads((Path(folder) / "policy.json").read_text(encoding="utf-8"))
-        return cls(facts, lambda observation: session.run(None, {"observations": observation[None]})[0][0])
+        return cls(read_facts(folder), lambda observation: session.run(None, {"observations": observation[None]})[0][0])
 
     def reset(self, heading: float | None = None) -> None:
         """Begin anew. A policy without commands walks into a heading, rad; None for that of the first reading."""
@@ -273,7 +277,7 @@ def _about(axis: np.ndarray, angle: float) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    for index, motor in enumerate(Policy.load().facts["motors"]):
+    for index, motor in enumerate(read_facts()["motors"]):
         texts = [
             f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in motor.items()
         ]

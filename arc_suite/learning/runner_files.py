@@ -35,7 +35,7 @@ _PARTS = {
     "history": ("history",),
 }
 _ESTIMATED = {"height": "torso's height", "velocity": "torso's velocity", "motion": "mean velocity"}
-_ABSENT = "absent"  # name of a part that is 0
+_ABSENT = "absent"  # before the name of a part that is 0
 
 
 def save(folder: str | os.PathLike[str], network: Network) -> list[str]:
@@ -67,7 +67,8 @@ def describe_machine(network: Network) -> dict[str, Any]:
                                 `policy_metadata.metadata`; low and high, its range, rad
     imu                         orientation of the file's root frame, in which the IMU measures, in the torso's frame
     held                        joints outside of the legs by name, and the angle at which training holds each, rad
-    observation                 [part, size] in order; parts that are not built from sensors are 0
+    substeps                    simulation steps between two actions in training
+    observation                 [part, size] in order; those named "absent ..." are 0, as in training
     estimated                   parts that are estimated from the feet that stand, though training saw the simulation's
     history                     steps, and [part, size] of each
     follows_commands            whether there is a command; else the policy walks into the first heading
@@ -95,6 +96,7 @@ def describe_machine(network: Network) -> dict[str, Any]:
         "task": metadata["task"],
         "task_kwargs": metadata["task_kwargs"],
         "control_timestep": metadata["control_timestep"],
+        "substeps": metadata["substeps"],
         "actions": metadata["actions"],
         "torque_held": metadata["torque_held"],
         "delay": metadata.get("delay", [0, 0]),
@@ -133,7 +135,7 @@ def _parts_of_block(task: Task, name: str) -> list[tuple[str, int]]:
         part_names, block.parts, np.broadcast_to(block.sensed, len(part_names)), strict=True
     ):
         if leaves_out and not is_sensed:
-            part_name = _ABSENT
+            part_name = f"{_ABSENT} {part_name}"
         elif part_name == "forces":
             cure = "train with exclude_blocks=contact_forces or sensors_only=true"
             raise ValueError(f"block {name}: sensors do not give it; {cure}")

@@ -180,6 +180,20 @@ def test_gains_that_the_file_does_not_have_are_sized():
     assert "limits: 1000 N m of 12 motors is a placeholder, far above their load" in notes
 
 
+def test_gains_that_the_file_does_not_have_can_be_chosen(odd):
+    body, notes = import_robot(A1, stiffness=60.0, damping=2.0)
+    assert {(joint.servo.stiffness, joint.servo.damping) for joint in body.joints} == {(60.0, 2.0)}
+    (note,) = [note for note in notes if note.startswith("gains: ")]
+    assert note.endswith("the others have a stiffness of 60 N m/rad and a damping of 2 N m s/rad")
+    sized = import_robot(A1).body.joints[0].servo
+    damped = import_robot(A1, damping=2.0).body.joints[0].servo
+    assert (damped.stiffness, damped.damping) == (sized.stiffness, 2.0)
+    kept = import_robot(odd, stiffness=60.0, damping=2.0).body.legs[0].joints[0].servo
+    assert (kept.stiffness, kept.damping) == (40.0, 1.5)
+    with pytest.raises(SpecError, match="stiffness: expected a number from"):
+        import_robot(A1, stiffness=float("nan"))
+
+
 def test_a_keyframe_that_is_named_is_the_standing_pose(tmp_path):
     path = tmp_path / "go2.xml"
     keys = '<key name="low" qpos="0 0 0.2 1 0 0 0 0 1.2 -2.4 0 1.2 -2.4 0 1.2 -2.4 0 1.2 -2.4"/></keyframe>'

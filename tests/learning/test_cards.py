@@ -3,6 +3,7 @@
 import json
 import pathlib
 import re
+import types
 
 import programs
 import pytest
@@ -47,6 +48,17 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "several", "of_suite"),
+    [("tick", False, True), ("spider", False, True), ("varied:0-9", True, True), ("dachs", False, False)],
+)
+def test_bodies_of_others_have_licenses_of_their_own(name, several, of_suite):
+    run = types.SimpleNamespace(setup=types.SimpleNamespace(name=name, several=several))
+    assert cards._is_of_suite(run) == of_suite
+    assert ("looks are the suite's" in cards._license_text(run)) == of_suite
+    assert (f"`{name}` is no robot of the suite" in cards._license_text(run)) != of_suite
+
+
 def test_the_program_draws_the_policy(folder):
     module_folder = pathlib.Path(tiny_studies.__file__).parent
     done = programs.run("-m", "arc_suite", "card", str(folder), "--modules=tiny_studies", path=module_folder)

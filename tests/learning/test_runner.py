@@ -316,6 +316,18 @@ def test_the_page_of_imported_robots_plays_a_policy(tmp_path, monkeypatch):
     assert len(calls) == 107 and not calls[-1][1].any()
 
 
+def test_run_prints_motors_without_onnxruntime_and_absent_parts_have_names(tmp_path):
+    facts = runner_files.describe_machine(made(imports.body("a1_like.urdf"), "steer", sensors_only=True))
+    names = [name for name, _ in facts["observation"] if name.startswith("absent")]
+    assert names == ["absent height", "absent velocity", "absent forces", "absent motion"]
+    assert facts["substeps"] == round(facts["control_timestep"] / imports.body("a1_like.urdf").simulation.timestep)
+    (tmp_path / "policy.json").write_text(json.dumps(facts))
+    (tmp_path / "run.py").write_bytes(runner_files.RUNNER.read_bytes())
+    (tmp_path / "onnxruntime.py").write_text("raise ImportError('onnxruntime')")
+    done = subprocess.run([sys.executable, "run.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert programs.passed(done).startswith("0 motor FR_hip_joint, joint r1_joint1, action 0, home ")
+
+
 def test_export_writes_a_folder_that_needs_no_suite(tmp_path):
     pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
     save(tmp_path / "policy.npz", made(imports.body("a1_like.urdf"), "steer", delay=(0, 2), **SENSED))
