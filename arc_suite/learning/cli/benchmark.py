@@ -111,9 +111,8 @@ def score_policies(division: str) -> None:
 
 def announce(policies, desc: str, **options):
     """Print how many policies are judged, as that takes minutes, and return their progress bar."""
-    say(
-        f"{desc}: {len(policies)} of the {SEEDS * len(PLACES)} policies of an entry, {evaluation.EPISODES} episodes each"
-    )
+    size = SEEDS * len(PLACES)
+    say(f"{desc}: {len(policies)} of the {size} policies of an entry, {evaluation.EPISODES} episodes each")
     return progress(policies, desc=desc, **options)
 
 
