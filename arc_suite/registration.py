@@ -234,7 +234,8 @@ def _check_parameters(body: Body, task: str, parameters: Mapping[str, Any]) -> N
         required_names = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
         missing = sorted(required_names - parameters.keys())
         if missing:
-            raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}")
+            cure = "give them too, or leave out the table, which is then fitted to the body"
+            raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}; {cure}")
     TASKS[task].settings_for(body, parameters)
 
 

@@ -122,14 +122,9 @@ def find_motors(
         for joint in joints:
             load = max(loads[joint], _MIN_LOAD_SHARE * largest_load)
             limit = limits_of_file.get(joint) or _limit_by_rule(load, inertias[joint])
-            exceeds_load = largest_load > 0.0 and limit.torque > _MAX_LOADS_PER_LIMIT * largest_load
-            if limit.torque >= _PLACEHOLDER_TORQUE or exceeds_load:
-                limit = limit._replace(origin=_PLACEHOLDER)
-            gains = gains_of_file.get(joint)
-            if gains is None:
-                joint_damping = float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
-                gains = _gains_by_rule(load, inertias[joint], limit.torque, joint_damping)
-                gains = gains.choose(stiffness, damping)
+            limit = _mark_placeholder(limit, largest_load)
+            sized_gains = _gains_by_rule(load, inertias[joint], limit.torque, _joint_damping(robot, joint))
+            gains = gains_of_file.get(joint) or sized_gains.choose(stiffness, damping)
             speed = speeds.get(robot.joint_name(joint))
             servos[joint] = Servo(
                 stiffness=gains.stiffness,
@@ -149,6 +144,18 @@ def find_motors(
         _gain_note(stance.joints, gains_of_file, stiffness, damping),
     )
     return Motors(servos, all_notes)
+
+
+def _joint_damping(robot: Robot, joint: int) -> float:
+    """Return the damping of a joint in the file, N m s/rad."""
+    return float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
+
+
+def _mark_placeholder(limit: _Limit, largest_load: float) -> _Limit:
+    """Return a limit with its origin: a placeholder if it is too large for the load, N m, of joints like its own."""
+    exceeds_load = largest_load > 0.0 and limit.torque > _MAX_LOADS_PER_LIMIT * largest_load
+    is_placeholder = limit.torque >= _PLACEHOLDER_TORQUE or exceeds_load
+    return limit._replace(origin=_PLACEHOLDER) if is_placeholder else limit
 
 
 def _is_speed(speed: float | None, height: float) -> bool:

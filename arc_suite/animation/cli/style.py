@@ -203,6 +203,10 @@ def print_report(robot: str, reports: Mapping[str, Mapping[str, Any]]) -> None:
         reports: reports of `style.report`, by label of the policy.
     """
     print_table(robot, list(reports), _robot_lines(list(reports.values())))
+    for label, report in reports.items():
+        names = [name for name, metric in report["metrics"].items() if math.isinf(metric["robot"].mean)]
+        if names:
+            print(f"{label}: {', '.join(names).replace('_', ' ')}: -, as the robot gets nowhere")
     first_report = next(iter(reports.values()))
     leg_names = list(first_report["metrics"]["foot_slip"]["legs"])
     for label, report in reports.items():
@@ -250,8 +254,8 @@ def print_table(heading: str, columns: list[str], lines: list[TableLine]) -> Non
 
 
 def format_number(value: float, decimals: int = 3) -> str:
-    """Return a number as text; a dash for NaN."""
-    return "-" if math.isnan(value) else f"{value:.{decimals}f}"
+    """Return a number as text; a dash for what is undefined, or for an amount a meter of a body that gets nowhere."""
+    return f"{value:.{decimals}f}" if math.isfinite(value) else "-"
 
 
 def format_summary(summary: evaluation.Summary) -> str:

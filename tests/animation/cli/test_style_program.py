@@ -42,7 +42,8 @@ def test_report_of_two_policies(tmp_path):
     assert rows["speed"][:2] == ["m/s", "0.600"]
     assert [float(field) for field in rows["speed"][2::3]] == pytest.approx([0.59, 0.0], abs=0.03)
     assert rows["duty factor"][0] == "0.600"
-    assert rows["foot slip"][-1] == "inf"
+    assert rows["foot slip"][-1] == "-"
+    assert "own_walkers:frozen: foot slip, cost of transport: -, as the robot gets nowhere" in lines
     assert lines.count("") == 3  # above the robot's table, and two of legs
 
     report = json.loads(figures.read_text(), parse_constant=pytest.fail)

@@ -72,7 +72,7 @@ def test_the_default_length_of_a_run_follows_from_its_task(name, task, steps):
         ({"improvement": 1.0}, r"^improvement: expected a number between 0 and 1, got 1\.0$"),
         ({"learning_rate": 0}, r"^learning_rate: expected a number between 0 and 1, got 0$"),
         ({"tau": 0}, r"^tau: expected a number from 1e-06 to 1, got 0$"),
-        ({"batch": 0}, r"^batch: expected an integer from 1, got 0$"),
+        ({"batch": 0}, r"^batch: expected an integer from 1 to 16777216, got 0$"),
         ({"early_stop": "safe"}, r"^unknown early_stop 'safe'"),
     ],
 )

@@ -310,8 +310,8 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
     ("task", "presets"),
     [
         ("walk", {"zero", "refined", "tuned", "straight", "medium"}),
-        ("rough", {"zero", "climbing", "surefooted", "steered", "refined", "tuned", "straight", "medium"}),
-        ("navigate", {"zero", "planned", "steered", "surefooted", "refined", "tuned", "straight", "medium"}),
+        ("rough", {"zero", "climbing", "surefooted", "steered"}),
+        ("navigate", {"zero", "planned", "steered", "surefooted"}),
     ],
 )
 def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, monkeypatch, task, presets):
