@@ -98,11 +98,10 @@ def _describe_overload(body: Body, stillness: Stillness) -> str:
     weak_joints = [joint for joint, is_weak in zip(body.joints, stillness.overloaded, strict=True) if is_weak]
     names = ", ".join(joint.alias or joint.name for joint in weak_joints[:_MAX_NAMES])
     problem = f"sinks as it stands: {len(weak_joints)} motors give their largest torque all the time ({names})"
-    cure = cures.find_strong_enough(body, lambda stronger_body: not measure_stillness(stronger_body).overloaded.any())
-    if cure is None:
-        return f"{problem}; {cures.FACTORS[-1]:g} times their torque does not hold it either"
-    factor, _ = cure
-    return f"{problem}; {factor:g} times their torque holds it, {_torque_range(weak_joints, factor)}"
+    for factor in cures.FACTORS:
+        if not measure_stillness(cures.multiply_motors(body, factor)).overloaded.any():
+            return f"{problem}; {factor:g} times their torque holds it, {_torque_range(weak_joints, factor)}"
+    return f"{problem}; {cures.FACTORS[-1]:g} times their torque does not hold it either"
 
 
 def _torque_range(joints: Sequence[Joint], factor: float) -> str:
@@ -175,12 +174,12 @@ def _advice(body: Body, walk: cures.FirstWalk) -> str:
 
 def _advice_on_motors(body: Body) -> str:
     """Return which multiple of the motors' torques and gains makes an imported robot walk."""
-    cure = cures.find_strong_enough(body, lambda stronger_body: cures.walk(stronger_body).quality == _GOOD_QUALITY)
-    if cure is None:
-        return f": motors of {cures.FACTORS[-1]:g} times the torques and gains do not help"
-    factor, stronger_body = cure
-    motors = f"with {factor:g} times the torques and gains of its motors ({_torque_range(body.joints, factor)})"
-    return f": its motors are weak: {motors} it {_describe_walk(cures.walk(stronger_body))}"
+    for factor in cures.FACTORS:
+        walk = cures.walk(cures.multiply_motors(body, factor))
+        if walk.quality == _GOOD_QUALITY:
+            motors = f"with {factor:g} times the torques and gains of its motors ({_torque_range(body.joints, factor)})"
+            return f": its motors are weak: {motors} it {_describe_walk(walk)}"
+    return f": motors of {cures.FACTORS[-1]:g} times the torques and gains do not help"
 
 
 def _describe_walk(walk: cures.FirstWalk) -> str:

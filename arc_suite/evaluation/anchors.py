@@ -74,7 +74,7 @@ class Anchors(NamedTuple):
         """Why returns have no scores: no demonstrator, or none that earns a tenth more than standing still; or ""."""
         if self.demonstrator is None:
             return "no demonstrator suits body and task"
-        if self.demonstrator - self.zero < _MIN_GAIN * abs(self.zero):
+        if self.demonstrator - self.zero <= _MIN_GAIN * abs(self.zero):
             returns = f"{self.demonstrator:.1f}, and standing still {self.zero:.1f}"
             return f"the best demonstrator, {self.preset}, earns {returns}"
         return ""
@@ -177,10 +177,15 @@ def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES, first
 def _presets_to_measure(task: Task) -> tuple[str, ...]:
     """Return the presets that suit a task and read all its commands, or where none does, all that suit it."""
     names = suited_presets(task)
-    obedient_names = tuple(
-        name for name in names if not ignored_commands(task, law(task, preset_of(task.scene.body, name)))
-    )
-    return obedient_names or names
+    return tuple(name for name in names if _reads_all_commands(task, name)) or names
+
+
+def _reads_all_commands(task: Task, name: str) -> bool:
+    """Return whether a preset takes the body of a task and reads all that the task commands."""
+    try:
+        return not ignored_commands(task, law(task, preset_of(task.scene.body, name)))
+    except ValueError:
+        return False
 
 
 def play_returns(setup: Setup, name: str, seeds: Sequence[int]) -> np.ndarray:

@@ -8,7 +8,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.evaluation.walking import Verdict, WalkWatcher
-from arc_suite.robots.spec import Body, Link
+from arc_suite.robots.spec import Body, Joint, Link
 
 _STEPS = 100  # control steps; 5 s of the four robots, of which the first 2 s are the start
 _STEPS_OF_IMPORTED = 1000  # control steps, as some imported robots fall late
@@ -93,43 +93,28 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
     return max(better_walks.items(), key=rank, default=None)
 
 
-def find_strong_enough(body: Body, is_cured: Callable[[Body], bool]) -> tuple[float, Body] | None:
-    """Return the least factor of motors with which an imported body is cured, and that body; None if none helps.
-
-    Args:
-        body: any; None is returned unless it is imported.
-        is_cured: whether a body has the problem no more.
-    """
-    if not body.source:
-        return None
-    for factor in FACTORS:
-        stronger_body = multiply_motors(body, factor)
-        if is_cured(stronger_body):
-            return factor, stronger_body
-    return None
-
-
 def multiply_motors(body: Body, factor: float) -> Body:
     """Return an imported body whose motors have a multiple of their torques and gains."""
 
-    def strengthen(link: Link) -> Link:
-        if link.joint is None:
-            return link
-        servo = link.joint.servo
+    def strengthen(joint: Joint) -> Joint:
+        servo = joint.servo
         changes = {name: factor * getattr(servo, name) for name in ("limit", "stiffness", "damping")}
         if servo.stall is not None:
             changes["stall"] = factor * servo.stall
-        return link.replace(joint=link.joint.replace(servo=servo.replace(**changes)))
+        return joint.replace(servo=servo.replace(**changes))
 
-    return body.replace(legs=tuple(leg.replace(links=tuple(map(strengthen, leg.links))) for leg in body.legs))
+    return _change_joints(body, strengthen)
 
 
 def _leave_out(body: Body, names: tuple[str, ...]) -> Body:
     """Return a body whose joints leave out fields."""
+    return _change_joints(body, lambda joint: joint.replace(**dict.fromkeys(names)))
 
-    def without_fields(link: Link) -> Link:
-        if link.joint is None:
-            return link
-        return link.replace(joint=link.joint.replace(**dict.fromkeys(names)))
 
-    return body.replace(legs=tuple(leg.replace(links=tuple(map(without_fields, leg.links))) for leg in body.legs))
+def _change_joints(body: Body, change: Callable[[Joint], Joint]) -> Body:
+    """Return a body with each joint changed."""
+
+    def change_link(link: Link) -> Link:
+        return link if link.joint is None else link.replace(joint=change(link.joint))
+
+    return body.replace(legs=tuple(leg.replace(links=tuple(map(change_link, leg.links))) for leg in body.legs))

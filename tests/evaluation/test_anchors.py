@@ -23,6 +23,7 @@ def test_a_score_is_0_for_standing_and_1_for_the_demonstrator():
     ("scale", "flaw"),
     [
         (Anchors(1000.0), "no demonstrator suits body and task"),
+        (Anchors(0.0, 0.0, "medium"), "the best demonstrator, medium, earns 0.0, and standing still 0.0"),
         (Anchors(1000.0, 900.0, "medium"), "the best demonstrator, medium, earns 900.0, and standing still 1000.0"),
         (
             Anchors(1900.0, 1918.0, "straight"),
