@@ -58,6 +58,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "hopper": ("leaper",),
     "humanoid": ("leaper",),
     "imitation": ("mimic",),
+    "input": ("spec", "robot", "file"),
     "joystick": ("steer",),
     "jump": ("leap",),
     "learning_rate": ("policy_rate",),
@@ -66,7 +67,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "lr": ("learning_rate", "policy_rate"),
     "max_episode_steps": ("time_limit",),
     "max_grad_norm": ("gradient_norm",),
-    "model": ("policy", "run"),
+    "model": ("policy", "run", "spec", "robot"),
     "mjcf": ("spec", "robot"),
     "model_path": ("policy", "run"),
     "n_envs": ("num_envs",),
@@ -83,6 +84,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "out": ("output", "json", "results"),
     "output": ("json", "results", "id"),
     "output_dir": ("output", "results"),
+    "path": ("spec", "robot", "file"),
     "policy": ("run", "algorithm"),
     "ppo2": ("ppo",),
     "quadruped": ("leaper",),
@@ -96,6 +98,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "size": ("width", "scale"),
     "skeleton": ("skin",),
     "skinned": ("skin",),
+    "spec": ("robot",),
     "speed": ("target_velocity",),
     "stand": ("walk",),
     "standup": ("recover",),
@@ -110,6 +113,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "velocity": ("target_velocity", "steer"),
     "walker": ("leaper",),
     "walker2d": ("leaper",),
+    "xml": ("spec", "robot"),
 }
 _GAP_BETWEEN_NAMES = re.compile(r"[\s;+|]+")  # in place of commas
 _VERSION = re.compile(r"-v\d{1,3}$")  # of Gymnasium's names

@@ -5,7 +5,8 @@
 
 The file that is written is a body with the physics of the robot's file, to the last bit: on the floor of the
 suite, without contacts of the robot with itself. It needs no other file. A line each tells the legs, the
-order of the joints, the standing pose, the limits of the motors, what was repaired and what is left out.
+order of the joints, the standing pose, the limits of the motors, the joints' damping and friction, links without
+a mass, what was repaired and what is left out.
 
 Other programs, and `arc_suite.load`, take the robot's own file, too.
 """

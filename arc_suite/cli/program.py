@@ -3,6 +3,7 @@
 import contextlib
 import inspect
 import io
+import itertools
 import os
 import re
 import signal
@@ -206,6 +207,7 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
             long_names = [f"--{name}" for name in names if name[0] == error.flagname]
             if long_names:
                 raise ValueError(f"unknown flag '-{error.flagname}'; did you mean {' or '.join(long_names)}?") from None
+        value = value or _value_behind(with_underscores, error.flagname)
         _refuse_name_of_argument(error.flagname, value, parameters)
         if error.flagname in _CURES:
             raise ValueError(f"unknown flag {checks.preview(error.flagname)}; {_CURES[error.flagname]}") from None
@@ -254,9 +256,20 @@ def hyperparameter_words() -> set[str]:
 
 def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -> None:
     """Raise ValueError for a flag that is the name of an argument without a flag."""
-    if any(meaning in parameters for meaning in checks.meanings(name)):
-        argument = checks.quote(value) or name.upper()
-        raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {argument}, without a flag?")
+    for meaning in checks.meanings(name):
+        if meaning in parameters:
+            argument = f": {checks.quote(value)}" if value else ""
+            raise ValueError(
+                f"unknown flag {checks.preview(name)}; the {meaning} is an argument without a flag{argument}"
+            )
+
+
+def _value_behind(arguments: Sequence[str], name: str) -> str:
+    """Return the argument behind a flag, which may be its value; "" if there is none, or another flag."""
+    for flag, value in itertools.pairwise(arguments):
+        if flag in (f"--{name}", f"-{name}"):
+            return "" if value[:1] in _DASHES else value
+    return ""
 
 
 def _suggest_list(arguments: Sequence[str], positional_arguments: Sequence[str], parameter_count: int) -> str:

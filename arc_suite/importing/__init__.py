@@ -195,8 +195,10 @@ def _describe_robot(path: Path, file: RobotFile, robot: Robot, stance: Stance, c
     if choices.armature is None:
         body, armature_notes = armatures.calm(body, robot, servos, write_body)
     first_notes = notes.import_notes(robot, stance, names, order)
+    resistance = notes.resistance_notes(robot, stance)
     last_notes = notes.omission_notes(file, robot, stance, names)
-    return ImportedRobot(body, (*first_notes, *unit_notes, *motor_notes, *armature_notes, *file.notes, *last_notes))
+    all_notes = (*first_notes, *unit_notes, *motor_notes, *resistance, *armature_notes, *file.notes, *last_notes)
+    return ImportedRobot(body, all_notes)
 
 
 def _find_standing_robot(path: Path, choices: _Choices) -> _StandingRobot:

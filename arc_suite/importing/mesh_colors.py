@@ -37,9 +37,25 @@ def name_urdf_shapes(robot: ElementTree.Element) -> dict[str, np.ndarray]:
     return {name: color for name, color in colors.items() if color is not None}
 
 
+def count_colored_visuals(robot: ElementTree.Element) -> int:
+    """Return how many visual shapes of a URDF have a material."""
+    return len(robot.findall("link/visual/material"))
+
+
+def count_colored_geoms(spec: mujoco.MjSpec) -> int:
+    """Return how many geoms of an MJCF file have a color or a material, without those of the world."""
+    geoms = [geom for geom in spec.geoms if geom.parent.name != "world"]
+    return sum(bool(geom.material) or has_color(geom) for geom in geoms)
+
+
+def has_color(geom: mujoco.MjsGeom) -> bool:
+    """Return whether the `rgba` of a geom is not MuJoCo's default."""
+    return not np.allclose(geom.rgba, _NO_COLOR)
+
+
 def find_rgba(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> np.ndarray:
     """Return the color (4,) of a geom of an MJCF file, or of its material if that has no texture."""
-    material = spec.material(geom.material) if geom.material and np.allclose(geom.rgba, _NO_COLOR) else None
+    material = spec.material(geom.material) if geom.material and not has_color(geom) else None
     if material is None or any(material.textures):
         return np.array(geom.rgba)
     return np.array(material.rgba)
@@ -70,7 +86,7 @@ def find_colors(
     color_of_file = {path: _find_material_color(material) for path, material in materials.items()}
     colors = []
     for geom in spec.geoms:
-        color = None if np.allclose(geom.rgba, _NO_COLOR) else _check_color(geom.rgba)
+        color = _check_color(geom.rgba) if has_color(geom) else None
         if color is None and geom.meshname in file_of_mesh:
             color = color_of_file.get(file_of_mesh[geom.meshname])
         colors.append(None if color is None else color[:3])

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from arc_suite.importing import drives, loops, trunk, visual_meshes
+from arc_suite.importing.motors import format_span
 from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Stance
@@ -42,6 +43,38 @@ def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int
     yield from trunk.placement_notes(robot)
 
 
+def resistance_notes(robot: Robot, stance: Stance) -> Iterator[str]:
+    """Yield notes on the damping, friction and springs of the legs' joints, which are those of the file."""
+    model = robot.model
+    dofs = model.jnt_dofadr[list(stance.joints)]
+    count = len(dofs)
+    damping = _span_above_zero(model.dof_damping[dofs], "N m s/rad")
+    friction = _span_above_zero(model.dof_frictionloss[dofs], "N m")
+    springs = _span_above_zero(model.jnt_stiffness[list(stance.joints)], "N m/rad")
+    if damping:
+        yield f"joint damping: that of the file, {damping} of {count} joints; servos damp in addition"
+    elif not model.dof_dampingpoly[dofs].any():
+        yield "joint damping: none in the file; servos alone damp"
+    yield (
+        f"joint friction: that of the file, {friction} of {count} joints"
+        if friction
+        else "joint friction: none in the file"
+    )
+    if springs:
+        yield f"joint springs: those of the file, {springs} of {count} joints"
+    torso_damping = model.dof_damping[model.jnt_dofadr[model.body_jntadr[robot.root]]]
+    if torso_damping:
+        yield f"torso damping: the file resists its movement by {torso_damping:.4g} N s/m, kept"
+
+
+def _span_above_zero(values: np.ndarray, unit: str) -> str:
+    """Return the range of the values (n,) above 0, and their count, such as "0.1 N m at 4"; "" if there are none."""
+    positive = values[values > 0.0]
+    if not len(positive):
+        return ""
+    return f"{format_span(positive.min(), positive.max())} {unit} at {len(positive)}"
+
+
 def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) -> Iterator[str]:
     """Yield notes on what is left out, or is not as in the file."""
     model = file.model
@@ -51,9 +84,8 @@ def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) 
     for kind, count in _omission_counts(file, robot, stance).items():
         if count:
             yield f"left out: {count} {kind}"
-    yield from visual_meshes.note(file.visuals)
-    lost_visuals = "" if file.visuals.meshes else "; looks, as pictures show the colliders"
-    yield f"left out: contacts of the robot with itself{lost_visuals}"
+    yield visual_meshes.describe_looks(file.visuals, file.colored_shapes)
+    yield "left out: contacts of the robot with itself"
     yield from _world_notes(robot)
     wheels = _find_wheels(robot, stance)
     if wheels:

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 import mujoco
 
 from arc_suite import parsers
-from arc_suite.importing import bounds, inertias, kinds, references, units, urdf
+from arc_suite.importing import bounds, inertias, kinds, mesh_colors, missing_masses, references, units, urdf
 from arc_suite.importing.facing import LEVEL, Facing, turn_torso
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of, text_length
 from arc_suite.importing.tree import FREE
@@ -38,6 +38,7 @@ class RobotFile(NamedTuple):
         root: body of the torso.
         meshes: meshes of geoms whose shape is a mesh, by geom.
         visuals: visual meshes.
+        colored_shapes: number of shapes to which the file gives a color or a material.
         order: names of joints in the order of the file; empty if the model has that order.
         driven: names of the joints that a URDF drives; empty if it does not say.
         speeds: speeds, rad/s, that a URDF gives as the limits of joints, by name.
@@ -50,6 +51,7 @@ class RobotFile(NamedTuple):
     root: int
     meshes: dict[int, Mesh]
     visuals: Visuals
+    colored_shapes: int
     order: tuple[str, ...]
     driven: frozenset[str]
     speeds: dict[str, float]
@@ -66,12 +68,14 @@ class _Spec(NamedTuple):
         order: as in `RobotFile`.
         notes: as in `RobotFile`.
         mesh_files: files of meshes, with those that were looked for and are missing.
+        colored_shapes: as in `RobotFile`.
     """
 
     spec: mujoco.MjSpec
     order: tuple[str, ...]
     notes: tuple[str, ...]
     mesh_files: tuple[Path, ...]
+    colored_shapes: int
 
 
 def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotFile:
@@ -93,12 +97,13 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     is_urdf = root_element.tag == "robot"
     driven = urdf.find_driven_joints(root_element) if is_urdf else frozenset()
     speeds = urdf.find_speeds(root_element) if is_urdf else {}
-    spec, order, notes, mesh_files = _read_spec(path, root_element)
+    spec, order, notes, mesh_files, colored_shapes = _read_spec(path, root_element)
     bounds.check_mesh_files(mesh_files)
     if scale != 1.0:
         units.scale_lengths(spec, scale)
     model, mesh_notes = _compile(spec)
     model, torso, torso_notes = _free_torso(spec, model)
+    mass_notes = () if is_urdf else missing_masses.describe_bodies(spec, model, torso)
     model, unit_notes = units.repair_meshes(spec, model, torso)
     model = units.scale_inertias(spec, model, torso, scale)
     model, inertia_notes = inertias.correct_inertias(spec, model, torso)
@@ -107,23 +112,25 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     visuals = Visuals()
     if text_length(meshes) < _MAX_TEXT_WITH_VISUALS:
         visuals = read_visuals(path, visual_element, model, torso, facing, scale)
-    all_notes = (*notes, *mesh_notes, *torso_notes, *unit_notes, *inertia_notes)
+    all_notes = (*notes, *mesh_notes, *torso_notes, *mass_notes, *unit_notes, *inertia_notes)
     all_parts = tuple(dict.fromkeys((*parts, *mesh_files, *visuals.files)))
-    return RobotFile(model, torso, meshes, visuals, order, driven, speeds, all_notes, all_parts, facing)
+    return RobotFile(model, torso, meshes, visuals, colored_shapes, order, driven, speeds, all_notes, all_parts, facing)
 
 
 def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:
     """Return the spec of a file."""
     if root_element.tag == "robot":
+        colored_shapes = mesh_colors.count_colored_visuals(root_element)
         text, order, notes, mesh_files = urdf.repair_urdf(root_element, path.parent)
         # The text is not the file: numbers of its lines would mislead.
         spec = _with_short_errors(lambda: mujoco.MjSpec.from_string(text), shows_line_numbers=False)
-        return _Spec(spec, order, notes, mesh_files)
+        return _Spec(spec, order, notes, mesh_files, colored_shapes)
     spec = _with_short_errors(lambda: mujoco.MjSpec.from_file(str(path)))
     notes = references.delete_references(spec)
+    colored_shapes = mesh_colors.count_colored_geoms(spec)
     delete_visuals(spec)
     mesh_files = tuple(file_of(spec, mesh) for mesh in spec.meshes if mesh.file)
-    return _Spec(spec, order=(), notes=notes, mesh_files=mesh_files)
+    return _Spec(spec, order=(), notes=notes, mesh_files=mesh_files, colored_shapes=colored_shapes)
 
 
 def _with_short_errors(function: Callable[[], _Result], shows_line_numbers: bool = True) -> _Result:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arc_suite.importing import inertias, world_link
+from arc_suite.importing import inertias, missing_masses, world_link
 from arc_suite.importing.world_link import Elements
 from arc_suite.robots.spec import SpecError
 
@@ -299,7 +299,7 @@ def _principal_moments(inertia: Mapping[str, float]) -> np.ndarray:
 
 
 def _add_missing_masses(links: Elements, joints: Elements) -> Iterator[str]:
-    """Give links that move without mass, also in links fixed to them, a small mass; yield a note on these."""
+    """Give links that move without mass, also in links fixed to them, a small mass; yield notes on missing masses."""
     masses = {}
     for name, link in links.items():
         if link.find("inertial") is not None:
@@ -322,15 +322,17 @@ def _add_missing_masses(links: Elements, joints: Elements) -> Iterator[str]:
         has_mass = any(masses.get(link) for link in rigid_part)
         if not has_mass and (masses or not solid_links.intersection(rigid_part)):
             light_links.append(name)
-    if not light_links:
-        return
     mass = _LIGHT_LINK * sum(masses.values()) or _LIGHT_MASS
     for name in light_links:
         inertial = ElementTree.SubElement(links[name], "inertial")
         ElementTree.SubElement(inertial, "mass", value=repr(mass))
         texts = dict.fromkeys(_MOMENTS, repr(inertias.ball_moment(mass))) | dict.fromkeys(_PRODUCTS, "0")
         ElementTree.SubElement(inertial, "inertia", texts)
-    yield f"repaired: {len(light_links)} links that move and weigh nothing get {mass:.2g} kg, such as {light_links[0]}"
+    if light_links:
+        count = len(light_links)
+        yield f"repaired: {count} links that move and weigh nothing get {mass:.2g} kg, such as {light_links[0]}"
+    if masses:
+        yield from missing_masses.describe_links(links)
 
 
 def _links_fixed_to(name: str, fixed_children: Mapping[str, list[str]]) -> list[str]:

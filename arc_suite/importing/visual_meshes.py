@@ -2,7 +2,7 @@
 
 import contextlib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,12 +30,14 @@ class Visual(NamedTuple):
         points: (n, 3) in the body's frame, m.
         faces: (m, 3) indices of points.
         color: (3,) sRGB, 0 to 1; None if the file gives none.
+        is_of_obj: whether the color is that of an .obj file's material, and none of the robot's file.
     """
 
     body: int
     points: np.ndarray
     faces: np.ndarray
     color: np.ndarray | None = None
+    is_of_obj: bool = False
 
 
 class Visuals(NamedTuple):
@@ -138,6 +140,7 @@ def _collect_visuals(
     geoms = [(geom, geom.meshname) for geom in spec.geoms]
     file_of_mesh = {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file}
     colors = mesh_colors.find_colors(spec, file_of_mesh, materials)
+    has_color = [mesh_colors.has_color(geom) for geom, _ in geoms]
     for geom, _ in geoms:  # balls lie where the file puts meshes, and are compiled at once
         geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
         geom.meshname = ""
@@ -150,13 +153,13 @@ def _collect_visuals(
     ]:
         return Visuals()
     whole_visuals = []
-    for (geom, mesh_name), color in zip(geoms, colors, strict=True):
+    for (geom, mesh_name), color, is_of_file in zip(geoms, colors, has_color, strict=True):
         body = int(places.geom_bodyid[geom.id])
         if places.body_rootid[body] == torso:
             points, faces = triangles[mesh_name]
             points = points @ rotations.matrix(places.geom_quat[geom.id]).T + places.geom_pos[geom.id]
             turned_points = points @ facing.rotation.T if body == torso else points
-            whole_visuals.append(Visual(body, turned_points, faces, color))
+            whole_visuals.append(Visual(body, turned_points, faces, color, is_of_obj=not is_of_file))
     point_count = sum(len(visual.points) for visual in whole_visuals)
     share = min(1.0, _MAX_POINTS / max(point_count, 1))
     visuals = [_simplify(visual, max(_MIN_POINTS, int(share * len(visual.points)))) for visual in whole_visuals]
@@ -202,12 +205,20 @@ def _cluster(coordinates: np.ndarray) -> np.ndarray:
     return clusters
 
 
-def note(visuals: Visuals) -> Sequence[str]:
-    """Return a line on the visual meshes, if there are any."""
+def describe_looks(visuals: Visuals, colored_shapes: int) -> str:
+    """Return a line on what pictures show, and on colors that are left out.
+
+    Args:
+        visuals: the visual meshes.
+        colored_shapes: number of shapes to which the robot's file gives a color or a material.
+    """
+    kept_colors = sum(visual.color is not None and not visual.is_of_obj for visual in visuals.meshes)
+    lost = colored_shapes - kept_colors
+    lost_colors = f"; colors or textures of {lost} shapes are left out" if lost > 0 else ""
     if not visuals.meshes:
-        return ()
+        return f"looks: pictures show the colliders, in colors of the suite{lost_colors}"
     count = sum(len(visual.points) for visual in visuals.meshes)
     reduction = f", with {count} of {visuals.point_count} points" if count < visuals.point_count else ""
     colored = sum(visual.color is not None for visual in visuals.meshes)
     colors = f", {colored} with the file's color" if colored else ""
-    return (f"looks: {len(visuals.meshes)} visual meshes{reduction}{colors}, for pictures, clips and pages",)
+    return f"looks: {len(visuals.meshes)} visual meshes{reduction}{colors}, for pictures, clips and pages{lost_colors}"

@@ -9,6 +9,7 @@ from tiers import tiers
 
 from arc_suite.tasks import TASKS
 
+BARE = "is an argument without a flag"
 ROBOTS = "(there are: queen, bastion, tick, leaper, "
 # What follows the name of the program; those of the first part have a cure that was missing once.
 CURED = {
@@ -139,7 +140,17 @@ FIRST_HOUR = {
     "animate --palette=moss -o a.glb": "--palette: goes with --robot, --spec or --legs\n",
     "animate --name=krabbo": "unknown flag 'name'; arc-suite build_model --name NAME --json writes a spec with a name",
     "evaluate --robot=tick --preset=steered": "observation: expected a block command, as the task steer has (--task ",
-    "import --urdf=go2.urdf": "unknown flag 'urdf'; did you mean go2.urdf, without a flag?\n",
+    "import --urdf=go2.urdf": f"unknown flag 'urdf'; the robot {BARE}: go2.urdf\n",
+    "import --urdf go2.urdf": f"unknown flag 'urdf'; the robot {BARE}: go2.urdf\n",
+    "import -o a.json --mjcf go2.urdf": f"unknown flag 'mjcf'; the robot {BARE}: go2.urdf\n",
+    "import --file go2.urdf": f"unknown flag 'file'; the robot {BARE}: go2.urdf\n",
+    "import --xml go2.urdf": f"unknown flag 'xml'; the robot {BARE}: go2.urdf\n",
+    "import --input go2.urdf": f"unknown flag 'input'; the robot {BARE}: go2.urdf\n",
+    "import --path go2.urdf": f"unknown flag 'path'; the robot {BARE}: go2.urdf\n",
+    "import --model go2.urdf": f"unknown flag 'model'; the robot {BARE}: go2.urdf\n",
+    "import --robot go2.urdf": f"unknown flag 'robot'; the robot {BARE}: go2.urdf\n",
+    "motion --input walk.npz": f"unknown flag 'input'; the file {BARE}: walk.npz\n",
+    "import --spec=go2.urdf": f"unknown flag 'spec'; the robot {BARE}: go2.urdf\n",
     "evaluate --urdf=go2.urdf": "unknown flag 'urdf'; did you mean 'spec'? (there are: ",
     "evaluate --robot=tick --task=patrol": f"unknown task 'patrol' (there are: {', '.join(TASKS)}, module:name)\n",
     "evaluate --robot=tick;queen": f"unknown robot 'tick;queen'; did you mean 'tick,queen'? {ROBOTS}",

@@ -16,6 +16,7 @@ class Learner:
         self.predict = print
 """
 INTEGER = "expected an integer in the range [1, 100000]"
+BARE = "is an argument without a flag"
 SPAN = "expected a number from 0 to 100, or two of them, the lower first"
 LINES = {
     "train --lr=1e-4": "unknown flag 'lr'; did you mean --hp learning_rate=1e-4 or --hp policy_rate=1e-4?\n",
@@ -42,10 +43,11 @@ LINES = {
     "evaluate --run=runs/a": "unknown flag 'run'; did you mean 'policy'? (there are: ",
     "evaluate --checkpoint=runs/a": "unknown flag 'checkpoint'; did you mean 'policy'? (there are: ",
     "evaluate --output=a.json": "unknown flag 'output'; did you mean 'json'? (there are: ",
-    "export --policy=runs/a": "unknown flag 'policy'; did you mean runs/a, without a flag?\n",
-    "export --run runs/a": "unknown flag 'run'; did you mean RUN, without a flag?\n",
+    "export --policy=runs/a": f"unknown flag 'policy'; the run {BARE}: runs/a\n",
+    "export --run runs/a": f"unknown flag 'run'; the run {BARE}: runs/a\n",
+    "export --run": f"unknown flag 'run'; the run {BARE}\n",
     "export runs/a --format=onnx": "unknown flag 'format'; the extension of the output is its format\n",
-    "benchmark --division=samples": "unknown flag 'division'; did you mean samples, without a flag?\n",
+    "benchmark --division=samples": f"unknown flag 'division'; the division {BARE}: samples\n",
     "benchmark samples --output=a": "unknown flag 'output'; did you mean 'results'? (there are: ",
     "render --duration=3": "unknown flag 'duration'; did you mean 'steps'? (there are: ",
     "render --resolution=640x480": "unknown flag 'resolution'; did you mean 'width'? (there are: ",

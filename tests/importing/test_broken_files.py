@@ -50,7 +50,7 @@ def broken(folder, file, old, new):
 
 # What comes in, by what is wrong: a file, a text in it and its replacement, and part of a note.
 CURED = {
-    "visual meshes are missing": (A1, "", "", "looks, as pictures show the colliders"),
+    "visual meshes are missing": (A1, "", "", "looks: pictures show the colliders"),
     "a collision mesh is missing": (A1, BOX, '<mesh filename="package://a/b.stl"/>', UNREAD),
     "a collision mesh is Collada": (A1, BOX, '<mesh filename="b.dae"/>', UNREAD),
     "a collision mesh has no name": (A1, BOX, "<mesh/>", UNREAD),

@@ -1,4 +1,4 @@
-"""One true line on what is not as in the file: mimic joints, reductions, one-sided motors, floors, drag in a fluid."""
+"""One true line on what is as in the file, or is not: masses, joints, motors, floors, drag in a fluid."""
 
 import imports
 import mujoco
@@ -147,3 +147,66 @@ def test_drag_of_ellipsoids_is_told_in_a_fluid_alone(density, tmp_path):
     assert of_kind(notes, "fluid") == ([line] if density else [])
     model = mujoco.MjModel.from_xml_string(body.source)
     assert model.opt.density == density and not model.geom_fluid.any()
+
+
+MASS = '<inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
+CUBE = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+PART = """<link name="{0}">{1}</link><joint name="{0}_to_trunk" type="fixed">
+  <origin xyz="0 0 0.1"/><parent link="trunk"/><child link="{0}"/></joint>"""
+
+
+def mass_of(body):
+    return mujoco.MjModel.from_xml_string(body.source).body_mass.sum()
+
+
+def test_links_without_a_mass_and_what_they_weigh_are_told(tmp_path):
+    plain_mass = mass_of(change(tmp_path, "a1_like.urdf").body)
+    empty = "masses: {} links have none in the file and no collider: none here ({})"
+    for inertial in ("", MASS):
+        parts = PART.format("lid", inertial + CUBE) + PART.format("lamp", inertial)
+        body, notes = change(tmp_path, "a1_like.urdf", ("</robot>", f"{parts}</robot>"))
+        lid = "masses: 1 links with colliders have none in the file, and get 1000 kg/m^3 (lid)"
+        assert of_kind(notes, "masses") == [lid, empty.format(2, "base, lamp")]
+        assert mass_of(body) == pytest.approx(plain_mass + 1.0)  # a cube of a liter
+    many = "".join(PART.format(name, "") for name in "abcde")
+    _, notes = change(tmp_path, "a1_like.urdf", ("</robot>", f"{many}</robot>"))
+    assert of_kind(notes, "masses") == [empty.format(6, "base, a, b, c, ...")]
+
+
+def test_bodies_that_weigh_what_their_shapes_do_are_told(tmp_path):
+    body, notes = change(tmp_path, "go2_like.xml")
+    assert not of_kind(notes, "masses")
+    inertial = '<inertial pos="-0.0037 -0.0223 -0.0327" mass="1.152"'
+    box = '<geom type="box" size="0.0123 0.017 0.1065"'
+    heavy_box = box.replace("<geom", '<geom mass="2.152"')
+    text = (imports.FILES / "go2_like.xml").read_text()
+    thigh = text[text.index(inertial) : text.index("/>", text.index(inertial)) + 2]
+    heavier_body, notes = change(tmp_path, "go2_like.xml", (thigh, ""), (box, heavy_box))
+    count = text.count(thigh)
+    line = f"masses: {count} of 13 bodies have no inertial in the file: they have the mass or density of their shapes"
+    assert of_kind(notes, "masses") == [line]
+    assert mass_of(heavier_body) == pytest.approx(mass_of(body) + count)
+
+
+def test_damping_friction_and_springs_of_joints_are_told(tmp_path):
+    _, notes = change(tmp_path, "a1_like.urdf")
+    assert of_kind(notes, "joint damping", "joint friction", "joint springs") == [
+        "joint damping: none in the file; servos alone damp",
+        "joint friction: none in the file",
+    ]
+    joint = '<joint name="FR_{}_joint" type="revolute">'
+    dynamics = '<dynamics damping="{}" friction="{}"/>'
+    changes = [
+        (joint.format("hip"), joint.format("hip") + dynamics.format(0.05, 0.0)),
+        (joint.format("calf"), joint.format("calf") + dynamics.format(0.2, 0.1)),
+    ]
+    _, notes = change(tmp_path, "a1_like.urdf", *changes)
+    assert "joint damping: that of the file, 0.05 to 0.2 N m s/rad at 2 of 12 joints; servos damp in addition" in notes
+    assert "joint friction: that of the file, 0.1 N m at 1 of 12 joints" in notes
+    torso = ("<freejoint/>", '<joint type="free" damping="3"/>')
+    springs = ('<joint axis="0 1 0"', '<joint stiffness="5" axis="0 1 0"')
+    body, notes = change(tmp_path, "go2_like.xml", torso, springs)
+    assert "joint springs: those of the file, 5 N m/rad at 12 of 12 joints" in notes
+    assert "torso damping: the file resists its movement by 3 N s/m, kept" in notes
+    model = mujoco.MjModel.from_xml_string(body.source)
+    assert model.dof_damping[:6].tolist() == [3.0] * 6 and model.jnt_stiffness[1:].tolist() == [5.0] * 12

@@ -23,7 +23,8 @@ FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
 TRUNK_VISUAL = (
     '<visual><origin xyz="0 0 0"/><geometry><mesh filename="package://quadruped_description/meshes/trunk.dae"/>'
 )
-LEFT_OUT = "left out: contacts of the robot with itself; looks, as pictures show the colliders"
+LOST_COLOR = "colors or textures of 1 shapes are left out"
+COLLIDERS = "looks: pictures show the colliders, in colors of the suite"
 
 
 def write_stl(path, points, faces):
@@ -89,7 +90,7 @@ def test_a_mesh_of_a_urdf_stays_in_its_place(tmp_path):
 
 def test_a_mesh_of_an_mjcf_file_stays_in_its_place(tmp_path):
     body, notes = import_robot(write_mjcf(tmp_path))
-    assert "looks: 1 visual meshes, for pictures, clips and pages" in notes
+    assert f"looks: 1 visual meshes, for pictures, clips and pages; {LOST_COLOR}" in notes  # of an ellipsoid
     points = WEDGE * (0.2, 0.2, 0.5) - (0.0, 0.0, 0.1)
     assert in_order(visual_points(body, "l1_link3")) == pytest.approx(in_order(points), abs=1e-3)
 
@@ -140,9 +141,9 @@ def test_a_mesh_that_cannot_be_read_keeps_no_robot_out(data, tmp_path):
     path = write_urdf(tmp_path)
     (tmp_path / "trunk.stl").write_bytes(data)
     body, notes = import_robot(path)
-    assert LEFT_OUT in notes and body.source == import_robot(A1).body.source
+    assert COLLIDERS in notes and body.source == import_robot(A1).body.source
     (tmp_path / "trunk.stl").unlink()
-    assert LEFT_OUT in import_robot(path).notes
+    assert COLLIDERS in import_robot(path).notes
 
 
 def test_the_file_of_a_mesh_is_followed(tmp_path):
@@ -200,7 +201,8 @@ def write_looks(folder, kind):
 @pytest.mark.parametrize("kind", ["mjcf", "urdf", "shared", "obj"])
 def test_a_mesh_keeps_its_color(kind, tmp_path):
     body, notes = import_robot(write_looks(tmp_path, kind))
-    assert "looks: 1 visual meshes, 1 with the file's color, for pictures, clips and pages" in notes
+    line = "looks: 1 visual meshes, 1 with the file's color, for pictures, clips and pages"
+    assert (f"{line}; {LOST_COLOR}" if kind == "mjcf" else line) in notes
     assert body_from_json(body_to_json(body)) == body
     described, materials = parts.describe_body(body)
     assert materials["visual_color0"].color == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
@@ -221,7 +223,21 @@ def test_a_color_that_is_none_is_left_out(rgba, tmp_path):
     path = write_looks(tmp_path, "urdf")
     path.write_text(path.read_text().replace("0.1 0.2 0.3 1", rgba))
     body, notes = import_robot(path)
-    assert "looks: 1 visual meshes, for pictures, clips and pages" in notes and "rgba" not in body.source
+    assert f"looks: 1 visual meshes, for pictures, clips and pages; {LOST_COLOR}" in notes
+    assert "rgba" not in body.source
+
+
+def test_colors_that_pictures_lack_are_counted(tmp_path):
+    material = '<material name="white"/></visual>'
+    texts = {
+        "robot.urdf": (A1, "</visual>", material),
+        "robot.xml": (GO2, '<geom name="FL" class="foot"', '<geom name="FL" rgba="1 0 0 1" class="foot"'),
+    }
+    for name, (file, old, new) in texts.items():
+        text = file.read_text()
+        (tmp_path / name).write_text(text.replace(old, new))
+        count = text.count(old) + (file == GO2)  # which has a colored ellipsoid; its floor has a material
+        assert f"{COLLIDERS}; colors or textures of {count} shapes are left out" in import_robot(tmp_path / name).notes
 
 
 def test_materials_of_an_obj_file_are_read_in_its_folder_alone(tmp_path):
