@@ -84,7 +84,7 @@ def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) 
     for kind, count in _omission_counts(file, robot, stance).items():
         if count:
             yield f"left out: {count} {kind}"
-    yield visual_meshes.describe_looks(file.visuals, file.colored_shapes)
+    yield visual_meshes.describe_visuals(file.visuals, file.colored_shapes)
     yield "left out: contacts of the robot with itself"
     yield from _world_notes(robot)
     wheels = _find_wheels(robot, stance)

@@ -205,7 +205,7 @@ def _cluster(coordinates: np.ndarray) -> np.ndarray:
     return clusters
 
 
-def describe_looks(visuals: Visuals, colored_shapes: int) -> str:
+def describe_visuals(visuals: Visuals, colored_shapes: int) -> str:
     """Return a line on what pictures show, and on colors that are left out.
 
     Args:
