@@ -12,8 +12,9 @@ With --walk its default demonstrator walks it for 100 control steps, an imported
 drags its torso, or stays below 0.7 of the target speed, the demonstrator `medium` tries. Where that fails, too, a
 line names the fields to leave out, which are then sized to suit the body; of an imported robot, it says whether
 stronger motors help. With
---tasks the demonstrator of each task walks it, too, in four episodes of 200 control steps; a line for each
-task names the preset, its metric and how many episodes ended upright.
+--tasks the demonstrator of each task walks it, too, in four episodes of 200 control steps. A line for each
+task names the preset, the mean of its metric, and how many episodes it ended without a fall; in `recover`, in
+how many of them it got up.
 
 A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
 the line names the terms, metrics and blocks that differ.
@@ -150,8 +151,8 @@ def _try_tasks(spec: str, body: Body) -> None:
     """Print how the demonstrator of each task walks a body in it."""
     trials = suitability.try_defaults(body, _SEEDS, _STEPS)
     for trial in program.progress(trials, total=len(TASKS), desc="walk", unit="task", leave=False):
-        upright = f"{trial.upright} of {trial.episodes} upright"
-        print(f"{spec}: {trial.task} by {trial.preset}: {trial.metric} {trial.value:.2f}, {upright}", flush=True)
+        for text in (trial.describe(), *trial.warnings):
+            print(f"{spec}: {trial.task} by {trial.preset}: {text}", flush=True)
 
 
 def _advice(body: Body, walk: cures.FirstWalk) -> str:

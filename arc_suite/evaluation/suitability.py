@@ -1,5 +1,6 @@
 """How well the presets that suit a task walk a body in it."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -13,7 +14,14 @@ from arc_suite.tasks import TASKS
 
 SEEDS = range(500, 508)  # no demonstrator was tuned on these episodes
 # Names of metrics. A trial has the first of them that its task has.
-METRICS = ("goals", "tracking", "speed", "joint_error", "up")
+_GOT_UP = "up"  # metric of tasks in which a body begins on the ground
+METRICS = ("goals", "tracking", "speed", "joint_error", _GOT_UP)
+_METRIC_TEXTS = {
+    "goals": "{:.2f} goals an episode",
+    "tracking": "tracking {:.2f} of 1",
+    "speed": "{:.2f} m/s",
+    "joint_error": "joints off by {:.2f} rad",
+}
 MAX_SHORTFALL = 0.05  # of a default preset, as a share of what the best preset gains over standing still
 
 
@@ -26,8 +34,9 @@ class Trial(NamedTuple):
         mean_return: over the episodes.
         metric: name of the task's metric; see `METRICS`.
         value: mean of the metric at the end of the episodes.
-        upright: number of episodes without a fall.
+        upright: number of episodes without a fall; where bodies begin on the ground, of those in which it got up.
         episodes: number of episodes.
+        warnings: texts of what the preset and the task warned of.
     """
 
     task: str
@@ -37,6 +46,13 @@ class Trial(NamedTuple):
     value: float
     upright: int
     episodes: int
+    warnings: tuple[str, ...] = ()
+
+    def describe(self) -> str:
+        """Return the metric, and how many episodes ended well."""
+        if self.metric == _GOT_UP:
+            return f"{self.upright} of {self.episodes} got up"
+        return f"{_METRIC_TEXTS[self.metric].format(self.value)}, {self.upright} of {self.episodes} without a fall"
 
 
 def try_defaults(body: Body, seeds: Sequence[int], steps: int) -> Iterator[Trial]:
@@ -74,23 +90,28 @@ def try_presets(body: Body, task: str, seeds: Sequence[int], steps: int) -> list
 
 
 def try_preset(setup: Setup, preset: str, seeds: Sequence[int], steps: int) -> Trial:
-    """Return a trial of a preset, or of standing still, `zero`; see `try_presets`."""
+    """Return a trial of a preset, or of standing still, `zero`; see `try_presets`. Its warnings are not shown."""
     has_fallen = np.zeros(len(seeds), bool)
 
     def note_falls(is_playing, is_falling):
         has_fallen[is_falling] = True
 
-    results = anchors.play_episodes(setup, preset, seeds, steps, note_falls)
+    with warnings.catch_warnings(record=True) as caught_warnings:
+        results = anchors.play_episodes(setup, preset, seeds, steps, note_falls)
     metrics = results[0].progress
     metric = next(name for name in METRICS if name in metrics)
+    is_upright = ~has_fallen
+    if metric == _GOT_UP:
+        is_upright = np.array([result.progress[metric] > 0.0 for result in results])
     return Trial(
         task=setup.kind.name,
         preset=preset,
         mean_return=float(np.mean([result.total for result in results])),
         metric=metric,
         value=float(np.mean([result.progress[metric] for result in results])),
-        upright=int((~has_fallen).sum()),
+        upright=int(is_upright.sum()),
         episodes=len(results),
+        warnings=tuple(dict.fromkeys(str(warning.message) for warning in caught_warnings)),
     )
 
 
