@@ -265,9 +265,11 @@ def check_one_step(trial: Trial, body: Body | str) -> None:
 
 def print_table(elites: Iterable[gallery.Elite], trial: Trial) -> None:
     """Print a row for each cell: its body, and the metric in both evaluations."""
-    metric = GOALS[trial.goal].metric
-    line = "{:<24} {:>6} {:>12} {:>12} {:>12}"
-    print(line.format("cell", "body", metric[:12], "evaluated again", "power, W/kg"))
+    goal = GOALS[trial.goal]
+    metric = goal.metric
+    unit = goal.unit.replace(" ", ", ")
+    line = "{:<24} {:>6} {:>17} {:>15} {:>12}"
+    print(line.format("cell", "body", f"{goal.metric_text}{unit}", "evaluated again", "power, W/kg"))
     for elite in elites:
         first = f"{getattr(elite.first, metric):.3f}"
         second = f"{getattr(elite.second, metric):.3f}"

@@ -93,6 +93,13 @@ class Map(NamedTuple):
         """Return the name of a cell's files, such as legs6_links3."""
         return "_".join(f"{name}{number}" for name, number in zip(self.names, cell, strict=True))
 
+    def describe(self, cell: Sequence[int]) -> str:
+        """Return a cell in words, such as "6 legs, 3 links" or "height 2 of 5, width 4 of 5"."""
+        texts = []
+        for name, edges, number in zip(self.names, self.edges, cell, strict=True):
+            texts.append(f"{number} {name}" if edges is None else f"{name} {number} of {len(edges) + 1}")
+        return ", ".join(texts)
+
 
 def _bin_edges(axis: Axis, around: Body | None, amount: float) -> tuple[float, ...] | None:
     """Return the edges of the bins of an axis; see `Map.of`."""

@@ -110,9 +110,8 @@ def write_specs(folder: Path, elites: Iterable[Elite]) -> None:
 
 def caption(elite: Elite, cell_map: Map, goal: str) -> str:
     """Return the cell of an elite, and its metric in its second evaluation."""
-    bins = ", ".join(f"{number} {name}" for name, number in zip(cell_map.names, elite.cell, strict=True))
-    metric = getattr(elite.second, GOALS[goal].metric)
-    return f"{bins}: {metric:.3g}{GOALS[goal].unit}"
+    value = getattr(elite.second, GOALS[goal].metric)
+    return f"{cell_map.describe(elite.cell)}: {GOALS[goal].metric_text} {value:.3g}{GOALS[goal].unit}"
 
 
 def draw_pictures(elites: Iterable[Elite], cell_map: Map, trial: Trial) -> dict[Cell, np.ndarray]:

@@ -61,6 +61,11 @@ class Goal(NamedTuple):
     may_fall: bool = False
     unit: str = ""
 
+    @property
+    def metric_text(self) -> str:
+        """Return the metric in words."""
+        return self.metric.replace("_", " ")
+
     def value(self, walk: WalkMeans) -> float:
         """Return the metric of a walk as a number to be raised."""
         return self.sign * getattr(walk, self.metric)

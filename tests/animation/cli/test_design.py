@@ -48,6 +48,10 @@ def test_files(found):
         assert body.name.startswith("tick_") and len(body.legs) == 6
         assert cell in done.stdout
     assert imageio.imread(folder / "gallery.png").ndim == 3
+    header, *lines = [line for line in done.stdout.splitlines() if line.startswith(("cell ", *best))]
+    columns = ["cell", "body", "speed, m/s", "evaluated again", "power, W/kg"]
+    ends = [header.index(column) + len(column) for column in columns]
+    assert all(line[end - 1] != " " and line[end : end + 1] in ("", " ") for line in lines for end in ends[1:])
 
 
 @pytest.mark.release

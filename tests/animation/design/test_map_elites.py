@@ -5,10 +5,12 @@ import json
 
 import pytest
 
+from arc_suite.animation.design import gallery
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes
 from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
 from arc_suite.animation.design.trials import Outcome, Round, Trial, WalkMeans
+from arc_suite.robots import ROBOTS
 
 ROUND = Round({}, (0,), 10)
 TRIAL = Trial("walk", "transport", Budget(12.0, 1.5), ROUND, ROUND)
@@ -27,6 +29,20 @@ def evaluated(jobs):
         walk = fake(body)
         found.append(Outcome("", walk, walk if -walk.cost_of_transport > elite else None))
     return found
+
+
+@pytest.mark.parametrize(
+    ("axes", "cell", "goal", "text"),
+    [
+        (["legs", "links"], (6, 3), "transport", "6 legs, 3 links: cost of transport 1.5"),
+        (["height", "width"], (2, 5), "speed", "height 2 of 5, width 5 of 5: speed 0.25 m/s"),
+        (["links"], (4,), "robustness", "4 links: tracking 0.75"),
+    ],
+)
+def test_a_picture_names_cell_and_metric(axes, cell, goal, text):
+    walk = WalkMeans(speed=0.25, achieved=1.0, tracking=0.75, cost_of_transport=1.5, power=5.0, falls=0.0)
+    elite = gallery.Elite("label", cell, 0, ROBOTS["tick"], walk, walk)
+    assert gallery.caption(elite, Map.of(axes), goal) == text
 
 
 @functools.cache
