@@ -1,5 +1,6 @@
 """Pages to play in: the ports of law, task and networks against Python, and what is in a page."""
 
+import functools
 import math
 import pathlib
 import re
@@ -33,6 +34,8 @@ SCRIPT = [(1.0, 0.0, 0.0), (0.6, 0.0, 0.4), (0.0, 0.0, 0.0), (0.0, 0.5, 0.0), (-
 SCRIPT += [(0.5, -0.25, -0.25), (0.0, 0.0, 0.0)]
 POSES = [np.zeros(6), np.eye(6)[4], -0.5 * np.eye(6)[0], 0.3 * np.eye(6)[5], np.array((0.3, 0.2, -0.2, 0.2, -0.1, 0.0))]
 TEMPI = (1.0, 0.8, 1.2)
+
+describe_creature = functools.cache(play_pages.creature)  # seconds a body, which several tests play
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +140,7 @@ def test_leaps_follow_the_keyframes_of_python(script, name, speed, plays):
     """Standing still a body jumps, walking it leaps; actions are those of the drive towards Python's targets."""
     body, pressed = ROBOTS[name], 60
     creature, law = (
-        play_pages.creature(body),
+        describe_creature(body),
         policy("cpg", body, "steered", task=Setup.of(body, "directed").definition).law,
     )
     legs, pose = Legs.of(law.body), tuple(law.legs.by_joint(law.rest_angles).tolist())
@@ -227,7 +230,7 @@ def test_a_policy_of_any_body_is_that_of_python(script, tmp_path, task):
 @pytest.mark.parametrize(("name", "of_python", "tolerance"), [("tick", "ppo", 1e-4), ("queen", "cpg", 1e-6)])
 def test_a_body_gets_up_as_in_python(script, name, of_python, tolerance):
     """By the policy of the package, or by `rising`; a network computes in float32."""
-    setup, creature = Setup.of(name, "recover"), play_pages.creature(ROBOTS[name])
+    setup, creature = Setup.of(name, "recover"), describe_creature(ROBOTS[name])
     given = [upright(creature, [0.0] * 3) for _ in range(12)]
     start, positions, actions, observations = played(setup, policy(of_python, name, task=setup.definition), given)
     episode = {"creature": creature, "ground": "level", "asked": given, "rises": True}
@@ -241,7 +244,7 @@ def test_a_body_gets_up_as_in_python(script, name, of_python, tolerance):
 @pytest.mark.slow
 @nodes.needs_node
 def test_a_body_on_its_back_gets_up_and_walks_on(script):
-    creature = play_pages.creature(ROBOTS["tick"])
+    creature = describe_creature(ROBOTS["tick"])
     start = creature["grounds"]["level"]["start"]
     steps = 200  # 10 s
     fallen = {"creature": creature, "ground": "level", "qvel": [], "desired": [0.0] * 3}
@@ -259,7 +262,7 @@ def test_a_body_on_its_back_gets_up_and_walks_on(script):
 def test_heights_on_bumps_are_those_of_python(script):
     """Contacts with height fields differ between versions of MuJoCo; heights over them do not."""
     arena = Setup.of("tick", "steer", {"arena": "bumps"}).definition.scene.arena
-    creature = play_pages.creature(ROBOTS["tick"])
+    creature = describe_creature(ROBOTS["tick"])
     places = np.random.default_rng(0).uniform((-20.0, -5.0), (20.0, 5.0), (20, 2))  # beyond the edges, too
     still = {
         "creature": creature,
@@ -298,7 +301,7 @@ def test_heights_of_ground_from_files_are_those_of_python(script, tmp_path, name
 def test_bodies_walk_from_their_start(script, ground):
     """Ahead as fast as the command says or nearly so, on either ground, and upside down is a fall."""
     body, steps = ROBOTS["tick"], 100
-    creature = play_pages.creature(body)
+    creature = describe_creature(body)
     walk = {"qpos": creature["grounds"][ground]["start"], "qvel": [], "desired": [0.0, 0.0, 0.0]}
     walk |= {"creature": creature, "ground": ground, "asked": [upright(creature, [1.0, 0.0, 0.0])] * steps}
     over = walk | {"qpos": [0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, *walk["qpos"][7:]]}
@@ -313,7 +316,7 @@ def test_bodies_walk_from_their_start(script, ground):
 @nodes.needs_node
 def test_the_largest_kick_fells_queen_in_half_of_the_tries(script):
     """As it walks, over eight directions and five phases of the gait: it lies until it would get up."""
-    creature = play_pages.creature(ROBOTS["queen"])
+    creature = describe_creature(ROBOTS["queen"])
     step = creature["task"]["step"]
     cycle = 1.0 / (creature["task"]["direction"]["frequency"] * step)  # steps
     walk = {"creature": creature, "ground": "level", "qvel": [], "desired": [0.0, 0.0, 0.0]}
@@ -347,7 +350,7 @@ def kick_in_heights(body):
 def test_what_a_page_holds_of_a_body(monkeypatch):
     """Names of bodies come from files of others: they are text."""
     monkeypatch.setattr(pages, "read_built_file", lambda name: f"built {name}".encode())
-    creature = play_pages.creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
+    creature = describe_creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
     page = play_pages.page([creature])
     assert "<title>&lt;leaper&gt;</title>" in page
     assert creatures_of(page) == [creature]
@@ -394,7 +397,7 @@ def test_walkers_are_bodies_by_legs_and_links():
 
 def test_a_page_begins_with_the_licenses(monkeypatch):
     monkeypatch.setattr(pages, "read_built_file", lambda name: b"[" + name.encode() + b"]")
-    page = play_pages.page([play_pages.creature(ROBOTS["leaper"])])
+    page = play_pages.page([describe_creature(ROBOTS["leaper"])])
     assert page.index('<meta charset="utf-8">') < 200  # where browsers look for it
     order = ["Apache License", "Third-party licenses", "Qhull", "-->", "[play.js]", "<body", 'id="engine"']
     places = [page.index(text) for text in order]
@@ -463,7 +466,7 @@ def test_networks_that_a_page_cannot_run(tmp_path, task, settings, message):
     ids=["tick", "leaper", "9x2", "5x4"],
 )
 def test_a_run_is_faster_than_the_walk_or_there_is_none(body, run, script):
-    creature = play_pages.creature(body)
+    creature = describe_creature(body)
     direction = creature["task"]["direction"]
     assert direction["run"] == run
     start = {"qpos": creature["grounds"]["level"]["start"], "qvel": [0.0] * (6 + len(body.joint_names))}
