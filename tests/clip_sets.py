@@ -7,9 +7,11 @@ a run that was interrupted goes on. Remove it when clips change.
 
 Prints for each body the cycles of its loops and the largest seam, how far its start and stop are from walk and idle
 before they are made to meet, the slip of its walk as it is and planted, and what was left out. Lengths are in standing
-heights. Then prints how many bodies have each clip, and the most frequent line of those that are left out. Fails if a
-frame of a clip breaks a bound, a body has no file, fewer than 85 % of the random bodies have loops of one cycle, or
-fewer than 85 % of the bodies stop from a pose within 0.08 of the walk's.
+heights. Then prints how many bodies have each clip, and the most frequent line of those that are left out. Of `slow`
+and `run` it prints speed and cadence as multiples of the walk, and of all paces the duty factor of feet and the share
+of samples in which feet follow the schedule of the gait. Fails if a frame of a clip breaks a bound, a body has no file,
+fewer than 85 % of the random bodies have loops of one cycle, or fewer than 85 % of the bodies stop from a pose within
+0.08 of the walk's.
 """
 
 import collections
@@ -25,7 +27,7 @@ import mujoco
 import numpy as np
 from tqdm import tqdm
 
-from arc_suite.animation.clips import bounds, planting, weight
+from arc_suite.animation.clips import bounds, on_ground, planting, weight
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.clips import FPS, sample_clip
 from arc_suite.animation.clips.drafts import make_drafts
@@ -34,8 +36,9 @@ from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
 from arc_suite.models.kinematics import Legs
-from arc_suite.robots import ROBOTS, spec_files
+from arc_suite.robots import ROBOTS, gaits, spec_files
 from arc_suite.simulation.model import compile_model
+from arc_suite.tasks import clock
 
 ONE_CYCLE, CONNECTED, APART = 0.85, 0.85, 0.08  # legs of two joints often stop from poses of their own
 LOW = 0.01  # of a sole that slips
@@ -83,6 +86,30 @@ def broken(body, made) -> dict[str, str]:
     return excesses
 
 
+def measure_paces(body, recorder: Recorder, made) -> dict[str, float]:
+    """Return speed, cadence, duty factor and share of samples in schedule of `slow`, `walk` and `run`, by name.
+
+    The schedule is that of the gait at the pace, from the touchdown of the first foot on, with which loops begin.
+    """
+    numbers = {}
+    for name in ("slow", "walk", "run"):
+        if name not in made:
+            continue
+        draft = made[name]
+        setup = recorder._setup_at_pace(gaits.PACES[name]) if name in gaits.PACES else recorder._setup
+        parameters = setup.definition.parameters
+        soles = on_ground.measure_ground(body, draft.motion).soles[:-1]
+        is_down = soles < LOW * body.torso.standing_height
+        phases = 2.0 * np.pi * draft.cycles * np.arange(len(is_down)) / len(is_down) - parameters.phase_offsets[0]
+        schedule = clock.desired_contacts(phases, parameters.duty_factor, parameters.phase_offsets)
+        numbers[f"{name} duty"] = is_down.mean()
+        numbers[f"{name} in schedule"] = (is_down == schedule).mean()
+        if name != "walk" and "walk" in made:
+            numbers[f"{name} speed"] = draft.motion.twist[0] / made["walk"].motion.twist[0]
+            numbers[f"{name} cadence"] = made["walk"].cycle / draft.cycle
+    return numbers
+
+
 def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     """Return numbers of the clips of a body by name, and the reasons of those that are left out."""
     recorder, left_out = make_recorder(body), {}
@@ -92,6 +119,7 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     found = {"clips": len(CLIPS) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
     found["broken"] = len(excesses := broken(body, {name: made[name] for name in CLIPS if name not in left_out}))
     left_out |= {name: f"BROKEN: {excess}" for name, excess in excesses.items()}
+    found |= measure_paces(body, recorder, made)
     found["seam"] = np.degrees(max((draft.motion.seam for draft in loops), default=np.nan))
     if "walk" in made and "idle" in made:
         walk, transition = light["walk"], recorder.record_transition(CLIPS["walk"].command)
@@ -164,6 +192,10 @@ def main(count: str = "100", folder: str = "out/clip_sets") -> int:
     def values(key, names):
         return np.array([numbers[name].get(key, np.nan) for name in names])
 
+    for key in (key for key in numbers["tick"] if key.startswith(("slow ", "walk ", "run "))):
+        ratios = values(key, numbers)
+        quantiles = ", ".join(f"{value:.2f}" for value in np.nanquantile(ratios, (0.0, 0.1, 0.5, 0.9, 1.0)))
+        print(f"{key}, {np.isfinite(ratios).sum()} bodies: least, 10 %, median, 90 % and most: {quantiles}")
     for key in ("seam", "start", "stop", "idle", "slip", "slip planted", "sinks", "sinks planted"):
         for kind, names in (("robots and examples", others), ("random bodies", bodies)):
             quantiles = ", ".join(f"{value:.3f}" for value in np.nanquantile(values(key, names), (0.5, 0.9, 0.95, 1.0)))
