@@ -23,6 +23,7 @@ from arc_suite.policies.network import Network
 from arc_suite.simulation.cores import usable_cores
 
 _SAVE_INTERVAL = 30.0  # s between two checkpoints of a learner that stays on a device
+_UNITS = {"reward": " a step"}  # of metrics behind a progress bar
 
 
 def train(
@@ -358,7 +359,7 @@ def _postfix(metrics: Mapping[str, float], progress_values: Mapping[str, Any]) -
     if "return" in progress_values:
         values["return"] = progress_values["return"]
     values |= dict(list(metrics.items())[:2])
-    return ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+    return ", ".join(f"{name} {value:.4g}{_UNITS.get(name, '')}" for name, value in values.items())
 
 
 def _training_seeds(configuration: Configuration, folder: Path) -> seed_ranges.Ranges | None:

@@ -197,9 +197,9 @@ def train_run(run: Configuration, threshold: float | None) -> int:
                 say(f"{folder}: return {metrics['return']:.1f} after {step} steps")
             listen(step, metrics)
 
-        def start_progress(*args, **kwargs):
-            say(f"{folder}: {run.setup}, {run.algorithm}, {run.steps} steps")
-            return progress(*args, **kwargs)
+        def start_progress(*args, initial, **kwargs):
+            say(f"{folder}: {run.setup}, {run.algorithm}, {run.steps} steps{describe_next_evaluation(run, initial)}")
+            return progress(*args, initial=initial, **kwargs)
 
         with resumable(folder), watch_for_termination() as is_terminated:
 
@@ -229,6 +229,14 @@ def train_run(run: Configuration, threshold: float | None) -> int:
         if FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
             print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
     return 0
+
+
+def describe_next_evaluation(run: Configuration, evaluated_step: int) -> str:
+    """Return after which step a run is evaluated next; "" for one whose last evaluation is over."""
+    if evaluated_step >= run.steps:
+        return ""
+    next_step = run.context(Path()).next_evaluation(evaluated_step)
+    return f"; the next evaluation comes after {next_step} (--evaluate_every)"
 
 
 def play_final_episodes(run: Configuration, folder: Path, threads: int | None) -> None:

@@ -105,6 +105,12 @@ def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     assert [key for key in whole if whole[key] != resumed[key]] == []
 
 
+def test_progress_shows_the_latest_evaluation_and_training_since():
+    metrics = {"reward": 1.43418, "falls": 42.0, "std": 0.37}
+    assert training._postfix(metrics, {}) == "reward 1.434 a step, falls 42"
+    assert training._postfix(metrics, {"return": 2649.7}) == "return 2650, reward 1.434 a step, falls 42"
+
+
 def test_the_policy_of_a_run_earns_what_its_table_says(tiny, tmp_path):
     """By the protocol, on single environments, bit-exactly."""
     run = tiny("sac")

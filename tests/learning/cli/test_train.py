@@ -186,7 +186,8 @@ def folder(tmp_path_factory):
     assert done.returncode == 0, done.stderr
     first, *evaluations, last, judged = done.stdout.partition("next:\n")[0].splitlines(keepends=True)
     assert judged.startswith("runs/tick-walk-sope_eo-0: judged in 100 episodes, seeds 4")
-    assert first == 'runs/tick-walk-sope_eo-0: tick, walk, {"time_limit": 2}, sope_eo, 200 steps\n'
+    start = 'runs/tick-walk-sope_eo-0: tick, walk, {"time_limit": 2}, sope_eo, 200 steps'
+    assert first == f"{start}; the next evaluation comes after 100 (--evaluate_every)\n"
     line = re.compile(r"runs/tick-walk-sope_eo-0: return \d+\.\d after (\d+) steps\n")
     returns = list(map(line.fullmatch, evaluations))
     assert [found and found[1] for found in returns] == ["100", "200"] and FINISHED.fullmatch(last)
@@ -207,6 +208,7 @@ class TestRun:
         before = (folder / "evaluations.csv").read_bytes()
         done = run("train", *TINY, cwd=folder.parents[1])
         assert done.returncode == 0 and FINISHED.search(done.stdout)
+        assert " 200 steps\n" in done.stdout and "next evaluation" not in done.stdout
         assert (folder / "evaluations.csv").read_bytes() == before
 
     def test_the_best_checkpoint_is_kept(self, folder):
