@@ -73,7 +73,7 @@ def load(
         ValueError: an unknown name, or a value that does not fit.
         OSError: a file that cannot be read.
     """
-    refuse_arguments(others, load)
+    refuse_arguments(others, load, task_name)
     settings = dict(checks.mapping("task_kwargs", task_kwargs))
     options = checks.mapping("environment_kwargs", environment_kwargs)
     random = settings.pop("random", None)

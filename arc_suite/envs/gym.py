@@ -90,7 +90,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         Raises:
             ValueError: an unknown name, or a value that does not fit.
         """
-        refuse_arguments(others, type(self).__init__)
+        refuse_arguments(others, type(self).__init__, task_name)
         modes = [*_HEADLESS_MODES]
         if opengl.has_display():
             modes.append("human")

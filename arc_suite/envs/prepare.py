@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks, registry
+from arc_suite.envs import gymnasium_arguments
 from arc_suite.models.sizing import simulation
 from arc_suite.models.standing import standing_qpos
 from arc_suite.robots.spec import Body
@@ -46,6 +47,7 @@ def prepare_task(
     if chosen_arena is not None and task_class.own_arena:
         raise ValueError(f"arena: task {task_class.name} has a ground of its own, expected none")
     modifier_settings = {**task_class.modifiers, **_take_modifier_settings(task_settings)}
+    gymnasium_arguments.refuse_settings(task_settings, task_class)
     registry.refuse_settings_of_others(task_class, task_settings)
     settings = task_class.settings_for(body, task_settings)
     arena = task_class.arena(body, settings) if chosen_arena is None else registry.arena_of(chosen_arena, body)
@@ -92,16 +94,23 @@ _HINTS = {
 }
 
 
-def refuse_arguments(arguments: Mapping[str, Any], function: Callable) -> None:
+def refuse_arguments(arguments: Mapping[str, Any], function: Callable, task_name: str | None = None) -> None:
     """Raise ValueError for arguments that a function does not have; the error names what takes their place.
 
     Args:
         arguments: arguments that no parameter of the function takes, by name.
         function: function that opens an environment.
+        task_name: task of the environment, one.
     """
+    hints = gymnasium_arguments.HINTS | _HINTS
     for name, value in arguments.items():
-        if name in _HINTS:
-            raise ValueError(f"argument {name!r}: {_HINTS[name]}")
+        cures = None
+        if task_name is not None:
+            cures = gymnasium_arguments.find_settings(name, value, registry.task_of(task_name))
+        if cures:
+            raise ValueError(f"argument {name!r}: write task_kwargs={checks.preview(cures)} in its place")
+        if name in hints:
+            raise ValueError(f"argument {name!r}: {hints[name]}")
         setting_names = registry.setting_names()
         if name in setting_names:
             setting = f"{{{name!r}: {checks.preview(value)}}}"

@@ -165,7 +165,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         # Set first, as Gymnasium also closes an environment whose `__init__` has raised.
         self._lock = Lock()
         self.batch = None
-        refuse_arguments(others, type(self).__init__)
+        refuse_arguments(others, type(self).__init__, task_name)
 
         task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
         seed = task_kwargs.pop("random", None)

@@ -252,7 +252,9 @@ def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, cha
         ValueError: an unknown term, or a weight that is no finite number.
     """
     if not isinstance(changed, Mapping | None):
-        raise ValueError(f"weights: expected a mapping of names to numbers, got {checks.preview(changed)}")
+        term, weight = next(iter(of_task.items()))
+        example = f'such as {{"{term}": {weight:g}}}'
+        raise ValueError(f"weights: expected a mapping of names to numbers, {example}, got {checks.preview(changed)}")
     weights_by_term = {name: of_body.get(name, weight) for name, weight in of_task.items()}
     for name, weight in (changed or {}).items():
         number = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)

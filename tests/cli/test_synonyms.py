@@ -17,6 +17,7 @@ class Learner:
 """
 INTEGER = "expected an integer in the range [1, 100000]"
 BARE = "is an argument without a flag"
+INSTEAD = 'walk has weights={"forward": 2} in its place\n'
 SPAN = "expected a number from 0 to 100, or two of them, the lower first"
 LINES = {
     "train --lr=1e-4": "unknown flag 'lr'; did you mean --hp learning_rate=1e-4 or --hp policy_rate=1e-4?\n",
@@ -30,7 +31,8 @@ LINES = {
     "train --algorithm=td3": "unknown algorithm 'td3'; did you mean 'sac'? (there are: ",
     "evaluate --task=stand": "unknown task 'stand'; did you mean 'walk'? (there are: ",
     "evaluate --task=Stairs": "unknown task 'Stairs'; did you mean 'stairs'? (there are: ",
-    "evaluate --set forward_reward_weight=2": "unknown setting of walk 'forward_reward_weight'; did you mean 'we",
+    "evaluate --set forward_reward_weight=2": f"setting 'forward_reward_weight': {INSTEAD}",
+    "evaluate --set weights=2": 'weights: expected a mapping of names to numbers, such as {"forward": 1.5}, got 2\n',
     "evaluate --set speed=2": "unknown setting of walk 'speed'; did you mean 'target_velocity'? (there are: ",
     "evaluate --speed=2": "unknown flag 'speed'; did you mean --set target_velocity=2?\n",
     "evaluate --set seed=5": "--set seed=5: programs seed every episode; see --help for the flag of the first seed\n",

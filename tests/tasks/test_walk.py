@@ -113,7 +113,7 @@ NUMBER = "expected a number from -1e+06 to 1e+06, got"
     [
         ({"timelimit": 3}, "unknown setting of walk 'timelimit'; did you mean 'time_limit'?"),
         ({"weights": {"forward": math.nan}}, f"weights['forward']: {NUMBER} nan"),
-        ({"weights": [1.0]}, "weights: expected a mapping of names to numbers, got [1.0]"),
+        ({"weights": [1.0]}, 'weights: expected a mapping of names to numbers, such as {"forward": 1.5}, got [1.0]'),
         ({"duty_factor": 1.5}, "duty_factor: expected a number from 0 to 1, got 1.5"),
         ({"velocity_band": 0}, "velocity_band: expected a number above 0, at most 1e+06, got 0"),
         ({"weights": {"posture": -1e300}}, f"weights['posture']: {NUMBER} -1e+300"),
