@@ -21,8 +21,10 @@ _MAX_GALLERY = 12  # pictures
 class Downloads:
     """Buttons that save files, lines to copy, and a gallery of what was saved since the studio began."""
 
-    def __init__(self, gui: viser.GuiApi, session: Session, editor: Editor, show_state: Callable[[], None]):
+    def __init__(self, server: viser.ViserServer, session: Session, editor: Editor, show_state: Callable[[], None]):
         """Add the widgets to the present container of the page; `show_state` has its widgets show the state."""
+        gui = server.gui
+        self._server = server
         self._session = session
         self._editor = editor
         self._show_state = show_state
@@ -63,12 +65,18 @@ class Downloads:
             options = {"weight": self._weight.value} if file.takes_weight else {}
             content = file.make(creature, qpos, commands, **options)
         except (ValueError, OSError, RenderingUnavailable) as error:
-            client.add_notification(f"No {file_name}", " ".join(str(error).split()), color="red")
-        else:
-            client.send_file_download(file_name, content, save_immediately=True)
-            self._add_to_gallery(file_name, state)
+            if self._is_here(client):
+                client.add_notification(f"No {file_name}", " ".join(str(error).split()), color="red")
+            return
         finally:
             notification.remove()
+        if self._is_here(client):
+            client.send_file_download(file_name, content, save_immediately=True)
+            self._add_to_gallery(file_name, state)
+
+    def _is_here(self, client: viser.ClientHandle) -> bool:
+        """Return whether a visitor is still connected; viser warns of what is sent to one who has left."""
+        return client.client_id in self._server.get_clients()
 
     def _add_to_gallery(self, file_name: str, state: PageState) -> None:
         """Show a creature that was saved, with the state of the page to return to; only the latest stay."""

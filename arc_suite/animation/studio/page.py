@@ -127,7 +127,7 @@ class Page:
         with tabs.add_tab("Command"):
             self._add_command()
         with tabs.add_tab("Files"):
-            self._downloads = Downloads(self._gui, session, self._editor, self._show_state)
+            self._downloads = Downloads(self._server, session, self._editor, self._show_state)
         for field, widget in self._widgets.items():
             widget.on_update(in_order(functools.partial(self._set_field, field)))
         self._panel = self._gui.add_panel()
