@@ -1,6 +1,5 @@
 """Overlaps of a body's parts, which no contact keeps apart, standing and in the strides of its gait."""
 
-import copy
 import functools
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -17,6 +16,7 @@ from arc_suite.models.stride import fitted_gait, half_stroke, strokes
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 
+_FAR = 1e6  # m, of distances that are measured
 _MAX_DEPTH = 0.01  # standing heights, of an overlap that does not count
 
 # Demonstrators lengthen strides to keep their course, and as they start. They stretch strides by this factor at least,
@@ -46,18 +46,14 @@ class Overlap(NamedTuple):
     pose: str
 
 
-def overlaps(body: Body, spread: float = 1.0) -> Iterator[Overlap]:
+def overlaps(body: Body) -> Iterator[Overlap]:
     """Yield the overlaps of a body: between torso and legs beyond their hips, and between legs.
 
     Hips lie in the torso, and side by side. Ballast touches nothing, and may overlap.
-
-    Args:
-        body: the spec.
-        spread: factor of the distances of the legs' mounts from the torso's middle, seen from above.
     """
     if body.source:  # the legs of an imported body are only a sketch of its colliders
         return
-    yield from overlaps_in_poses(body, _poses(body), spread)
+    yield from overlaps_in_poses(body, _poses(body))
 
 
 def find_largest_stretch(body: Body, stretch_steps: Callable[[float], np.ndarray], largest: float) -> float:
@@ -93,13 +89,11 @@ def find_largest_stretch(body: Body, stretch_steps: Callable[[float], np.ndarray
     return stretch
 
 
-def overlaps_in_poses(body: Body, poses: Iterable[tuple[str, np.ndarray]], spread: float = 1.0) -> Iterator[Overlap]:
+def overlaps_in_poses(body: Body, poses: Iterable[tuple[str, np.ndarray]]) -> Iterator[Overlap]:
     """Yield the overlaps of a body in poses by name, (joints,) rad; see `overlaps`."""
     names = _geom_names(body)
     pairs = _separate_pairs(body)
-    model = copy.copy(compile_body(body))
-    first_links = [model.body(leg.part_names[0]).id for leg in body.legs]
-    model.body_pos[first_links, :2] *= spread
+    model = compile_body(body)
     data = mujoco.MjData(model)
     max_distances = model.geom_rbound[pairs].sum(axis=1)  # between centers of geoms that can overlap, m
     for pose, angles in poses:
@@ -112,6 +106,20 @@ def overlaps_in_poses(body: Body, poses: Iterable[tuple[str, np.ndarray]], sprea
             depth = -mujoco.mj_geomDistance(model, data, first, second, 0.0, None)
             if depth > _MAX_DEPTH * body.torso.standing_height:
                 yield Overlap((names[first], names[second]), depth, pose)
+
+
+def measure_gaps(body: Body) -> np.ndarray:
+    """Return the distances (legs,) from the torso to the first link of each leg, m; at most 0 where they touch."""
+    model = compile_body(body)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    solids = range(len(body.torso.solids))
+    first_links = (
+        len(body.torso.solids) + len(body.ballast) + np.cumsum([0, *(len(leg.parts) for leg in body.legs)])[:-1]
+    )
+    return np.array(
+        [min(mujoco.mj_geomDistance(model, data, solid, link, _FAR, None) for solid in solids) for link in first_links]
+    )
 
 
 def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite.models import sizing, stride
 from arc_suite.models.outline import torso_box
-from arc_suite.models.overlap import overlaps
+from arc_suite.models.overlap import measure_gaps, overlaps
 from arc_suite.models.standing import PoseMechanics, by_leg, measure_standing
 from arc_suite.robots.spec import Body, Leg
 
@@ -30,6 +30,7 @@ _MIN_DISPLACEMENT = 1e-6  # m, that a text names
 _LOADS_OF_BRISK_STRIDE = 7.0
 
 _SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # factors of the legs' mounts, tried against overlaps
+_SHARES_OF_MOUNTS = np.arange(0.95, 0.0, -0.05)  # factors of mounts that are apart from the torso
 _MAX_NAMES = 4  # of legs in one text
 
 
@@ -79,7 +80,7 @@ def hopeless_flaws(body: Body) -> list[Flaw]:
 
 def _check_all_but_parts(body: Body) -> Iterator[Flaw]:
     pose = measure_standing(body)
-    for check in (_check_feet, _check_torso, _check_legs, _check_support, _check_motors, _check_joints):
+    for check in (_check_feet, _check_torso, _check_legs, _check_mounts, _check_support, _check_motors, _check_joints):
         yield from check(body, pose)
 
 
@@ -130,6 +131,28 @@ def _check_legs(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
         yield Flaw(f"no demonstrator keeps its balance on {len(body.legs)} legs: 3 and more walk", False)
 
 
+def _check_mounts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+    """Find legs that begin apart from the torso."""
+    if body.source:  # its solids are only a sketch of its colliders
+        return
+    gaps = measure_gaps(body)
+    is_apart = gaps > 0.0
+    if is_apart.any():
+        names = _join_names(body, is_apart)
+        text = f"{names} begin up to {gaps.max():.3g} m away from the torso: legs mounted nearer to its middle fit"
+        yield Flaw(text, False, _mount_in_torso(body, is_apart))
+
+
+def _mount_in_torso(body: Body, is_apart: np.ndarray) -> Body | None:
+    """Return the body with legs that are apart from the torso mounted nearer to its middle; None if none touches it."""
+    for share in _SHARES_OF_MOUNTS:
+        displacements = [(share - 1.0) * np.array(leg.mount[:2]) for leg in body.legs]
+        attached_body = _keep_if_attached(_move_legs(body, is_apart[:, None] * displacements))
+        if attached_body is not None:
+            return attached_body
+    return None
+
+
 def _check_support(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find a center of mass outside the polygon of the feet, or too near its edge."""
     if len(body.legs) < 3:
@@ -146,7 +169,7 @@ def _check_support(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
             f"a tower that tips over when tilted by {tilt:.2g} degrees: "
             f"feet {distance:.2g} m further out all around fit"
         )
-        yield Flaw(text, False, _move_legs(body, outwards))
+        yield Flaw(text, False, _keep_if_attached(_move_legs(body, outwards)))
 
 
 def _overhang_flaw(body: Body, pose: PoseMechanics) -> Flaw:
@@ -163,7 +186,7 @@ def _overhang_flaw(body: Body, pose: PoseMechanics) -> Flaw:
     share_of_rest = 1.0 - _mass_of_legs(body) / pose.mass
     x, y, _ = (pose.center - middle) / share_of_rest
     cure = _move_legs(body, [(x, y)] * len(body.legs))
-    return Flaw(f"{error}: legs {_describe_displacement(x, y)} fit", is_hopeless, cure)
+    return Flaw(f"{error}: legs {_describe_displacement(x, y)} fit", is_hopeless, _keep_if_attached(cure))
 
 
 def _mass_of_legs(body: Body) -> float:
@@ -264,6 +287,12 @@ def _remove_motors(body: Body, is_removed: Sequence[bool]) -> Body:
     return body.replace(legs=tuple(legs))
 
 
+def _keep_if_attached(body: Body) -> Body | None:
+    """Return the body, or None if legs of it begin apart from the torso."""
+    is_sketch = bool(body.source)  # of the colliders of an imported body
+    return body if is_sketch or (measure_gaps(body) <= 0.0).all() else None
+
+
 def _move_legs(body: Body, displacements: Iterable) -> Body:
     """Return the body with its legs moved on the torso by displacements (legs, 2), m."""
     legs = []
@@ -332,9 +361,19 @@ def _check_parts(body: Body) -> Iterator[Flaw]:
     if deepest is None:
         return
     text = f"{' and '.join(deepest.names)} overlap by {deepest.depth:.3g} m in {deepest.pose}"
+    largest_spreads = np.ones(len(body.legs))  # at which legs still touch the torso
     for spread in _SPREADS:
-        if not any(overlaps(body, spread)):
-            outwards = [(spread - 1.0) * np.array(leg.mount[:2]) for leg in body.legs]
-            yield Flaw(f"{text}: legs mounted {spread:g} times as far out fit", False, _move_legs(body, outwards))
+        is_attached = measure_gaps(_spread_mounts(body, np.full(len(body.legs), spread))) <= 0.0
+        largest_spreads[is_attached] = spread
+        wider_body = _spread_mounts(body, largest_spreads)
+        if not any(overlaps(wider_body)):
+            at_most = "" if is_attached.all() else "up to "
+            yield Flaw(f"{text}: legs mounted {at_most}{spread:g} times as far out fit", False, wider_body)
             return
     yield Flaw(f"{text}: shorter or thinner links fit", False)
+
+
+def _spread_mounts(body: Body, spreads: np.ndarray) -> Body:
+    """Return the body with the distances of its legs' mounts from the middle, seen from above, times (legs,)."""
+    displacements = [(spread - 1.0) * np.array(leg.mount[:2]) for leg, spread in zip(body.legs, spreads, strict=True)]
+    return _move_legs(body, displacements)

@@ -11,7 +11,7 @@ from arc_suite.bodies.families import sound_body
 from arc_suite.bodies.shaping import shaped
 from arc_suite.cpg import Demonstrator
 from arc_suite.evaluation import cures
-from arc_suite.models.overlap import overlaps
+from arc_suite.models.overlap import measure_gaps, overlaps
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body, Foot, Joint, Leg, Link, Motor, Solid, Torso
@@ -238,6 +238,26 @@ def test_overlaps_are_told_with_what_fits(body, text, cured):
     *_, flaw = flaws(body)
     assert (flaw.text, flaw.hopeless, flaw.cure is not None) == (text, False, cured)
     assert not cured or not any(overlaps(flaw.cure))
+
+
+def thick(height, spread=1.0):
+    """The body with a thick torso, and its legs mounted so many times as far out."""
+    chassis = BODY.torso.solids[0].replace(shape="ellipsoid", size=(0.4, 0.3, height))
+    legs = [leg.replace(mount=(spread * leg.mount[0], spread * leg.mount[1], 0.0)) for leg in BODY.legs]
+    return BODY.replace(torso=BODY.torso.replace(solids=(chassis,)), legs=tuple(legs))
+
+
+def test_legs_apart_from_the_torso_are_told_and_attached():
+    (flaw,) = flaws(thick(0.1, spread=2.0))
+    assert flaw.text.startswith("l1, l3, r1, r3 begin up to ")
+    assert flaw.text.endswith(" m away from the torso: legs mounted nearer to its middle fit")
+    assert (measure_gaps(flaw.cure) <= 0.0).all() and (measure_gaps(thick(0.1, spread=2.0)) > 0.0).sum() == 4
+
+
+def test_a_cure_of_overlaps_keeps_legs_on_the_torso():
+    flaw = flaws(thick(0.25))[-1]
+    assert " overlap by " in flaw.text and flaw.text.endswith("legs mounted up to 2 times as far out fit")
+    assert not any(overlaps(flaw.cure)) and (measure_gaps(flaw.cure) <= 0.0).all()
 
 
 def test_depths_of_overlaps():

@@ -51,6 +51,27 @@ def test_visuals_keep_every_array_of_the_dynamics(body):
     assert visuals.GROUP not in shown.geom_group[same]
 
 
+@pytest.mark.parametrize(
+    ("tail", "goes"),
+    [
+        (Solid(name="tail", shape="capsule", size=(0.02, 0.15), position=(-0.3, 0.0, 0.1), euler_deg=(0, -60, 0)), -1),
+        (Solid(name="fin", shape="box", size=(0.1, 0.01, 0.05), position=(-0.25, 0.0, 0.0)), -1),
+        (Solid(name="mast", shape="cylinder", size=(0.02, 0.15), position=(-0.3, 0.0, 0.15)), 0),
+    ],
+)
+def test_a_tail_goes_on_from_the_rearmost_solid(tail, goes):
+    """As its end does, from a place inside of it."""
+    body = _TICK.replace(name="tailed", torso=_TICK.torso.replace(solids=(*_TICK.torso.solids, tail)))
+    (bone,) = visuals.bones(body)
+    model = compiled(body, False)
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, model.geom(tail.name).quat)
+    inside = (np.array(bone.pivot) - tail.position) @ rotation.reshape(3, 3)
+    extents = tail.size if tail.shape == "box" else (tail.size[0], tail.size[0], tail.size[1] + tail.size[0])
+    assert (abs(inside) <= np.array(extents) + 1e-9).all()
+    assert np.sign(round(bone.tip[0] - bone.pivot[0], 9)) == goes
+
+
 @every_body
 def test_everything_that_visuals_add_is_named(body):
     model = compiled(body, True)

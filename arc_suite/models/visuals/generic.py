@@ -6,7 +6,7 @@ import numpy as np
 
 from arc_suite.models.outline import solid_corners
 from arc_suite.models.visuals.spec import Bone, Ornament, Visuals, whip
-from arc_suite.robots.spec import Body
+from arc_suite.robots.spec import Body, Solid
 
 _PIVOT_SHARE = 0.85  # of half of the length of a torso, from its middle to the pivot of the tail
 _TAIL_LENGTH = 0.6  # of the geometric mean of a torso's length and the height at which it stands
@@ -24,7 +24,7 @@ def generic_visuals(body: Body) -> Visuals:
     eye_size = (0.4 * radius, 0.7 * radius, 0.7 * radius)
     x, y, z = center + half_extents * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
     half_length = half_extents[0] / 2.0  # of the snout
-    tail = _tail(body, min(all_corners, key=lambda corners: corners[:, 0].min()))
+    tail = _tail(body)
     return Visuals(
         colors={
             "shell": (0.62, 0.66, 0.72),
@@ -42,11 +42,30 @@ def generic_visuals(body: Body) -> Visuals:
     )
 
 
-def _tail(body: Body, corners: np.ndarray) -> Bone:
-    """Return a tail that rises behind the rearmost solid of the torso, of given corners, above the mounts of legs."""
+def _tail(body: Body) -> Bone:
+    """Return a tail: of a torso it rises behind it, above the mounts of legs; of a rearmost other solid it goes on."""
+    chassis = body.torso.solids[0]
+    rearmost_solid = min(body.torso.solids, key=lambda solid: solid_corners(solid)[:, 0].min())
+    corners = solid_corners(rearmost_solid)
     half_extents = np.ptp(corners, axis=0) / 2.0
-    pivot = corners.mean(axis=0) - half_extents * (_PIVOT_SHARE, 0.0, -_PIVOT_SHARE * math.sqrt(1.0 - _PIVOT_SHARE**2))
+    if rearmost_solid == chassis:
+        offset = half_extents * (_PIVOT_SHARE, 0.0, -_PIVOT_SHARE * math.sqrt(1.0 - _PIVOT_SHARE**2))
+        pivot = corners.mean(axis=0) - offset
+        direction = np.array((-math.cos(_TAIL_RISE), 0.0, math.sin(_TAIL_RISE)))
+    else:
+        pivot, direction = _find_free_end(rearmost_solid, chassis)
     length = _TAIL_LENGTH * math.sqrt(2.0 * half_extents[0] * body.torso.standing_height)
-    tip = pivot + length * np.array((-math.cos(_TAIL_RISE), 0.0, math.sin(_TAIL_RISE)))
+    tip = pivot + length * direction
     radius = _TAIL_WIDTH * length
     return Bone("tail", "tail", tuple(pivot.tolist()), tuple(tip.tolist()), radius, 0.5 * radius)
+
+
+def _find_free_end(solid: Solid, chassis: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Return a point inside the end of a solid that is farther from the chassis, and the direction to it (3,)."""
+    corners = solid_corners(solid)
+    edges = corners[[4, 2, 1]] - corners[0]  # along the axes of the solid
+    longest_edge = max(edges, key=np.linalg.norm)
+    ends = [share * longest_edge for share in (-_PIVOT_SHARE / 2.0, _PIVOT_SHARE / 2.0)]
+    distances = [np.linalg.norm(corners.mean(axis=0) + end - chassis.position) for end in ends]
+    end = ends[int(np.argmax(distances))]
+    return corners.mean(axis=0) + end, end / np.linalg.norm(end)
