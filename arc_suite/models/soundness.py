@@ -147,7 +147,7 @@ def _mount_in_torso(body: Body, is_apart: np.ndarray) -> Body | None:
     """Return the body with legs that are apart from the torso mounted nearer to its middle; None if none touches it."""
     for share in _SHARES_OF_MOUNTS:
         displacements = [(share - 1.0) * np.array(leg.mount[:2]) for leg in body.legs]
-        attached_body = _keep_if_attached(_move_legs(body, is_apart[:, None] * displacements))
+        attached_body = _return_if_whole(_move_legs(body, is_apart[:, None] * displacements))
         if attached_body is not None:
             return attached_body
     return None
@@ -169,7 +169,7 @@ def _check_support(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
             f"a tower that tips over when tilted by {tilt:.2g} degrees: "
             f"feet {distance:.2g} m further out all around fit"
         )
-        yield Flaw(text, False, _keep_if_attached(_move_legs(body, outwards)))
+        yield Flaw(text, False, _return_if_whole(_move_legs(body, outwards)))
 
 
 def _overhang_flaw(body: Body, pose: PoseMechanics) -> Flaw:
@@ -186,7 +186,7 @@ def _overhang_flaw(body: Body, pose: PoseMechanics) -> Flaw:
     share_of_rest = 1.0 - _mass_of_legs(body) / pose.mass
     x, y, _ = (pose.center - middle) / share_of_rest
     cure = _move_legs(body, [(x, y)] * len(body.legs))
-    return Flaw(f"{error}: legs {_describe_displacement(x, y)} fit", is_hopeless, _keep_if_attached(cure))
+    return Flaw(f"{error}: legs {_describe_displacement(x, y)} fit", is_hopeless, _return_if_whole(cure))
 
 
 def _mass_of_legs(body: Body) -> float:
@@ -287,7 +287,7 @@ def _remove_motors(body: Body, is_removed: Sequence[bool]) -> Body:
     return body.replace(legs=tuple(legs))
 
 
-def _keep_if_attached(body: Body) -> Body | None:
+def _return_if_whole(body: Body) -> Body | None:
     """Return the body, or None if legs of it begin apart from the torso."""
     is_sketch = bool(body.source)  # of the colliders of an imported body
     return body if is_sketch or (measure_gaps(body) <= 0.0).all() else None
