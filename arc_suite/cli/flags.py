@@ -12,7 +12,7 @@ from absl import flags
 from arc_suite import checks, policies, registry
 from arc_suite.arenas import ARENAS
 from arc_suite.bodies import generator, shaping
-from arc_suite.cli import program
+from arc_suite.cli import flag_mistakes
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import other_libraries, zips
@@ -421,7 +421,7 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
 def _refuse_flag_as_name(flag: str, name: str, value: str) -> None:
     """Raise ValueError for a flag of the program that stands as a name in another flag, such as --set steps=100."""
     is_flag = len(name) > 1 and name in FLAGS and "absl" not in FLAGS.find_module_defining_flag(name).split(".")
-    is_name = name in registry.setting_names() or (flag == "hp" and name in program.hyperparameter_words())
+    is_name = name in registry.setting_names() or (flag == "hp" and name in flag_mistakes.hyperparameter_words())
     if is_flag and not is_name and name != "seed":
         raise ValueError(
             f"--{flag} {checks.quote(f'{name}={value}')}: it is a flag; did you mean --{name}={checks.quote(value)}?"

@@ -1,0 +1,226 @@
+"""Answers to flags that a program does not have, to flags given twice, and to arguments that belong into a flag."""
+
+import itertools
+import os
+import re
+from collections.abc import Iterable, Sequence
+from typing import NoReturn
+
+from absl import flags
+
+from arc_suite import checks, policies, registry
+from arc_suite.tasks import TASKS
+
+DASHES = "-\u2013\u2014"  # also those that word processors write in place of two
+
+_POLICY_EXTENSIONS = (".npz", ".zip")
+_SEVERAL = re.compile(r"\bcommas\b|\ball\b|\bseveral\b")  # in the help of a flag whose text may be a list
+_GIVEN_TWICE = re.compile(r"flag --(\w+)=(.*): already defined as ", re.DOTALL)  # an error of absl
+_FLAGS_OF_A_BODY = ("robot", "spec", "legs")
+
+# What shows files that no program of the suite shows, by extension.
+_VIEWERS = {
+    ".glb": "Blender, Godot and other programs show a .glb: see docs/engines.md",
+    ".html": "a browser shows a page",
+}
+
+# Answers to flags of other programs, which no flag of this suite replaces.
+_RESUME = "the same command goes on where it was interrupted"
+_DEVICE = "learners compute on the device of JAX; see docs/gpu.md"
+_CURES = {
+    "continue": _RESUME,
+    "resume": _RESUME,
+    "cuda": _DEVICE,
+    "device": _DEVICE,
+    "gpu": _DEVICE,
+    "name": "arc-suite build_model --name NAME --json writes a spec with a name of its own",
+    "format": "the extension of the output is its format",
+}
+
+
+def refuse_unknown(
+    error: flags.UnrecognizedFlagError, names: Sequence[str], arguments: Sequence[str], parameters: Sequence[str]
+) -> None:
+    """Raise ValueError for a flag that the program does not have, with what to write in place of it.
+
+    Args:
+        error: that of absl.
+        names: names of the flags of the program.
+        arguments: those of the command line.
+        parameters: names of the arguments of the program that are no flags.
+    """
+    name = error.flagname
+    _, _, value = error.flagvalue.partition("=")
+    _refuse_name_of_value(name, value, names)
+    if len(name) == 1:
+        long_names = [f"--{long_name}" for long_name in names if long_name[0] == name]
+        if long_names:
+            raise ValueError(f"unknown flag '-{name}'; did you mean {' or '.join(long_names)}?") from None
+    value = value or _value_behind(arguments, name)
+    _refuse_name_of_argument(name, value, parameters)
+    if name in _CURES:
+        raise ValueError(f"unknown flag {checks.preview(name)}; {_CURES[name]}") from None
+    checks.name(name, names, "flag")  # raises a ValueError that suggests a name
+
+
+def refuse_value(error: flags.IllegalFlagValueError) -> None:
+    """Raise ValueError for a value that its flag does not take, with what the flag takes."""
+    flag_and_value = str(error).removesuffix(f": {error.__context__}")  # flag --NAME=VALUE
+    name, _, value = flag_and_value.removeprefix("flag --").partition("=")
+    parser = flags.FLAGS[name].parser
+    choices = getattr(parser, "enum_values", ("true", "false"))
+    expected = parser.syntactic_help or " or ".join(choices)
+    hint = ""
+    if isinstance(parser, flags.IntegerParser):
+        hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
+    raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None
+
+
+def forbid_repetition(program_flags: Iterable[flags.Flag]) -> None:
+    """Let absl raise an error for a flag that is given twice; flags of several values take further ones all the same.
+
+    Absl itself takes the last value, without a word.
+    """
+    for flag in program_flags:
+        flag.allow_overwrite = False
+
+
+def refuse_repetition(error: flags.IllegalFlagValueError) -> None:
+    """Raise ValueError, with both values, if absl refused a flag that was given twice; also if the values are equal."""
+    match = _GIVEN_TWICE.match(str(error))
+    if match is None:
+        return
+    flag = flags.FLAGS[match[1]]
+    values = [_value_text(flag), match[2]]
+    list_of_values = _join_values(flag, values) or _suggest_names_of_bodies(flag)
+    suggestion = f"; {list_of_values.rstrip('; ')}" if list_of_values else ""
+    values_text = " and ".join(checks.quote(value) for value in values)
+    raise ValueError(f"--{flag.name}: expected it once, got {values_text}{suggestion}")
+
+
+def _value_text(flag: flags.Flag) -> str:
+    """Return the value of a flag as one types it."""
+    if flag.boolean:
+        return "true" if flag.value else "false"
+    return flag.serialize().partition("=")[2]
+
+
+def _suggest_names_of_bodies(flag: flags.Flag) -> str:
+    """Return how a program takes several bodies, for a flag of one body; "" if it takes one."""
+    takes_several_bodies = "robot" in flags.FLAGS and _SEVERAL.search(flags.FLAGS["robot"].help) is not None
+    is_of_body = flag.name in _FLAGS_OF_A_BODY
+    return "--robot takes several by name, such as --robot=spider,hound" if is_of_body and takes_several_bodies else ""
+
+
+def refuse_argument(arguments: Sequence[str], positional_arguments: Sequence[str], parameter_count: int) -> NoReturn:
+    """Raise ValueError for an argument without a flag that is too many, with the flag that it may belong to.
+
+    Args:
+        arguments: those of the command line.
+        positional_arguments: those of them that are no flags and no values of flags, by absl.
+        parameter_count: number of arguments without a flag that the program takes.
+    """
+    argument = positional_arguments[parameter_count]
+    suggestion = _suggest_list(arguments, positional_arguments, parameter_count) or _suggest_flag(argument)
+    raise ValueError(f"unexpected argument {checks.preview(argument)}; {suggestion}see --help")
+
+
+def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> None:
+    """Raise ValueError for a flag that is the name of a setting or of a hyperparameter, with the flag that takes it."""
+    words_of_flags = {
+        "set": registry.setting_names() - {"random"},  # programs seed episodes by flags of their own
+        "hp": hyperparameter_words(),
+    }
+    meanings = checks.meanings(name)
+    if any(meaning in flag_names for meaning in meanings):
+        return
+    suggestions = [
+        f"--{flag} {meaning}={checks.quote(value) or 'VALUE'}"
+        for flag, words in words_of_flags.items()
+        for meaning in meanings
+        if flag in flag_names and meaning in words
+    ]
+    if suggestions:
+        raise ValueError(f"unknown flag {checks.preview(name)}; did you mean {' or '.join(suggestions)}?")
+
+
+def hyperparameter_words() -> set[str]:
+    """Return the names of hyperparameters, as the help of --hp lists them; none without that flag."""
+    return set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flags.FLAGS else set()
+
+
+def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -> None:
+    """Raise ValueError for a flag that is the name of an argument without a flag."""
+    for meaning in checks.meanings(name):
+        if meaning in parameters:
+            argument = f": {checks.quote(value)}" if value else ""
+            raise ValueError(
+                f"unknown flag {checks.preview(name)}; the {meaning} is an argument without a flag{argument}"
+            )
+
+
+def _value_behind(arguments: Sequence[str], name: str) -> str:
+    """Return the argument behind a flag, which may be its value; "" if there is none, or another flag."""
+    for flag, value in itertools.pairwise(arguments):
+        if flag in (f"--{name}", f"-{name}"):
+            return "" if value[:1] in DASHES else value
+    return ""
+
+
+def _suggest_list(arguments: Sequence[str], positional_arguments: Sequence[str], parameter_count: int) -> str:
+    """Return a question for a flag whose several values have spaces between them, such as --clips walk idle.
+
+    Args:
+        arguments: those of the command line.
+        positional_arguments: those of them that are no flags and no values of flags, by absl.
+        parameter_count: number of arguments without a flag that the program takes.
+
+    Returns:
+        "" where no flag with several values comes before the first argument that is too many.
+    """
+    end = start = arguments.index(positional_arguments[parameter_count])
+    while start > 0 and arguments[start - 1][:1] not in DASHES:
+        start -= 1
+    while end < len(arguments) and arguments[end][:1] not in DASHES:
+        end += 1
+    name, equals, value = arguments[start - 1].lstrip("-").replace("-", "_").partition("=")
+    if start == 0 or name not in flags.FLAGS or flags.FLAGS[name].boolean:
+        return ""
+    values = [value] * bool(equals) + list(arguments[start:end])
+    arguments_elsewhere = len(positional_arguments) - (len(values) - 1)
+    arguments_behind = max(0, parameter_count - arguments_elsewhere)
+    return _join_values(flags.FLAGS[name], values[: len(values) - arguments_behind])
+
+
+def _join_values(flag: flags.Flag, values: Sequence[str]) -> str:
+    """Return a question for several values of a flag; "" if it takes one value."""
+    if isinstance(flag, flags.MultiFlag):
+        is_list_of_settings = all("=" in text for text in values)
+        return f"did you mean {' '.join(f'--{flag.name} {text}' for text in values)}? " if is_list_of_settings else ""
+    if isinstance(flag.parser, flags.IntegerParser | flags.FloatParser) or flag.boolean:
+        return ""
+    if not isinstance(flag.parser, flags.ListParser) and _SEVERAL.search(flag.help) is None:
+        return ""
+    list_text = ",".join(text.strip(",") for text in values if text.strip(","))
+    return f"did you mean --{flag.name}={list_text}? a list has commas and no spaces; "
+
+
+def _suggest_flag(argument: str) -> str:
+    """Return a question for the flag that an argument may be the value of; "" if the program has no such flag."""
+    name, equals, value = argument.lstrip(DASHES).partition("=")
+    if name in flags.FLAGS and (equals or argument[0] in DASHES):
+        return f"did you mean --{name}{equals}{value}? "
+    extension = os.path.splitext(argument)[1].lower()
+    if extension in _VIEWERS and os.path.exists(argument):
+        return f"{_VIEWERS[extension]}; "
+    flag_takes_argument = {
+        "robot": argument in registry.robot_words(),
+        "task": argument in TASKS,
+        "spec": extension in (".json", *registry.READERS),
+        "policy": argument in policies.POLICIES or os.path.isdir(argument) or extension in _POLICY_EXTENSIONS,
+        "output": extension != "" and not os.path.exists(argument),
+    }
+    for flag, takes_argument in flag_takes_argument.items():
+        if takes_argument and flag in flags.FLAGS:
+            return f"did you mean --{flag}={argument}? "
+    return ""
