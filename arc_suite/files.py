@@ -35,6 +35,19 @@ _MAX_ENTRIES = 1000  # of a folder, among which a similar name is sought
 _LEAST_SIMILARITY = 0.75  # of a name that an error suggests, up to 1
 _ADDRESS = re.compile(r"[a-z][a-z0-9+.-]{1,15}:/", re.IGNORECASE)  # at the start; the drive of a path is one letter
 _MAX_STEM = 32  # characters of a target's name in the names of its temporary files
+# What JSON wants, by the beginning of the text at which it does not go on.
+_RULES_OF_JSON = {
+    "//": "JSON has no comments",
+    "/*": "JSON has no comments",
+    "#": "JSON has no comments",
+    "'": "JSON has double quotes",
+    ",": "a comma too many",
+    "]": "a comma too many, or a value too few",
+    "}": "a comma too many, or a value too few",
+    "True": "JSON has true, false and null",
+    "False": "JSON has true, false and null",
+    "None": "JSON has true, false and null",
+}
 
 
 def folder(path: str | os.PathLike[str]) -> Path:
@@ -335,8 +348,24 @@ def read_json(path: str | os.PathLike[str], max_bytes: int = MAX_JSON) -> Any:
         raise ValueError(f"expected at most {max_bytes} bytes")
     try:
         return json.loads(path.read_text(encoding="utf-8"))
+    except json.JSONDecodeError as error:
+        raise ValueError(f"expected JSON; {describe_json_error(error)}") from None
     except RecursionError:
         raise ValueError("expected JSON that is not nested so deeply") from None
+
+
+def describe_json_error(error: json.JSONDecodeError) -> str:
+    """Return where a text is no JSON, and the rule that it breaks."""
+    place = f"line {error.lineno}, column {error.colno}"
+    if error.pos == 0:
+        return f"{place}: it is no JSON, which begins with a bracket"
+    text_behind = error.doc[error.pos :].lstrip()
+    if not text_behind:
+        return f"{place}: the text ends before its last bracket"
+    for beginning, rule in _RULES_OF_JSON.items():
+        if text_behind.startswith(beginning):
+            return f"{place}: {rule}"
+    return f"{place}: {error.msg[:1].lower()}{error.msg[1:]}"
 
 
 def lock(file: IO) -> bool:

@@ -5,9 +5,10 @@ parser catches all of them. The caller checks bounds on the work before the pars
 """
 
 import contextlib
+import json
 from collections.abc import Iterator
 
-from arc_suite import checks
+from arc_suite import checks, files
 
 # Errors whose texts say what Python did, and not what is wrong with the file.
 _REASONS = {
@@ -46,6 +47,8 @@ def guard(
 
 def describe(error: Exception) -> str:
     """Return the reason that an error of a parser gives, in one line."""
+    if isinstance(error, json.JSONDecodeError):
+        return files.describe_json_error(error)
     for kind, reason in _REASONS.items():
         if isinstance(error, kind):
             return reason

@@ -22,6 +22,7 @@ from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.bodies import generator
 from arc_suite.bodies.families import sound_body
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
     DEFAULT_LINKS,
     adjust_body,
@@ -114,7 +115,7 @@ def _output_from_flags() -> Path | None:
     if not FLAGS.json and path.suffix.lower() == ".json":
         raise ValueError(f"--output={path}: a model is .xml; --json writes the spec")
     if path.suffix:
-        checks.extension(path, [extension])
+        outputs.check_extension(path, [extension])
     return path
 
 

@@ -36,21 +36,54 @@ _CURES = {
     "name": "arc-suite build_model --name NAME --json writes a spec with a name of its own",
     "format": "the extension of the output is its format",
 }
+_FORM_OF_BODIES = "docs/bodies.md: heads, tails and ballast"
+_COUNT_OF_BODIES = "--bodies bounds the search"
+_CURES_OF_PROGRAMS = {
+    "animate": {"frames": "a clip lasts a whole cycle; --fps sets its pictures"},
+    "build_model": dict.fromkeys(("ballast", "density", "head", "mass", "tail", "torso"), _FORM_OF_BODIES),
+    "check": {"fix": "arc-suite studio --spec FILE has a button for the value that fits"},
+    "completion": {"install": "its output goes into a file; see --help"},
+    "design": {
+        "spec": "did you mean --around?",
+        "legs": "the search chooses legs; --around keeps those of a creature",
+        "minutes": _COUNT_OF_BODIES,
+        "n": _COUNT_OF_BODIES,
+        "t": _COUNT_OF_BODIES,
+    },
+    "doctor": {"fix": "its lines say what to do"},
+    "play": {"task": "a page has the task of its policy"},
+    "render": {
+        "background": "arc-suite animate --transparent writes a picture of a clip without a background",
+        "i": "did you mean --spec or --policy?",
+        "r": "did you mean --fps?",
+        "t": "did you mean --steps?",
+        "transparent": "arc-suite animate --transparent writes a picture of a clip without a background",
+        "y": "files are written over",
+    },
+}
 
 
 def refuse_unknown(
-    error: flags.UnrecognizedFlagError, names: Sequence[str], arguments: Sequence[str], parameters: Sequence[str]
+    error: flags.UnrecognizedFlagError,
+    program: str,
+    names: Sequence[str],
+    arguments: Sequence[str],
+    parameters: Sequence[str],
 ) -> None:
     """Raise ValueError for a flag that the program does not have, with what to write in place of it.
 
     Args:
         error: that of absl.
+        program: name of the program, without arc-suite.
         names: names of the flags of the program.
         arguments: those of the command line.
         parameters: names of the arguments of the program that are no flags.
     """
     name = error.flagname
     _, _, value = error.flagvalue.partition("=")
+    cure = _CURES_OF_PROGRAMS.get(program, {}).get(name)
+    if cure is not None:
+        raise ValueError(f"unknown flag {checks.preview(name)}; {cure}") from None
     _refuse_name_of_value(name, value, names)
     if len(name) == 1:
         long_names = [f"--{long_name}" for long_name in names if long_name[0] == name]
@@ -122,6 +155,8 @@ def refuse_argument(arguments: Sequence[str], positional_arguments: Sequence[str
     """
     argument = positional_arguments[parameter_count]
     suggestion = _suggest_list(arguments, positional_arguments, parameter_count) or _suggest_flag(argument)
+    if parameter_count and not suggestion:
+        suggestion = "it takes one at a time; "
     raise ValueError(f"unexpected argument {checks.preview(argument)}; {suggestion}see --help")
 
 

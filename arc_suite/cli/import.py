@@ -15,7 +15,8 @@ import contextlib
 
 from absl import flags
 
-from arc_suite import checks, files, registry
+from arc_suite import files, registry
+from arc_suite.cli import outputs
 from arc_suite.importing import import_robot
 from arc_suite.importing.facing import AXES
 from arc_suite.importing.units import SCALE_RANGE
@@ -64,7 +65,7 @@ def main(robot: str | None = None) -> None:
     with contextlib.ExitStack() as stack:
         output_path = None
         if FLAGS.output is not None:
-            checks.extension(FLAGS.output, [".json"])
+            outputs.check_extension(FLAGS.output, [".json"])
             output_path = stack.enter_context(files.writing(FLAGS.output))
         body, notes = import_robot(
             robot,

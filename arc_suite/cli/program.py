@@ -178,7 +178,8 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
         positional_arguments = flags.FLAGS(with_underscores)
     except flags.UnrecognizedFlagError as error:
         names = sorted({flag.name for flag in program_flags})
-        flag_mistakes.refuse_unknown(error, names, with_underscores, parameters)
+        program = module.__name__.rpartition(".")[2]
+        flag_mistakes.refuse_unknown(error, program, names, with_underscores, parameters)
         raise
     except flags.IllegalFlagValueError as error:
         flag_mistakes.refuse_repetition(error)

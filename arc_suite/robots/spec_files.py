@@ -12,7 +12,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from arc_suite import checks, files
+from arc_suite import checks, files, parsers
 from arc_suite.robots import sources
 from arc_suite.robots.spec import MAX_SOURCE, Body, SpecError
 
@@ -113,7 +113,7 @@ def body_from_json(text: str | bytes) -> Body:
     except RecursionError:
         raise SpecError("expected a body in JSON, got too many brackets within brackets") from None
     except ValueError as error:
-        raise SpecError(f"expected a body in JSON: {error}") from None
+        raise SpecError(f"expected a body in JSON; {parsers.describe(error)}") from None
     for key in _KINDS_OF_JSON.keys() & (fields if isinstance(fields, dict) else {}):
         raise SpecError(f"expected a body in JSON, got {_KINDS_OF_JSON[key]}")
     return sources.check(_make_spec(Body, fields, path=""))

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 
+import page_commands
 import programs
 import pytest
 from interpreters import ROOT, printed
@@ -30,9 +31,9 @@ def folder(tmp_path):
 
 @pytest.fixture
 def run(folder, monkeypatch):
-    """Return a function that runs a command of the guide in that folder, with other flags at the end."""
+    """Return a function that runs a command of the guide in that folder, with other flags."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder / "datasets"))
-    return lambda command, *flags: programs.run(*command.split(), *flags, cwd=folder)
+    return lambda command, *flags: programs.run(*page_commands.change_flags(command, *flags).split(), cwd=folder)
 
 
 def test_a_law_moves_any_body(folder):

@@ -225,7 +225,10 @@ CASES = [
     (load("folder", "walk"), "robot 'folder': it is a folder; expected a name, or a file .json, .xml, .urdf"),
     (load("blank.json", "walk"), "blank.json: expected a body in JSON, got an empty file"),
     (load("arrays.json", "walk"), "arrays.json: expected a body in JSON, got a file that is no text"),
-    (load("text.json", "walk"), "text.json: expected a body in JSON: Expecting value: line 1 column 1 (char 0)"),
+    (
+        load("text.json", "walk"),
+        "text.json: expected a body in JSON; line 1, column 1: it is no JSON, which begins with a bracket",
+    ),
     (load("list.json", "walk"), "list.json: expected an object with the fields of a Body, got a list"),
     (load("empty.json", "walk"), "empty.json: name: missing; a Body needs it"),
     # Keyword arguments.

@@ -187,7 +187,12 @@ def test_refusing_keeps_no_memory():
     ("text", "message"),
     [
         ("", "expected a body in JSON, got an empty file"),
-        (json.dumps(SOUND)[:-40], "expected a body in JSON: "),
+        (json.dumps(SOUND)[:-40], "expected a body in JSON; line 1, column "),
+        ('{"a": 1, // 2', "expected a body in JSON; line 1, column 10: JSON has no comments"),
+        ("{'a': 1}", "expected a body in JSON; line 1, column 2: JSON has double quotes"),
+        ('{"a": [1,,2]}', "expected a body in JSON; line 1, column 10: a comma too many"),
+        ('{"a": True}', "expected a body in JSON; line 1, column 7: JSON has true, false and null"),
+        ('{"a": [1,', "expected a body in JSON; line 1, column 10: the text ends before its last bracket"),
         ("[1, 2]", "expected an object with the fields of a Body, got a list"),
         ("7", "expected an object with the fields of a Body, got a number"),
         ("[" * 200_000, "expected a body in JSON, got too many brackets within brackets"),

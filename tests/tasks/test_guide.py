@@ -3,6 +3,7 @@
 import functools
 import re
 
+import page_commands
 import programs
 import pytest
 from interpreters import ROOT, printed
@@ -147,7 +148,7 @@ def test_commands(package, command, tmp_path, monkeypatch):
         )
         arguments[arguments.index("--verify=ID")] = f"--verify={made.stdout.partition(':')[0]}"
     else:
-        arguments += SHORT.get(program, [])
+        name, program, *arguments = page_commands.change_flags(command, *SHORT.get(program, [])).split()
     done = programs.arc_suite(program, *arguments, cwd=tmp_path)
     if "cannot render" in done.stderr:
         pytest.skip("no OpenGL here")

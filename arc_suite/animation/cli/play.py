@@ -17,8 +17,9 @@ keeps walking, and left and right turn its course.
 
 from absl import flags
 
-from arc_suite import checks, files
+from arc_suite import files
 from arc_suite.animation import pages, play_pages
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
     adjust_body,
     bodies_from_flags,
@@ -47,7 +48,7 @@ def main() -> None:
     """Write the page."""
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
-    checks.extension(FLAGS.output, [".html"])
+    outputs.check_extension(FLAGS.output, [".html"])
     pages.read_built_file("play.js")  # raises an error now if there is none
     bodies = _bodies_from_flags()  # first: this imports the modules that flags name
     bodies = choose_bodies(policy_setup(), bodies)

@@ -23,6 +23,7 @@ from absl import flags
 
 from arc_suite import checks, files, style
 from arc_suite.animation import pages
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
     check_flags_suit_file,
     define_walk,
@@ -102,7 +103,7 @@ def main() -> None:
     }
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html")
-    extension = checks.extension(FLAGS.output, _DEFAULT_STEPS)
+    extension = outputs.check_extension(FLAGS.output, _DEFAULT_STEPS)
     steps = _DEFAULT_STEPS[extension] if FLAGS.steps is None else FLAGS.steps
     if steps < 1 and extension != ".png":
         raise ValueError(f"--steps={steps}: expected 1 or more for a film or a page")

@@ -34,7 +34,7 @@ from arc_suite.animation.studio.view import View
 from arc_suite.cpg.selection import presets_of
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import MAX_PALETTE_SEED
-from arc_suite.robots.spec_files import MAX_IMPORTED
+from arc_suite.robots.spec_files import MAX_IMPORTED, check_kind
 
 _REFRESH_INTERVAL = 0.25  # s, between two updates of the status and the charts
 _PANEL_WIDTH = 280  # pixels of the panel with the widgets: a third of a phone's window, held across
@@ -354,6 +354,7 @@ class Page:
         first_bytes = event.target.value.content[: MAX_IMPORTED + 1]  # one more than allowed, so that it is refused
         text = first_bytes.decode("utf-8", "replace")
         try:
+            check_kind(name)
             if is_state(text):
                 state = self._read_state(text)
             else:
@@ -361,7 +362,7 @@ class Page:
                 state = present_state._replace(sketch=open_file(present_state.sketch, text))
             open_creature(state.sketch)
         except (ValueError, OSError) as error:
-            reason = " ".join(str(error).split())
+            reason = " ".join(str(error).split()).removeprefix(f"{name}: ")
             event.client.add_notification("No creature", f"{name}: {reason}", color="red")
             return
         self._editor.edit(lambda present_state: state, "file")

@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from arc_suite import checks, registry
+from arc_suite import checks, parsers, registry
 from arc_suite.bodies import families, generator
 from arc_suite.bodies.shaping import Shape, link_ends, link_names, shaped
 from arc_suite.bodies.torsos import UNCHANGED
@@ -130,7 +130,9 @@ def settings_field(sketch: Sketch) -> Mapping[str, Any]:
     try:
         return checks.mapping("settings", json.loads(sketch.settings.strip() or "{}"))
     except (json.JSONDecodeError, RecursionError) as error:
-        raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
+        raise ValueError(
+            f'settings: expected a JSON object, such as {{"friction": 0.5}}; {parsers.describe(error)}'
+        ) from None
 
 
 def make_settings(sketch: Sketch, body: Body) -> dict[str, Any]:

@@ -21,8 +21,9 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks, files, policies
+from arc_suite import files, policies
 from arc_suite.bodies import universal
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
     complete_task,
     custom_body,
@@ -55,7 +56,7 @@ def main(run: str | None = None) -> None:
     name = policy_name(run)
     folder = path if path.is_dir() else path.parent
     output = Path(FLAGS.output or folder / "policy.onnx")
-    checks.extension(output, [".onnx"])
+    outputs.check_extension(output, [".onnx"])
     files.check_target(FLAGS.output)
     if FLAGS["robot"].present or custom_body() is not None:
         task, settings = complete_task(policy_setup(run), *task_from_flags())

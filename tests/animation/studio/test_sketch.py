@@ -193,7 +193,10 @@ def test_legs_that_overlap_are_moved_apart():
     [
         (Sketch(legs=5, layout="pairs"), "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
         (Sketch(gait="trot"), "gait 'trot' does not fit walker_8x3 with its 8 legs (fit: tripod, tetrapod, ripple, "),
-        (Sketch(settings="friction=1"), 'settings: expected a JSON object, such as {"friction": 0.5}: Expecting value'),
+        (
+            Sketch(settings="friction=1"),
+            'settings: expected a JSON object, such as {"friction": 0.5}; line 1, column 1',
+        ),
         (Sketch(settings="[1]"), "settings: expected a mapping of names to values, got [1]"),
         (Sketch(settings='{"random": 1}'), "setting 'random': expected none, as every episode has a seed, got 1"),
         (Sketch(settings='{"arena": "os:path"}'), ""),

@@ -20,11 +20,11 @@ def page():
     server.stop()
 
 
-def opened(page, content):
+def opened(page, content, name="wrong.json"):
     """What the visitor reads who opens a file."""
     told = []
     client = SimpleNamespace(add_notification=lambda title, body, color: told.append(body))
-    value = SimpleNamespace(name="wrong.json", content=content)
+    value = SimpleNamespace(name=name, content=content)
     page._open_upload(SimpleNamespace(target=SimpleNamespace(value=value), client=client))
     return told
 
@@ -51,3 +51,8 @@ def test_a_file_that_makes_no_creature_changes_nothing(page, content, reason):
 def test_a_spec_is_opened(page):
     assert opened(page, body_to_json(generator.generate(6, 2)).encode()) == []
     assert page._editor.state.sketch.source == FILE
+
+
+def test_a_file_of_another_kind_is_named_by_its_extension(page):
+    reason = "brute.png: expected a body, .json, .xml or .urdf; a .png holds a picture or a film"
+    assert opened(page, b"\x89PNG\r\n", "brute.png") == [reason]

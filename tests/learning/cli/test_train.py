@@ -97,7 +97,7 @@ def test_errors_are_one_line(flags, line, tmp_path):
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("{", "Expecting property name"),
+        ("{", "expected JSON; line 1, column 2: the text ends before its last bracket"),
         ("[]", "configuration: expected a mapping of names to values, got []"),
         ("{}", "expected a robot, got none"),
         ('{"robot": "tik"}', "unknown robot 'tik'; did you mean 'tick'?"),
