@@ -51,14 +51,13 @@ class Flaw(NamedTuple):
 def flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body, none for one that should walk.
 
-    Overlaps are not among them where the standing height is far off, as the length of strides follows from it.
+    Where the standing height is far off, it is the only flaw: strokes and strides are compared with it.
     """
-    body_flaws = list(_check_all_but_parts(body))
     pose = measure_standing(body)
     height_flaws = [*_check_feet(body, pose), *_check_torso(body, pose)]
-    if not any(flaw.hopeless for flaw in height_flaws):
-        body_flaws += _check_parts(body)
-    return body_flaws
+    if any(flaw.hopeless for flaw in height_flaws):
+        return height_flaws
+    return [*_check_all_but_parts(body), *_check_parts(body)]
 
 
 def has_flaws(body: Body) -> bool:

@@ -237,10 +237,10 @@ def write_results(
         [(most_common_reason, _)] = reasons.most_common(1)
         raise ValueError(f"none of {len(search.candidates)} bodies counts; most often: {most_common_reason}")
     print_table(elites, trial)
-    pictures = gallery.draw_pictures(progress(elites, "rendering", unit="body", leave=False), cell_map, trial)
+    pictures = gallery.draw_pictures(progress(elites, "rendering", unit="body"), cell_map, trial)
     gallery.write_picture(folder / "gallery.png", pictures)
     if FLAGS.pages:
-        gallery.write_walks(folder / "walks", progress(elites, "walking", unit="body", leave=False), cell_map, trial)
+        gallery.write_walks(folder / "walks", progress(elites, "walking", unit="body"), cell_map, trial)
         gallery.write_page(folder / "gallery.html", pictures, cell_map, f"{trial.goal} in {trial.task}")
 
 

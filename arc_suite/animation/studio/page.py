@@ -91,7 +91,8 @@ def serve(session: Session, host: str, port: int, report: Callable[[str], None])
         report(f"http://{host}:{server.get_port()}/?token={server.token}")
         session.run(page.show)
     finally:
-        server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints that it has stopped
+            server.stop()
 
 
 class Page:
