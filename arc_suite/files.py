@@ -357,15 +357,16 @@ def read_json(path: str | os.PathLike[str], max_bytes: int = MAX_JSON) -> Any:
 def describe_json_error(error: json.JSONDecodeError) -> str:
     """Return where a text is no JSON, and the rule that it breaks."""
     place = f"line {error.lineno}, column {error.colno}"
-    if error.pos == 0:
-        return f"{place}: it is no JSON, which begins with a bracket"
     text_behind = error.doc[error.pos :].lstrip()
     if not text_behind:
         return f"{place}: the text ends before its last bracket"
     for beginning, rule in _RULES_OF_JSON.items():
         if text_behind.startswith(beginning):
             return f"{place}: {rule}"
-    return f"{place}: {error.msg[:1].lower()}{error.msg[1:]}"
+    if error.pos == 0:
+        return f"{place}: it is no JSON, which begins with a bracket"
+    reason = error.msg.removesuffix(" starting at")
+    return f"{place}: {reason[:1].lower()}{reason[1:]}"
 
 
 def lock(file: IO) -> bool:

@@ -189,6 +189,8 @@ def test_refusing_keeps_no_memory():
         ("", "expected a body in JSON, got an empty file"),
         (json.dumps(SOUND)[:-40], "expected a body in JSON; line 1, column "),
         ('{"a": 1, // 2', "expected a body in JSON; line 1, column 10: JSON has no comments"),
+        ("// a body", "expected a body in JSON; line 1, column 1: JSON has no comments"),
+        ('{"a": "b', "expected a body in JSON; line 1, column 7: unterminated string"),
         ("{'a': 1}", "expected a body in JSON; line 1, column 2: JSON has double quotes"),
         ('{"a": [1,,2]}', "expected a body in JSON; line 1, column 10: a comma too many"),
         ('{"a": True}', "expected a body in JSON; line 1, column 7: JSON has true, false and null"),
