@@ -219,7 +219,8 @@ def test_help_says_what_each_policy_is():
 def test_errors_of_a_program_name_it(program):
     taking = ("check", "import", "motion", "export", "card", "study", "benchmark", "completion")  # an argument
     done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
-    programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; see --help\n")
+    cure = "it takes one at a time; " if program in taking else ""
+    programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; {cure}see --help\n")
 
 
 @pytest.mark.parametrize(
