@@ -45,7 +45,7 @@ def test_bad_arguments_are_one_line_and_write_nothing(tmp_path):
     for arguments, line in (
         ((), "expected a file in MJCF or URDF; see --help\n"),
         (("none.xml",), "cannot read none.xml: no such file or directory\n"),
-        ((GO2, "-o", tmp_path / "a.xml"), "unknown extension '.xml' (there are: .json); arc-suite build_model writes .xml\n"),
+        ((GO2, "-o", tmp_path / "a.xml"), "unknown extension '.xml' (there are: .json); arc-suite build_model writ"),
         ((GO2, "--home=sit", "-o", tmp_path / "a.json"), f"{GO2}: unknown keyframe 'sit' (there are: lying, home)\n"),
         (
             (GO2.with_name("a1_like.urdf"), "--home=sit"),
