@@ -80,5 +80,6 @@ def change_flags(command: str, *changes: str) -> str:
     for change in changes:
         name = change.partition("=")[0]
         if name not in _REPEATED_FLAGS:
-            command = re.sub(rf" {name}(=| )\S+", "", command)
+            short_name = "|-o" if name == "--output" else ""
+            command = re.sub(rf" ({name}{short_name})(=| )\S+", "", command)
     return " ".join([command, *changes])

@@ -1,9 +1,9 @@
-"""Answers to flags that a program does not have, to flags given twice, and to arguments that belong into a flag."""
+"""Answers to flags that a program does not have, and to arguments that belong into a flag."""
 
 import itertools
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NoReturn
 
 from absl import flags
@@ -15,8 +15,6 @@ DASHES = "-\u2013\u2014"  # also those that word processors write in place of tw
 
 _POLICY_EXTENSIONS = (".npz", ".zip")
 _SEVERAL = re.compile(r"\bcommas\b|\ball\b|\bseveral\b")  # in the help of a flag whose text may be a list
-_GIVEN_TWICE = re.compile(r"flag --(\w+)=(.*): already defined as ", re.DOTALL)  # an error of absl
-_FLAGS_OF_A_BODY = ("robot", "spec", "legs")
 
 # What shows files that no program of the suite shows, by extension.
 _VIEWERS = {
@@ -107,42 +105,6 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
     if isinstance(parser, flags.IntegerParser):
         hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
     raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None
-
-
-def forbid_repetition(program_flags: Iterable[flags.Flag]) -> None:
-    """Let absl raise an error for a flag that is given twice; flags of several values take further ones all the same.
-
-    Absl itself takes the last value, without a word.
-    """
-    for flag in program_flags:
-        flag.allow_overwrite = False
-
-
-def refuse_repetition(error: flags.IllegalFlagValueError) -> None:
-    """Raise ValueError, with both values, if absl refused a flag that was given twice; also if the values are equal."""
-    match = _GIVEN_TWICE.match(str(error))
-    if match is None:
-        return
-    flag = flags.FLAGS[match[1]]
-    values = [_value_text(flag), match[2]]
-    list_of_values = _join_values(flag, values) or _suggest_names_of_bodies(flag)
-    suggestion = f"; {list_of_values.rstrip('; ')}" if list_of_values else ""
-    values_text = " and ".join(checks.quote(value) for value in values)
-    raise ValueError(f"--{flag.name}: expected it once, got {values_text}{suggestion}")
-
-
-def _value_text(flag: flags.Flag) -> str:
-    """Return the value of a flag as one types it."""
-    if flag.boolean:
-        return "true" if flag.value else "false"
-    return flag.serialize().partition("=")[2]
-
-
-def _suggest_names_of_bodies(flag: flags.Flag) -> str:
-    """Return how a program takes several bodies, for a flag of one body; "" if it takes one."""
-    takes_several_bodies = "robot" in flags.FLAGS and _SEVERAL.search(flags.FLAGS["robot"].help) is not None
-    is_of_body = flag.name in _FLAGS_OF_A_BODY
-    return "--robot takes several by name, such as --robot=spider,hound" if is_of_body and takes_several_bodies else ""
 
 
 def refuse_argument(arguments: Sequence[str], positional_arguments: Sequence[str], parameter_count: int) -> NoReturn:

@@ -167,13 +167,11 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
         parameters: names of the arguments that are no flags; errors suggest them.
 
     Raises:
-        ValueError: a flag that the program does not have, a flag given twice that takes one value, a value that its
-            flag does not take, or an empty one.
+        ValueError: a flag that the program does not have, a value that its flag does not take, or an empty one.
         flags.Error: a flag without its value.
     """
     with_underscores = [_FLAG_NAME.sub(lambda match: match[0].replace("-", "_"), text) for text in arguments]
     program_flags = list(_flags_of(module))
-    flag_mistakes.forbid_repetition(program_flags)
     try:
         positional_arguments = flags.FLAGS(with_underscores)
     except flags.UnrecognizedFlagError as error:
@@ -182,7 +180,6 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
         flag_mistakes.refuse_unknown(error, program, names, with_underscores, parameters)
         raise
     except flags.IllegalFlagValueError as error:
-        flag_mistakes.refuse_repetition(error)
         flag_mistakes.refuse_value(error)
         raise
     for flag in program_flags:
