@@ -356,17 +356,17 @@ def read_json(path: str | os.PathLike[str], max_bytes: int = MAX_JSON) -> Any:
 
 def describe_json_error(error: json.JSONDecodeError) -> str:
     """Return where a text is no JSON, and the rule that it breaks."""
-    place = f"line {error.lineno}, column {error.colno}"
+    position = f"line {error.lineno}, column {error.colno}"
     text_behind = error.doc[error.pos :].lstrip()
     if not text_behind:
-        return f"{place}: the text ends before its last bracket"
+        return f"{position}: the text ends before its last bracket"
     for beginning, rule in _RULES_OF_JSON.items():
         if text_behind.startswith(beginning):
-            return f"{place}: {rule}"
+            return f"{position}: {rule}"
     if error.pos == 0:
-        return f"{place}: it is no JSON, which begins with a bracket"
+        return f"{position}: it is no JSON, which begins with a bracket"
     reason = error.msg.removesuffix(" starting at")
-    return f"{place}: {reason[:1].lower()}{reason[1:]}"
+    return f"{position}: {reason[:1].lower()}{reason[1:]}"
 
 
 def lock(file: IO) -> bool:

@@ -42,6 +42,7 @@ from arc_suite.tasks import clock
 
 ONE_CYCLE, CONNECTED, APART = 0.85, 0.85, 0.08  # legs of two joints often stop from poses of their own
 LOW = 0.01  # of a sole that slips
+PACES = ("slow", "walk", "fast", "run")
 
 
 def make_recorder(body) -> Recorder:
@@ -87,14 +88,13 @@ def broken(body, made) -> dict[str, str]:
 
 
 def measure_paces(body, recorder: Recorder, made) -> dict[str, float]:
-    """Return speed, cadence, duty factor and share of samples in schedule of `slow`, `walk` and `run`, by name.
+    """Return speed, cadence, duty factor, share of samples in schedule and height of steps of paces, by name.
 
-    The schedule is that of the gait at the pace, from the touchdown of the first foot on, with which loops begin.
+    Speed and cadence are multiples of the walk's, heights standing heights. The schedule is that of the gait at the
+    pace, from the touchdown of the first foot on, with which loops begin.
     """
     numbers = {}
-    for name in ("slow", "walk", "run"):
-        if name not in made:
-            continue
+    for name in [name for name in PACES if name in made]:
         draft = made[name]
         setup = recorder._setup_at_pace(gaits.PACES[name]) if name in gaits.PACES else recorder._setup
         parameters = setup.definition.parameters
@@ -104,6 +104,7 @@ def measure_paces(body, recorder: Recorder, made) -> dict[str, float]:
         schedule = clock.desired_contacts(phases, parameters.duty_factor, parameters.phase_offsets)
         numbers[f"{name} duty"] = is_down.mean()
         numbers[f"{name} in schedule"] = (is_down == schedule).mean()
+        numbers[f"{name} lift"] = soles.max(axis=0).mean() / body.torso.standing_height
         if name != "walk" and "walk" in made:
             numbers[f"{name} speed"] = draft.motion.twist[0] / made["walk"].motion.twist[0]
             numbers[f"{name} cadence"] = made["walk"].cycle / draft.cycle
@@ -192,7 +193,7 @@ def main(count: str = "100", folder: str = "out/clip_sets") -> int:
     def values(key, names):
         return np.array([numbers[name].get(key, np.nan) for name in names])
 
-    for key in (key for key in numbers["tick"] if key.startswith(("slow ", "walk ", "run "))):
+    for key in (key for key in numbers["tick"] if key.startswith(PACES)):
         ratios = values(key, numbers)
         quantiles = ", ".join(f"{value:.2f}" for value in np.nanquantile(ratios, (0.0, 0.1, 0.5, 0.9, 1.0)))
         print(f"{key}, {np.isfinite(ratios).sum()} bodies: least, 10 %, median, 90 % and most: {quantiles}")

@@ -5,32 +5,21 @@ python tests/clip_weight.py BODY ...
 A body is a robot, an example, a file, or random:SEED. Prints for each body the range of the torso's height in the walk
 and the run, standing heights, its roll and mean pitch, degrees, and the slip of its feet, without and with weight; the
 largest pitch that weight adds into the acceleration of a start and a stop, degrees; how far it moves the torso back,
-down and ahead in starts, stops, strikes and jumps, standing heights, with the share that legs allow; and for each pace
-its speed and cadence, as multiples of the walk, its duty factor, and the height of its steps, standing heights.
+down and ahead in starts, stops, strikes and jumps, standing heights, with the share that legs allow; and the numbers
+of each pace, see `clip_sets.measure_paces`.
 """
 
-import functools
 import sys
 
+import clip_sets
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import on_ground, planting, weight
+from arc_suite.animation.clips import planting, weight
 from arc_suite.animation.clips.drafts import make_drafts
-from arc_suite.animation.clips.recorder import Recorder
-from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
 
-LOOPS = ["slow", "walk", "fast", "run"]
 ACTIONS = ["attack", "jump"]
-LOW = 0.01  # standing heights, of a sole in stance
-
-
-class Kept(Recorder):
-    """A recorder that records each walk and each passage once."""
-
-    record_walk = functools.cache(Recorder.record_walk)
-    record_transition = functools.cache(Recorder.record_transition)
 
 
 def tilts(draft) -> np.ndarray:
@@ -53,10 +42,9 @@ def gait_numbers(body, walk) -> str:
 def main(*names: str) -> None:
     """Print the numbers of bodies."""
     for name in names:
-        _, _, seed = name.partition("random:")
-        body = sound_body(int(seed)) if seed else Setup.of(name, "steer").body
-        recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
-        clips = [*LOOPS, "start", "stop", *ACTIONS]
+        body = Setup.of(name, "steer").body
+        recorder, left_out = clip_sets.make_recorder(body), {}
+        clips = [*clip_sets.PACES, "start", "stop", *ACTIONS]
         light, heavy = (
             make_drafts(recorder, clips, iter, left_out, character=weight.choose_character(size)) for size in (0.0, 1.0)
         )
@@ -72,16 +60,8 @@ def main(*names: str) -> None:
             back, _, down = changes.min(axis=0)
             ahead = changes[:, 0].max()
             lines.append(f"{clip}: back {-back:.3f}, down {-down:.3f}, ahead {ahead:.3f}, weight {heavy[clip].weight}")
-        walk = light["walk"]
-        for clip in [clip for clip in LOOPS if clip in light]:
-            draft = light[clip]
-            speed, cadence = draft.motion.twist[0] / walk.motion.twist[0], walk.cycle / draft.cycle
-            soles = on_ground.measure_ground(body, draft.motion).soles[:-1]
-            duty = (soles < LOW * body.torso.standing_height).mean()
-            lift = soles.max(axis=0).mean() / body.torso.standing_height
-            lines.append(
-                f"{clip}: speed {speed:.2f}, cadence {cadence:.2f}, duty factor {duty:.2f}, height of steps {lift:.2f}"
-            )
+        for key, number in clip_sets.measure_paces(body, recorder, light).items():
+            lines.append(f"{key} {number:.2f}")
         lines += [f"no {clip}: {reason}" for clip, reason in left_out.items()]
         print("; ".join([name, *lines]), flush=True)
 

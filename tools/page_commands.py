@@ -11,10 +11,9 @@ _SECTION = re.compile(r"(?:\A# |^## )(?P<name>[^\n]*)\n(?P<text>.*?)(?=^## |\Z)"
 _BLOCK = re.compile(r"^```(?P<kind>sh|python)\n(?P<text>.*?)^```", re.MULTILINE | re.DOTALL)
 _SAVE_REQUEST = re.compile(r"[Ss]ave this as\s+`(?P<file>[^`]+)`[^`]*\Z")
 _COMMAND = re.compile(r"(?:^|`)((?:python (?:tools/|-m arc_suite)|arc-suite )[^`\n]*(?:\n[^`\n]+(?=`))?)", re.MULTILINE)
-_REPEATED_FLAGS = ("--set", "--hp", "--length")  # which take several values
 _COMMENT = re.compile(r"\s+#.*")
 
-# Programs whose work fewer episodes, bodies or minutes shorten: what a check changes in a command of a page.
+# Programs whose work fewer episodes, bodies or minutes shorten: what a check adds to a command of a page.
 SHORTER = {
     "train": "--minutes=2",
     "evaluate": "--episodes=1",
@@ -72,14 +71,4 @@ def shorten(command: str) -> str:
     """Return a command that does less of the same."""
     words = command.split()
     program = words[1] if len(words) > 1 else ""
-    return change_flags(command, SHORTER[program]) if program in SHORTER else command
-
-
-def change_flags(command: str, *changes: str) -> str:
-    """Return a command with flags such as --episodes=1, in place of those of the same names."""
-    for change in changes:
-        name = change.partition("=")[0]
-        if name not in _REPEATED_FLAGS:
-            short_name = "|-o" if name == "--output" else ""
-            command = re.sub(rf" ({name}{short_name})(=| )\S+", "", command)
-    return " ".join([command, *changes])
+    return f"{command} {SHORTER.get(program, '')}".strip()

@@ -194,7 +194,7 @@ def _join_values(flag: flags.Flag, values: Sequence[str]) -> str:
     if isinstance(flag, flags.MultiFlag):
         is_list_of_settings = all("=" in text for text in values)
         return f"did you mean {' '.join(f'--{flag.name} {text}' for text in values)}? " if is_list_of_settings else ""
-    if isinstance(flag.parser, flags.IntegerParser | flags.FloatParser) or flag.boolean:
+    if isinstance(flag.parser, flags.IntegerParser | flags.FloatParser):
         return ""
     if not isinstance(flag.parser, flags.ListParser) and _SEVERAL.search(flag.help) is None:
         return ""

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable
+from pathlib import Path
 
 from arc_suite import checks
 
@@ -36,7 +37,7 @@ def check_extension(path: str | os.PathLike[str], valid: Iterable[str]) -> str:
     try:
         return checks.extension(path, valid)
     except ValueError as error:
-        for extension, program in _PROGRAM_OF_EXTENSION.items():
-            if os.fspath(path).lower().endswith(extension):
-                raise ValueError(f"{error}; {program}") from None
-        raise
+        program = _PROGRAM_OF_EXTENSION.get(Path(path).suffix.lower())
+        if program is None:
+            raise
+        raise ValueError(f"{error}; {program}") from None

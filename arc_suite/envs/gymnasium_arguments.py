@@ -43,7 +43,12 @@ HINTS = {
 
 
 def find_settings(name: str, value: Any, task: type[Task]) -> dict[str, Any]:
-    """Return the settings of a task that take the place of an argument with its value; none if there are none."""
+    """Return the settings of a task that take the place of an argument with its value; none if there are none.
+
+    None are known of a task of another package that does not list its settings.
+    """
+    if not hasattr(task, "names"):
+        return {}
     if name in _TERMS:
         terms, sign = _TERMS[name]
         term = next((term for term in terms if term in task.weights), None)

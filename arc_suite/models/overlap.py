@@ -109,14 +109,18 @@ def overlaps_in_poses(body: Body, poses: Iterable[tuple[str, np.ndarray]]) -> It
 
 
 def measure_gaps(body: Body) -> np.ndarray:
-    """Return the distances (legs,) from the torso to the first link of each leg, m; at most 0 where they touch."""
+    """Return the distances (legs,) from the torso to the first link of each leg, m; at most 0 where they touch.
+
+    Those of an imported body are 0: its solids are only a sketch of its colliders.
+    """
+    if body.source:
+        return np.zeros(len(body.legs))
     model = compile_body(body)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     solids = range(len(body.torso.solids))
-    first_links = (
-        len(body.torso.solids) + len(body.ballast) + np.cumsum([0, *(len(leg.parts) for leg in body.legs)])[:-1]
-    )
+    names = _geom_names(body)
+    first_links = [names.index(leg.part_names[0]) for leg in body.legs]
     return np.array(
         [min(mujoco.mj_geomDistance(model, data, solid, link, _FAR, None) for solid in solids) for link in first_links]
     )

@@ -132,8 +132,6 @@ def _check_legs(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
 
 def _check_mounts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
     """Find legs that begin apart from the torso."""
-    if body.source:  # its solids are only a sketch of its colliders
-        return
     gaps = measure_gaps(body)
     is_apart = gaps > 0.0
     if is_apart.any():
@@ -145,8 +143,7 @@ def _check_mounts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
 def _mount_in_torso(body: Body, is_apart: np.ndarray) -> Body | None:
     """Return the body with legs that are apart from the torso mounted nearer to its middle; None if none touches it."""
     for share in _SHARES_OF_MOUNTS:
-        displacements = [(share - 1.0) * np.array(leg.mount[:2]) for leg in body.legs]
-        attached_body = _return_if_whole(_move_legs(body, is_apart[:, None] * displacements))
+        attached_body = _return_if_whole(_spread_mounts(body, np.where(is_apart, share, 1.0)))
         if attached_body is not None:
             return attached_body
     return None
@@ -288,8 +285,7 @@ def _remove_motors(body: Body, is_removed: Sequence[bool]) -> Body:
 
 def _return_if_whole(body: Body) -> Body | None:
     """Return the body, or None if legs of it begin apart from the torso."""
-    is_sketch = bool(body.source)  # of the colliders of an imported body
-    return body if is_sketch or (measure_gaps(body) <= 0.0).all() else None
+    return body if (measure_gaps(body) <= 0.0).all() else None
 
 
 def _move_legs(body: Body, displacements: Iterable) -> Body:

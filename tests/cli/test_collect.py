@@ -73,7 +73,7 @@ def test_datasets_have_other_falls_than_judges(root):
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
-    programs.refused(run(*arguments), f"arc-suite collect: {message}\n")
+    programs.refused(run("--episodes=2", *arguments), f"arc-suite collect: {message}\n")
     assert not root.exists()
 
 

@@ -3,7 +3,6 @@
 import re
 
 import check_clients
-import page_commands
 import programs
 import pytest
 
@@ -46,7 +45,7 @@ def test_the_task_of_the_first_steps(tmp_path):
     (tmp_path / module.file).write_text(module.text)
     (evaluate,) = re.findall("^arc-suite (evaluate .*)$", commands.text, re.MULTILINE)
     short = ["--policy=zero", "--episodes=1", "--set=time_limit=1"]
-    programs.passed(programs.arc_suite(*page_commands.change_flags(evaluate, *short).split(), cwd=tmp_path))
+    programs.passed(programs.arc_suite(*evaluate.split(), *short, cwd=tmp_path))
     assert '"task": "ice:ice"' in (tmp_path / "ice.json").read_text()
 
 
@@ -54,8 +53,7 @@ def test_the_task_of_the_first_steps(tmp_path):
 def test_the_spider_of_the_first_steps(tmp_path):
     short = {"evaluate": ["--set=time_limit=1"], "render": ["--steps=2"], "animate": ["--clips=idle"]}
     for command in STEPS["A spider as animation clips"].blocks[0].text.splitlines():
-        changes = short.get(command.split()[1], ())
-        programs.passed(programs.run(*page_commands.change_flags(command, *changes).split(), cwd=tmp_path))
+        programs.passed(programs.run(*command.split(), *short.get(command.split()[1], ()), cwd=tmp_path))
     assert {path.name for path in tmp_path.iterdir()} == {"spider.mp4", "clips.glb", "clips.clips.json"}
 
 

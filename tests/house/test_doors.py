@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 
-import page_commands
 import programs
 import pytest
 from interpreters import ROOT, printed
@@ -31,9 +30,9 @@ def folder(tmp_path):
 
 @pytest.fixture
 def run(folder, monkeypatch):
-    """Return a function that runs a command of the guide in that folder, with other flags."""
+    """Return a function that runs a command of the guide in that folder, with other flags at the end."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder / "datasets"))
-    return lambda command, *flags: programs.run(*page_commands.change_flags(command, *flags).split(), cwd=folder)
+    return lambda command, *flags: programs.run(*command.split(), *flags, cwd=folder)
 
 
 def test_a_law_moves_any_body(folder):

@@ -99,9 +99,9 @@ def test_a_zip_knows_its_robot(normalized, saved, recwarn):
 
 def test_programs_take_statistics(normalized):
     folder = normalized[0]
-    evaluate = ("evaluate", "--robot=tick", "--episodes=1", "--set=time_limit=1", "--vecnormalize=stats.pkl")
-    programs.passed(programs.arc_suite(*evaluate, "--policy=ppo.zip", cwd=folder))
-    done = programs.arc_suite(*evaluate, "--policy=cpg", cwd=folder)
+    evaluate = ("evaluate", "--robot=tick", "--policy=ppo.zip", "--episodes=1", "--set=time_limit=1")
+    programs.passed(programs.arc_suite(*evaluate, "--vecnormalize=stats.pkl", cwd=folder))
+    done = programs.arc_suite(*evaluate, "--vecnormalize=stats.pkl", "--policy=cpg", cwd=folder)
     line = "--vecnormalize=stats.pkl: goes with a zip of stable-baselines3, got 'cpg'"
     programs.refused(done, f"arc-suite evaluate: {line}\n")
 

@@ -3,7 +3,6 @@
 import functools
 import re
 
-import page_commands
 import programs
 import pytest
 from interpreters import ROOT, printed
@@ -39,12 +38,17 @@ def test_task(package):
         + """
 print(observations.shape, [block.shape for block in blocks.values()])
 print((arc_suite.symmetry("leaper", "crouch").observation.signs < 0).sum())
+try:
+    arc_suite.load("leaper", "crouch", forward_reward_weight=0.5)
+except ValueError as error:
+    print(error)
 """
     )
-    first, *_, shapes, negative = package(code)
+    first, *_, shapes, negative, refusal = package(code)
     assert first.startswith("[0.7] {'height': ")
     assert shapes == "(8, 48) [(8, 23), (8, 24), (8, 1)]"
     assert int(negative) == 2 + 4 + 3 + 4  # the quaternion, hips, velocities of the torso, hips
+    assert refusal.startswith("argument 'forward_reward_weight': the setting weights has the weight of every term")
 
 
 BATCH = """
@@ -148,7 +152,7 @@ def test_commands(package, command, tmp_path, monkeypatch):
         )
         arguments[arguments.index("--verify=ID")] = f"--verify={made.stdout.partition(':')[0]}"
     else:
-        name, program, *arguments = page_commands.change_flags(command, *SHORT.get(program, [])).split()
+        arguments += SHORT.get(program, [])
     done = programs.arc_suite(program, *arguments, cwd=tmp_path)
     if "cannot render" in done.stderr:
         pytest.skip("no OpenGL here")

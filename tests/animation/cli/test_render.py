@@ -24,9 +24,8 @@ CAMERAS = "(there are: tracking, portrait, profile, eye)"
 EXTENSIONS = "(there are: .png, .mp4, .gif, .webp, .html)"
 
 
-def render(folder, *arguments, size=(64, 48)):
-    width, height = size
-    return programs.arc_suite("render", f"--width={width}", f"--height={height}", *arguments, cwd=folder)
+def render(folder, *arguments):
+    return programs.arc_suite("render", "--width=64", "--height=48", *arguments, cwd=folder)
 
 
 def views_of(path, columns, rows):
@@ -78,8 +77,8 @@ def test_gif_shows_every_control_step_in_real_time(tmp_path):
 @pytest.mark.long
 def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     """Under the random policy Leaper falls long before 200 steps; odd sizes become even, as yuv420p needs."""
-    odd = ("--robot=leaper", "--policy=random", "--steps=200")
-    done = render(tmp_path, *odd, "--output=leaper.mp4", size=(65, 49))
+    odd = ("--robot=leaper", "--policy=random", "--width=65", "--height=49", "--steps=200")
+    done = render(tmp_path, *odd, "--output=leaper.mp4")
     assert done.returncode == 0, done.stderr
     steps = int(re.search(r"in ([0-9]+) steps", done.stdout)[1])
     assert 10 < steps < 100

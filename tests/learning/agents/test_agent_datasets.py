@@ -4,7 +4,6 @@ import functools
 import pathlib
 
 import numpy as np
-import page_commands
 import programs
 import pytest
 import tiny_studies
@@ -34,8 +33,8 @@ def collected(run, tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
 
     def collect(*flags):
-        command = f"collect --robot=tick --policy={run} --set=time_limit=2 --episodes=6 --threads=1"
-        return programs.run("-m", "arc_suite", *page_commands.change_flags(command, *flags).split(), cwd=ROOT)
+        command = ["collect", "--robot=tick", f"--policy={run}", "--set=time_limit=2", "--episodes=6", "--threads=1"]
+        return programs.run("-m", "arc_suite", *command, *flags, cwd=ROOT)
 
     return collect
 

@@ -5,7 +5,6 @@ import pathlib
 import re
 
 import numpy as np
-import page_commands
 import programs
 import pytest
 
@@ -22,7 +21,7 @@ def run(tmp_path):
     (tmp_path / "random_search.py").write_text(RANDOM_SEARCH)
 
     def command(text, *flags):
-        done = programs.run(*page_commands.change_flags(text, *flags).split(), cwd=tmp_path)
+        done = programs.run(*text.split(), *flags, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -32,19 +31,19 @@ def run(tmp_path):
 @pytest.mark.long
 def test_a_new_learner(run, tmp_path):
     """It needs no JAX, resumes bit-exactly, and every program takes its policy."""
-    short = ["--hp=directions=2", "--hp=horizon=20", "--evaluate_every=80", "--set=time_limit=2"]
+    short = ["--hp=directions=2", "--hp=horizon=20", "--evaluate_every=80", "--set", "time_limit=2"]
     for folder, steps in (("whole", []), ("broken", ["--minutes=0"]), ("broken", [])):
-        run(TRAIN_SEARCH, *short, "--steps=160", f"--output=runs/{folder}", *steps)
+        run(TRAIN_SEARCH, *short, "--steps=160", "-o", f"runs/{folder}", *steps)
     whole, broken = ((tmp_path / "runs" / name / "checkpoint.npz") for name in ("whole", "broken"))
     with np.load(whole) as one, np.load(broken) as other:
         assert one["generation"] == other["generation"] == 2
         assert np.array_equal(one["weight"], other["weight"]) and one["weight"].any()
     (tmp_path / "runs" / "whole").rename(tmp_path / "runs" / "search")
-    assert "\nleaper " in run(EVALUATE, "--episodes=1", "--set=time_limit=2")
+    assert "\nleaper " in run(EVALUATE, "--episodes=1", "--set", "time_limit=2")
 
 
 @pytest.mark.long
 @pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="of the extra learn: make check-agents")
 def test_new_hyperparameters(run, tmp_path):
-    out = run(TRAIN_PATIENT, "--steps=50", "--hp=hidden=8", "--hp=batch=4", "--set=time_limit=2")
+    out = run(TRAIN_PATIENT, "--steps=50", "--hp=hidden=8", "--hp=batch=4", "--set", "time_limit=2")
     assert "\nruns/patient: finished, return " in out
