@@ -49,11 +49,13 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "file": ("spec", "robot"),
     "fetch": ("navigate",),
     "first_person": ("eye",),
+    "floor": ("arena",),
     "follow": ("tracking",),
     "forward_reward_weight": ("weights",),
     "fpv": ("eye",),
     "front": ("portrait",),
     "gamma": ("discount",),
+    "ground": ("arena",),
     "half_cheetah": ("leaper",),
     "halfcheetah": ("leaper",),
     "healthy_reward": ("weights",),
@@ -79,6 +81,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "net_arch": ("hidden",),
     "num_legs": ("legs",),
     "nod": ("pitch",),
+    "noise": ("observation_noise",),
     "none": ("in_place",),
     "num_workers": ("threads", "jobs"),
     "off": ("in_place",),
@@ -90,9 +93,12 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "path": ("spec", "robot", "file"),
     "policy": ("run", "algorithm"),
     "ppo2": ("ppo",),
+    "push": ("kicks",),
+    "pushes": ("kicks",),
     "quadruped": ("leaper",),
     "reset_noise_scale": ("base_noise",),
     "resolution": ("width",),
+    "reward": ("weights",),
     "robot": ("spec",),
     "run": ("walk", "policy"),
     "save": ("output", "json"),
@@ -107,6 +113,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "stand": ("walk",),
     "standup": ("recover",),
     "td3": ("sac",),
+    "terrain": ("arena",),
     "terminate_when_unhealthy": ("healthy_range",),
     "timesteps": ("steps",),
     "total_timesteps": ("steps",),
@@ -117,6 +124,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "velocity": ("target_velocity", "steer"),
     "walker": ("leaper",),
     "walker2d": ("leaper",),
+    "wind": ("force",),
     "xml": ("spec", "robot"),
 }
 _GAP_BETWEEN_NAMES = re.compile(r"[\s;+|]+")  # in place of commas
@@ -126,6 +134,7 @@ _VERSION = re.compile(r"-v\d{1,3}$")  # of Gymnasium's names
 _MIN_NAMED_BOUND = 1e-6
 _MAX_DIGITS = 20  # of an integer in a text
 _MAX_QUOTE = 300  # characters
+_SAME_WORD = 0.9  # similarity, up to 1, of two spellings of one word
 _MAX_PATH = 80  # characters of a path `module:name` in an error
 _COUNT = re.compile(r"(\d{1,20}(?:\.\d{0,20})?(?:e\d\d?)?)([km]?)", re.IGNORECASE)  # such as 1e5, 100k
 _FACTORS = {"": 1, "k": 1_000, "m": 1_000_000}  # of the letters after a count
@@ -180,8 +189,14 @@ def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
 
 
 def meanings(name: str) -> tuple[str, ...]:
-    """Return a name, and the names that this suite has for it, if it is one of other libraries."""
-    return name, *SYNONYMS.get(name, ())
+    """Return a name, and the names that this suite has for it, if it is one of other libraries, or spelled like one."""
+    return name, *_synonyms(name)
+
+
+def _synonyms(word: str) -> tuple[str, ...]:
+    if word not in SYNONYMS:
+        word = next(iter(difflib.get_close_matches(word, SYNONYMS, n=1, cutoff=_SAME_WORD)), "")
+    return SYNONYMS.get(word, ())
 
 
 def hint(value, valid: Iterable[str]) -> str:
@@ -195,10 +210,13 @@ def hint(value, valid: Iterable[str]) -> str:
     if len(words) > 1 and set(words) <= set(valid_names):
         return _suggest(repr(",".join(words)))
     lower_text = _VERSION.sub("", text).lower()
-    synonyms = [synonym for synonym in SYNONYMS.get(lower_text, ()) if synonym in valid_names]
+    synonyms = [synonym for synonym in _synonyms(lower_text) if synonym in valid_names]
     same_letters = [name for name in valid_names if str(name).lower() == lower_text]
-    suggestions = same_letters or synonyms or difflib.get_close_matches(text, valid_names, n=1)
-    suggestions = suggestions or difflib.get_close_matches(lower_text, valid_names, n=1)
+    similar_names = difflib.get_close_matches(text, valid_names, n=1)
+    if not similar_names:
+        similar_names = difflib.get_close_matches(lower_text, valid_names, n=1)
+    is_known_synonym = lower_text in SYNONYMS
+    suggestions = same_letters or (synonyms if is_known_synonym else []) or similar_names or synonyms
     return f"; did you mean {suggestions[0]!r}?" if suggestions else ""
 
 

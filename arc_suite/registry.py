@@ -22,7 +22,7 @@ from arc_suite import checks, files
 from arc_suite.arenas import ARENAS, Arena, ground_text
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json, load_body
+from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json, hint_in_folder, load_body
 from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.modifiers import MODIFIERS
 
@@ -228,7 +228,8 @@ def _refuse_other_words(text: str) -> None:
     _refuse_name_of_file("robot", text, (".json", *READERS))
     if files.is_folder(text):
         extensions = ", ".join((".json", *READERS))
-        raise ValueError(f"robot {checks.preview(text)}: it is a folder; expected a name, or a file {extensions}")
+        hint = hint_in_folder(text)
+        raise ValueError(f"robot {checks.preview(text)}: it is a folder; expected a name, or a file {extensions}{hint}")
 
 
 def _refuse_gymnasium_id(kind: str, text: str) -> None:

@@ -114,6 +114,8 @@ def _output_from_flags() -> Path | None:
         return path.with_suffix(extension)
     if not FLAGS.json and path.suffix.lower() == ".json":
         raise ValueError(f"--output={path}: a model is .xml; --json writes the spec")
+    if FLAGS.json and path.suffix.lower() == ".xml":
+        raise ValueError(f"--output={path}: a spec is .json; without --json the model is written")
     if path.suffix:
         outputs.check_extension(path, [extension])
     return path

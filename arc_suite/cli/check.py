@@ -6,7 +6,8 @@
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
-nothing up, none that can step. An imported body stands for a second; a line tells whether its motors are too
+nothing up, none that can step. Motors that a spec leaves out are chosen to hold any ballast; a line tells how strong
+they are where ballast is heavy. An imported body stands for a second; a line tells whether its motors are too
 weak to hold it, or its joints buzz.
 With --walk its default demonstrator walks it for 100 control steps, an imported robot for 1000. Where it falls,
 drags its torso, or stays below 0.7 of the target speed, the demonstrator `medium` tries. Where that fails, too, a
@@ -32,7 +33,9 @@ from arc_suite.cli.flags import ROBOT_HELP, define_task, refuse_flags, task_from
 from arc_suite.cpg.selection import suited_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance, cures, suitability
+from arc_suite.models.sizing import size_body
 from arc_suite.models.soundness import flaws
+from arc_suite.models.standing import measure_standing
 from arc_suite.robots.spec import Body, Joint
 from arc_suite.simulation.stillness import Stillness, calming_armature, measure_stillness
 from arc_suite.tasks import TASKS
@@ -46,6 +49,7 @@ flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}
 _SEEDS = suitability.SEEDS[:4]  # of the episodes of each task
 _STEPS = 200  # control steps of each of them
 _MAX_NAMES = 4  # of joints in one line
+_HEAVY_BALLAST = 5.0  # weights of the rest of a body
 _SAME_ARMATURE = 0.99  # of what fits; a file rounds numbers
 _GOOD_QUALITY = 2  # of a walk that counts as walking; see `cures.FirstWalk`
 _FAILURE_TEXTS = {"touch": "drags its torso", "slow": "is slow"}  # by the failures of a walk, except falls
@@ -74,6 +78,7 @@ def _check_body(spec: str) -> bool:
     is_held = stillness is None or not stillness.overloaded.any()
     if not body_flaws and is_held:
         print(f"{spec}: {body.name} stands and can take steps")
+        _tell_of_heavy_ballast(spec, body)
     stands_still = stillness is None or _check_stillness(spec, body, stillness)
     walks_well = True
     can_walk = not any(flaw.hopeless for flaw in body_flaws)
@@ -82,6 +87,21 @@ def _check_body(spec: str) -> bool:
     if FLAGS.tasks and can_walk:
         _try_tasks(spec, body)
     return walks_well and stands_still and not body_flaws
+
+
+def _tell_of_heavy_ballast(spec: str, body: Body) -> None:
+    """Print how strong motors are that the suite chooses for ballast of many times the weight of the rest."""
+    ballast_mass = sum(ballast.mass for ballast in body.ballast)
+    ratio = ballast_mass / (measure_standing(body).mass - ballast_mass)
+    has_chosen_motors = any(joint.torque is None for joint in body.joints)
+    if ratio < _HEAVY_BALLAST or not has_chosen_motors:
+        return
+    largest_torque = max(joint.torque for joint in size_body(body).joints)
+    rounded_torque = float(f"{largest_torque:.3g}")
+    print(
+        f"{spec}: its ballast of {ballast_mass:g} kg weighs {ratio:.0f} times the rest: the suite chooses motors "
+        f"of up to {rounded_torque:g} N m for it; a gear in the spec sets others"
+    )
 
 
 def _check_stillness(spec: str, body: Body, stillness: Stillness) -> bool:

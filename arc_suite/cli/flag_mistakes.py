@@ -13,6 +13,10 @@ from arc_suite.tasks import TASKS
 
 DASHES = "-\u2013\u2014"  # also those that word processors write in place of two
 
+_FLAG = re.compile(r"--?([a-z_]+)(?:=.*)?", re.DOTALL)
+_BARE_KEY = re.compile(r"([{,]\s*)([a-z_]\w*)(\s*:)")  # a name in braces, without its quotes
+_BRACKETS = {"{": "}", "[": "]"}
+
 _POLICY_EXTENSIONS = (".npz", ".zip")
 _SEVERAL = re.compile(r"\bcommas\b|\ball\b|\bseveral\b")  # in the help of a flag whose text may be a list
 
@@ -31,9 +35,12 @@ _CURES = {
     "cuda": _DEVICE,
     "device": _DEVICE,
     "gpu": _DEVICE,
+    "gravity": "environment.change_model sets it, see docs/environments.md",
     "name": "arc-suite build_model --name NAME --json writes a spec with a name of its own",
     "format": "the extension of the output is its format",
 }
+# Flags whose values a shell changes, unless they are quoted.
+_CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
 _FORM_OF_BODIES = "docs/bodies.md: heads, tails and ballast"
 _COUNT_OF_BODIES = "--bodies bounds the search"
 _CURES_OF_PROGRAMS = {
@@ -105,6 +112,23 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
     if isinstance(parser, flags.IntegerParser):
         hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
     raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None
+
+
+def refuse_missing_value(error: flags.Error) -> None:
+    """Raise ValueError for a flag without its value, if a shell drops such values; `error` is that of absl."""
+    name = str(error).rpartition("-")[2]
+    if name in _CURES_OF_MISSING_VALUES:
+        raise ValueError(f"{error}; {_CURES_OF_MISSING_VALUES[name]}") from None
+
+
+def refuse_flag_as_value(flag: flags.Flag) -> None:
+    """Raise ValueError for a flag without its value that has taken the next flag as its value."""
+    for text in flag.value if isinstance(flag.value, list) else [flag.value]:
+        match = _FLAG.fullmatch(text) if isinstance(text, str) else None
+        if match and match[1] in flags.FLAGS:
+            cure = _CURES_OF_MISSING_VALUES.get(flag.name)
+            hint = f"; {cure}" if cure else ""
+            raise ValueError(f"--{flag.name}: expected a value, got the flag {checks.quote(text)}{hint}")
 
 
 def refuse_argument(arguments: Sequence[str], positional_arguments: Sequence[str], parameter_count: int) -> NoReturn:
@@ -192,14 +216,25 @@ def _suggest_list(arguments: Sequence[str], positional_arguments: Sequence[str],
 def _join_values(flag: flags.Flag, values: Sequence[str]) -> str:
     """Return a question for several values of a flag; "" if it takes one value."""
     if isinstance(flag, flags.MultiFlag):
-        is_list_of_settings = all("=" in text for text in values)
-        return f"did you mean {' '.join(f'--{flag.name} {text}' for text in values)}? " if is_list_of_settings else ""
+        return _join_settings(flag.name, values)
     if isinstance(flag.parser, flags.IntegerParser | flags.FloatParser):
         return ""
     if not isinstance(flag.parser, flags.ListParser) and _SEVERAL.search(flag.help) is None:
         return ""
     list_text = ",".join(text.strip(",") for text in values if text.strip(","))
     return f"did you mean --{flag.name}={list_text}? a list has commas and no spaces; "
+
+
+def _join_settings(flag_name: str, values: Sequence[str]) -> str:
+    """Return a question for several settings, or for one whose value a shell has split at its spaces; else ""."""
+    if all("=" in text for text in values):
+        return f"did you mean {' '.join(f'--{flag_name} {text}' for text in values)}? "
+    setting = " ".join(values)
+    name, equals, value = setting.partition("=")
+    if equals and _BRACKETS.get(value[:1]) == value[-1:]:
+        quoted_keys = _BARE_KEY.sub(r'\1"\2"\3', value)  # a shell drops these quotes, too
+        return f"did you mean --{flag_name} '{name}={quoted_keys}'? a shell splits at spaces without quotes; "
+    return ""
 
 
 def _suggest_flag(argument: str) -> str:

@@ -20,7 +20,7 @@ from arc_suite.cli import outputs
 from arc_suite.importing import import_robot
 from arc_suite.importing.facing import AXES
 from arc_suite.importing.units import SCALE_RANGE
-from arc_suite.robots.spec_files import body_to_json, check_kind
+from arc_suite.robots.spec_files import body_to_json, check_kind, refuse_folder
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("output", None, "File to write the body to, in JSON. [default: none]", short_name="o")
@@ -59,6 +59,7 @@ def main(robot: str | None = None) -> None:
         raise ValueError("expected a file in MJCF or URDF; see --help")
     if robot in registry.robot_words():
         raise ValueError(f"{robot} is a body of the suite: every program takes it as --robot={robot}")
+    refuse_folder(robot)
     check_kind(robot)
     if not all(FLAGS.feet):
         raise ValueError(f"--feet={','.join(FLAGS.feet)}: expected names with commas between them")

@@ -167,7 +167,8 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
         parameters: names of the arguments that are no flags; errors suggest them.
 
     Raises:
-        ValueError: a flag that the program does not have, a value that its flag does not take, or an empty one.
+        ValueError: a flag that the program does not have, a value that its flag does not take, an empty one, or another
+            flag in place of a value.
         flags.Error: a flag without its value.
     """
     with_underscores = [_FLAG_NAME.sub(lambda match: match[0].replace("-", "_"), text) for text in arguments]
@@ -182,9 +183,14 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
     except flags.IllegalFlagValueError as error:
         flag_mistakes.refuse_value(error)
         raise
+    except flags.Error as error:
+        flag_mistakes.refuse_missing_value(error)
+        raise
     for flag in program_flags:
         if flag.present and flag.value in ("", []):
             raise ValueError(f"--{flag.name}=: expected a value, got none")
+        if flag.present:
+            flag_mistakes.refuse_flag_as_value(flag)
     return positional_arguments
 
 

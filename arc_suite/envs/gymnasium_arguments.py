@@ -26,6 +26,7 @@ HINTS = {
     "dt": _CONTROL_STEP,
     "frame_skip": _CONTROL_STEP,
     "timestep": _CONTROL_STEP,
+    "gravity": "change_model({'gravity': [0.0, 0.0, -1.62]}) of the environment sets it",
     "xml_file": "arc_suite.envs.gym.Env('go2.xml', 'walk') opens a robot from a file",
     "render_fps": "pictures have the rate of control steps, metadata['render_fps']",
     "camera_name": "camera_id takes names, too, with a render_mode",

@@ -116,6 +116,10 @@ def refuse_arguments(arguments: Mapping[str, Any], function: Callable, task_name
             setting = f"{{{name!r}: {checks.preview(value)}}}"
             raise ValueError(f"argument {name!r}: it is a setting of the task; write task_kwargs={setting}")
         valid_names = [key for key in inspect.signature(function).parameters if key not in ("self", "others")]
+        settings_meant = [word for word in checks.meanings(name) if word in setting_names and word not in hints]
+        if settings_meant and not any(meaning in valid_names for meaning in checks.meanings(name)):
+            setting = f"{{{settings_meant[0]!r}: {checks.preview(value)}}}"
+            raise ValueError(f"unknown argument {name!r}; did you mean task_kwargs={setting}?")
         hint = checks.hint(name, [*valid_names, *setting_names])
         arguments_text = ", ".join(valid_names)
         raise ValueError(f"unknown argument {name!r}{hint} (there are: {arguments_text}; task_kwargs has the settings)")

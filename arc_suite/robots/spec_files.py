@@ -6,6 +6,7 @@ There are no includes, no paths and no markup.
 
 import collections
 import dataclasses
+import itertools
 import json
 import os
 import re
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from arc_suite import checks, files, parsers
-from arc_suite.robots import sources
+from arc_suite.robots import field_hints, sources
 from arc_suite.robots.spec import MAX_SOURCE, Body, SpecError
 
 MAX_BYTES = 1 << 18  # of a file; a body of 64 legs with 16 links each has fewer
@@ -38,8 +39,12 @@ _KINDS_OF_JSON = {
     "clips": "what arc-suite animate tells of clips",
     "frames": "what arc-suite animate tells of a sheet of sprites",
     "algorithm": "the configuration of a run",
+    "elites": "the report of a search: its bodies lie in the folder bodies next to it",
 }
+_BODIES_IN_FOLDERS = ("bodies/*.json", "*.urdf", "*.xml", "*.json", "urdf/*.urdf")  # the first is that of a search
+_FILES_OF_RUNS = ("config.json", "policy.npz")
 
+_MAX_FILES = 1000  # of a folder, among which a body is sought
 _MAX_QUOTE = 40  # characters of a key in an error
 _MAX_DIGITS = 20  # of an integer that is read as such; longer ones are read as floats
 _LIST_OF_NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
@@ -59,6 +64,7 @@ def load_body(path: str | os.PathLike[str]) -> Body:
     """
     if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
         path = EXAMPLES[checks.name(path, EXAMPLES, "spec", suggestions=("FILE.json",))]
+    refuse_folder(path)
     data = files.read_bytes(path, MAX_IMPORTED)
     check_kind(path)
     max_bytes = MAX_IMPORTED if b'"source"' in data else MAX_BYTES
@@ -75,6 +81,24 @@ def check_kind(path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix in _KINDS_OF_FILES:
         raise SpecError(f"{path}: expected a body, .json, .xml or .urdf; a {suffix} holds {_KINDS_OF_FILES[suffix]}")
+
+
+def refuse_folder(path: str | os.PathLike[str]) -> None:
+    """Raise OSError for a folder in place of a file, with what it holds."""
+    if files.is_folder(os.fspath(path)):
+        raise IsADirectoryError(f"cannot read {path}: is a directory{hint_in_folder(path)}")
+
+
+def hint_in_folder(path: str | os.PathLike[str]) -> str:
+    """Return the part of an error that suggests what a folder holds: a run, or a file that may be a body; else ""."""
+    folder = Path(path)
+    if all((folder / name).is_file() for name in _FILES_OF_RUNS):
+        return "; --policy takes the folder of a run"
+    for pattern in _BODIES_IN_FOLDERS:
+        body_files = sorted(itertools.islice(folder.glob(pattern), _MAX_FILES))
+        if body_files:
+            return f"; did you mean {checks.quote(body_files[0])}?"
+    return ""
 
 
 def save_body(body: Body, path: str | os.PathLike[str]) -> None:
@@ -168,10 +192,8 @@ def _make_spec(kind: type, value: Any, path: str) -> Any:
         raise SpecError(f"expected an object with the fields of a {kind.__name__}, got {_json_type(value)}", None, path)
     fields = {field.name: field for field in dataclasses.fields(kind)}
     for name in value:
-        try:
-            checks.name(name[:_MAX_QUOTE], fields, "field")
-        except ValueError as error:
-            raise SpecError(str(error), None, path) from None
+        if name not in fields:
+            raise SpecError(field_hints.describe_unknown(name[:_MAX_QUOTE], kind), None, path)
     for field in fields.values():
         if field.default is dataclasses.MISSING and field.name not in value:
             raise SpecError(f"missing; a {kind.__name__} needs it", field.name, path)

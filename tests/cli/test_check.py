@@ -10,7 +10,10 @@ import pytest
 
 from arc_suite.bodies import generator
 from arc_suite.evaluation import cures
+from arc_suite.models import standing
+from arc_suite.models.sizing import size_body
 from arc_suite.robots import spec_files
+from arc_suite.robots.spec import Ballast
 from arc_suite.tasks import TASKS
 
 TASK_NAMES = f"(there are: {', '.join(TASKS)}, module:name)"
@@ -44,6 +47,23 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
     assert (done.returncode, done.stdout, done.stderr) == (1, f"{path}: {flaw}\n", "")
     summary = programs.arc_suite("build_model", "--spec", path, "--summary").stdout
     assert summary.splitlines()[-1].split(maxsplit=1) == ["flaw", flaw]
+
+
+def test_motors_for_heavy_ballast_are_told(path):
+    body = generator.generate(6, 3)
+    for mass, is_told in ((1.0, False), (100.0, True), (5000.0, True)):
+        iron = Ballast(name="iron", shape="sphere", size=(0.05,), mass=mass)
+        laden_body = body.replace(ballast=(iron,))
+        spec_files.save_body(laden_body, path)
+        _, *notes = programs.passed(check(path)).splitlines()
+        torque = max(joint.torque for joint in size_body(laden_body).joints)
+        ratio = round(mass / standing.measure_standing(body).mass)
+        note = f"its ballast of {mass:g} kg weighs {ratio} times the rest: the suite chooses motors of up to "
+        assert [line.removeprefix(f"{path}: {note}") for line in notes] == [
+            f"{float(f'{torque:.3g}'):g} N m for it; a gear in the spec sets others"
+        ] * is_told
+    spec_files.save_body(size_body(body).replace(ballast=laden_body.ballast), path)
+    assert "N m that hold the body up" in check(path).stdout
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,37 @@ OTHERS = {
     "check body.json my.json": "unexpected argument 'my.json'; it takes one at a time; see --help\n",
     "completion --install": "unknown flag 'install'; its output goes into a file; see --help\n",
 }
+COLORS = "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'\n"
+BRITISH = "colo" + "ur"
+SPLIT = "a shell splits at spaces without quotes; see --help\n"
+OTHERS |= {
+    "studio --host=localhost:9000": "--host=localhost:9000: expected a host alone; did you mean --host=localhost -",
+    "studio --host=http://localhost:9000/": "--host=http://localhost:9000/: expected a host alone; did you mean --hos",
+    "studio --host=http://localhost": "--host=http://localhost: expected a host alone; did you mean --host=localho",
+    "studio --host=:9000": "--host=:9000: expected a host alone; did you mean --port=9000?\n",
+    "studio --host=9000": "--host=9000: expected a host alone; did you mean --port=9000?\n",
+    "studio --host=*": "--host=*: expected a host alone; did you mean --host=0.0.0.0?\n",
+    "render --robot=tick --palette": f"Missing value for flag --palette; {COLORS}",
+    "render --palette --robot=tick": f"--palette: expected a value, got the flag --robot=tick; {COLORS}",
+    "render --robot=tick --palette -o a.png": f"--palette: expected a value, got the flag -o; {COLORS}",
+    "evaluate --set --robot=tick": "--set: expected a value, got the flag --robot=tick\n",
+    "evaluate --json --robot tick": "--json: expected a value, got the flag --robot\n",
+    "render --robot -h": "--robot: expected a value, got the flag -h\n",
+    "evaluate --set weights={forward: 2}": (
+        f"unexpected argument '2}}'; did you mean --set 'weights={{\"forward\": 2}}'? {SPLIT}"
+    ),
+    "evaluate --set friction=[0.5, 1.2] --robot tick": (
+        f"unexpected argument '1.2]'; did you mean --set 'friction=[0.5, 1.2]'? {SPLIT}"
+    ),
+    "evaluate --gravity=1.62": "unknown flag 'gravity'; environment.change_model sets it, see docs/environments.md\n",
+    "evaluate --terrain=rough": "unknown flag 'terrain'; did you mean 'arena'? (there are: ",
+    "evaluate --wind=1": "unknown flag 'wind'; did you mean --set force=1?\n",
+    "evaluate --set gravity=1": "setting 'gravity': change_model({'gravity': [0.0, 0.0, -1.62]}) of the environment",
+    "evaluate --set terrain=rough": "unknown setting of walk 'terrain'; did you mean 'arena'? (there are: ",
+    f"build_model --legs=8 --{BRITISH}=red": f"unknown flag '{BRITISH}'; did you mean 'palette'? (there are: ",
+    "evaluate --chekpoint=runs/tick": "unknown flag 'chekpoint'; did you mean 'policy'? (there are: ",
+    "train --total_timestep=100": "unknown flag 'total_timestep'; did you mean 'steps'? (there are: ",
+}
 BODY = "expected a body, .json, .xml or .urdf"
 WAVE = f"{wave.__file__} was read, as the name of ./wave.py is taken: give that file another name\n"
 # Files and words in the place of others.
@@ -91,6 +122,12 @@ MISPLACED = {
     "evaluate --robot=tick --policy=tick": "policy 'tick': it is a robot; expected as robot, next to a policy",
     "evaluate --policy=foldr": "unknown policy 'foldr'; did you mean folder?\n",
     "evaluate --robot=folder": "robot 'folder': it is a folder; expected a name, or a file .json, .xml, ",
+    "evaluate --robot=gallery": "robot 'gallery': it is a folder; expected a name, or a file .json, .xml, .urdf; did "
+    "you mean gallery/bodies/a.json?\n",
+    "render --spec=./gallery": "cannot read gallery: is a directory; did you mean gallery/bodies/a.json?\n",
+    "import gallery": "cannot read gallery: is a directory; did you mean gallery/bodies/a.json?\n",
+    "check gallery/design.json": "gallery/design.json: expected a body in JSON, got the report of a search: its ",
+    "check runs/tick": "cannot read runs/tick: is a directory; --policy takes the folder of a run\n",
     "evaluate --spec=clip.glb": f"clip.glb: {BODY}; a .glb holds clips\n",
     "evaluate --robot=page.html": f"page.html: {BODY}; a .html holds a page\n",
     "import arrays.npz": f"arrays.npz: {BODY}; a .npz holds arrays, such as a policy or a motion\n",
@@ -114,7 +151,7 @@ MISPLACED = {
     ),
     "check clip.glb": f"clip.glb: {BODY}; a .glb holds clips\n",
     "build_model --robot=tick --output=tick.urdf": "unknown extension '.urdf' (there are: .xml)\n",
-    "build_model --robot=tick --json --output=tick.xml": "unknown extension '.xml' (there are: .json)\n",
+    "build_model --robot=tick --json --output=tick.xml": "--output=tick.xml: a spec is .json; without --json the ",
     "motion clip.glb --robot=tick -o a.npz": "clip.glb: expected a binary glTF file",
     "motion arrays.npz --robot=tick -o a.npz": "arrays.npz: expected a motion, or arrays as mjlab has them",
     "animate --robot=tick --clips=arrays.npz -o a.glb": "arrays.npz: no motion, or a damaged one: ",
@@ -225,6 +262,9 @@ def test_a_mistake_is_one_line(command, tmp_path):
     (tmp_path / "model.onnx").write_bytes(b"\x08")
     (tmp_path / "broken.py").write_text("def make(:\n")
     (tmp_path / "folder").mkdir()
+    (tmp_path / "gallery" / "bodies").mkdir(parents=True)
+    (tmp_path / "gallery" / "bodies" / "a.json").touch()
+    (tmp_path / "gallery" / "design.json").write_text('{"elites": []}')
     (tmp_path / "runs" / "tick").mkdir(parents=True)
     for name in ("config.json", "policy.npz"):
         (tmp_path / "runs" / "tick" / name).write_text("{}")

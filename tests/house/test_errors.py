@@ -292,6 +292,13 @@ CASES = [
         opened(kick=1),
         "unknown argument 'kick'; did you mean 'kicks'? (there are: domain_name, task_name, task_kwargs, ",
     ),
+    (opened(gravity=1), "argument 'gravity': change_model({'gravity': [0.0, 0.0, -1.62]}) of the environment sets it"),
+    (walk(gravity=1), "setting 'gravity': change_model({'gravity': [0.0, 0.0, -1.62]}) of the environment sets it"),
+    (make(terrain="rough"), "unknown argument 'terrain'; did you mean task_kwargs={'arena': 'rough'}?"),
+    (opened(speed=2), "unknown argument 'speed'; did you mean task_kwargs={'target_velocity': 2}?"),
+    (envs(duration=5), "unknown argument 'duration'; did you mean task_kwargs={'time_limit': 5}?"),
+    (opened(wind=3), "unknown argument 'wind'; did you mean task_kwargs={'force': 3}?"),
+    (walk(noise=3), "unknown setting of walk 'noise'; did you mean 'observation_noise'? (there are: "),
     (make(wdith=1), "unknown argument 'wdith'; did you mean 'width'? (there are: domain_name, task_name, task_kwargs"),
     (make(render_mode="ansi"), "unknown render_mode 'ansi' (there are: rgb_array, depth_array)"),
 ]

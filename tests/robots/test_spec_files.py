@@ -98,7 +98,12 @@ IN_SOLID = "name, shape, size, position, euler_deg"
 THIN = "legs: r2_foot: expected a radius from 0.0009 at density 10, got "
 PARALLEL = "camera.xyaxes: expected two directions that are not parallel, got "
 SHAPES = "sphere, capsule, cylinder, ellipsoid, box"
-IN_BODY = "name, torso, legs, camera, density, ballast, simulation, agility, palette, source, held, file_joints"
+IN_BODY = "(there are: name, torso, legs, camera, density, ballast, simulation, agility, palette)"
+IN_TORSO = "(there are: standing_height, solids)"
+IN_LINK = "(there are: name, end, radius, joint)"
+IN_JOINT = "(there are: name, axis, range_deg, armature, damping, friction_loss, motor)"
+BRITISH = "colo" + "ur"
+WEIGHT = "density of the body sets the weight of all parts, ballast adds some"
 
 
 @pytest.mark.parametrize(
@@ -124,7 +129,33 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation, agility, pal
         (("camera", "xyaxes"), [1, 0, 0.5, -0.5, 0, -0.25], f"{PARALLEL}(1.0, 0.0, 0.5, -0.5, 0.0, -0.25)"),
         (("camera", "xyaxes"), [0, 0, 0, 0, 1, 0], f"{PARALLEL}(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)"),
         (("legs",), None, "legs: expected a list of Legs, got null"),
-        (("include",), "a.xml", f"unknown field 'include' (there are: {IN_BODY})"),
+        (("include",), "a.xml", f"unknown field 'include' {IN_BODY}"),
+        (("torso", "ballast"), [], f"torso: unknown field 'ballast'; it is a field of a Body {IN_TORSO}"),
+        (("torso", "camera"), {}, f"torso: unknown field 'camera'; it is a field of a Body {IN_TORSO}"),
+        (
+            ("legs", 0, "radius"),
+            1,
+            "legs[0]: unknown field 'radius'; it is a field of a Link (there are: name, mount, links, foot, yaw_deg)",
+        ),
+        ((*HIP, "gear"), 1, f"{AT_HIP}: unknown field 'gear'; it is a field of a Motor {IN_JOINT}"),
+        (("mass",), 1, f"unknown field 'mass'; {WEIGHT} {IN_BODY}"),
+        (("torso", "mass"), 1, f"torso: unknown field 'mass'; {WEIGHT} {IN_TORSO}"),
+        (("legs", 0, "links", 0, "weight"), 1, f"legs[0].links[0]: unknown field 'weight'; {WEIGHT} {IN_LINK}"),
+        (("color",), "red", f"unknown field 'color'; did you mean 'palette'? {IN_BODY}"),
+        ((BRITISH,), "red", f"unknown field '{BRITISH}'; did you mean 'palette'? {IN_BODY}"),
+        (("colors",), ["red"], f"unknown field 'colors'; did you mean 'palette'? {IN_BODY}"),
+        (("torso", "color"), "red", f"torso: unknown field 'color'; palette of the body has its colors {IN_TORSO}"),
+        (
+            ("gravity",),
+            1,
+            "unknown field 'gravity'; environment.change_model({'gravity': [0.0, 0.0, -1.62]}) sets it " + IN_BODY,
+        ),
+        (("terrain",), 1, f"unknown field 'terrain'; --arena or a task such as rough has the ground {IN_BODY}"),
+        (("gait",), 1, f"unknown field 'gait'; it is a setting of tasks, --set gait=VALUE {IN_BODY}"),
+        (("head",), "round", f"unknown field 'head'; docs/bodies.md: heads, tails and ballast {IN_BODY}"),
+        (("height",), 1, f"unknown field 'height'; standing_height of the torso sets it {IN_BODY}"),
+        (("motors",), 1, f"unknown field 'motors'; each joint has its motor {IN_BODY}"),
+        (("camra",), 1, f"unknown field 'camra'; did you mean 'camera'? {IN_BODY}"),
     ],
 )
 def test_a_malformed_field_is_named_by_its_path(path, value, message):
@@ -218,7 +249,15 @@ def test_files_that_hold_no_body_are_named(tmp_path):
     path.write_text(" " * (MAX_BYTES + 1))
     with refused(f"{path}: expected at most {MAX_BYTES} bytes", SpecError):
         load_body(path)
-    for missing, reason in ((tmp_path / "none.json", "no such file or directory"), (tmp_path, "is a directory")):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    body_inside = f"is a directory; did you mean {path}?"
+    cases = (
+        (tmp_path / "none.json", "no such file or directory"),
+        (folder, "is a directory"),
+        (tmp_path, body_inside),
+    )
+    for missing, reason in cases:
         with refused(f"cannot read {missing}: {reason}", OSError):
             load_body(missing)
 

@@ -13,10 +13,11 @@ ssh -L 8080:localhost:8080 MACHINE. Without --task a demonstrator acts in direct
 
 import dataclasses
 import json
+import re
 
 from absl import flags
 
-from arc_suite import versions
+from arc_suite import checks, versions
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, sources
 from arc_suite.arenas import ground_text
@@ -31,11 +32,32 @@ flags.DEFINE_integer(
 )
 
 
+_ADDRESS = re.compile(r"(?:https?://)?([^/:]*)(?::(\d{1,5}))?/?")
+_PORT_ALONE = re.compile(r"[1-9]\d{1,4}")
+
+
 def main() -> None:
     """Open the page and step until Ctrl-C."""
+    _check_host(FLAGS.host)
     with versions.require_extra("the studio needs viser", "animate"):
         from arc_suite.animation.studio.page import serve
     serve(Session(_sketch_from_flags()), FLAGS.host, FLAGS.port, _print_address)
+
+
+def _check_host(text: str) -> None:
+    """Raise ValueError for a text that is more than a host, such as one with a port."""
+    match = _ADDRESS.fullmatch(text)
+    host, port = match.groups() if match else (text, None)
+    if _PORT_ALONE.fullmatch(host):
+        port = host
+        host = ""
+    if host == "*":  # of servers that listen everywhere
+        host = "0.0.0.0"
+    if host == text:
+        return
+    cures = [f"--{flag}={value}" for flag, value in (("host", host), ("port", port)) if value]
+    hint = f"; did you mean {' '.join(cures)}?" if cures else ""
+    raise ValueError(f"--host={checks.quote(text)}: expected a host alone{hint}")
 
 
 def _print_address(url: str) -> None:

@@ -83,7 +83,8 @@ def serve(session: Session, host: str, port: int, report: Callable[[str], None])
     try:
         socket.create_server((host, 0)).close()  # raises an error now, where viser would wait forever
     except OSError as error:
-        raise ValueError(f"host {host}: cannot listen there: {(error.strerror or str(error)).lower()}") from None
+        reason, _, _ = (error.strerror or str(error)).partition(" (")  # behind it Python repeats the address
+        raise ValueError(f"host {host}: cannot listen there: {reason.lower()}") from None
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
         server = Server(host=host, port=port, label="arc_suite studio", verbose=False)
     try:
