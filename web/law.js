@@ -1,5 +1,5 @@
 // The law `Stepping`, as arc_suite.cpg.stepping defines it, with constants that Python computed.
-import { clamp, moved, reached, tilt, vertical, verticalAbout, weighing } from "./legs.js";
+import { clamp, moved, reached, relaxed, tilt, vertical, verticalAbout, weighing } from "./legs.js";
 import { paceUnder } from "./pace.js";
 
 const share = (value) => value - Math.floor(value); // of a cycle
@@ -106,7 +106,9 @@ export class Law {
       const ground = [0, 1].map((i) => leg.place[i] + size * (along * half * flow[i] + shifted * shift[i]));
       const lift = size * raised * c.lift * Math.sin(Math.PI * swung);
       const goal = moved([...ground, z + lift], posed, c.height);
-      return reached(leg, this.state.angles[index], goal, weighing(flow, c.across), c.damping_of_feet, c.steps);
+      const weights = weighing(flow, c.across);
+      const angles = reached(leg, this.state.angles[index], goal, weights, c.damping_of_feet, c.steps);
+      return relaxed(leg, angles, c.relaxing_share, c.relaxing_damping);
     });
   }
 

@@ -64,6 +64,15 @@ export function reached(leg, angles, goal, weights, damping, steps) {
   return angles;
 }
 
+// Angles of a leg's links nearer to those at rest, where its sole stays, if it has more than three joints.
+export function relaxed(leg, angles, share, damping) {
+  if (leg.moves.filter(Boolean).length <= 3) return angles;
+  const way = leg.angles.map((angle, link) => share * (angle - angles[link])), { moves } = sole(leg, angles);
+  const displacement = [0, 1, 2].map((i) => moves.reduce((sum, move, link) => sum + move[i] * way[link], 0));
+  const turned = plus(angles, minus(way, least(moves, displacement, damping)));
+  return turned.map((angle, link) => clamp(angle, leg.low[link], leg.high[link]));
+}
+
 // Weights of an error along a path [x, y], across it, and in height.
 export function weighing(path, across) {
   const length = Math.hypot(...path);

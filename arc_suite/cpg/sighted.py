@@ -13,7 +13,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg import footholds
 from arc_suite.cpg.command_law import CommandLaw, Request
-from arc_suite.models import posture
+from arc_suite.models import foot_paths, posture
 from arc_suite.models.kinematics import Legs, path_weights, point_velocities, tilt_heights
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
@@ -121,6 +121,7 @@ class Sighted(CommandLaw):
         weights = path_weights(point_velocities(velocity, feet), _SLIP_WEIGHT)
         damping = posture.IK_DAMPING * self.mechanics.height
         angles = self.legs.solve_joint_angles(state.angles, feet, weights, damping, _IK_ITERATIONS)
+        angles = self.legs.relax_redundant_joints(angles, self._first_state.angles, foot_paths.RELAXING_SHARE, damping)
         angles = self.correct_bends(angles)
         targets = self.legs.by_joint(state.angles)
         changes = self.legs.by_joint(angles) - targets

@@ -1,7 +1,8 @@
 """The demonstrators that step: one law for any body that follows a command of velocities, without sight.
 
 Feet follow paths in space. In stance a foot moves against the requested velocity, in swing it returns and is lifted.
-Joint angles follow by inverse kinematics, which folds legs that stand near the bounds of their joints.
+Joint angles follow by inverse kinematics, which folds legs that stand near the bounds of their joints. The joints of a
+leg of four links or more return to rest as far as its foot leaves them free.
 
 Where a task observes a pose and a gait by command, feet step in that gait under a torso in that pose: both are read
 anew in every step, so that they may change at any time. Feedback on height, roll and pitch makes up for what joints
@@ -114,6 +115,7 @@ class Stepping(CommandLaw):
         standing_height = self.mechanics.height
         self._rate_unit = (GRAVITY / standing_height) ** 0.5  # Hz, in which commands give the gait's frequency
         self._ik_damping = foot_paths.IK_DAMPING * standing_height  # m
+        self._relaxing_damping = posture.IK_DAMPING * standing_height  # m
         self.foot_lift = parameters.lift * standing_height
         # Proportional feedback replaces an integral: with both, gaits are disturbed.
         if parameters.integral:
@@ -199,6 +201,9 @@ class Stepping(CommandLaw):
         weights = path_weights(point_velocities(velocity, self.rest_soles), self.parameters.across)
         next_angles = self.legs.solve_joint_angles(
             joint_angles, soles, weights, self._ik_damping, foot_paths.IK_ITERATIONS
+        )
+        next_angles = self.legs.relax_redundant_joints(
+            next_angles, self.rest_angles, foot_paths.RELAXING_SHARE, self._relaxing_damping
         )
         target_angles = self.legs.by_joint(joint_angles)
         return next_angles, target_angles, self.legs.by_joint(next_angles) - target_angles
@@ -340,6 +345,8 @@ class Stepping(CommandLaw):
             "across": self.parameters.across,
             "damping_of_feet": self._ik_damping,
             "steps": foot_paths.IK_ITERATIONS,
+            "relaxing_share": foot_paths.RELAXING_SHARE,
+            "relaxing_damping": self._relaxing_damping,
             "largest": _MAX_POSE_ERROR,
             "most_off": _MAX_POSE_INTEGRAL,
             "rate": self._rate_unit,

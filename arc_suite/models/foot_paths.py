@@ -11,6 +11,7 @@ IK_ITERATIONS = 3  # of inverse kinematics in a control step
 # Standing heights. With less of it, legs that are stretched out jump, neighbors of many legs press against each other,
 # and feet push against uneven ground in place of yielding.
 IK_DAMPING = 0.5
+RELAXING_SHARE = 0.2  # of the way to rest, in a control step, of joints that the place of a foot leaves free
 SLIP_WEIGHT = 0.3  # of a foot's slip across its path against its motion along it
 FOOT_CLEARANCE = 0.3  # standing heights, of a foot in mid-swing
 

@@ -8,6 +8,7 @@ from arc_suite.robots.spec import Body
 
 _JOINT_RANGE_SHARE = 0.95  # of a joint's range, about its middle, that targets may use
 _RELAXING_ITERATIONS = 50
+_DIMENSIONS = 3  # of the place of a foot
 _MIN_PATH_LENGTH = 1e-9  # of the path of a foot that moves
 # (3, 9) of which each row has the matrix of the cross product with a unit vector.
 _CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], float)
@@ -159,6 +160,28 @@ class Legs(NamedTuple):
             change = least_changes(free_jacobian, error, damping)
             angles = xp.minimum(xp.maximum(angles + change, self.low), self.high)
         return angles
+
+    def relax_redundant_joints(self, angles, rest_angles, share: float, damping: float) -> np.ndarray:
+        """Return angles (..., legs, links) nearer to those at rest, of legs with more than three joints; soles stay.
+
+        The place of a foot leaves such a leg free. Without this, damped least squares let its pose drift, as those of
+        a foot on a closed path do not return (Klein and Huang, "Review of pseudoinverse control for use with
+        kinematically redundant manipulators", 1983).
+
+        Args:
+            angles: (..., legs, links) rad.
+            rest_angles: (legs, links) rad.
+            share: of the way to the angles at rest.
+            damping: m.
+        """
+        is_redundant = self.has_joint.sum(axis=-1) > _DIMENSIONS
+        if not is_redundant.any():
+            return angles
+        xp = angles.__array_namespace__()
+        _, jacobian = self.soles(angles)
+        approach = share * is_redundant[:, None] * (rest_angles - angles)
+        change = approach - least_changes(jacobian, jacobian @ approach[..., None], damping)
+        return xp.minimum(xp.maximum(angles + change, self.low), self.high)
 
     def relaxed_joint_angles(self, goals, weights, damping: float) -> np.ndarray:
         """Return the angles (legs, links), rad, near the middle of the joints' ranges, that bring soles near goals.

@@ -63,3 +63,26 @@ def test_a_joint_with_more_damping_changes_less():
     jacobian = np.ones((3, 2))
     first, second = damped_changes(jacobian, jacobian.T @ np.ones(3), np.diag((0.1, 10.0)))
     assert first == pytest.approx(100.0 * second)
+
+
+def test_redundant_joints_return_to_rest_under_soles_that_stay():
+    body = generator.random_body(4)
+    legs = Legs.of(body)
+    assert (legs.has_joint.sum(axis=-1) == 4).all()
+    height = body.torso.standing_height
+    rest_angles = 0.5 * (legs.low + legs.high)
+    soles, _ = legs.soles(rest_angles)
+    bent_angles = rest_angles + 0.2 * (legs.high - legs.low) * (0.0, 1.0, -1.0, 1.0)
+    weights = np.tile(np.eye(3), (len(soles), 1, 1))
+    angles = legs.solve_joint_angles(bent_angles, soles, weights, 0.02 * height, 40)
+    assert abs(angles - rest_angles).max(axis=-1).min() > 0.2  # in another pose each foot is in its place
+    for _ in range(100):
+        angles = legs.relax_redundant_joints(angles, rest_angles, 0.1, 1e-3 * height)
+    assert_allclose(legs.soles(angles)[0], soles, atol=0.03 * height)
+    assert abs(angles - rest_angles).max() < 0.05
+
+
+@pytest.mark.parametrize("body", [*ROBOTS.values(), generator.random_body(1)], ids=lambda body: body.name)
+def test_joints_that_a_foot_needs_do_not_relax(body):
+    legs = Legs.of(body)
+    assert legs.relax_redundant_joints(legs.low, legs.high, 0.2, 0.01) is legs.low
