@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
+from arc_suite.models.foot_paths import RELAXING_SHARE
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.posture import find_rest_pose
 from arc_suite.models.standing import GRAVITY, measure_standing, stability_margin
@@ -253,6 +254,7 @@ def _solve(body: Body, paths: Paths, loops: bool = False, follows: bool = True) 
             angles = np.empty((len(goals), *rest_angles.shape))
             for frame, frame_goals in enumerate(goals):
                 frame_angles = centers.solve_joint_angles(frame_angles, frame_goals, weights[0], damping, 6)
+                frame_angles = centers.relax_redundant_joints(frame_angles, rest_angles, RELAXING_SHARE, damping)
                 angles[frame] = frame_angles
     reached, _ = centers.soles(angles)
     return _Fit(legs.by_joint(angles), np.linalg.norm(reached - goals, axis=-1) / height)

@@ -45,6 +45,12 @@ def test_loop_keeps_its_speed_and_strides_in_the_gait_of_the_other_body(body):
     np.testing.assert_allclose(motion.angles[-1], motion.angles[0], atol=0.01)
 
 
+def test_loop_closes_on_legs_with_four_joints():
+    """Their joints drifted by up to a degree in a cycle, and a longer motion by as much in each of its steps."""
+    motion, _ = motions.retarget(drawn_motions.step_loop(QUEEN), registry.body_of("random:17"))
+    np.testing.assert_allclose(motion.angles[-1], motion.angles[0], atol=np.radians(0.2))
+
+
 def test_gesture_has_the_foot_that_stands_in_the_same_place():
     raised = drawn_motions.raise_leg(QUEEN, 0)
     motion, notes = motions.retarget(raised, SPIDER)
