@@ -8,6 +8,7 @@ from dm_control import mjcf
 
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.models import builder, mjcf_text, sizing, source, visuals
+from arc_suite.models.outline import outline
 from arc_suite.robots.spec import Body
 
 
@@ -36,7 +37,15 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
         arena.add_to(root, **builder.contact(sized_body.simulation))
     if decorated:
         visuals.decorate(root, sized_body)
+        _frame_ornaments(root, sized_body)
     return root
+
+
+def _frame_ornaments(root: mjcf.RootElement, body: Body) -> None:
+    """Move the cameras that frame a body so that they see its ornaments, too."""
+    points = np.concatenate([outline(body), visuals.outline_ornaments(body)])
+    for name, camera in builder.cameras(body, points).items():
+        root.find("camera", name).set_attributes(**camera)
 
 
 def text(body: Body, arena: Arena | None = FLAT, decorated: bool = False) -> str:

@@ -7,7 +7,7 @@ from episodes import begun
 from tiers import tiers
 
 import arc_suite
-from arc_suite import models
+from arc_suite import models, registry
 from arc_suite.models import visuals
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import MATERIALS, Solid
@@ -24,8 +24,16 @@ STRANGER = _TICK.replace(
 BODIES = [*ROBOTS.values(), STRANGER]
 # What may differ on bodies and joints: where their geoms are listed, and a length scale that only sleeping reads.
 LAYOUT = {"body_geomnum", "body_geomadr", "body_bvhadr", "body_bvhnum", "dof_length"}
-FEW = ("bastion", "stranger")  # in `make check`
-every_body = pytest.mark.parametrize("body", tiers(BODIES, lambda body: body.name in FEW), ids=lambda body: body.name)
+FEW = ("bastion", "stranger", "hound")  # in `make check`
+HOUND = registry.body_of("hound")  # with a long tail that is drawn
+
+
+def is_in_check(body) -> bool:
+    """Return whether tests of a body are in `make check`."""
+    return body.name in FEW
+
+
+every_body = pytest.mark.parametrize("body", tiers(BODIES, is_in_check), ids=lambda body: body.name)
 every_robot = pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot in FEW))
 
 
@@ -92,7 +100,7 @@ def test_ornaments_of_a_pair_mirror_each_other():
     np.testing.assert_allclose(turn[1].reshape(3, 3), reflection @ turn[0].reshape(3, 3) @ reflection, atol=1e-12)
 
 
-@every_body
+@pytest.mark.parametrize("body", tiers([*BODIES, HOUND], is_in_check), ids=lambda body: body.name)
 @pytest.mark.parametrize("camera", ["portrait", pytest.param("profile", marks=pytest.mark.slow)])
 def test_near_cameras_frame_the_standing_body(body, camera):
     """Seen by segmentation, the body touches no edge of a 4:3 picture, yet fills most of its width or height."""

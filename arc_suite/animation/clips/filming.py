@@ -11,6 +11,7 @@ from arc_suite import rotations
 from arc_suite.animation import swinging
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.models import visuals
+from arc_suite.models.outline import CORNERS
 from arc_suite.models.standing import standing_qpos
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
@@ -21,7 +22,7 @@ from arc_suite.tasks import readings
 _FREE_CAMERA = -1  # MuJoCo's number of the camera without a name
 _AZIMUTH = 90.0  # degrees: a body with heading 0 goes to the right in the picture
 _ELEVATION = -20.0  # degrees: the camera looks down
-_FRAMING = 1.0  # times the distance at which the body fills the picture
+_MARGIN = 1.03  # times the distance at which the body fills the picture
 _EXTENTS_TO_CAMERA = 1.5  # distance of MuJoCo's free camera, in extents of the scene
 _PLAIN_GROUND = (0.36, 0.40, 0.45, 1.0)  # RGBA; a grid would stand still under a body that walks in place
 _NO_GROUND = (0.0, 0.0, 0.0, 0.0)
@@ -192,13 +193,14 @@ def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _St
         drawing = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
     model = drawing.model.ptr
     stage = _Stage(drawing, _list_swinging_geoms(body, model))
-    radius, height = _bounding_cylinder(stage, poses)
+    radii, heights = _measure_outline(stage, poses)
+    height = heights.max()
     camera = model.vis.global_
     camera.azimuth = _AZIMUTH
     camera.elevation = _ELEVATION
     model.stat.center[:] = 0.0, 0.0, 0.5 * height
     half_view = math.radians(0.5 * camera.fovy)
-    distance = _FRAMING * math.hypot(radius, 0.5 * height) / math.sin(half_view)
+    distance = _MARGIN * _find_distance(radii, heights - 0.5 * height, half_view)
     model.vis.map.shadowclip *= model.stat.extent * _EXTENTS_TO_CAMERA / distance
     model.stat.extent = distance / _EXTENTS_TO_CAMERA
     # The ground is half a height below the point that the camera looks at.
@@ -223,19 +225,40 @@ def _list_swinging_geoms(body: Body, model: mujoco.MjModel) -> list[_SwingingGeo
     return geoms
 
 
-def _bounding_cylinder(stage: _Stage, poses: Sequence[_Pose]) -> tuple[float, float]:
-    """Return radius and height, m, of the cylinder about the vertical axis that holds the body in all poses."""
+def _measure_outline(stage: _Stage, poses: Sequence[_Pose]) -> tuple[np.ndarray, np.ndarray]:
+    """Return distances from the vertical axis and heights, (n,) m, of the corners of boxes around geoms in poses."""
     model = stage.drawing.model.ptr
+    data = stage.drawing.data
     is_body_geom = model.geom_bodyid > 0
-    geom_radii = model.geom_rbound[is_body_geom]
-    radius = 0.0
-    height = 0.0
+    boxes = model.geom_aabb[is_body_geom, None]  # centers and half-extents, in the frames of the geoms
+    corners = boxes[..., :3] + CORNERS * boxes[..., 3:]
+    points_of_poses = []
     for pose in poses:
         stage.pose(pose)
-        centers = stage.drawing.data.geom_xpos[is_body_geom]
-        radius = max(radius, (np.linalg.norm(centers[:, :2], axis=-1) + geom_radii).max())
-        height = max(height, (centers[:, 2] + geom_radii).max())
-    return radius, height
+        geom_rotations = data.geom_xmat[is_body_geom].reshape(-1, 3, 3)
+        points_of_poses.append(data.geom_xpos[is_body_geom, None] + corners @ geom_rotations.swapaxes(-1, -2))
+    points = np.concatenate(points_of_poses).reshape(-1, 3)
+    return np.linalg.norm(points[:, :2], axis=-1), points[:, 2]
+
+
+def _find_distance(radii: np.ndarray, heights: np.ndarray, half_view: float) -> float:
+    """Return the least distance of a camera, m, that sees points in whichever direction the body turns.
+
+    A point that turns about the vertical axis has a largest distance from the camera's plane and from each edge of the
+    picture: it is in view if its offset is at most tan(half_view) times its depth.
+
+    Args:
+        radii: (n,) distances of the points from the vertical axis, m.
+        heights: (n,) heights of the points over the point that the camera looks at, m.
+        half_view: half of the field of view, rad.
+    """
+    slope = 1.0 / math.tan(half_view)
+    sine = math.sin(math.radians(-_ELEVATION))
+    cosine = math.cos(math.radians(-_ELEVATION))
+    to_sides = heights * sine + radii * math.hypot(cosine, slope)
+    to_top = heights * (sine + slope * cosine) + radii * abs(cosine - slope * sine)
+    to_bottom = heights * (sine - slope * cosine) + radii * abs(cosine + slope * sine)
+    return float(np.concatenate([to_sides, to_top, to_bottom]).max())
 
 
 def _render_pose(stage: _Stage, pose: _Pose, size: int, transparent: bool) -> np.ndarray:

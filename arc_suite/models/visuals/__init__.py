@@ -6,12 +6,13 @@ from collections.abc import Iterable
 import numpy as np
 from dm_control import mjcf
 
+from arc_suite.models.outline import solid_corners
 from arc_suite.models.visuals import bastion, leaper, queen, tick
 from arc_suite.models.visuals.generic import generic_visuals
 from arc_suite.models.visuals.scene import add_scene
 from arc_suite.models.visuals.spec import Bone, Ornament, Visuals
 from arc_suite.robots import palettes
-from arc_suite.robots.spec import Body, Leg, Link
+from arc_suite.robots.spec import Body, Leg, Link, Solid
 
 # A creature without an entry has the visuals `generic`.
 VISUALS = {"queen": queen.VISUALS, "bastion": bastion.VISUALS, "tick": tick.VISUALS, "leaper": leaper.VISUALS}
@@ -55,6 +56,21 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
         _add_ornament(torso, ornament)
     for leg in body.legs:
         _decorate_leg(root, leg, visuals)
+
+
+def outline_ornaments(body: Body) -> np.ndarray:
+    """Return points in the torso's frame whose convex hull holds the ornaments of a body: (n, 3)."""
+    corners = [np.empty((0, 3))]
+    for ornament in _with_twins(_visuals(body).ornaments):
+        solid = Solid(
+            name=ornament.name,
+            shape=ornament.shape,
+            size=ornament.size,
+            position=ornament.position,
+            euler_deg=ornament.euler_deg,
+        )
+        corners.append(solid_corners(solid))
+    return np.concatenate(corners)
 
 
 def bones(body: Body) -> list[Bone]:

@@ -29,6 +29,8 @@ def test_a_sheet_has_a_row_for_each_direction(idle):
     rows = [row[:, :SIZE] for row in np.split(sheet, 4)]
     for row in rows:
         assert 0.1 < (row[..., 3] > 0).mean() < 0.7 and not row[[0, -1], :, 3].any() and not row[:, [0, -1], 3].any()
+    columns_with_body = np.flatnonzero(np.any([row[..., 3].any(axis=0) for row in rows], axis=0))
+    assert np.ptp(columns_with_body) > 0.85 * SIZE
     lowest = [np.flatnonzero(row[..., 3].any(axis=1)).max() for row in rows]  # of feet nearer than the torso
     assert made.ground_line < min(lowest) < made.ground_line + 0.2 * SIZE
     # Feet, and what is nearer to the camera or reaches further ahead.
@@ -67,5 +69,5 @@ def test_an_importer_reads_where_cells_are(tmp_path):
     ]
     milliseconds = sum(frame["duration"] for frame in frames[:columns])
     assert milliseconds == round(1000.0 * columns / meta["fps"]) and "repeat" not in meta["frameTags"][0]
-    assert meta["pixels_per_meter"] == pytest.approx(38.093 * 32 / SIZE, rel=1e-3)  # of the same clip in SIZE
+    assert meta["pixels_per_meter"] == pytest.approx(44.285 * 32 / SIZE, rel=1e-3)  # of the same clip in SIZE
     assert frames[-1]["anchor"] == {"x": 0.5, "y": pytest.approx(meta["ground_line"] / 32, abs=1e-3)}
