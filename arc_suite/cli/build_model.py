@@ -10,6 +10,7 @@ The body is a robot of the suite, a spec file, or one made to order:
   arc-suite build_model --spec spider --summary
   arc-suite build_model --robot tick --task stairs --set difficulty=1 --output stairs.xml
   arc-suite build_model --robot tick --no_arena --output tick.xml
+  arc-suite build_model --legs 6 --no_ornaments --json --output plain.json
 """
 
 import contextlib
@@ -53,6 +54,7 @@ flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the bod
 flags.DEFINE_string("name", None, "Name of the body, of letters a to z, digits and underscores.")
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
 flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")
+flags.DEFINE_bool("no_ornaments", False, "Leave out eyes, tails, shells and the like, which are drawn on the torso.")
 flags.DEFINE_bool("no_arena", False, "Leave floor and free joint to the scene that takes the model.")
 flags.DEFINE_string(
     "output",
@@ -98,6 +100,8 @@ def _check_flags() -> None:
         refuse_flags(("json", "visuals", "no_arena"), "goes with --output, as no model is written")
         if FLAGS.render is None:
             refuse_flags(("task", "set", "arena"), "goes with --output or --render, as no model is written")
+    if not (FLAGS.json or FLAGS.visuals or FLAGS.render is not None):
+        refuse_flags(("no_ornaments",), "goes with --json, --visuals or --render, as other models have no ornaments")
     if FLAGS.json:
         refuse_flags(("visuals", "no_arena"), "goes without --json, as a spec has no decorations and no arena")
         if FLAGS.render is None:
@@ -143,6 +147,8 @@ def _body_from_flags() -> Body:
         body = adjust_body(generator.generate(FLAGS.legs, links, FLAGS.layout))
     if FLAGS.scale is not None:
         body = generator.scaled(body, FLAGS.scale)
+    if FLAGS.no_ornaments:
+        body = body.replace(ornaments=False)
     if FLAGS.name is None:
         return body
     if FLAGS.name in ROBOTS:

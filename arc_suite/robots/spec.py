@@ -205,6 +205,12 @@ def _check_integer(value: Any, low: int, high: int) -> int:
     return value
 
 
+def _check_boolean(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise SpecError(f"expected true or false, got {_preview(value)}")
+    return value
+
+
 def _preview(value: Any) -> str:
     """Return how errors show a value: the beginning of its `repr`, or its type."""
     has_short_repr = value is None or isinstance(value, (str, int, float, tuple, list))
@@ -773,6 +779,8 @@ class Body(_Spec):
         agility: factor on the gear of motors that are sized; above 1 for bodies that leap.
         palette: palette of the body's colors: one of `PALETTES`, a seed, or colors of the first of `MATERIALS`, such as
             `COLORS_EXAMPLE`; None: the robot's own, or gray. See `palettes.colors`.
+        ornaments: whether eyes, tails, shells and the like, without weight, are drawn on the torso. An imported body
+            has the looks of its file.
         source: MJCF of an imported body. It has parts and joints of the same names as here, and the standing pose as
             the keyframe `home`; see `arc_suite.models.source`.
         held: joints of an imported body that belong to no leg.
@@ -788,6 +796,7 @@ class Body(_Spec):
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
     agility: float = _number_field(low=0.1, high=10.0, default=1.0)
     palette: str | int | None = _field(_check_palette, default=None, optional=True)
+    ornaments: bool = _field(_check_boolean, default=True)
     source: str | None = _field(_check_text, 1, MAX_SOURCE, default=None, optional=True)
     held: tuple[Held, ...] = _field(_check_items, Held, 0, _MAX_HELD_JOINTS, default=())
     file_joints: tuple[str, ...] = _field(_check_texts, _MAX_FILE_JOINTS, default=())
@@ -834,6 +843,8 @@ class Body(_Spec):
             self._fail("agility", "expected the default in a body with a source, which has its motors and weights")
         elif self.density != DENSITY:
             self._fail("density", "expected the default in a body with a source, which has its motors and weights")
+        elif not self.ornaments:
+            self._fail("ornaments", "expected the default in a body with a source, which has the looks of its file")
         elif self.simulation is None:
             self._fail("simulation", "missing; a body with a source needs it")
 

@@ -17,7 +17,7 @@ SET = "set task arena"
 COMMON = f"{BODY} {SET} policy vecnormalize preset"
 # Flags by program: each has an effect with any others, or is refused as in a case below or in test_flags.py.
 ALWAYS = {
-    "build_model": "robot spec legs links length palette name output summary render scale seed",
+    "build_model": "robot spec legs links length palette name output summary render scale seed no_ornaments",
     "import": "armature damping forward home output scale stiffness",
     "check": "task tasks walk",
     "render": f"{COMMON} seed steps output".replace(" preset", ""),
@@ -55,6 +55,7 @@ GLB = "it is for .glb, not for .png"
 FILMS = "it is for .mp4, .gif, .webp, not for"
 ZERO = "--policy=zero --preset=fast"
 CASES = [
+    ("build_model", "--robot=tick --no_ornaments", "--no_ornaments: goes with --json, --visuals or --render, as other"),
     ("build_model", "--robot=tick --set=kicks=1", f"--set kicks: {NEITHER}"),
     ("build_model", "--robot=tick --task=stairs --set=rise=0.1 --set=gait=wave", f"--set gait: {NEITHER}"),
     ("build_model", "--robot=tick --set=time_limit=3", f"--set time_limit: {NEITHER}"),

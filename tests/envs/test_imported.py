@@ -236,6 +236,9 @@ def test_settings_that_servos_cannot_have_are_refused():
     expected = "expected the default in a body with a source, which has its motors and weights"
     with refused(f"Body(quadruped_15_kg).agility: {expected}", SpecError):
         QUADRUPED.replace(agility=2.0)
+    expected = "expected the default in a body with a source, which has the looks of its file"
+    with refused(f"Body(quadruped_15_kg).ornaments: {expected}", SpecError):
+        QUADRUPED.replace(ornaments=False)
     with refused("length: quadruped_15_kg was imported, and keeps its torso; scale, links, ends change"):
         shaping.shaped(QUADRUPED, length=2.0)
 

@@ -11,6 +11,7 @@ from arc_suite import models, registry
 from arc_suite.models import visuals
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import MATERIALS, Solid
+from arc_suite.robots.spec_files import body_from_json, body_to_json
 
 # A body that has no visuals of its own: Tick's legs, four of them askew, under a lying capsule.
 _TICK = ROBOTS["tick"]
@@ -57,6 +58,23 @@ def test_visuals_keep_every_array_of_the_dynamics(body):
     assert not shown.geom_conaffinity[added].any()
     assert set(shown.geom_group[added]) == {visuals.GROUP}
     assert visuals.GROUP not in shown.geom_group[same]
+
+
+@every_body
+def test_a_body_without_ornaments_has_bare_legs_and_solids(body):
+    bare_body = body.replace(ornaments=False)
+    plain, shown, bare = compiled(body, False), compiled(body, True), compiled(bare_body, True)
+
+    def names_on_torso(model):
+        torso = model.body("torso").id
+        return {model.geom(index).name for index in np.flatnonzero(model.geom_bodyid == torso)}
+
+    assert names_on_torso(bare) == names_on_torso(plain) < names_on_torso(shown)
+    geoms_of_legs = {shown.geom(index).name for index in range(shown.ngeom)} - names_on_torso(shown)
+    assert geoms_of_legs == {bare.geom(index).name for index in range(bare.ngeom)} - names_on_torso(bare)
+    assert visuals.bones(bare_body) == [] and visuals.geoms_of_bones(bare_body) == {}
+    assert visuals.bones(body) != [] or body.name == "stranger"
+    assert body_from_json(body_to_json(bare_body)) == bare_body
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,7 @@ IN_SOLID = "name, shape, size, position, euler_deg"
 THIN = "legs: r2_foot: expected a radius from 0.0009 at density 10, got "
 PARALLEL = "camera.xyaxes: expected two directions that are not parallel, got "
 SHAPES = "sphere, capsule, cylinder, ellipsoid, box"
-IN_BODY = "(there are: name, torso, legs, camera, density, ballast, simulation, agility, palette)"
+IN_BODY = "(there are: name, torso, legs, camera, density, ballast, simulation, agility, palette, ornaments)"
 IN_TORSO = "(there are: standing_height, solids)"
 IN_LINK = "(there are: name, end, radius, joint)"
 IN_JOINT = "(there are: name, axis, range_deg, armature, damping, friction_loss, motor)"
@@ -155,6 +155,7 @@ WEIGHT = "density of the body sets the weight of all parts, ballast adds some"
         (("head",), "round", f"unknown field 'head'; docs/bodies.md: heads, tails and ballast {IN_BODY}"),
         (("height",), 1, f"unknown field 'height'; standing_height of the torso sets it {IN_BODY}"),
         (("motors",), 1, f"unknown field 'motors'; each joint has its motor {IN_BODY}"),
+        (("ornaments",), [], "ornaments: expected true or false, got []"),
         (("camra",), 1, f"unknown field 'camra'; did you mean 'camera'? {IN_BODY}"),
     ],
 )

@@ -88,6 +88,9 @@ def add_shape(gui: viser.GuiApi, sketch: Sketch) -> dict[str, Any]:
     palettes.add_text_field("Colors", hint, default=DEFAULT_CHOICE)
     palettes.show_choice(sketch.palette)
     widgets["palette"] = palettes
+    widgets["no_ornaments"] = gui.add_checkbox(
+        "No ornaments", sketch.no_ornaments, hint="Without the eyes, tails and the like that weigh nothing"
+    )
     return widgets
 
 

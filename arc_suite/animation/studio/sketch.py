@@ -42,6 +42,7 @@ class Sketch:
         lengths: pairs of a link's name and the factor of its length. Links that the body lacks are ignored.
         ends: pairs of a part's name and the link's end, see `shaping.Shape`. Parts that the body lacks are ignored.
         palette: as `palettes.parse` takes it, or `DEFAULT_CHOICE`.
+        no_ornaments: whether the body has no ornaments, see `Body.ornaments`; an imported body has none.
         task: name of the task.
         gait: name of the gait, or `DEFAULT_CHOICE`.
         speed: target velocity, as a multiple of the body's own; demonstrators go in a gait that suits it.
@@ -70,6 +71,7 @@ class Sketch:
     lengths: tuple[tuple[str, float], ...] = ()
     ends: tuple[tuple[str, Vector], ...] = ()
     palette: str = DEFAULT_CHOICE
+    no_ornaments: bool = False
     task: str = "directed"
     gait: str = DEFAULT_CHOICE
     speed: float = 1.0
@@ -116,9 +118,17 @@ def make_body(sketch: Sketch) -> Body:
     """
     original_body = source_body(sketch)
     shaped_body = shaped(original_body, **_shape_changes(sketch, original_body))
-    if sketch.palette == DEFAULT_CHOICE:
-        return shaped_body
-    return shaped_body.replace(palette=palettes.parse(sketch.palette))
+    return shaped_body.replace(**_changes_of_looks(sketch, original_body))
+
+
+def _changes_of_looks(sketch: Sketch, original_body: Body) -> dict[str, Any]:
+    """Return the fields of a body about its looks that a sketch sets."""
+    changes: dict[str, Any] = {}
+    if sketch.palette != DEFAULT_CHOICE:
+        changes["palette"] = palettes.parse(sketch.palette)
+    if sketch.no_ornaments and not original_body.source:
+        changes["ornaments"] = False
+    return changes
 
 
 def settings_field(sketch: Sketch) -> Mapping[str, Any]:
@@ -242,8 +252,9 @@ def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
         arguments = ", ".join(f"{name}={value!r}" for name, value in shape_changes.items())
         robots.append("shaping")
         code = f"shaping.shaped({code}, {arguments})"
-    if sketch.palette != DEFAULT_CHOICE:
-        code = f"{code}.replace(palette={palettes.parse(sketch.palette)!r})"
+    looks = _changes_of_looks(sketch, original_body)
+    if looks:
+        code = f"{code}.replace({', '.join(f'{name}={value!r}' for name, value in looks.items())})"
     return code, {"arc_suite": ["policies"], "arc_suite.models": models, "arc_suite.robots": robots}
 
 

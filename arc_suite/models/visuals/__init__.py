@@ -91,8 +91,9 @@ def _with_twins(items: Iterable) -> list:
 
 
 def _visuals(body: Body) -> Visuals:
-    """Return the visuals of a robot by its name, or those that suit any body."""
-    return VISUALS.get(body.name) or generic_visuals(body)
+    """Return the visuals of a robot by its name, or those that suit any body, with ornaments if it has some."""
+    visuals = VISUALS.get(body.name) or generic_visuals(body)
+    return visuals if body.ornaments else visuals._replace(ornaments=(), bones=())
 
 
 def add_materials(root: mjcf.RootElement, body: Body) -> None:

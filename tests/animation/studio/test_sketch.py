@@ -38,6 +38,7 @@ SKETCHES = {
     "example": Sketch(source="spider", task="stairs", settings='{"difficulty": 0.5}'),
     "random": Sketch(source=RANDOM, seed=7, policy="zero", palette="7"),
     "file": Sketch(source=FILE, file=body_to_json(HIGH)),
+    "without ornaments": Sketch(legs=4, palette="moss", no_ornaments=True),
 }
 
 
@@ -50,6 +51,7 @@ SKETCHES = {
         ("example", load_body("spider")),
         ("random", sound_body(7).replace(palette=7)),
         ("file", HIGH),
+        ("without ornaments", generator.generate(4, 3).replace(palette="moss", ornaments=False)),
     ],
 )
 def test_the_body(name, body):
