@@ -3,6 +3,7 @@
 import itertools
 import os
 import re
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
@@ -41,6 +42,9 @@ _CURES = {
 }
 # Flags whose values a shell changes, unless they are quoted.
 _CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
+# Flags of which users expect all values, where the last one holds, and the programs that show one creature.
+_FLAGS_OF_ONE = ("robot", "spec")
+_PROGRAMS_OF_ONE = ("animate", "play", "render", "studio", "view")
 _FORM_OF_BODIES = "docs/bodies.md: heads, tails and ballast"
 _COUNT_OF_BODIES = "--bodies bounds the search"
 _CURES_OF_PROGRAMS = {
@@ -129,6 +133,27 @@ def refuse_flag_as_value(flag: flags.Flag) -> None:
             cure = _CURES_OF_MISSING_VALUES.get(flag.name)
             hint = f"; {cure}" if cure else ""
             raise ValueError(f"--{flag.name}: expected a value, got the flag {checks.quote(text)}{hint}")
+
+
+def warn_of_repeated_flags(program: str, arguments: Sequence[str]) -> None:
+    """Warn of a flag such as --spec that stands twice with different values, of which the last one holds.
+
+    Only programs that show one creature do so: others are started with flags behind those of another program.
+
+    Args:
+        program: name of the program, without arc-suite.
+        arguments: those of the command line.
+    """
+    for name in _FLAGS_OF_ONE if program in _PROGRAMS_OF_ONE else ():
+        values = []
+        for argument, next_argument in itertools.pairwise([*arguments, ""]):
+            flag, equals, value = argument.partition("=")
+            if flag == f"--{name}":
+                values.append(value if equals else next_argument)
+        if len(set(values)) > 1:
+            warnings.warn(
+                f"--{name}: {len(values)} values; the last one holds, {checks.quote(values[-1])}", stacklevel=2
+            )
 
 
 def refuse_argument(arguments: Sequence[str], positional_arguments: Sequence[str], parameter_count: int) -> NoReturn:

@@ -173,11 +173,11 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
     """
     with_underscores = [_FLAG_NAME.sub(lambda match: match[0].replace("-", "_"), text) for text in arguments]
     program_flags = list(_flags_of(module))
+    program = module.__name__.rpartition(".")[2]
     try:
         positional_arguments = flags.FLAGS(with_underscores)
     except flags.UnrecognizedFlagError as error:
         names = sorted({flag.name for flag in program_flags})
-        program = module.__name__.rpartition(".")[2]
         flag_mistakes.refuse_unknown(error, program, names, with_underscores, parameters)
         raise
     except flags.IllegalFlagValueError as error:
@@ -191,6 +191,7 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
             raise ValueError(f"--{flag.name}=: expected a value, got none")
         if flag.present:
             flag_mistakes.refuse_flag_as_value(flag)
+    flag_mistakes.warn_of_repeated_flags(program, with_underscores)
     return positional_arguments
 
 

@@ -193,6 +193,19 @@ def test_writing_refuses_before_the_work_starts(tmp_path, monkeypatch, path, rea
         files.check_target(path)
 
 
+def test_a_flag_of_one_value_that_stands_twice_is_told():
+    for name, arguments, line in (
+        ("render", ("--spec=spider", "--spec", "crab"), "--spec: 2 values; the last one holds, crab\n"),
+        ("play", ("--robot", "tick", "--robot=a", "--robot=b"), "--robot: 3 values; the last one holds, b\n"),
+        ("animate", ("--clips=walk", "--clips=run"), ""),  # as commands append flags to those of others
+        ("animate", ("--spec=crab", "--spec=crab"), ""),
+        ("render", ("--legs=4", "--legs=6"), ""),
+        ("evaluate", ("--robot=tick", "--robot=queen"), ""),
+    ):
+        done = programs.arc_suite(name, *arguments, "--help")
+        assert (done.returncode, done.stderr) == (0, line and f"arc-suite {name}: {line}")
+
+
 def test_a_check_leaves_files_and_folders_as_they_are(tmp_path):
     (tmp_path / "old.txt").write_text("old")
     for path in (None, tmp_path / "old.txt", tmp_path / "new.txt"):
