@@ -1,4 +1,4 @@
-"""Make animation clips for game engines (.glb), and of one a motion, a film or sprites.
+"""Make animation clips for game engines (.glb) or as sprites, and of one a motion or a film.
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
@@ -6,14 +6,14 @@
   arc-suite animate --robot tick --clips attack --output attack.npz
   arc-suite animate --policy runs/queen-steer-dagger-0 --output queen.glb
   arc-suite animate --robot queen --clips walk --turntable --transparent --output queen.webp
-  arc-suite animate --spec spider --clips walk --fps 12 --size 128 --directions 8 --output sprites.png
+  arc-suite animate --spec spider --clips walk,idle --fps 12 --size 128 --directions 8 --output sprites.png
 
 Metrics go to .clips.json. One policy makes all clips, each under a command of its own. Loops begin at the same phase
 of the gait and hold the same number of cycles. start and stop connect idle and walk. tuned and refined are presets of
 the four robots' demonstrators, with a gait of their own. A clip that cannot be made is left out with a line. A motion
 (.npz) is what `arc-suite motion` and tasks read; --clips takes motions, too. A film (.mp4, .gif, .webp) shows one clip,
-in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction; its
-cells, rate and ground line go to .sprites.json, as Aseprite writes them.
+in place and as long as it lasts, so that it plays forever. A sheet (.png) has a row of frames for each direction of
+a clip; its cells, rates and ground line go to .sprites.json, as Aseprite writes them.
 """
 
 import math

@@ -46,7 +46,8 @@ DEFAULT_DIRECTIONS = 8  # of a sheet
 
 # Suffixes of the JSON files next to files. A spec of the same name, .json, stays as it is.
 _METRICS_SUFFIXES = {GLB_EXTENSION: ".clips.json", SHEET_EXTENSION: ".sprites.json"}
-_MAX_SHEET_WIDTH = 16384  # pixels
+_SEVERAL_CLIPS = (GLB_EXTENSION, SHEET_EXTENSION)  # files that hold them
+_MAX_SHEET_SIZE = 16384  # pixels, width and height
 _BLENDER_EXTENSIONS = (".fbx", ".bvh", ".blend")  # of the files that tools/to_fbx.py writes
 
 
@@ -69,7 +70,7 @@ def animate(
     """Write animation clips of a body, as `arc-suite animate` does, and return them.
 
     The extension of the path says what is written: `.glb`, with metrics in `.clips.json`; one clip as a motion,
-    `.npz`, see `arc_suite.motions`; one as a film, `.mp4`, `.gif` or `.webp`; or one as a sheet of sprites, `.png`,
+    `.npz`, see `arc_suite.motions`; one as a film, `.mp4`, `.gif` or `.webp`; or some as a sheet of sprites, `.png`,
     with its cells in `.sprites.json`, see `sprites.describe_sheet`.
 
     Args:
@@ -107,7 +108,7 @@ def animate(
         if extension == GLB_EXTENSION:
             metrics |= _write_glb(temporary, setup.body, made_clips, **options)
         elif extension == SHEET_EXTENSION:
-            metrics |= _write_sheet(temporary, path.name, setup.body, made_clips[0], **options)
+            metrics |= _write_sheet(temporary, path.name, setup.body, made_clips, **options)
         else:
             _write_motion_or_film(temporary, extension, setup.body, made_clips[0], progress, **options)
     return made_clips
@@ -154,7 +155,7 @@ def _check_arguments(path: Path, names: Sequence[str], fps: float, options: Mapp
         suitable = OPTION_EXTENSIONS[option]
         if extension not in suitable:
             raise ValueError(f"{option}: it is for {', '.join(suitable)}, not for {extension}")
-    if extension != GLB_EXTENSION and (len(names) != 1 or names == [ALL]):
+    if extension not in _SEVERAL_CLIPS and (len(names) != 1 or names == [ALL]):
         raise ValueError(f"clips: expected one for {extension}, got {', '.join(names)}")
     films.check_fps(fps, extension)
     for option in OPTION_BOUNDS.keys() & options.keys():
@@ -205,15 +206,18 @@ def _write_sheet(
     path: Path,
     name: str,
     body: Body,
-    clip: Clip,
+    clips: Sequence[Clip],
     size: int = DEFAULT_SIZE,
     transparent: bool = False,
     directions: int = DEFAULT_DIRECTIONS,
 ) -> dict[str, Any]:
-    """Write a sheet of sprites of a clip, and return its description, given the name that the file will have."""
-    width = size * len(clip.times)
-    if width > _MAX_SHEET_WIDTH:
-        raise ValueError(f"the sheet is {width} pixels wide, more than {_MAX_SHEET_WIDTH}; lower fps or size")
-    sheet = filming.sprite_sheet(body, clip, size, directions, transparent)
+    """Write a sheet of sprites of clips, and return its description, given the name that the file will have."""
+    width = size * max(map(filming.count_frames, clips))
+    if width > _MAX_SHEET_SIZE:
+        raise ValueError(f"the sheet is {width} pixels wide, more than {_MAX_SHEET_SIZE}; lower fps or size")
+    height = size * directions * len(clips)
+    if height > _MAX_SHEET_SIZE:
+        raise ValueError(f"the sheet is {height} pixels high, more than {_MAX_SHEET_SIZE}; lower size or directions")
+    sheet = filming.sprite_sheet(body, clips, size, directions, transparent)
     films.write_png(path, [sheet.picture], 0.0)
-    return sprites.describe_sheet(name, clip, sheet)
+    return sprites.describe_sheet(name, clips, sheet)

@@ -36,7 +36,8 @@ class Sheet(NamedTuple):
     """A sheet of sprites.
 
     Attributes:
-        picture: (height, width, 3 or 4) uint8, of square cells: a row for each direction, a column for each frame.
+        picture: (height, width, 3 or 4) uint8, of square cells: a row for each direction of a clip, a column for each
+            frame.
         cell_size: width and height of a cell, pixels.
         ground_line: where the ground below the torso is in each cell, pixels from its top.
         pixels_per_meter: scale of the body at the vertical axis below the torso; each sheet has its own.
@@ -116,10 +117,11 @@ def film_pictures(
         RenderingUnavailable: no OpenGL here.
     """
     picture_count = count_film_pictures(clip, turntable)
-    frames = np.arange(picture_count) % _count_frames(clip)
+    frames = np.arange(picture_count) % count_frames(clip)
     turn = 2.0 * np.pi if turntable else 0.0
     headings = np.linspace(0.0, turn, picture_count, endpoint=False)
-    stage, poses = _open_stage(body, clip, frames, headings, transparent)
+    poses = _list_poses(body, clip, frames, headings)
+    stage = opengl.call(lambda: _prepare_stage(body, poses[: count_frames(clip)], transparent))
     yield from _render(stage, poses, size, transparent)
 
 
@@ -128,42 +130,52 @@ def count_film_pictures(clip: Clip, turntable: bool = False) -> int:
     repetitions = 1
     if turntable:
         repetitions = max(1, round(_TURN_SECONDS / clip.motion.seconds))
-    return repetitions * _count_frames(clip)
+    return repetitions * count_frames(clip)
 
 
-def sprite_sheet(body: Body, clip: Clip, size: int, directions: int, transparent: bool = False) -> Sheet:
-    """Return a sheet with a row for each direction and a column for each frame of the clip.
+def sprite_sheet(body: Body, clips: Sequence[Clip], size: int, directions: int, transparent: bool = False) -> Sheet:
+    """Return a sheet in which a clip has a row for each direction and a column for each frame.
 
-    The first row goes to the right in the picture; each next one is turned further to the left. Other arguments are
-    those of `film_pictures`.
+    The first row goes to the right in the picture; each next one is turned further to the left. All clips have one
+    scale. Cells after the last frame of a clip are empty. Other arguments are those of `film_pictures`.
 
     Args:
-        body: body of the clip.
-        clip: clip to show.
+        body: body of the clips.
+        clips: clips to show.
         size: size of a square, pixels.
         directions: how many.
         transparent: whether all but the body is left out.
     """
-    columns = _count_frames(clip)
-    frames = np.tile(np.arange(columns), directions)
-    headings = np.repeat(2.0 * np.pi * np.arange(directions) / directions, columns)
-    stage, poses = _open_stage(body, clip, frames, headings, transparent)
+    headings = 2.0 * np.pi * np.arange(directions) / directions
+    frames_of_clips = [np.arange(count_frames(clip)) for clip in clips]
+    poses = []
+    framed_poses = []
+    for clip, frames in zip(clips, frames_of_clips, strict=True):
+        poses += _list_poses(body, clip, np.tile(frames, directions), np.repeat(headings, len(frames)))
+        framed_poses += _list_poses(body, clip, frames, np.zeros(len(frames)))
+    stage = opengl.call(lambda: _prepare_stage(body, framed_poses, transparent))
     squares = list(_render(stage, poses, size, transparent))
-    sheet_rows = []
-    for first in range(0, len(squares), columns):
-        sheet_rows.append(np.concatenate(squares[first : first + columns], axis=1))
-    return Sheet(np.concatenate(sheet_rows), size, size * stage.ground_line, size / stage.view_height)
+    columns = max(map(len, frames_of_clips))
+    empty_square = np.broadcast_to(squares[0][0, 0], squares[0].shape)
+    rows = []
+    first = 0
+    for frames in frames_of_clips:
+        for _ in headings:
+            row = squares[first : first + len(frames)]
+            first += len(frames)
+            rows.append(np.concatenate(row + [empty_square] * (columns - len(row)), axis=1))
+    return Sheet(np.concatenate(rows), size, size * stage.ground_line, size / stage.view_height)
 
 
-def _count_frames(clip: Clip) -> int:
+def count_frames(clip: Clip) -> int:
     """Return the number of different frames of a clip; the last one of a loop is the first one again."""
     if clip.loops:
         return len(clip.times) - 1
     return len(clip.times)
 
 
-def _open_stage(body: Body, clip: Clip, frames, headings, transparent: bool) -> tuple[_Stage, list[_Pose]]:
-    """Return a stage, and poses for frames (n,) under headings (n,), rad, with the root at 0."""
+def _list_poses(body: Body, clip: Clip, frames, headings) -> list[_Pose]:
+    """Return poses for frames (n,) of a clip under headings (n,), rad, with the root at 0."""
     motion_in_place = clip.motion._replace(root=np.zeros_like(clip.motion.root))
     poses = motion_in_place.poses()[frames]
     poses[:, :2] = rotations.to_heading_frame(poses[:, :2], -headings)
@@ -171,9 +183,7 @@ def _open_stage(body: Body, clip: Clip, frames, headings, transparent: bool) -> 
     model = compile_model(body)
     positions = readings.positions(poses, readings.layout(model, body), standing_qpos(model))
     swings = swinging.rest_turns(body, len(clip.times)) if clip.swings is None else clip.swings
-    all_poses = [_Pose(qpos, swings[frame]) for qpos, frame in zip(positions, frames, strict=True)]
-    framed_poses = all_poses[: _count_frames(clip)]
-    return opengl.call(lambda: _prepare_stage(body, framed_poses, transparent)), all_poses
+    return [_Pose(qpos, swings[frame]) for qpos, frame in zip(positions, frames, strict=True)]
 
 
 def _render(stage: _Stage, poses: Sequence[_Pose], size: int, transparent: bool) -> Iterator[np.ndarray]:

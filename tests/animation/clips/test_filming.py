@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from arc_suite import animation
 from arc_suite.animation import clips as export
@@ -23,7 +24,7 @@ def idle():
 
 @pytest.mark.slow
 def test_a_sheet_has_a_row_for_each_direction(idle):
-    made = filming.sprite_sheet(BODY, idle, SIZE, 4, transparent=True)
+    made = filming.sprite_sheet(BODY, [idle], SIZE, 4, transparent=True)
     sheet, columns = made.picture, len(idle.times) - 1
     assert sheet.shape == (4 * SIZE, columns * SIZE, 4) and sheet.dtype == np.uint8
     rows = [row[:, :SIZE] for row in np.split(sheet, 4)]
@@ -55,19 +56,30 @@ def test_a_film_is_as_long_as_its_loop(idle):
 @pytest.mark.slow
 def test_an_importer_reads_where_cells_are(tmp_path):
     """The names are those of Aseprite's arrays: Phaser and PixiJS look frames up by their number."""
-    animation.animate("tick", tmp_path / "tick.PNG", "idle", fps=3, size=32, directions=2)
+    path = tmp_path / "tick.PNG"
+    idle, attack = animation.animate("tick", path, ["idle", "attack"], fps=3, size=32, directions=2)
     sheet = json.loads((tmp_path / "tick.sprites.json").read_text())
     frames, meta = sheet["frames"], sheet["meta"]
-    columns = meta["columns"]
-    assert meta["image"] == "tick.PNG" and meta["rows"] == 2
-    assert meta["size"] == {"w": 32 * columns, "h": 64} and meta["format"] == "RGB888"
-    assert [frame["filename"] for frame in frames] == [str(number) for number in range(2 * columns)]
+    columns = len(idle.times) - 1  # of a loop the last frame is the first one
+    attack_columns = len(attack.times)
+    assert attack_columns < columns
+    assert (meta["image"], meta["rows"], meta["columns"], meta["format"]) == ("tick.PNG", 4, columns, "RGB888")
+    assert meta["size"] == {"w": 32 * columns, "h": 4 * 32}
+    assert [frame["filename"] for frame in frames] == [str(number) for number in range(2 * (columns + attack_columns))]
     assert frames[columns + 1]["frame"] == {"x": 32, "y": 32, "w": 32, "h": 32}
-    assert [(tag["name"], tag["from"], tag["to"]) for tag in meta["frameTags"]] == [
-        ("idle_0", 0, columns - 1),
-        ("idle_180", columns, 2 * columns - 1),
+    assert frames[-1]["frame"] == {"x": 32 * (attack_columns - 1), "y": 96, "w": 32, "h": 32}
+    first = 2 * columns  # of attack
+    assert [(tag["name"], tag["from"], tag["to"], tag.get("repeat")) for tag in meta["frameTags"]] == [
+        ("idle_0", 0, columns - 1, None),
+        ("idle_180", columns, 2 * columns - 1, None),
+        ("attack_0", first, first + attack_columns - 1, "1"),
+        ("attack_180", first + attack_columns, first + 2 * attack_columns - 1, "1"),
     ]
     milliseconds = sum(frame["duration"] for frame in frames[:columns])
-    assert milliseconds == round(1000.0 * columns / meta["fps"]) and "repeat" not in meta["frameTags"][0]
-    assert meta["pixels_per_meter"] == pytest.approx(44.285 * 32 / SIZE, rel=1e-3)  # of the same clip in SIZE
+    assert milliseconds == round(1000.0 * columns / meta["frameTags"][0]["fps"])
     assert frames[-1]["anchor"] == {"x": 0.5, "y": pytest.approx(meta["ground_line"] / 32, abs=1e-3)}
+    # The attack reaches further than idle, and both have one scale.
+    picture = np.asarray(Image.open(path))
+    assert meta["pixels_per_meter"] < 44.285 * 32 / SIZE
+    assert np.ptp(picture[64:, 32 * attack_columns :], axis=(0, 1)).max() == 0  # cells after the last frame
+    assert np.ptp(picture[64:, : 32 * attack_columns], axis=(0, 1)).max() > 0
