@@ -231,11 +231,13 @@ check-mjx check-mjx-release: RUN = JAX_COMPILATION_CACHE_DIR=$(VENV)/compiled $(
 check-mjx: MARKS := not release
 check-mjx-release: MARKS := release
 
+# Compiled functions are kept for other processes and later runs; programs of tests run in folders of their own.
+COMPILED = JAX_COMPILATION_CACHE_DIR='$(CURDIR)/$(VENV)/compiled' JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.2
 # pandas before 3, as what rliable needs does not know it yet.
 check-agents check-agents-release: VENV := .venv-jax
 check-agents check-agents-release: EXTRAS := dev,learn
 check-agents check-agents-release: PACKAGES := onnxruntime rliable 'pandas<3' optuna==5.0.0
-check-agents check-agents-release: RUN = $(PYTEST) $(PARALLEL) -m "$(MARKS)" tests/learning/agents \
+check-agents check-agents-release: RUN = $(COMPILED) $(PYTEST) $(PARALLEL) -m "$(MARKS)" tests/learning/agents \
 	tests/learning/studies/test_study.py tests/learning/cli/test_train.py tests/learning/test_onnx_file.py \
 	tests/learning/test_runner.py tests/learning/test_sim_to_sim.py tests/evaluation/test_statistics.py \
 	tests/learning/test_cards.py tests/learning/test_trackers.py tests/examples/test_tracker_scripts.py
