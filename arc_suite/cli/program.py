@@ -26,6 +26,7 @@ from arc_suite.cli.version import describe_suite
 from arc_suite.simulation.opengl import RenderingUnavailable
 
 _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the start of an argument
+_GRACE_PERIOD = 20.0  # s, from SIGTERM to the end of the process; clusters give 30 s
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
 _EXPECTED_ERRORS = (flags.Error, ValueError, OSError, MemoryError, RenderingUnavailable, PhysicsError)
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
@@ -68,12 +69,29 @@ def resumable(folder: str | os.PathLike[str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def watch_for_termination() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns whether SIGTERM has come; meanwhile the signal does not end the process."""
+    """Yield a function that returns whether SIGTERM has come; meanwhile the signal does not end the process.
+
+    When it comes again, or after 20 s, it ends the process: a learner may never ask.
+    """
     termination = threading.Event()
-    previous_handler = signal.signal(signal.SIGTERM, lambda *_: termination.set())
+    end = threading.Timer(_GRACE_PERIOD, os.kill, (os.getpid(), signal.SIGTERM))
+    end.daemon = True
+    previous_handler = signal.getsignal(signal.SIGTERM)
+
+    def handle(number, frame):
+        if not termination.is_set():
+            termination.set()
+            end.start()
+        elif callable(previous_handler):
+            previous_handler(number, frame)
+        else:
+            raise interrupts.Terminated
+
+    signal.signal(signal.SIGTERM, handle)
     try:
         yield termination.is_set
     finally:
+        end.cancel()
         signal.signal(signal.SIGTERM, previous_handler)
 
 

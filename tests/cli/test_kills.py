@@ -6,12 +6,13 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 
 import kills
 import numpy as np
 import pytest
 
-from arc_suite.cli import program
+from arc_suite.cli import interrupts, program
 from arc_suite.learning.studies import csv_files, results
 
 FIXTURES = pathlib.Path(__file__).parents[1] / "fixtures"
@@ -138,6 +139,17 @@ def test_sigterm_can_be_asked_for():
         assert not came()
         os.kill(os.getpid(), signal.SIGTERM)
         assert came()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no SIGTERM to catch")
+@pytest.mark.parametrize("comes_again", [True, False])
+def test_sigterm_ends_those_who_never_ask(monkeypatch, comes_again):
+    monkeypatch.setattr(program, "_GRACE_PERIOD", 600.0 if comes_again else 0.05)
+    with pytest.raises(interrupts.Terminated), program.watch_for_termination():
+        os.kill(os.getpid(), signal.SIGTERM)
+        if comes_again:
+            os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60.0)
 
 
 @pytest.mark.slow
