@@ -1,6 +1,7 @@
 """Settings of tasks as texts: value, bounds and meaning of each."""
 
 import inspect
+import numbers
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -66,6 +67,8 @@ class Setting(NamedTuple):
 def own_settings(task: Task, task_kwargs: Mapping[str, Any] = {}) -> list[Setting]:
     """Return the settings that a task has in addition to those of all tasks, with the values of this task.
 
+    They are those of the task's `names`, and the fields of its `settings` that hold numbers or texts.
+
     Args:
         task: the task.
         task_kwargs: settings with which it was made; for those that it does not keep, such as `gait`.
@@ -74,7 +77,11 @@ def own_settings(task: Task, task_kwargs: Mapping[str, Any] = {}) -> list[Settin
     values = {"motion": "walk"} | dict(task_kwargs) | _read_values(task)
     meanings = _read_meanings(task)
     names_of_settings = getattr(type(task), "names", tuple)  # a method; tasks of other packages may lack it
-    return [_describe(name, values, meanings) for name in names_of_settings()]
+    names = list(names_of_settings())
+    for name, value in _fields(task.settings).items():
+        if name not in (*names, *_PARTS) and _is_plain(value):
+            names.append(name)
+    return [_describe(name, values, meanings) for name in names]
 
 
 def shared_settings(task_kwargs: Mapping[str, Any] = {}) -> list[Setting]:
@@ -140,6 +147,15 @@ def attribute_meanings(documented: type) -> dict[str, str]:
             for name in entry["names"].split(", "):
                 meanings[name] = " ".join(entry["text"].split()).removesuffix(".")
     return meanings
+
+
+def _is_plain(value: Any) -> bool:
+    """Return whether a value is a number, a text, None, or a collection of these."""
+    if isinstance(value, Mapping):
+        return all(map(_is_plain, value.values()))
+    if isinstance(value, tuple | list):
+        return not hasattr(value, "_fields") and all(map(_is_plain, value))
+    return value is None or isinstance(value, str | numbers.Number)
 
 
 def _describe(name: str, values: Mapping[str, Any], meanings: Mapping[str, str]) -> Setting:

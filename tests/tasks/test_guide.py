@@ -9,9 +9,17 @@ from interpreters import ROOT, printed
 from tiers import never, tiers
 
 GUIDE = "".join((ROOT / "docs" / f"adding_{name}.md").read_text() for name in ("a_task", "an_arena"))
-CROUCHING, USING_A_TASK, LEVEL_STEER, USING_A_TERM, CIRCLING, USING_A_COMMAND, RAMPS, USING_AN_ARENA = re.findall(
-    r"```python\n(.*?)```", GUIDE, re.DOTALL
-)
+(
+    CROUCHING,
+    USING_A_TASK,
+    LEVEL_STEER,
+    USING_A_TERM,
+    CARRYING,
+    CIRCLING,
+    USING_A_COMMAND,
+    RAMPS,
+    USING_AN_ARENA,
+) = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
 COMMANDS = re.findall(r"(?:^|`)(arc-suite [^`\n]*)", GUIDE, re.MULTILINE)
 SHORT = {
     "evaluate": ["--episodes=1"],
@@ -26,6 +34,7 @@ def package(tmp_path):
     """Writes the guide's modules and returns a function that runs Python in their folder."""
     (tmp_path / "crouching.py").write_text(CROUCHING)
     (tmp_path / "level_steer.py").write_text(LEVEL_STEER)
+    (tmp_path / "carrying.py").write_text(CARRYING)
     (tmp_path / "circling.py").write_text(CIRCLING)
     (tmp_path / "ramps.py").write_text(RAMPS)
     return functools.partial(printed, folder=tmp_path)
@@ -70,6 +79,35 @@ assert (reward, weights["level"]) == (timestep.reward, 1.0)
 def test_a_term_and_a_block(package):
     """In a dm_env as the guide shows them, and in a batch; test_jax runs them under `jit`."""
     assert package(USING_A_TERM + BATCH)[-1] == f"None {23 + 24 + 150 + 2 + 6 + 18 - 1}"
+
+
+SPILLED = """
+import arc_suite, carrying
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import conformance
+from arc_suite.tasks.setting_table import own_settings
+setup = Setup.of("tick", "carry", {"spill_cosine": 0.95})
+print(conformance.difference(setup, 20), own_settings(setup.definition)[-1][:2])
+environment = arc_suite.load("tick", "carry", {"spill_cosine": 0.9999, "random": 0})
+environment.reset()
+steps = 1
+while not environment.step([0.0] * 18).last():
+    steps += 1
+    assert environment.task.memory.cosine >= 0.9999
+print(steps < 1000, environment.task.memory.cosine < 0.9999)
+try:
+    Setup.of("tick", "carry", {"spill_cosin": 1.0}).definition
+except ValueError as error:
+    print(error)
+"""
+
+
+@pytest.mark.slow
+def test_a_setting_and_a_memory(package):
+    conforming, spilled, refusal = package(SPILLED)
+    assert conforming == "None ('spill_cosine', '0.95')"
+    assert spilled == "True True"
+    assert refusal.startswith("unknown setting of carry 'spill_cosin'; did you mean 'spill_cosine'?")
 
 
 ROUND = """
