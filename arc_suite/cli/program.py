@@ -19,7 +19,7 @@ from dm_control.rl.control import PhysicsError
 from tqdm import tqdm
 
 from arc_suite import files
-from arc_suite.cli import flag_mistakes, interrupts
+from arc_suite.cli import flag_mistakes, interrupts, places
 from arc_suite.cli.help_text import help_text
 from arc_suite.cli.programs import docstring_of
 from arc_suite.cli.version import describe_suite
@@ -124,34 +124,39 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
             flag_mistakes.refuse_argument(arguments, positional_arguments, len(parameters))
         return main(*positional_arguments)
 
-    guard(parse_and_call, name or Path(script).name)
+    guard(parse_and_call, name or Path(script).name, module)
 
 
-def guard(work: Callable[[], int | None], name: str) -> NoReturn:
+def guard(work: Callable[[], int | None], name: str, module: ModuleType | None = None) -> NoReturn:
     """Call `work` and exit the process with the status that it returns.
 
     - A wrong flag, a ValueError, an OSError, a MemoryError, a RenderingUnavailable and a PhysicsError, of a body that
       cannot be simulated, become one line on standard error and exit status 1. Ctrl-C becomes one line and exit status
-      130, SIGTERM one line and 143.
-    - Any other exception is a mistake of the suite, and keeps its traceback.
-    - A warning becomes one line on standard error.
+      130, SIGTERM one line and 143. The line of an error from other code, such as a task of another package, ends
+      with its place; see `places.describe_error`. Python's development mode, `python -X dev`, keeps the traceback.
+    - Any other exception is a mistake of the suite or of other code, and keeps its traceback.
+    - A warning becomes one line on standard error, with its place as that of an error.
     - Where nobody reads the output any more, as in `program | head`, the work goes on without it, so that its files are
       written.
 
     Args:
         work: takes nothing, returns an exit status or None.
         name: name of the program, with which the line begins.
+        module: module of the program; None for one of the suite.
     """
 
-    def print_reason(reason, *_, **__):
-        print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr)
+    def print_reason(reason: str) -> None:
+        print(f"{name}: {' '.join(reason.split())}", file=sys.stderr)
+
+    def show_warning(warning, category, path, line, *_, **__):
+        print_reason(places.describe_warning(warning, path, line, module))
 
     # A stream that was closed before the start is None.
     output = _Output(sys.stdout or io.StringIO())
     errors = _Output(sys.stderr or io.StringIO())
     statuses: list[int] = []  # of signals
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors), warnings.catch_warnings():
-        warnings.showwarning = print_reason
+        warnings.showwarning = show_warning
         try:
             with interrupts.interruptible(name, statuses):
                 status = work()
@@ -162,8 +167,8 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
                 message = str(error) if is_interrupt else ""
                 print_reason(message or "interrupted")
                 status = statuses[-1] if statuses else interrupts.INTERRUPTED
-            elif isinstance(error, _EXPECTED_ERRORS):
-                print_reason(error)
+            elif isinstance(error, _EXPECTED_ERRORS) and not sys.flags.dev_mode:
+                print_reason(places.describe_error(error, module))
                 status = 1
             else:
                 raise

@@ -84,6 +84,73 @@ def test_expected_errors_are_one_line(tool, kind):
     programs.refused(tool(f"--raises={kind}"), "count.py: a b\n")
 
 
+CALLER = '''"""Call a function.
+
+python call.py raise_value
+"""
+import carry
+from arc_suite.cli import program
+
+def main(function=""):
+    if function == "main":
+        raise ValueError("no function")
+    getattr(carry, function)()
+
+if __name__ == "__main__":
+    program.run(main)
+'''
+CARRY = """import warnings
+import numpy as np
+from absl import flags
+from arc_suite import checks
+
+class Carry:
+    def terms(self):
+        return np.zeros(2) + np.zeros(3)
+
+def add(): Carry().terms()
+def check(): checks.integer("legs", "two", 1)
+def read(): open("missing.txt")
+def refuse(): raise flags.Error("no flag")
+def parse(): (lambda: float("two"))()
+def warn(): warnings.warn("light")
+def divide(): return np.ones(2) / np.zeros(2)
+def look_up(): {}["weight"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("function", "line"),
+    [
+        ("add", "operands could not be broadcast together with shapes (2,) (3,) (carry.py:8, in Carry.terms)"),
+        ("check", "legs: expected an integer from 1, got 'two' (carry.py:11, in check)"),
+        ("read", "[Errno 2] No such file or directory: 'missing.txt' (carry.py:12, in read)"),
+        ("parse", "could not convert string to float: 'two' (carry.py:14, in parse.<lambda>)"),
+        ("warn", "light (carry.py:15)"),
+        ("divide", "divide by zero encountered in divide (carry.py:16)"),
+        ("refuse", "no flag"),
+        ("main", "no function"),
+    ],
+)
+def test_errors_of_other_code_end_with_their_place(tmp_path, function, line):
+    """Those of flags, and of the program itself, do not."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab" / "carry.py").write_text(CARRY)
+    (tmp_path / "programs").mkdir()
+    (tmp_path / "programs" / "call.py").write_text(CALLER)
+    done = programs.run("../programs/call.py", function, cwd=tmp_path / "lab", path=tmp_path / "lab")
+    assert (done.stdout, done.stderr) == ("", f"call.py: {line}\n")
+    assert done.returncode == (0 if function in ("warn", "divide") else 1)
+
+
+def test_development_mode_keeps_the_traceback_of_other_code(tmp_path):
+    (tmp_path / "carry.py").write_text("raise ValueError('too heavy')")
+    command = [sys.executable, "-X", "dev", "-m", "arc_suite", "evaluate", "--task=carry:carry"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr and done.stderr.endswith("ValueError: too heavy\n")
+
+
 def test_unexpected_errors_keep_their_traceback(tool):
     done = tool("--raises=key")
     assert done.returncode == 1
