@@ -41,7 +41,7 @@ def write_scores() -> None:
         name = path.parent.name
         division, _, learner = name.partition("-")
         if division in DIVISIONS:
-            run_results = results.read_results(catalog.study(name).runs, path.parent)
+            run_results = results.read_results(catalog.committed_study(name, path.parent).runs, path.parent)
             benchmark.write(STUDIES, division, learner, benchmark.score_results(run_results))
     for (division, learner), scores in benchmark.read(STUDIES).items():
         published = STUDIES / f"{division}-{learner}"

@@ -6,6 +6,7 @@ that a finished study stays finished.
 
 import itertools
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from arc_suite import checks
@@ -13,6 +14,7 @@ from arc_suite.learning.agents import algorithms
 from arc_suite.learning.studies import tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.learning.studies.tables import Prior, Run, Study, run
+from studies import committed
 
 _PAPERS_ALGORITHMS = ("sac", "sacfd", "speq", "speq_o2o", "sope_eo", "sope")
 _WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
@@ -210,3 +212,21 @@ def study(name: str) -> Study:
     if name.partition("-")[0] in DIVISIONS:
         return tables.study(name)
     return STUDIES[checks.name(name, STUDIES, "study")]
+
+
+def committed_study(name: str, published: Path) -> Study:
+    """Return the study of a name, for a report of its tables; algorithms of other packages need not be registered.
+
+    Args:
+        name: name of the study.
+        published: folder of its tables.
+
+    Raises:
+        ValueError: there is none, or a damaged table.
+        OSError: a table cannot be read.
+    """
+    division, _, learner = name.partition("-")
+    is_folder_name = tables.folder_name(name) == name  # `module:attribute` names an algorithm that can be imported
+    if division in DIVISIONS and learner not in algorithms.ALGORITHMS and is_folder_name and published.is_dir():
+        return committed.read(name, published)
+    return study(name)

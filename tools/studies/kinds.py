@@ -26,7 +26,9 @@ def text(studies: Path, *names: str) -> str:
         ValueError: an unknown study, or a damaged table of it.
         OSError: a table cannot be read.
     """
-    kinds_of_studies = {name: _cells_by_kind(studies / name, catalog.study(name)) for name in names}
+    kinds_of_studies = {
+        name: _cells_by_kind(studies / name, catalog.committed_study(name, studies / name)) for name in names
+    }
     counts = collections.Counter(kind for kinds in kinds_of_studies.values() for kind in kinds)
     columns = {}
     places_of_studies = []

@@ -72,7 +72,7 @@ def study_rows(name: str, published: Path) -> list[dict[str, str]]:
         ValueError: an unknown study, or a damaged table.
         OSError: a table cannot be read.
     """
-    groups = results.group_by_place(results.read_results(catalog.study(name).runs, published))
+    groups = results.group_by_place(results.read_results(catalog.committed_study(name, published).runs, published))
     demonstrators = results.read_demonstrators(published)
     rows = []
     for _, _, seeds in report.by_kind(groups):

@@ -177,6 +177,14 @@ class Configuration:
         return algorithms.algorithm(self.algorithm)._replace(hyperparameters=self.hyperparameters)
 
     @property
+    def default_hyperparameters(self) -> Mapping[str, Any]:
+        """Hyperparameters that the algorithm has by default, by name; on a device those of its simulation."""
+        definition = algorithms.algorithm(self.algorithm)
+        if self.learns_on_device:
+            definition = definition.with_hyperparameters({"simulation": self.hyperparameters.simulation})
+        return dataclasses.asdict(definition.hyperparameters)
+
+    @property
     def learns_on_device(self) -> bool:
         """Whether simulation and learning stay on JAX's device; see `device_learner`."""
         return algorithms.stays_on_device(self.hyperparameters)
@@ -214,14 +222,10 @@ class Configuration:
     @property
     def command(self) -> str:
         """Command line that trains the same policy; hyperparameters with the algorithm's defaults are left out."""
-        algorithm = algorithms.algorithm(self.algorithm)
-        changes = {}
-        if self.learns_on_device:
-            changes["simulation"] = self.hyperparameters.simulation
-            algorithm = algorithm.with_hyperparameters(changes)
-        defaults = dataclasses.asdict(algorithm.hyperparameters)
+        changes = {"simulation": self.hyperparameters.simulation} if self.learns_on_device else {}
+        defaults = self.default_hyperparameters
         hyperparameters = dataclasses.asdict(self.hyperparameters)
-        changes |= {name: value for name, value in hyperparameters.items() if value != defaults[name]}
+        changes |= {n: value for n, value in hyperparameters.items() if n not in defaults or value != defaults[n]}
         words = [
             "arc-suite",
             "train",
@@ -256,7 +260,7 @@ class Configuration:
         idle_names = set()
         if not hyperparameters.get("style"):
             idle_names.update(STYLE_FIELDS)
-        default_steps = getattr(algorithms.algorithm(self.algorithm).hyperparameters, SCHEDULE_STEPS, None)
+        default_steps = self.default_hyperparameters.get(SCHEDULE_STEPS)
         if default_steps is not None and hyperparameters[SCHEDULE_STEPS] == default_steps <= self.steps:
             idle_names.add(SCHEDULE_STEPS)
         return {name: value for name, value in hyperparameters.items() if name not in idle_names}

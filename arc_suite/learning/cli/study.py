@@ -90,7 +90,7 @@ def make_or_report(
     if not runs:
         raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.runs)}")
     folder = Path(FLAGS.runs or Path("runs", tables.folder_name(name)))
-    results = Path(FLAGS.results or Path("studies", tables.folder_name(name)))
+    results = results_folder(name)
     if FLAGS.report:
         publication.publish(study.runs, folder, results, progress)
         print(write_report(name, study, results))
@@ -110,6 +110,11 @@ def make_or_report(
             status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
     publication.publish(study.runs, folder, results, progress)
     return status
+
+
+def results_folder(name: str) -> Path:
+    """Return the folder of a study's tables, as the flags say."""
+    return Path(FLAGS.results or Path("studies", tables.folder_name(name)))
 
 
 def submit(command: Sequence[str], jobs: int, folder: Path, results: Path) -> int:

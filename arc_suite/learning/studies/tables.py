@@ -129,10 +129,21 @@ def benchmark(division: str, algorithm: str) -> Study:
         raise ValueError(f"{what} {rule.source}: {', '.join(fitting_names)}")
     runs = []
     for seed, (robot, task) in itertools.product(range(SEEDS), PLACES):
-        prior = Prior(_collecting_preset(robot, task), rule.episodes) if rule.episodes else None
+        prior = prior_of_division(division, robot, task)
         settings = SETTINGS.get((robot, task))
         runs.append(run(robot, algorithm, rule.steps_in(task), seed, task, settings, prior=prior))
-    return Study(f"division {division} of the benchmark: {algorithm}", tuple(runs))
+    return Study(benchmark_title(division, algorithm), tuple(runs))
+
+
+def benchmark_title(division: str, algorithm: str) -> str:
+    """Return the title of the study of an algorithm on a division."""
+    return f"division {division} of the benchmark: {algorithm}"
+
+
+def prior_of_division(division: str, robot: str, task: str) -> Prior | None:
+    """Return the prior data that a division gives in a place; None for none."""
+    episodes = DIVISIONS[division].episodes
+    return Prior(_collecting_preset(robot, task), episodes) if episodes else None
 
 
 def _collecting_preset(robot: str, task: str) -> str:

@@ -3,11 +3,14 @@
 import pathlib
 import shutil
 
+import programs
 import pytest
-from published_tables import constant, publish
+from published_tables import cells, constant, publish
 from refusals import refused
 
-from arc_suite.learning.studies import results
+from arc_suite.evaluation import judging
+from arc_suite.learning.studies import benchmark, csv_files, report, results
+from arc_suite.learning.studies.benchmark import RunScore
 from arc_suite.learning.studies.tables import Study, run
 from studies import catalog, leaderboard, reports
 
@@ -44,6 +47,88 @@ def test_a_folder_of_no_study_is_refused(tmp_path):
     with refused("unknown study 'shrt'; did you mean 'short'? (there are: paper, ", begins=True):
         leaderboard.write(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["shrt"]
+
+
+EVO = {
+    "kind": "evo:ars",
+    "algorithm": "evo:ars",
+    "robot": "tick",
+    "task": "walk",
+    "task_kwargs": "{}",
+    "hyperparameters": '{"directions": 16, "rate": 0.05}',
+    "steps": "1000000",
+    "evaluate_every": "500000",
+    "training": "{}",
+    "training_seeds": "[]",
+    "sources": "[]",
+}
+EVO_COMMAND = (
+    "`arc-suite train --robot=tick --task=walk --algorithm=evo:ars --steps=1000000 --seed=0 --evaluate_every=500000 "
+    "--hp=directions=16 --hp=rate=0.05`"
+)
+
+
+def publish_evo(studies, notes="", **cells_of_row):
+    """Commit two seeds of an algorithm of a package that is not installed, with scores; return their folder."""
+    folder = studies / "top-evo.ars"
+    twins = [run("tick", "sac", 1_000_000, seed)._replace(label="evo:ars") for seed in (0, 1)]
+    for twin in twins:
+        publish(folder, twin, constant(100.0, 200.0))
+    rows = [{"run": twin.name, "seed": twin.configuration.seed, **EVO, **cells_of_row} for twin in twins]
+    csv_files.write(folder / results.RUNS, results.RUN_COLUMNS, rows)
+    scores = [RunScore("tick", "walk", seed, 204.5, -0.6, 1.0, 0.5, 0.1, notes=notes) for seed in (0, 1)]
+    benchmark.write(studies, "top", "evo.ars", scores)
+    return folder
+
+
+@pytest.mark.parametrize("notes", ["", "source unknown"])
+def test_rows_need_no_algorithm_of_another_package(tmp_path, notes):
+    """Its command has all hyperparameters, as nobody knows their defaults; scores tell whether it has a source."""
+    published = publish_evo(tmp_path, notes)
+    shutil.copytree(COMMITTED / "imitation", tmp_path / "imitation")
+    shutil.copytree(COMMITTED / "top-sb3_ppo", tmp_path / "top-sb3_ppo")
+    leaderboard.write(tmp_path)
+    page = (tmp_path / "README.md").read_text()
+    row = cells(page, "tick, walk", "evo:ars")
+    assert row[2:8] == ["-", "-", "2", "204.5", "-", "204.5, 204.5"]
+    assert row[15:] == [f"ten episodes; {notes}".strip("; "), "[top-evo.ars](top-evo.ars/README.md)", EVO_COMMAND]
+    assert cells(page, "tick, walk", "dagger")[16] == "[imitation](imitation/README.md)"
+    study = catalog.committed_study("top-evo.ars", published)
+    assert study.title == "division top of the benchmark: evo:ars, 2 of 30 runs"
+    (tmp_path / "top-evo.ars" / results.RUNS).unlink()
+    with refused(f"{published}: holds no runs, and so has no report; ", begins=True):
+        catalog.committed_study("top-evo.ars", published)
+
+
+def test_an_algorithm_that_uses_what_a_division_does_not_give_is_noted(tmp_path):
+    published = publish_evo(tmp_path, "source unknown", sources='["a demonstrator"]')
+    (row,) = leaderboard.study_rows("top-evo.ars", published)
+    assert row["notes"] == "ten episodes; source unknown; has used a demonstrator"
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"algorithm": "evo:cma"}, "expected the algorithm evo.ars of the folder's name, got evo.cma"),
+        ({"hyperparameters": "[1"}, "damaged: "),
+        ({"robot": "quen"}, "unknown robot 'quen'; did you mean 'queen'?"),
+    ],
+)
+def test_a_damaged_table_of_another_package_is_one_line(tmp_path, changes, line):
+    published = publish_evo(tmp_path, **changes)
+    with pytest.raises(ValueError, match=r"top-evo.ars.runs.csv: damaged: ") as error:
+        leaderboard.write(tmp_path)
+    assert line in str(error.value) and str(published) in str(error.value)
+
+
+@pytest.mark.slow
+def test_reports_of_other_packages_are_written_from_their_tables(tmp_path):
+    publish_evo(tmp_path / "studies")
+    programs.passed(programs.tool("study", "top-evo.ars", "--report", cwd=tmp_path))
+    page = (tmp_path / "studies" / "top-evo.ars" / report.REPORT).read_text()
+    levels = judging.levels(run("tick", "sac", 1).configuration.setup)
+    assert cells(page, "tick, walk", "evo:ars", "0")[3:] == ["1,000,000 of 1,000,000", "3.0", EVO_COMMAND]
+    assert cells(page, "tick, walk", "standing still")[4] == f"{levels['zero'].mean:.1f}"
 
 
 def test_the_committed_leaderboard_is_made_of_committed_tables(tmp_path):
