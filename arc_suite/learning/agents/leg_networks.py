@@ -238,8 +238,14 @@ class AnyLegs(NamedTuple):
         return inputs[joint_mask.any(axis=-1)]
 
     def normalize(self, moments: Moments) -> Normalizer:
-        """Return the normalizer of 759 numbers, the same for every leg; it does not change the number of joints."""
+        """Return the normalizer of 759 numbers, the same for every leg; it does not change the number of joints.
+
+        Inputs that never changed, as the ground in `steer`, are 0: in other tasks they have no effect.
+        """
+        xp = moments.mean.__array_namespace__()
         mean, factor, limit = moments.normalizer()
+        is_constant = (moments.count > 0.0) & (moments.squares == 0.0)
+        factor = xp.where(is_constant, xp.zeros_like(factor), factor)
         return Normalizer(tokens.repeat_for_legs(mean, 0.0), tokens.repeat_for_legs(factor, 1.0), limit)
 
     def export_actions(self, parameters, x):
