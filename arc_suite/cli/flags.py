@@ -4,7 +4,7 @@ import contextlib
 import json
 import re
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from absl import flags
@@ -27,6 +27,7 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _SEVERAL_SETTINGS = re.compile(r"\w+=[^,]*(?:, *[a-z_]+=[^,]*)+")  # such as "mass=1.2,friction=0.5"
 
 MAX_COUNT = 100_000  # episodes, or bodies: more than anyone waits for
+NAMING_FLAGS = "--robot, --task or --set"  # flags whose values may be `module:name`, which they import
 DEFAULT_LINKS = 3  # of each leg of a body made to order
 ROBOT_HELP = (
     f"{', '.join(registry.robot_words())}; a file in JSON, MJCF or URDF; module:name of one that another package has"
@@ -80,6 +81,36 @@ def define_task(default: str = "walk") -> None:
         "Setting of the task, name=value. Values are JSON where they parse, else text: "
         "--set target_velocity=0.8 --set gait=ripple --set weights='{\"posture\": -0.01}'.",
     )
+
+
+def define_modules(what: str) -> None:
+    """Define --modules, for programs that read names of other packages' parts in files.
+
+    Args:
+        what: the file, which ends the help's first sentence.
+    """
+    flags.DEFINE_list(
+        "modules", [], f"Modules, with commas between them, that register what {what} names: files import nothing."
+    )
+
+
+def import_modules() -> None:
+    """Import the modules of --modules.
+
+    Raises:
+        ValueError: one cannot be imported.
+    """
+    for module in FLAGS.modules:
+        registry.import_module(module, "--modules")
+
+
+@contextlib.contextmanager
+def hint_import(flag: str) -> Iterator[None]:
+    """Add to the error of a module that a file names, and that is not imported, which flag imports it."""
+    try:
+        yield
+    except registry.NotImported as error:
+        raise ValueError(f"{error}, by {flag}") from None
 
 
 def define_policy(text: str = policies.HELP) -> None:
@@ -276,17 +307,20 @@ def _print_training_setup(trained: Setup, setups: Mapping[str, Setup]) -> None:
     print(line)
 
 
-def policy_setup(policy: str | None = None) -> Setup | None:
+def policy_setup(policy: str | None = None, importing_flags: str = NAMING_FLAGS) -> Setup | None:
     """Return the setup that judges a policy, see `Setup.judging`; None for a policy that is no file.
 
     Args:
         policy: policy of a program without --policy; None for the policy of --policy.
+        importing_flags: flags that import modules which the policy's file names, for errors.
 
     Raises:
         ValueError: as `policies.setup_of`.
         OSError: as `policies.setup_of`.
     """
-    training_setup = policies.setup_of(policy_name(FLAGS.policy if policy is None else policy))
+    name = policy_name(FLAGS.policy if policy is None else policy)
+    with hint_import(importing_flags):
+        training_setup = policies.setup_of(name)
     if training_setup is None:
         return None
     return training_setup.judging()

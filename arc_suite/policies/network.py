@@ -129,8 +129,8 @@ def load(path: str | os.PathLike[str]) -> Network:
     """Read a policy file, or that of a run's folder; nothing that it names is imported.
 
     Raises:
-        ValueError: a damaged file, or a robot, task or arena whose module has not been imported; or a run learns that
-            declares no policy as its source.
+        NotImported: the module of a robot, task or arena has not been imported yet.
+        ValueError: a damaged file; or a run learns that declares no policy as its source.
         OSError: it cannot be read.
     """
     usage.add_source(usage.POLICY)
@@ -148,7 +148,7 @@ def load(path: str | os.PathLike[str]) -> Network:
         with parsers.guard(f"{path}: no policy, or a damaged one", passes=(registry.NotImported,)):
             return _read(path)
     except registry.NotImported as error:
-        raise ValueError(f"policy {path}: {error}") from None
+        raise registry.NotImported(f"policy {path}: {error}") from None
 
 
 def _read(path: Path) -> Network:

@@ -23,7 +23,7 @@ ALWAYS = {
     "render": f"{COMMON} seed steps output".replace(" preset", ""),
     "animate": f"{COMMON} clips fps straight plant weight output".replace(" preset", ""),
     "motion": f"{BODY} of clip loop fps output",
-    "play": f"{BODY} arena policy vecnormalize output",
+    "play": f"{BODY} arena policy vecnormalize modules output",
     "view": COMMON.replace(" preset", ""),
     "studio": f"{COMMON} host port".replace(" preset", ""),
     "settings": f"{BODY} {SET}",

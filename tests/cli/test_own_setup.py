@@ -65,5 +65,7 @@ def test_what_contradicts_the_run_is_one_line(folder, tmp_path, program, flags, 
 
 
 def test_an_exported_run_takes_no_other_task(folder):
-    message = f"policy {folder}: --task, --set and --arena go with the body of a policy of many bodies"
+    settings = json.dumps(SETTINGS, sort_keys=True)
+    kept = f"trained on tick, rough, {settings}, which an export keeps"
+    message = f"policy {folder}: {kept}; got flags of tick, walk, {settings}"
     one_line(run("export", str(folder), "--task=walk"), f"arc-suite export: {message}")

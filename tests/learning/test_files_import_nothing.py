@@ -134,14 +134,19 @@ def test_a_configuration_names_modules_as_other_processes_need_them(folder, with
     assert Configuration.of(arc_suite.Setup.of("tick")).modules == ()
 
 
-@pytest.mark.parametrize("change", IN_A_POLICY.values(), ids=IN_A_POLICY)
-def test_a_policy_imports_nothing(folder, change):
+def save_policy(folder, change):
+    """Write a policy file with other fields of its setup."""
     network.save(folder / "policy.npz", networks.made())
     with np.load(folder / "policy.npz") as stored:
         arrays = dict(stored)
     described = {name: value for name, value in change.items() if name != "algorithm"}
     arrays["policy"] = np.array(json.dumps(json.loads(str(arrays["policy"])) | described))
     np.savez(folder / "policy.npz", **arrays)
+
+
+@pytest.mark.parametrize("change", IN_A_POLICY.values(), ids=IN_A_POLICY)
+def test_a_policy_imports_nothing(folder, change):
+    save_policy(folder, change)
     for read in (policies.setup_of, policies.load_network, policies.training_seeds):
         with pytest.raises(ValueError, match=rf"^policy .*policy\.npz: \w+ 'strolling:\w+': {LINE}$"):
             read(str(folder / "policy.npz"))
@@ -157,3 +162,49 @@ def test_train_names_modules_for_a_configuration(folder):
     programs.refused(done, "arc-suite train: run.json: steps: expected an integer from 1, got 0\n")
     done = programs.arc_suite("train", "--modules=stroling", cwd=folder)
     programs.refused(done, "arc-suite train: --modules: cannot import stroling: No module named 'stroling'; start in ")
+
+
+BEETLE = {"robot": "strolling:beetle", "task": "strolling:stroll"}
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "by"),
+    [
+        ("evaluate", ["--policy=policy.npz"], "--robot, --task or --set"),
+        ("export", ["policy.npz"], "--robot, --task or --set"),
+        ("transfer", ["--policy=policy.npz"], "--task or --set"),
+        ("play", ["--policy=policy.npz", "--output=a.html"], "--modules"),
+    ],
+)
+def test_programs_say_which_flag_imports(folder, program, arguments, by):
+    save_policy(folder, BEETLE)
+    line = f"robot 'strolling:beetle': {LINE}, by {by}\n"
+    programs.refused(
+        programs.arc_suite(program, *arguments, cwd=folder), f"arc-suite {program}: policy policy.npz: {line}"
+    )
+    assert not (folder / "imported").exists()
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "line"),
+    [
+        (
+            "export",
+            ["policy.npz", "--robot=strolling:beetle", "--task=strolling:stroll", "--set=target_velocity=0.4"],
+            "trained on beetle, stroll, which an export keeps; got flags of beetle, stroll, ",
+        ),
+        (
+            "transfer",
+            ["--policy=policy.npz", "--task=strolling:stroll", "--set=strolling:wind=1.0"],
+            "expected one of ",
+        ),
+        ("play", ["--policy=policy.npz", "--modules=strolling", "--robot=queen", "--output=a.html"], "made for beetle"),
+    ],
+)
+def test_flags_are_imported_before_a_policy_is_read(folder, program, arguments, line):
+    """The file is read then: the line is about what it holds."""
+    save_policy(folder, BEETLE | {"robot": "tick"} if program == "transfer" else BEETLE)
+    programs.refused(
+        programs.arc_suite(program, *arguments, cwd=folder), f"arc-suite {program}: policy policy.npz: {line}"
+    )
+    assert (folder / "imported").exists()

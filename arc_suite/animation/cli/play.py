@@ -27,8 +27,10 @@ from arc_suite.cli.flags import (
     custom_body,
     define_arena,
     define_body,
+    define_modules,
     define_policy,
     define_preset,
+    import_modules,
     policy_name,
     policy_setup,
     preset_from_flags,
@@ -41,6 +43,7 @@ define_body(more=f", all of them to choose from, or {play_pages.WALKERS}: 27 bod
 define_arena()
 define_policy()
 define_preset()
+define_modules("the policy")
 flags.DEFINE_string("output", None, "File to write, .html. Required.", short_name="o")
 
 
@@ -50,8 +53,9 @@ def main() -> None:
         raise ValueError("no file to write; say --output=FILE.html")
     outputs.check_extension(FLAGS.output, [".html"])
     pages.read_built_file("play.js")  # raises an error now if there is none
-    bodies = _bodies_from_flags()  # first: this imports the modules that flags name
-    bodies = choose_bodies(policy_setup(), bodies)
+    import_modules()
+    bodies = _bodies_from_flags()  # this imports the modules that flags name
+    bodies = choose_bodies(policy_setup(importing_flags="--modules"), bodies)
     policy = policy_name(FLAGS.policy)
     preset = preset_from_flags()
     with files.writing(FLAGS.output) as temporary:

@@ -8,26 +8,20 @@ license, and shows a picture of the policy. `arc-suite train` writes it when a r
 
 from pathlib import Path
 
-from absl import flags
-
-from arc_suite import registry
+from arc_suite.cli.flags import define_modules, hint_import, import_modules
 from arc_suite.learning import cards
 from arc_suite.learning.agents import configuration, run_folder
 
-FLAGS = flags.FLAGS
-flags.DEFINE_list("modules", [], "Modules, with commas between them, that register what config.json names.")
+define_modules("config.json")
 
 
 def main(run: str | None = None) -> None:
     """Write the card, and print its path."""
     if run is None:
         raise ValueError("expected the folder of a run, such as runs/tick-walk-ppo-0")
-    for module in FLAGS.modules:
-        registry.import_module(module, "--modules")
+    import_modules()
     folder = Path(run)
     run_folder.read_config(folder)  # says that the folder is of no run
-    try:
+    with hint_import("--modules"):
         read_run = configuration.read(folder / run_folder.CONFIG)
-    except registry.NotImported as error:
-        raise ValueError(f"{error}, by --modules") from None
     print(f"wrote {cards.write(read_run, folder)}")

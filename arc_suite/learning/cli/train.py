@@ -35,7 +35,10 @@ from arc_suite import checks, evaluation, files, registry
 from arc_suite.cli.flags import (
     custom_body,
     define_body,
+    define_modules,
     define_task,
+    hint_import,
+    import_modules,
     named_values,
     only_body,
     refuse_flags,
@@ -117,11 +120,7 @@ flags.DEFINE_string(
     "Train as config.json of another run's folder says. It stands for the flags of body, policy and task, and for "
     "--seed, --steps and --evaluate_every.",
 )
-flags.DEFINE_list(
-    "modules",
-    [],
-    "Modules, with commas between them, that register what --config names: files themselves import nothing.",
-)
+define_modules("--config")
 flags.DEFINE_float(
     "minutes",
     None,
@@ -331,16 +330,13 @@ def configurations_from_flags() -> list[Configuration]:
         ValueError: a flag that does not fit.
         OSError: a file that cannot be read.
     """
-    for module in FLAGS.modules:
-        registry.import_module(module, "--modules")
+    import_modules()
     if FLAGS.config is not None:
         refuse_flags(
             (*_CONFIGURATION_FLAGS, "evaluate_every"), "expected none with --config, which has the whole configuration"
         )
-        try:
+        with hint_import("--modules"):
             return [configuration.read(Path(FLAGS.config))]
-        except registry.NotImported as error:
-            raise ValueError(f"{error}, by --modules") from None
     hyperparameters = named_values("hp", FLAGS.hp)
     training = named_values("train_set", FLAGS.train_set)
     several_bodies = registry.names_several_bodies(FLAGS.robot) and custom_body() is None

@@ -19,7 +19,7 @@ from absl import flags
 
 from arc_suite import checks, files, policies
 from arc_suite.bodies import universal
-from arc_suite.cli.flags import complete_task, define_task, refuse_flags, task_from_flags
+from arc_suite.cli.flags import complete_task, define_task, hint_import, refuse_flags, task_from_flags
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.learning.studies import bodies
@@ -34,7 +34,10 @@ flags.DEFINE_string("name", None, "Of the policy in this table. [default: the st
 
 def main() -> None:
     """Play, print the table and write the episodes."""
-    task, settings = complete_task(policies.setup_of(FLAGS.policy), *task_from_flags())
+    task, settings = task_from_flags()  # first: this imports the modules that flags name
+    with hint_import("--task or --set"):
+        trained = policies.setup_of(FLAGS.policy)
+    task, settings = complete_task(trained, task, settings)
     for family in FLAGS.families:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
