@@ -17,8 +17,9 @@ stronger motors help. With
 task names the preset, the mean of its metric, and how many episodes it ended without a fall; in `recover`, in
 how many of them it got up.
 
-A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
-the line names the terms, metrics and blocks that differ.
+A task: its methods must return what the contract says, and its terms, blocks and reward must be finite. A batch of
+environments must compute bit for bit what each computes alone, over 200 control steps; the line names the terms,
+metrics and blocks that differ.
 
 Exit status 1 if there is any flaw, fall, slow walk or difference.
 """
@@ -32,7 +33,7 @@ from arc_suite.cli import program
 from arc_suite.cli.flags import ROBOT_HELP, define_task, refuse_flags, task_from_flags
 from arc_suite.cpg.selection import suited_preset
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import conformance, cures, suitability
+from arc_suite.evaluation import conformance, cures, suitability, task_results
 from arc_suite.models.sizing import size_body
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import measure_standing
@@ -209,9 +210,14 @@ def _describe_walk(walk: cures.FirstWalk) -> str:
 
 
 def _check_task() -> bool:
-    """Print whether a batch of environments computes what each computes alone, and return it."""
+    """Print whether a task's results fit and are finite, and a batch computes what each computes alone; return it."""
     task, settings = task_from_flags()
     setup = Setup.of(FLAGS.robot, task, settings)
+    task_results.check_results(setup)
+    flaw = task_results.find_non_finite(setup, conformance.STEPS)
+    if flaw is not None:
+        print(f"{setup}: {flaw}, expected finite numbers")
+        return False
     difference = conformance.difference(setup)
     if difference is None:
         print(f"{setup}: a batch of environments equals each of them alone over {conformance.STEPS} steps")

@@ -17,6 +17,7 @@ EPISODES = 100  # that evaluate a final policy, from seed 0
 CURVE_EPISODES = 10  # that evaluate a point of a learning curve (the paper's Section 6, Experimental Setting)
 
 _PROGRESS = "progress_"  # prefix of the task's metrics in an info
+_REWARD = "reward_"  # prefix of the terms of the reward in an info
 
 
 class EpisodeResult(NamedTuple):
@@ -103,15 +104,47 @@ def run(
         seed: see `rollout`.
         max_steps: see `rollout`.
         watchers: called with every `TimeStep`, also that of the reset, while the environment is in that state.
+
+    Raises:
+        ValueError: as `rollout`; or a reward, or a block of the last observation, that is not finite.
     """
     rewards = []
+    timestep = None
     for timestep in rollout(environment, policy, seed, max_steps):
         if not timestep.first():
             rewards.append(timestep.reward)
         for watch in watchers:
             watch(timestep)
     progress = {name: float(value) for name, value in environment.task.progress.items()}
-    return EpisodeResult(float(sum(rewards)), len(rewards), progress)
+    total = float(sum(rewards))
+    if not math.isfinite(total):
+        step = next(step for step, reward in enumerate(rewards, 1) if not math.isfinite(reward))
+        for _ in rollout(environment, policy, seed, step):  # again, to see the terms of that step
+            pass
+        _refuse_non_finite(environment.task.definition.name, environment.task.terms, seed, f"in step {step}")
+    _check_observation(environment.task.definition.name, timestep, seed)
+    return EpisodeResult(total, len(rewards), progress)
+
+
+def _refuse_non_finite(task_name: str, terms: Mapping[str, Any], seed: int, when: str) -> None:
+    """Raise ValueError for the reward of an episode that is not finite; it names the terms that are not.
+
+    Args:
+        task_name: name of the task.
+        terms: terms of the reward of one environment by name, at that step.
+        seed: seed of the episode.
+        when: the step in words.
+    """
+    names = [name for name, term in terms.items() if not np.isfinite(term)]
+    cause = f": {', '.join(f'term {name!r} is {terms[name]}' for name in names)}" if names else ""
+    raise ValueError(f"task {task_name}: the reward of the episode of seed {seed} is not finite {when}{cause}")
+
+
+def _check_observation(task_name: str, timestep: TimeStep | None, seed: int) -> None:
+    """Raise ValueError for a block of the last observation of an episode that is not finite."""
+    for name, block in (timestep.observation if timestep is not None else {}).items():
+        if not np.isfinite(block).all():
+            raise ValueError(f"task {task_name}: block {name!r} is not finite at the end of the episode of seed {seed}")
 
 
 def episodes(environment: Environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)) -> list[EpisodeResult]:
@@ -143,7 +176,7 @@ def episodes_in_batch(
             that played the step, none after the reset, and of those in which it ended by a fall or a divergence.
 
     Raises:
-        ValueError: episodes that need not end.
+        ValueError: episodes that need not end, or a return that is not finite.
     """
     check_ends(environment.step_limit)
     num_envs = environment.num_envs
@@ -167,7 +200,10 @@ def episodes_in_batch(
             watch(is_playing, is_playing & (terminated | has_diverged))
         has_ended = is_playing & (terminated | truncated)
         for index in np.flatnonzero(has_ended).tolist():
-            progress[index] = _read_metrics(info, index)
+            progress[index] = _read_metrics(info, index, _PROGRESS)
+            if not math.isfinite(totals[index]):
+                terms = _read_metrics(info, index, _REWARD)
+                _refuse_non_finite(environment.task.definition.name, terms, seeds[index], f"by step {lengths[index]}")
         is_playing &= ~has_ended
         if has_ended.any() and is_playing.any():
             environment.rest(~is_playing)
@@ -178,10 +214,10 @@ def episodes_in_batch(
     return results
 
 
-def _read_metrics(info: Mapping[str, np.ndarray], index: int) -> dict[str, float]:
-    """Return the metrics of one environment of a batch; those of other tasks are left out."""
+def _read_metrics(info: Mapping[str, np.ndarray], index: int, prefix: str) -> dict[str, float]:
+    """Return the metrics of one environment of a batch with a prefix; those of other tasks are left out."""
     metrics = {}
     for name, values in info.items():
-        if name.startswith(_PROGRESS) and info[f"_{name}"][index]:
-            metrics[name.removeprefix(_PROGRESS)] = float(values[index])
+        if name.startswith(prefix) and info[f"_{name}"][index]:
+            metrics[name.removeprefix(prefix)] = float(values[index])
     return metrics

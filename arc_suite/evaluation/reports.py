@@ -12,7 +12,7 @@ from arc_suite import checks, policies
 from arc_suite.cpg import suited_preset
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import anchors, protocol, provenance, statistics
+from arc_suite.evaluation import anchors, protocol, provenance, statistics, task_results
 from arc_suite.evaluation.protocol import CURVE_EPISODES, EPISODES, EpisodeResult
 from arc_suite.evaluation.statistics import Summary
 from arc_suite.policies import Policy, PolicyFunction
@@ -172,6 +172,7 @@ def player(policy: str | os.PathLike[str] | Policy | PolicyFunction, setup: Setu
         OSError: as `evaluate`.
     """
     policies.check_preset(policy, preset)
+    task_results.check_results_of_others(setup)
     environment = setup.load()
     if policy == "cpg" and preset is None:
         preset = suited_preset(environment.task.definition)

@@ -99,6 +99,26 @@ def shared_model(body: Body, arena: Arena) -> mujoco.MjModel:
     return model
 
 
+def simulation_at(
+    model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray, mocap_pos: np.ndarray | None = None
+) -> mujoco.MjData:
+    """Return a simulation in a state, with all that follows from it.
+
+    Args:
+        model: a compiled model.
+        qpos: (nq,) positions.
+        qvel: (nv,) velocities.
+        mocap_pos: (mocap bodies, 3) positions of obstacles, m; None for those of the model.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    data.qvel[:] = qvel
+    if mocap_pos is not None:
+        data.mocap_pos[:] = mocap_pos
+    mujoco.mj_forward(model, data)
+    return data
+
+
 def change_fields(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: mujoco.MjData) -> None:
     """Write fields of a model, by name, and update the constants that MuJoCo derives from them.
 

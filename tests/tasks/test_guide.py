@@ -176,7 +176,7 @@ def test_mistakes_in_a_task_and_its_settings_are_one_line(module, setting, messa
     (tmp_path / "crouching.py").write_text(module)
     arguments = ("--task=crouching:crouch", "--robot=tick", "--policy=zero", "--episodes=1", *setting)
     done = programs.arc_suite("evaluate", *arguments, cwd=tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite evaluate: {message}\n")
+    programs.refused(done, f"arc-suite evaluate: {message}")
 
 
 @pytest.mark.parametrize("command", tiers(COMMANDS, never, lambda command: "evaluate" in command))

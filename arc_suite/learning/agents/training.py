@@ -12,6 +12,8 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite import checks, evaluation, files, seed_ranges, usage
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import task_results
 from arc_suite.learning.agents import algorithms, priors, run_folder, run_usage
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
 from arc_suite.learning.agents.evaluating import Evaluator, Lines, ProcessEvaluator
@@ -23,6 +25,7 @@ from arc_suite.policies.network import Network
 from arc_suite.simulation.cores import usable_cores
 
 _SAVE_INTERVAL = 30.0  # s between two checkpoints of a learner that stays on a device
+_FLAW_STEPS = 50  # control steps in which a task's results are looked at once a learner has diverged
 _UNITS = {"reward": " a step"}  # of metrics behind a progress bar
 
 
@@ -63,6 +66,7 @@ def train(
         _record(configuration, folder, threads, stays_on_device, [configuration.seed], on_metrics) as recorder,
         contextlib.closing(algorithm.learn(algorithm.hyperparameters, recorder.context)) as slices,
         recorder.show_progress(progress),
+        _naming_flaw_of_task(recorder.context.training),
     ):
         while not recorder.finished:
             is_time_up = minutes is not None and recorder.cpu_seconds() > 60.0 * minutes
@@ -112,6 +116,7 @@ def train_in_one_program(
         )
         for recorder in recorders:
             stack.enter_context(recorder.show_progress(progress))
+        stack.enter_context(_naming_flaw_of_task(contexts[0].training))
         while not all(recorder.finished for recorder in recorders):
             with _naming_damage(folders):
                 slices = next(all_slices)
@@ -280,6 +285,7 @@ def _record(
         record[PRIOR_SHA256] = priors.dataset_digest(configuration.prior)
     training_seeds = _training_seeds(configuration, folder)
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
+    task_results.check_results_of_others(configuration.setup)
     evaluation.check_ends(configuration.setup.definition.step_limit)
     growing_fields = ("steps",) if configuration.definition.extends else ()
     with run_folder.open_run(folder, record, growing_fields) as run_files, contextlib.ExitStack() as stack:
@@ -315,6 +321,19 @@ def _naming_damage(folders: Sequence[Path]) -> Iterator[None]:
     except Damaged as error:
         paths = ", ".join(str(folder / run_folder.CHECKPOINT) for folder in folders)
         raise ValueError(f"{paths} is damaged: {error}; delete it to start the run over") from None
+
+
+@contextlib.contextmanager
+def _naming_flaw_of_task(setup: Setup) -> Iterator[None]:
+    """Say in the error `Diverged` if the task itself gives results that are not finite, under random actions."""
+    try:
+        yield
+    except Diverged as error:
+        with usage.pause():
+            flaw = task_results.find_non_finite(setup, _FLAW_STEPS)
+        if flaw is not None:
+            error.args = (f"{error}; the task {setup.task} gives such results itself: {flaw} under random actions",)
+        raise
 
 
 class _CheckpointWriter:

@@ -25,6 +25,8 @@ from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.learner import Diverged
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.learning.agents.training import train
+from arc_suite.tasks import TASKS
+from arc_suite.tasks.walk import Walk
 
 NAMES = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.hyperparameters, SoftActorCritic)]
 STEPS, EVERY = 250, 100
@@ -233,6 +235,20 @@ def test_a_learner_that_diverges_stops_with_one_line_and_its_last_checkpoint(tin
         assert all(np.isfinite(stored[name]).all() for name in stored.files if name.startswith("state"))
     monkeypatch.setattr(off_policy, "update", update)
     assert train(run, tmp_path / "run", progress=silent), "the checkpoint is good"
+
+
+def test_a_learner_that_diverges_by_its_task_names_the_term(tmp_path, monkeypatch):
+    class Spoiled(Walk):
+        name = "spoiled"
+
+        def terms(self, memory, readings):
+            return super().terms(memory, readings) | {"forward": memory.forward_velocity * np.nan}
+
+    monkeypatch.setitem(TASKS, "spoiled", Spoiled)
+    run = Configuration.of(Setup.of("tick", "spoiled", SHORT), "sac", small("sac"), steps=200, evaluate_every=EVERY)
+    line = "; the task spoiled gives such results itself: step 1: term 'forward' is nan under random actions$"
+    with pytest.raises(Diverged, match=f"^the learner diverged: .* at step .*{line}"):
+        train(run, tmp_path / "run", progress=silent)
 
 
 def broken_off(run, folder):
