@@ -1,21 +1,24 @@
 """The guide to parts of other packages: its code runs, from a folder that is not the suite's."""
 
+import configparser
 import json
 import os
 import re
 import subprocess
 import sys
+import tomllib
 
 import programs
 import pytest
 from interpreters import ROOT, printed
+from packaging.requirements import Requirement
 
 GUIDE = (ROOT / "docs" / "doors.md").read_text()
 SHUFFLING, USING_A_LAW, GALES, USING_A_MODIFIER, _, GESTURING, JOINT_COUNTER, MEASURING = re.findall(
     r"```python\n(.*?)```", GUIDE, re.DOTALL
 )
 EVALUATE, COLLECT, _, _, ANIMATE, COUNT, _ = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
-(ENTRY_POINT,) = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
+ENTRY_POINT, PYPROJECT = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
 
 
 @pytest.fixture
@@ -172,6 +175,18 @@ def installed(folder):
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: legs-kit\nVersion: 1.0\n")
     (metadata / "entry_points.txt").write_text(f"[{group}]\n{entry.replace(chr(34), '')}\n")
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
+
+
+def test_the_package_of_the_guide_has_its_modules_and_the_address_of_the_suite(folder):
+    fields = tomllib.loads(PYPROJECT)
+    assert all((folder / f"{name}.py").exists() for name in fields["tool"]["setuptools"]["py-modules"])
+    assert fields["project"]["entry-points"] == tomllib.loads(ENTRY_POINT)["project"]["entry-points"]
+    (requirement,) = map(Requirement, fields["project"]["dependencies"])
+    (address,) = re.findall(r"^(?:# )?url = (\S+)$", (ROOT / "setup.cfg").read_text(), re.MULTILINE)
+    assert (requirement.name, requirement.url) == ("arc_suite", f"git+{address}@main")
+    extras = configparser.ConfigParser()
+    extras.read(ROOT / "setup.cfg")
+    assert requirement.extras <= set(extras["options.extras_require"])
 
 
 def command(environ, *arguments):
