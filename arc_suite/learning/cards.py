@@ -93,17 +93,30 @@ def _metadata(run: Configuration, mean_return: float) -> str:
 
 
 def _is_of_suite(run: Configuration) -> bool:
+    """Return whether all parts are the suite's; what is made of parts of others has a license of its own."""
+    return _has_body_of_suite(run) and not run.parts_of_others
+
+
+def _has_body_of_suite(run: Configuration) -> bool:
     """Return whether the bodies are the suite's; those of others have licenses of their own."""
+    kinds = {kind for kind, _ in run.parts_of_others}
+    if kinds & {"robot", "family"}:
+        return False
     return run.setup.several or run.setup.name in registry.robot_words()
 
 
 def _license_text(run: Configuration) -> str:
+    body_text = "The creature and its looks are the suite's"
     if _is_of_suite(run):
-        return "Apache-2.0, as the suite. The creature and its looks are the suite's."
-    return (
-        f"The code that trained it is under Apache-2.0. `{run.setup.name}` is no robot of the suite: its license is "
-        "that of the body's author. Set `license` at the head of this card to yours."
-    )
+        return f"Apache-2.0, as the suite. {body_text}."
+    names = [f"the {kind} `{name}`" for kind, name in run.parts_of_others]
+    sentences = [f"Not of the suite: {', '.join(names)}."] if names else []
+    if _has_body_of_suite(run):
+        sentences.append(f"{body_text}, under Apache-2.0.")
+    else:
+        sentences.append(f"`{run.setup.name}` is no robot of the suite: its license is that of the body's author.")
+    sentences.append("The license of this policy is for its author to state: set `license` at the head of this card.")
+    return " ".join(sentences)
 
 
 def _read_returns(folder: Path) -> tuple[np.ndarray, str]:

@@ -3,15 +3,19 @@
 import json
 import pathlib
 import re
+import sys
 import types
 
 import programs
 import pytest
 import tiny_studies
 
-from arc_suite import learning
+import arc_suite
+from arc_suite import learning, registry
 from arc_suite.learning import cards
 from arc_suite.learning.agents import configuration, run_folder
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.tasks.walk import Walk
 
 SETTINGS = {"time_limit": 0.25}
 
@@ -34,7 +38,7 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
     card = (folder / "README.md").read_text()
     head = card.split("---")[1]
     fields = dict(line.split(": ", 1) for line in head.strip().splitlines())
-    assert json.loads(fields["license"]) == "apache-2.0" and "walk" in json.loads(fields["tags"])
+    assert json.loads(fields["license"]) == "other" and "walk" in json.loads(fields["tags"])
     returns = run_folder.latest_returns(run_folder.table(folder, "evaluations"))
     (result,) = json.loads(fields["model-index"])[0]["results"]
     assert result["metrics"][0]["value"] == pytest.approx(returns.mean(), abs=0.05)
@@ -53,10 +57,63 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
     [("tick", False, True), ("spider", False, True), ("varied:0-9", True, True), ("dachs", False, False)],
 )
 def test_bodies_of_others_have_licenses_of_their_own(name, several, of_suite):
-    run = types.SimpleNamespace(setup=types.SimpleNamespace(name=name, several=several))
+    run = types.SimpleNamespace(setup=types.SimpleNamespace(name=name, several=several), parts_of_others=())
     assert cards._is_of_suite(run) == of_suite
     assert ("looks are the suite's" in cards._license_text(run)) == of_suite
     assert (f"`{name}` is no robot of the suite" in cards._license_text(run)) != of_suite
+
+
+OF_AUTHOR = "The license of this policy is for its author to state: set `license` at the head of this card."
+
+
+@pytest.fixture
+def carrier(monkeypatch):
+    """Register parts of each kind as if a module `outside` had, and take them back afterwards."""
+    before = [dict(table) for table in (registry.ROBOTS, registry.TASKS, registry.FAMILIES, registry.MODULE_OF_NAME)]
+    body = registry.ROBOTS["tick"].replace(name="mantis")
+    carry = type("Carry", (Walk,), {"name": "carry"})
+    arc_suite.register(module="outside", body=body, tasks=(carry,), families={"swarm": lambda seed: body})
+    monkeypatch.setitem(sys.modules, "outside", types.ModuleType("outside"))
+    yield
+    tables = (registry.ROBOTS, registry.TASKS, registry.FAMILIES, registry.MODULE_OF_NAME)
+    for table, entries in zip(tables, before, strict=True):
+        table.clear()
+        table.update(entries)
+
+
+@pytest.mark.parametrize(
+    ("robot", "task", "algorithm", "line"),
+    [
+        (
+            "mantis",
+            "carry",
+            "dagger",
+            "Not of the suite: the robot `outside:mantis`, the task `outside:carry`. `mantis` is no robot of the "
+            f"suite: its license is that of the body's author. {OF_AUTHOR}",
+        ),
+        (
+            "tick",
+            "walk",
+            "tiny_studies:climb",
+            "Not of the suite: the algorithm `tiny_studies:climb`. The creature and its looks are the suite's, under "
+            f"Apache-2.0. {OF_AUTHOR}",
+        ),
+        ("queen,outside:swarm:0-1", "walk", "dagger_bodies", None),
+        ("tick", "walk", "dagger", "Apache-2.0, as the suite. The creature and its looks are the suite's."),
+        (
+            "varied:0-1",
+            "walk",
+            "dagger_bodies",
+            "Apache-2.0, as the suite. The creature and its looks are the suite's.",
+        ),
+    ],
+)
+def test_parts_of_others_leave_the_license_to_the_author(carrier, robot, task, algorithm, line):
+    run = Configuration.of(arc_suite.Setup.of(robot, task), algorithm)
+    text = cards._license_text(run)
+    assert text == line if line else text.startswith("Not of the suite: the family `outside:swarm`. ")
+    is_of_suite = text.startswith("Apache-2.0")
+    assert f'license: "{"apache-2.0" if is_of_suite else "other"}"' in cards._metadata(run, 1.0)
 
 
 def test_the_program_draws_the_policy(folder):

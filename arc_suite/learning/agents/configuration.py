@@ -292,6 +292,15 @@ class Configuration:
         modules = [name.rpartition(":")[0] for _, name in _registered_names(self.to_dict()) if ":" in name]
         return tuple(dict.fromkeys(modules))  # each once
 
+    @property
+    def parts_of_others(self) -> tuple[tuple[str, str], ...]:
+        """Kind and name of each part in the configuration that another package has registered."""
+        parts = []
+        for kind, name in _registered_names(self.to_dict()):
+            kinds = (kind, "family") if kind == "robot" else (kind,)
+            parts += [(kind, name) for kind in kinds if (kind, registry.bare_name(name)) in registry.MODULE_OF_NAME]
+        return tuple(dict.fromkeys(parts))  # each once
+
     def record(self) -> dict[str, Any]:
         """Return `to_dict` with hashes and versions of everything that a run computes with, plain values by field.
 
