@@ -60,7 +60,7 @@ def _program_of_another_package(name: str) -> ModuleType:
         if name in FORMER_PROGRAMS:
             raise ValueError(f"{name} is no program any more; {FORMER_PROGRAMS[name]}")
         if name in entry_points:
-            full_name = f"{entry_points[name].value}:{name}"
+            full_name = f"{entry_points[name].module}:{name}"
         elif ":" in name:
             full_name = name
         else:

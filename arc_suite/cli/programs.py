@@ -60,13 +60,36 @@ def usage() -> str:
         summaries[name] = f"of the package {entry_point.dist.name}"
     width = max(len(name) for name in summaries)
     lines = [f"  {name:<{width}}  {text}" for name, text in summaries.items()]
-    return _USAGE.format(programs="\n".join(lines))
+    return "\n".join([_USAGE.format(programs="\n".join(lines)), *_describe_hidden_programs()])
 
 
 def installed_programs() -> dict[str, metadata.EntryPoint]:
-    """Return the entry points of programs of installed packages by name; those of the suite's names are left out."""
-    entry_points = metadata.entry_points(group=ENTRY_POINT_GROUP)
-    return {entry_point.name: entry_point for entry_point in entry_points if entry_point.name not in PROGRAMS}
+    """Return the entry points of programs of installed packages by name; of one name the first package in the alphabet.
+
+    Those of the suite's names are left out.
+    """
+    programs: dict[str, metadata.EntryPoint] = {}
+    for entry_point in _entry_points():
+        if entry_point.name not in PROGRAMS:
+            programs.setdefault(entry_point.name, entry_point)
+    return programs
+
+
+def _entry_points() -> list[metadata.EntryPoint]:
+    """Return the entry points of programs of all packages, packages in the order of the alphabet."""
+    return sorted(metadata.entry_points(group=ENTRY_POINT_GROUP), key=lambda entry_point: entry_point.dist.name)
+
+
+def _describe_hidden_programs() -> list[str]:
+    """Return a line for each installed program whose name runs another one."""
+    package_of_program = {name: entry_point.dist.name for name, entry_point in installed_programs().items()}
+    lines = []
+    for entry_point in _entry_points():
+        name = entry_point.name
+        if entry_point.dist.name != package_of_program.get(name):
+            line = f"{name} of the package {entry_point.dist.name} has the name of another program; run it as"
+            lines.append(f"{line} arc-suite {entry_point.module}:{name}.")
+    return lines
 
 
 def program_summary(name: str) -> str:

@@ -166,14 +166,14 @@ def test_a_program_runs_by_its_module(run):
     programs.refused(run(COUNT, "--robot=nobody"), "arc-suite measuring:count_joints: unknown robot 'nobody'")
 
 
-def installed(folder):
-    """Install the guide's program as a package does: metadata with the entry point of the guide."""
+def installed(folder, name="legs-kit", entries=None):
+    """Install programs as a package does: metadata with entry points, by default that of the guide."""
     (group,) = re.findall(r'"(.*)"\]', ENTRY_POINT)
     (entry,) = re.findall(r"\n(.*)\n", ENTRY_POINT)
-    metadata = folder / "legs_kit-1.0.dist-info"
+    metadata = folder / f"{name.replace('-', '_')}-1.0.dist-info"
     metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: legs-kit\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(f"[{group}]\n{entry.replace(chr(34), '')}\n")
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(f"[{group}]\n{entries or entry.replace(chr(34), '')}\n")
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
 
 
@@ -207,6 +207,21 @@ def test_help_lists_an_installed_program_and_imports_nothing(folder):
     (folder / "measuring.py").write_text("raise SystemExit('imported')\n")
     lines = programs.passed(command(environ, "--help")).splitlines()
     assert "  count_joints  of the package legs-kit" in lines
+
+
+def test_help_tells_of_programs_whose_names_run_others(folder):
+    installed(folder)
+    environ = installed(folder, "other-kit", "count_joints = measuring:count_joints\nevaluate = measuring")
+    lines = programs.passed(command(environ, "--help")).splitlines()
+    assert lines[-2:] == [
+        f"{name} of the package other-kit has the name of another program; run it as arc-suite measuring:{name}."
+        for name in ("count_joints", "evaluate")
+    ]
+
+
+def test_an_entry_point_may_name_an_attribute(folder):
+    environ = installed(folder, entries="count_joints = measuring:count_joints")
+    assert programs.passed(command(environ, "count_joints", "--robot=tick")) == "tick has 18 joints\n"
 
 
 @pytest.mark.parametrize(
