@@ -554,16 +554,27 @@ def import_module(module: str, subject: str) -> None:
         raise ValueError(message) from None
 
 
+def _name_in_file(path: str, key: str) -> str:
+    """Return how to name a part that the file of a module registers."""
+    name = f"{Path(path).stem}:{key}"
+    folder = Path(path).parent
+    return name if folder == Path() else f"{name}, with {folder} in PYTHONPATH"
+
+
 def _look_up(name, table: Mapping, kind: str, suggestions: Iterable[str] = ()):
     """Return the entry of `name`, or of `module:name` after an import of the module, in a table of a kind.
 
     Raises:
         ValueError: an unknown name, a module that cannot be imported, or a module that does not register the name.
     """
+    if isinstance(name, str) and name.endswith(".py"):
+        raise ValueError(f"{kind} {checks.preview(name)}: expected {_name_in_file(name, 'name')}")
     if not (isinstance(name, str) and ":" in name):
         return table[checks.name(name, table, kind, suggestions, ("module:name",))]
 
     module, _, key = name.rpartition(":")
+    if module.endswith(".py"):
+        raise ValueError(f"{kind} {checks.preview(name)}: expected {_name_in_file(module, key)}")
     if not all(part.isidentifier() for part in module.split(".")):
         raise ValueError(f"{kind} {checks.preview(name)}: expected module:name, with a module that can be imported")
     shown_key = repr(key[:_MAX_QUOTE])
