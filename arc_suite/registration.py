@@ -1,5 +1,6 @@
 """Registration of other packages' robots, tasks, laws, learners and other parts, and of ids with Gymnasium."""
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -18,7 +19,7 @@ from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.modifiers import MODIFIERS, Modifier
-from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
+from arc_suite.tasks.parameters import LARGEST, PARAMETERS, SHARED_NOISE
 
 BODIES = "bodies"  # stands in place of a robot's name in ids of environments of different bodies
 
@@ -29,6 +30,12 @@ _TABLES: dict[str, dict[str, Any]] = {
     "family": FAMILIES,
     "modifier": MODIFIERS,
     **ADDITIONS,
+}
+
+# Argument that `register` lacks -> what takes its place, in errors.
+_HINTS = {
+    **dict.fromkeys(("bodies", "robot", "robots"), "body takes one robot's body"),
+    "gait": "parameters has the gait of a robot",
 }
 
 
@@ -48,6 +55,7 @@ def register(
     algorithms: Mapping[str, Any] | None = None,
     clips: Mapping[str, Any] | None = None,
     programs: Mapping[str, str] | None = None,
+    **others: Any,
 ) -> None:
     """Add a robot, or parts of other kinds, to the suite: every task then exists for every robot.
 
@@ -79,6 +87,7 @@ def register(
         clips: values of classes of `animation.clips.catalog`, such as `Acted`, by name.
         programs: names of modules that `arc-suite` runs, by name of the program. Each module has a docstring and a
             function `main`.
+        others: unknown arguments, which are refused with what takes their place.
 
     A network, an algorithm or a clip may also be a text `module:attribute`: it is then imported and checked at its
     first use.
@@ -87,8 +96,15 @@ def register(
         ValueError: a name that is taken, a task or a law that lacks methods, or parameters or a preset that do not fit
             the body. Nothing has been registered then.
     """
+    for name in others:
+        if name in _HINTS:
+            raise ValueError(f"argument {name!r}: {_HINTS[name]}")
+        checks.name(name, [key for key in inspect.signature(register).parameters if key != "others"], "argument")
     if module == "__main__":  # other processes cannot import it
         module = None
+    _check_tables(tasks=tasks, modifiers=modifiers)
+    _check_tables(arenas=arenas, families=families, laws=laws, networks=networks)
+    _check_tables(algorithms=algorithms, clips=clips, programs=programs, presets=presets, parameters=parameters)
     all_additions = {
         "task": {_task_name(task): task for task in tasks},
         "arena": arenas,
@@ -126,6 +142,24 @@ def register(
     register_ids()
 
 
+def _check_tables(**additions: Any) -> None:
+    """Raise ValueError for parts by argument that are no tuple of classes or no mapping of names to parts."""
+    for name, parts in additions.items():
+        if name in ("tasks", "modifiers"):
+            if isinstance(parts, type) or not isinstance(parts, Iterable):
+                example = f"({parts.__name__},)" if isinstance(parts, type) else "(Name,)"
+                raise ValueError(f"{name}: expected classes, such as {name}={example}, got {checks.preview(parts)}")
+        elif not isinstance(parts, Mapping | None):
+            raise ValueError(f"{name}: expected a mapping of names to values, got {checks.preview(parts)}")
+
+
+def _is_new_version(value: Any, earlier_value: Any) -> bool:
+    """Return whether two classes or functions have the same name in the same module, as after an edit of a cell."""
+    attributes = ("__module__", "__qualname__")
+    names, earlier_names = ([getattr(part, name, None) for name in attributes] for part in (value, earlier_value))
+    return None not in names and names == earlier_names
+
+
 def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) -> None:
     """Raise ValueError for a name that is no identifier, or that something else has."""
     table = _TABLES[kind]
@@ -134,7 +168,8 @@ def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) ->
             raise ValueError(f"{kind} {checks.preview(name)}: expected a name of letters, digits and underscores")
         is_same_value = table.get(name) is value
         is_of_same_module = module is not None and MODULE_OF_NAME.get((kind, name)) == module
-        if name in table and not (is_same_value or is_of_same_module):  # registering a part again is fine
+        is_known = is_same_value or is_of_same_module or _is_new_version(value, table.get(name))
+        if name in table and not is_known:  # registering a part again is fine
             raise ValueError(f"{kind} {checks.preview(name)} is already registered; choose another name")
 
 
@@ -154,8 +189,9 @@ def _preset_class(name: str, law_class) -> type:
     if name in SUITE_PRESETS:
         raise ValueError(f"law {name!r}: the suite has presets of this name; choose another name")
     preset_class = type(law_class.preset)
-    if LAWS.get(preset_class, law_class) is not law_class:
-        raise ValueError(f"law {name!r}: presets of {preset_class.__name__} are those of {LAWS[preset_class].__name__}")
+    law_of_presets = LAWS.get(preset_class, law_class)
+    if law_of_presets is not law_class and not _is_new_version(law_class, law_of_presets):
+        raise ValueError(f"law {name!r}: presets of {preset_class.__name__} are those of {law_of_presets.__name__}")
     return preset_class
 
 
@@ -172,7 +208,37 @@ def _task_name(task) -> str:
     if missing:
         methods = " and no ".join(missing)
         raise ValueError(f"task {checks.preview(name)}: has no {methods}, which arc_suite.tasks.Task requires")
+    owner = next((base for base in task.__mro__ if "name" in vars(base)), None)
+    if owner is None:
+        raise ValueError(f"class {task.__name__} has no name: expected one, such as name = {task.__name__.lower()!r}")
+    if owner is not task and TASKS.get(name) is owner:
+        raise ValueError(f"class {task.__name__} has no name of its own: {name} is that of {owner.__name__}")
+    _check_task_attributes(task)
     return name
+
+
+def _check_task_attributes(task: type[Task]) -> None:
+    """Raise ValueError for an attribute of a class of a task that is not as the contract says.
+
+    A property decides its value for each task; `arc-suite check` looks at it.
+    """
+    weights, commands, demonstrators = (
+        None if isinstance(inspect.getattr_static(task, name, None), property) else getattr(task, name, None)
+        for name in ("weights", "commands", "demonstrators")
+    )
+    for term, weight in checks.mapping(f"{task.__name__}.weights", weights).items():
+        checks.number(f"{task.__name__}.weights[{term!r}]", weight, -LARGEST, LARGEST)
+    for command, size in checks.mapping(f"{task.__name__}.commands", commands).items():
+        checks.integer(f"{task.__name__}.commands[{command!r}]", size, 1)
+    is_sequence = isinstance(demonstrators, tuple | list | None)
+    if not (is_sequence and all(isinstance(name, str) for name in demonstrators or ())):
+        got = checks.preview(demonstrators)
+        raise ValueError(f"{task.__name__}.demonstrators: expected a tuple of names of presets, got {got}")
+    if not isinstance(inspect.getattr_static(task, "settings_for"), classmethod):
+        raise ValueError(f"{task.__name__}.settings_for: expected a class method, with @classmethod before it")
+    subclasses = task.__mro__[: task.__mro__.index(Task)]
+    if any("step_limit" in vars(base) for base in subclasses):
+        raise ValueError(f"{task.__name__}.step_limit: expected none; the setting time_limit, s, decides it")
 
 
 def _modifier_settings(modifier) -> Mapping[str, Any]:

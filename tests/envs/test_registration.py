@@ -2,7 +2,7 @@
 
 import functools
 import re
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import gymnasium
 import programs
@@ -211,6 +211,17 @@ def presets(**given):
 class Other(Walk):
     """Another task of a name that is taken."""
 
+    name = "walk"
+
+
+class Nameless(Walk):
+    """A task without a name of its own."""
+
+
+def crawl(**attributes):
+    """The argument that registers a subclass of Walk with attributes."""
+    return {"tasks": (type("Crawl", (Walk,), {"name": "crawl", **attributes}),)}
+
 
 class Parameters(NamedTuple):
     """Presets of a law of another package."""
@@ -274,6 +285,21 @@ class Misnamed(Walk):
         ({"tasks": (Misnamed,)}, "task 'walk-slowly': expected a name of letters, digits and underscores"),
         ({"tasks": (len,)}, "tasks: expected classes by the contract of arc_suite.tasks.Task, got <built-in"),
         (walk(ROW) | {"tasks": (Other,)}, "task 'walk' is already registered"),
+        ({"tasks": (Nameless,)}, "class Nameless has no name of its own: walk is that of Walk"),
+        ({"tasks": Other}, "tasks: expected classes, such as tasks=(Other,), got <class '"),
+        ({"modifiers": 3}, "modifiers: expected classes, such as modifiers=(Name,), got 3"),
+        ({"task": (Other,)}, "unknown argument 'task'; did you mean 'tasks'? (there are: module, body, parameters, "),
+        ({"bodies": (OTHER,)}, "argument 'bodies': body takes one robot's body"),
+        ({"gait": "ripple"}, "argument 'gait': parameters has the gait of a robot"),
+        ({"laws": ("mine",)}, "laws: expected a mapping of names to values, got ('mine',)"),
+        ({"algorithms": len}, "algorithms: expected a mapping of names to values, got <built-in function len>"),
+        (crawl(weights=["forward"]), "Crawl.weights: expected a mapping of names to values, got ['forward']"),
+        (crawl(weights={"forward": "1.5"}), "Crawl.weights['forward']: expected a number from -1e+06 to 1e+06, got"),
+        (crawl(weights={"forward": float("nan")}), "Crawl.weights['forward']: expected a number from -1e+06 to 1e+06"),
+        (crawl(commands={"asked": 0}), "Crawl.commands['asked']: expected an integer from 1, got 0"),
+        (crawl(demonstrators="steered"), "Crawl.demonstrators: expected a tuple of names of presets, got 'steered'"),
+        (crawl(settings_for=lambda self, *_: None), "Crawl.settings_for: expected a class method, with @classmethod "),
+        (crawl(step_limit=100), "Crawl.step_limit: expected none; the setting time_limit, s, decides it"),
         ({"arenas": {"flat": lambda body: None}}, "arena 'flat' is already registered"),
         ({"arenas": {"a-b": lambda body: None}}, "arena 'a-b': expected a name of letters, digits and underscores"),
         ({"laws": {"mine": Law, "a b": Law}}, "law 'a b': expected a name of letters, digits and underscores"),
@@ -308,6 +334,39 @@ def test_mistakes_are_one_line_and_register_nothing(arguments, message):
     with refused(message, begins=True):
         arc_suite.register(**arguments)
     assert [dict(table) for table in tables] == before
+
+
+@pytest.fixture
+def _restored_tables():
+    """Takes back what a test registers."""
+    tables = (TASKS, ARENAS, LAWS, registry.ADDITIONS["law"], registry.MODULE_OF_NAME, gymnasium.registry)
+    before = [dict(table) for table in tables]
+    yield
+    for table, entries in zip(tables, before, strict=True):
+        table.clear()
+        table.update(entries)
+
+
+@pytest.mark.usefixtures("_restored_tables")
+def test_a_part_that_is_edited_and_registered_again_replaces_its_earlier_version():
+    """As a cell of a notebook that runs twice; another class of that name is refused."""
+    for speed in (1.0, 2.0):
+
+        class Edited(Walk):
+            name = "edited"
+            weights: ClassVar = Walk.weights | {"forward": speed}
+
+        class EditedLaw(Clocked):
+            preset = Parameters()
+
+        def rise(body):
+            return None
+
+        arc_suite.register(tasks=(Edited,), laws={"edited_law": EditedLaw}, arenas={"edited_rise": rise})
+        assert (TASKS["edited"], ARENAS["edited_rise"], LAWS[Parameters]) == (Edited, rise, EditedLaw)
+    other = type("OtherEdited", (Walk,), {"name": "edited"})
+    with refused("task 'edited' is already registered; choose another name"):
+        arc_suite.register(tasks=(other,))
 
 
 @pytest.mark.filterwarnings("ignore:.*out of date")
