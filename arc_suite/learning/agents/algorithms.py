@@ -311,9 +311,15 @@ def algorithm(name: str) -> Algorithm:
     """Return the algorithm of a name, or of `module:name`, which another package registers.
 
     Raises:
-        ValueError: there is none.
+        ValueError: there is none, or its hyperparameters or its source do not fit.
     """
     definition = registry.find("algorithm", name, ALGORITHMS)
+    place = f"algorithm {checks.preview(name)}"
     if not isinstance(definition, Algorithm):
-        raise ValueError(f"algorithm {checks.preview(name)}: expected an Algorithm, got {type(definition).__name__}")
+        raise ValueError(f"{place}: expected an Algorithm, got {type(definition).__name__}")
+    hyperparameters = definition.hyperparameters
+    if isinstance(hyperparameters, type) or not dataclasses.is_dataclass(hyperparameters):
+        got = checks.preview(hyperparameters)
+        raise ValueError(f"{place}: hyperparameters: expected a value of a frozen dataclass, got {got}")
+    checks.name(definition.source, usage.SOURCES, "source of an algorithm")
     return definition

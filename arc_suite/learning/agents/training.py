@@ -14,7 +14,7 @@ from tqdm import tqdm
 from arc_suite import checks, evaluation, files, seed_ranges, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import task_results
-from arc_suite.learning.agents import algorithms, priors, run_folder, run_usage
+from arc_suite.learning.agents import algorithms, priors, run_folder, run_usage, slices
 from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
 from arc_suite.learning.agents.evaluating import Evaluator, Lines, ProcessEvaluator
 from arc_suite.learning.agents.learner import UNLEARNED_PREFIXES, Damaged, Diverged, RunContext, Slice
@@ -64,7 +64,11 @@ def train(
     stays_on_device = configuration.learns_on_device
     with (
         _record(configuration, folder, threads, stays_on_device, [configuration.seed], on_metrics) as recorder,
-        contextlib.closing(algorithm.learn(algorithm.hyperparameters, recorder.context)) as slices,
+        contextlib.closing(
+            slices.check_generator(
+                configuration.algorithm, algorithm.learn(algorithm.hyperparameters, recorder.context)
+            )
+        ) as learned_slices,
         recorder.show_progress(progress),
         _naming_flaw_of_task(recorder.context.training),
     ):
@@ -74,7 +78,9 @@ def train(
                 recorder.flush()
                 return False
             with _naming_damage([recorder.folder]):
-                learned_slice = next(slices)
+                learned_slice = slices.next_slice(
+                    configuration.algorithm, learned_slices, recorder.usage.steps, recorder.context.steps
+                )
             recorder.begin(learned_slice)
             recorder.complete(learned_slice)
     return True
@@ -119,10 +125,10 @@ def train_in_one_program(
         stack.enter_context(_naming_flaw_of_task(contexts[0].training))
         while not all(recorder.finished for recorder in recorders):
             with _naming_damage(folders):
-                slices = next(all_slices)
+                next_slices = next(all_slices)
             new_slices = [
                 (recorder, learned_slice)
-                for recorder, learned_slice in zip(recorders, slices, strict=True)
+                for recorder, learned_slice in zip(recorders, next_slices, strict=True)
                 if learned_slice is not None and not recorder.finished
             ]
             for recorder, learned_slice in new_slices:
