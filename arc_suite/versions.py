@@ -1,6 +1,7 @@
 """The packages on which results depend, and the line that says how to get them."""
 
 import contextlib
+import hashlib
 import sys
 import sysconfig
 import traceback
@@ -70,6 +71,28 @@ def version_of(package: str) -> str | None:
 def dependency_versions() -> dict[str, str | None]:
     """Return the versions of the suite and of what its results depend on, by package; None if not installed."""
     return {package: version_of(package) for package in _RECORDED_PACKAGES}
+
+
+def describe_module(module: str) -> str | None:
+    """Return the distribution that holds a module, with its version, if any does, and the SHA-256 of its file.
+
+    Args:
+        module: dotted name.
+
+    Returns:
+        Text such as "legs-kit 1.0, sha256 ab12..."; None for a module without a file.
+    """
+    from importlib import metadata  # imported here, as above
+
+    path = getattr(sys.modules.get(module), "__file__", None)
+    if path is None or not Path(path).is_file():
+        return None
+    words = []
+    package, _, _ = module.partition(".")
+    for distribution in metadata.packages_distributions().get(package, ())[:1]:
+        words.append(f"{distribution} {metadata.version(distribution)}")
+    words.append(f"sha256 {hashlib.sha256(Path(path).read_bytes()).hexdigest()}")
+    return ", ".join(words)
 
 
 def problems() -> list[str]:

@@ -29,6 +29,7 @@ def test_a_clone_on_the_path_shadows_no_module():
 
 def test_the_citation_names_this_version():
     assert f"\nversion: {arc_suite.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"version = {{{arc_suite.__version__}}}" in (ROOT / "docs" / "cite.md").read_text()
 
 
 def test_workflows_name_targets_that_exist():

@@ -1,5 +1,6 @@
 """The model card of a run: what it says, from a run of an algorithm that needs NumPy alone."""
 
+import hashlib
 import json
 import pathlib
 import re
@@ -49,6 +50,8 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
     assert f"arc-suite evaluate --policy {folder}" in card and f"\n{run.command}\n" in card
     assert re.search(r"policy, sha256 \| `[0-9a-f]{64}`", card) and "| mujoco | 3." in card
     assert "](picture.png)" not in card  # which was not drawn
+    sha256 = hashlib.sha256(pathlib.Path(tiny_studies.__file__).read_bytes()).hexdigest()
+    assert f"| module tiny_studies | sha256 {sha256} |" in card
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Files that name a module of another package: reading them imports nothing, and one line says what is missing."""
 
+import hashlib
 import json
 import sys
 
@@ -11,7 +12,7 @@ import pytest
 import arc_suite
 from arc_suite import policies, registry
 from arc_suite.cpg import selection
-from arc_suite.learning.agents import configuration
+from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.policies import network
 
@@ -142,6 +143,30 @@ def save_policy(folder, change):
     described = {name: value for name, value in change.items() if name != "algorithm"}
     arrays["policy"] = np.array(json.dumps(json.loads(str(arrays["policy"])) | described))
     np.savez(folder / "policy.npz", **arrays)
+
+
+def test_a_record_holds_version_and_hash_of_modules(folder, without_additions):
+    """Of those that register its parts, installed or not; a folder of before has none, and is the same run."""
+    import strolling  # noqa: F401
+
+    run = Configuration.of(arc_suite.Setup.of("beetle", "stroll"), "search")
+    sha256 = hashlib.sha256((folder / "strolling.py").read_bytes()).hexdigest()
+    record = run.record()
+    assert record["versions"]["module strolling"] == f"sha256 {sha256}"
+    metadata = folder / "strolling_kit-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: strolling-kit\nVersion: 1.0\n")
+    (metadata / "top_level.txt").write_text("strolling\n")
+    assert run.record()["versions"]["module strolling"] == f"strolling-kit 1.0, sha256 {sha256}"
+    assert not [name for name in Configuration.of(arc_suite.Setup.of("tick")).record()["versions"] if " " in name]
+
+    others = {name: version for name, version in record["versions"].items() if " " not in name}
+    (folder / "config.json").write_text(json.dumps(record | {"versions": others}))
+    run_folder.check_same_run(folder, record)
+    others["module strolling"] = "sha256 0"
+    (folder / "config.json").write_text(json.dumps(record | {"versions": others}))
+    with pytest.raises(ValueError, match=r": of another run, with versions.module strolling 'sha256 0', not 'sha256 "):
+        run_folder.check_same_run(folder, record)
 
 
 @pytest.mark.parametrize("change", IN_A_POLICY.values(), ids=IN_A_POLICY)

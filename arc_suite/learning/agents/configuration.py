@@ -15,7 +15,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.hyperparameters import BLOCKS_LEFT_OUT
 from arc_suite.learning.agents.learner import MAX_RUN_SEED, RunContext
-from arc_suite.learning.agents.run_folder import LEG_VIEWS, MODEL_HASH
+from arc_suite.learning.agents.run_folder import LEG_VIEWS, MODEL_HASH, MODULE
 from arc_suite.policies import network
 from arc_suite.simulation.model_hash import PHYSICS
 from arc_suite.tasks import leg_views
@@ -304,6 +304,8 @@ class Configuration:
     def record(self) -> dict[str, Any]:
         """Return `to_dict` with hashes and versions of everything that a run computes with, plain values by field.
 
+        Modules of other packages are among the versions; see `versions.describe_module`.
+
         Raises:
             ValueError: a setting of the task that does not fit.
         """
@@ -311,7 +313,8 @@ class Configuration:
         packages = {name: versions.version_of(name) for name in ("jax", "jaxlib", "optax")}
         fields = self.to_dict() | provenance
         fields["episodes"] = evaluation.CURVE_EPISODES
-        fields["versions"] = provenance["versions"] | packages
+        modules = {f"{MODULE}{name}": versions.describe_module(name) for name in self.modules}
+        fields["versions"] = provenance["versions"] | packages | modules
         if self._depends_on_leg_views():
             fields[LEG_VIEWS] = leg_views.VERSION
         return fields

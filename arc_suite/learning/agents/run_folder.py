@@ -29,6 +29,7 @@ LOCK = ".lock"
 TABLES = ("evaluations", "training", "times")
 LEG_VIEWS = "leg_views"  # name of a field of records: the version of what legs see; see `tasks.leg_views`
 MODEL_HASH = "model_sha256"  # in records of earlier versions, in place of `PHYSICS`; it differed among processors
+MODULE = "module "  # begins names of other packages' modules among versions; records of earlier versions lack them
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
 _NUMBERS_OF_PROGRESS = {"evaluated", "wall", "cpu", "return"}  # those that a checkpoint may have
@@ -210,7 +211,7 @@ def check_same_run(path: str | os.PathLike[str], config: Mapping[str, Any], left
                 f"write to another folder with --algorithm {algorithm} --hp start={path}"
             )
         field, _, _ = name.partition(".")
-        is_unknown = name == PHYSICS and folder_value is None
+        is_unknown = folder_value is None and (name == PHYSICS or name.startswith(f"versions.{MODULE}"))
         if field not in (*left_out, *_IGNORED_FIELDS) and not is_unknown:
             raise ValueError(
                 f"{path}: of another run, with {name} {checks.preview(folder_value)}, not {checks.preview(value)}; "
