@@ -65,7 +65,10 @@ def test_feet_do_not_jump_at_a_stop(robot, preset):
     assert resting.all() and changes[:15].max() < 1e-5 < walking
 
 
-@pytest.mark.parametrize(("robot", "task", "preset"), PRESETS)
+@pytest.mark.parametrize(
+    ("robot", "task", "preset"),
+    [*PRESETS, ("random:17", "steer", "steered"), ("random:17", "gaps", "sighted")],  # whose legs have four joints
+)
 def test_jit_computes_what_numpy_computes(robot, task, preset):
     jax = pytest.importorskip("jax", reason="of the extra `jax`: make check-jax")
     jax.config.update("jax_enable_x64", True)
