@@ -125,7 +125,17 @@ def test_only_the_program_that_runs_is_imported():
     )
     names = [
         f"arc_suite.cli.{name}"
-        for name in ("doctor", "flag_mistakes", "help_text", "interrupts", "main", "program", "programs", "version")
+        for name in (
+            "doctor",
+            "flag_mistakes",
+            "help_text",
+            "interrupts",
+            "main",
+            "places",
+            "program",
+            "programs",
+            "version",
+        )
     ]
     assert interpreters.printed(code)[1:] == [f"{names}"]
 

@@ -1,4 +1,4 @@
-"""Make animation clips for game engines (.glb) or as sprites, and of one a motion or a film.
+"""Make animation clips (.glb) or sprites, and of one clip a motion or a film.
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
