@@ -122,6 +122,9 @@ def register(
     for name, module_name in additions_by_kind.get("program", {}).items():
         if not isinstance(module_name, str):
             raise ValueError(f"program {name!r}: expected the name of a module, got {checks.preview(module_name)}")
+    for name, maker in additions_by_kind.get("arena", {}).items():
+        if not isinstance(maker, str):
+            _check_arguments(f"arena {name!r}: expected a function from a body to an Arena", maker, "body")
     law_by_preset_class = {
         _preset_class(name, law_class): law_class for name, law_class in additions_by_kind.get("law", {}).items()
     }
@@ -173,6 +176,24 @@ def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) ->
             raise ValueError(f"{kind} {checks.preview(name)} is already registered; choose another name")
 
 
+def _check_arguments(expectation: str, function: Any, *arguments: str) -> None:
+    """Raise ValueError for a value that is no function of so many arguments by position.
+
+    Args:
+        expectation: the beginning of the message.
+        function: any value.
+        *arguments: their names.
+    """
+    if not callable(function):
+        raise ValueError(f"{expectation}, got {checks.preview(function)}")
+    try:
+        inspect.signature(function).bind(*arguments)
+    except TypeError as error:
+        raise ValueError(f"{expectation} called with {' and '.join(arguments)}: {error}") from None
+    except ValueError:  # a function of C without a signature
+        return
+
+
 def _preset_class(name: str, law_class) -> type:
     """Return the class of the presets of another package's law, after checks of the law.
 
@@ -192,6 +213,7 @@ def _preset_class(name: str, law_class) -> type:
     law_of_presets = LAWS.get(preset_class, law_class)
     if law_of_presets is not law_class and not _is_new_version(law_class, law_of_presets):
         raise ValueError(f"law {name!r}: presets of {preset_class.__name__} are those of {law_of_presets.__name__}")
+    _check_arguments(f"law {name!r}: expected a class", law_class, "task", "preset")
     return preset_class
 
 

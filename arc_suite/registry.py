@@ -345,10 +345,18 @@ def arena_of(arena: str | Arena, body: Body) -> Arena:
     """Return the arena of a word in a size that suits a body; an `Arena` is returned as it is.
 
     Raises:
-        ValueError: as `arena_maker`, or ground of a file that is too small for the body.
+        ValueError: as `arena_maker`, ground of a file that is too small for the body, or a function of another package
+            that returns no `Arena`.
         OSError: the file cannot be read.
     """
-    return arena if isinstance(arena, Arena) else arena_maker(arena)(body)
+    if isinstance(arena, Arena):
+        return arena
+    ground = arena_maker(arena)(body)
+    if not isinstance(ground, Arena):
+        raise ValueError(
+            f"arena {checks.preview(arena)}: expected an Arena of its function, got {checks.preview(ground)}"
+        )
+    return ground
 
 
 def arena_maker(arena: str) -> Callable[[Body], Arena]:

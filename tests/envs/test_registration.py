@@ -12,7 +12,7 @@ from refusals import refused
 
 import arc_suite
 from arc_suite import registration, registry, suite
-from arc_suite.arenas import ARENAS
+from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.cpg.law import Clocked
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import LAWS
@@ -232,6 +232,18 @@ class Law(Clocked):
 
     preset = Parameters()
 
+    def __init__(self, task, preset):
+        """Stand still."""
+        super().__init__(lambda *_: 0.0)
+
+
+class Unfitted(Law):
+    """A law that takes no preset."""
+
+    def __init__(self, task):
+        """Take a task."""
+        super().__init__(task, None)
+
 
 class Lacking:
     """A law without parts."""
@@ -302,6 +314,12 @@ class Misnamed(Walk):
         (crawl(step_limit=100), "Crawl.step_limit: expected none; the setting time_limit, s, decides it"),
         ({"arenas": {"flat": lambda body: None}}, "arena 'flat' is already registered"),
         ({"arenas": {"a-b": lambda body: None}}, "arena 'a-b': expected a name of letters, digits and underscores"),
+        ({"arenas": {"mine": FLAT}}, "arena 'mine': expected a function from a body to an Arena, got Flat()"),
+        (
+            {"arenas": {"mine": lambda: FLAT}},
+            "arena 'mine': expected a function from a body to an Arena called with body: too many positional arguments",
+        ),
+        ({"laws": {"mine": Unfitted}}, "law 'mine': expected a class called with task and preset: too many positiona"),
         ({"laws": {"mine": Law, "a b": Law}}, "law 'a b': expected a name of letters, digits and underscores"),
         ({"laws": {"mine": Law, "steered": Law}}, "law 'steered': the suite has presets of this name; choose another"),
         (
@@ -356,7 +374,7 @@ def test_a_part_that_is_edited_and_registered_again_replaces_its_earlier_version
             name = "edited"
             weights: ClassVar = Walk.weights | {"forward": speed}
 
-        class EditedLaw(Clocked):
+        class EditedLaw(Law):
             preset = Parameters()
 
         def rise(body):
