@@ -391,6 +391,18 @@ def array(what: str, value: Any, size: int, low: float = -math.inf, high: float 
     return np.broadcast_to(values, size).astype(float)
 
 
+def numeric_kind(value: Any) -> str:
+    """Return NumPy's letter for the kind of a number or an array: "b" for booleans; "O" for other values."""
+    if isinstance(value, bool | int | float):
+        return "b" if isinstance(value, bool) else "f"
+    return getattr(getattr(value, "dtype", None), "kind", "O")
+
+
+def is_numeric(value: Any) -> bool:
+    """Return whether a value is a number, a boolean, or an array of them."""
+    return numeric_kind(value) in "fiub"
+
+
 def _describe_range(low: float, high: float) -> str:
     """Return a phrase for the numbers from `low` to `high`, such as "number from 0 to 1"."""
     if low == -math.inf:

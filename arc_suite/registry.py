@@ -562,11 +562,14 @@ def import_module(module: str, subject: str) -> None:
         raise ValueError(message) from None
 
 
-def _name_in_file(path: str, key: str) -> str:
-    """Return how to name a part that the file of a module registers."""
-    name = f"{Path(path).stem}:{key}"
+def _refuse_file(kind: str, name: str) -> None:
+    """Raise ValueError for a part that is named by the file of its module, with how to name it."""
+    path, extension, key = name.rpartition(".py")
+    if not extension or key[:1] not in ("", ":"):
+        return
     folder = Path(path).parent
-    return name if folder == Path() else f"{name}, with {folder} in PYTHONPATH"
+    hint = "" if folder == Path() else f", with {folder} in PYTHONPATH"
+    raise ValueError(f"{kind} {checks.preview(name)}: expected {Path(path).name}:{key[1:] or 'name'}{hint}")
 
 
 def _look_up(name, table: Mapping, kind: str, suggestions: Iterable[str] = ()):
@@ -575,14 +578,12 @@ def _look_up(name, table: Mapping, kind: str, suggestions: Iterable[str] = ()):
     Raises:
         ValueError: an unknown name, a module that cannot be imported, or a module that does not register the name.
     """
-    if isinstance(name, str) and name.endswith(".py"):
-        raise ValueError(f"{kind} {checks.preview(name)}: expected {_name_in_file(name, 'name')}")
+    if isinstance(name, str):
+        _refuse_file(kind, name)
     if not (isinstance(name, str) and ":" in name):
         return table[checks.name(name, table, kind, suggestions, ("module:name",))]
 
     module, _, key = name.rpartition(":")
-    if module.endswith(".py"):
-        raise ValueError(f"{kind} {checks.preview(name)}: expected {_name_in_file(module, key)}")
     if not all(part.isidentifier() for part in module.split(".")):
         raise ValueError(f"{kind} {checks.preview(name)}: expected module:name, with a module that can be imported")
     shown_key = repr(key[:_MAX_QUOTE])

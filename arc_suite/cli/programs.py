@@ -1,6 +1,7 @@
 """The programs of `arc-suite`, and its help; the standard library alone is imported here."""
 
 import ast
+import functools
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -75,6 +76,7 @@ def installed_programs() -> dict[str, metadata.EntryPoint]:
     return programs
 
 
+@functools.cache
 def _entry_points() -> list[metadata.EntryPoint]:
     """Return the entry points of programs of all packages, packages in the order of the alphabet."""
     return sorted(metadata.entry_points(group=ENTRY_POINT_GROUP), key=lambda entry_point: entry_point.dist.name)

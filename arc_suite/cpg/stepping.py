@@ -1,8 +1,8 @@
 """The demonstrators that step: one law for any body that follows a command of velocities, without sight.
 
 Feet follow paths in space. In stance a foot moves against the requested velocity, in swing it returns and is lifted.
-Joint angles follow by inverse kinematics, which folds legs that stand near the bounds of their joints. The joints of a
-leg of four links or more return to rest as far as its foot leaves them free.
+Joint angles follow by inverse kinematics, which folds legs that stand near the bounds of their joints. A leg with
+four joints or more returns to its pose at rest, as far as its foot leaves it free.
 
 Where a task observes a pose and a gait by command, feet step in that gait under a torso in that pose: both are read
 anew in every step, so that they may change at any time. Feedback on height, roll and pitch makes up for what joints

@@ -18,7 +18,6 @@ from arc_suite.tasks.scene import Inputs, Start
 _PACKAGE = __name__.partition(".")[0]
 _NUM_ENVS = 3  # of the batch in which kinds and shapes are checked
 _NUM_FINITE_ENVS = 16  # that random actions move
-_NUMERIC_KINDS = "fiub"  # of NumPy's arrays: floats, integers and booleans
 _READ_ONLY = "read-only"  # in NumPy's error of a write into a frozen array
 
 
@@ -154,7 +153,7 @@ def _check_memory(task: Task, method: str, memory, earlier_memory) -> None:
         _refuse(task, method, f"a memory of class {type(earlier_memory).__name__}", memory)
     for name, field in zip(memory._fields, memory, strict=True):
         for leaf in trees.leaves(field):
-            if not _is_numeric(leaf):
+            if not checks.is_numeric(leaf):
                 _refuse(task, method, f"numbers or arrays as {name!r} of the memory", leaf)
 
 
@@ -163,7 +162,7 @@ def _check_numbers(task: Task, method: str, numbers: Any, shape: tuple[int, ...]
     if not isinstance(numbers, Mapping):
         _refuse(task, method, "a dictionary of numbers by name", numbers)
     for name, value in numbers.items():
-        if not _is_numeric(value):
+        if not checks.is_numeric(value):
             _refuse(task, method, f"a number for each environment as {name!r}", value)
         if np.shape(value) not in ((), shape):
             _refuse(task, method, f"{name!r} of shape {shape}", f"shape {np.shape(value)}")
@@ -175,7 +174,7 @@ def _check_ends(task: Task, ends: Any, shape: tuple[int, ...]) -> None:
     if not (isinstance(ends, tuple) and len(ends) == 2):
         _refuse(task, "ended", expected, ends)
     for value in ends:
-        if _kind(value) != "b":
+        if checks.numeric_kind(value) != "b":
             _refuse(task, "ended", expected, ends)
         if np.shape(value) not in ((), shape):
             _refuse(task, "ended", f"booleans of shape {shape}", f"shape {np.shape(value)}")
@@ -224,18 +223,6 @@ def _freeze(leaf):
 def _repeat(tree):
     """Return a tree with a leading axis of environments that are all alike."""
     return trees.map_leaves(lambda leaf: np.stack([leaf] * _NUM_ENVS), tree)
-
-
-def _is_numeric(value) -> bool:
-    """Return whether a value is a number, a boolean or an array of them."""
-    return _kind(value) in _NUMERIC_KINDS
-
-
-def _kind(value) -> str:
-    """Return NumPy's letter for the kind of a number or an array: "b" for booleans; "O" for other values."""
-    if isinstance(value, bool | int | float):
-        return "b" if isinstance(value, bool) else "f"
-    return getattr(getattr(value, "dtype", None), "kind", "O")
 
 
 def _is_finite_number(weight) -> bool:

@@ -34,6 +34,14 @@ def _half_extents(solid: Solid) -> tuple[float, ...]:
     return solid.size
 
 
+def geom_corners(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Return the corners (geoms, 8, 3) of the boxes around geoms, turned with them, in the world, m."""
+    boxes = model.geom_aabb[:, None]  # centers and half-extents, in the frames of the geoms
+    corners = boxes[..., :3] + CORNERS * boxes[..., 3:]
+    geom_rotations = data.geom_xmat.reshape(-1, 3, 3)
+    return corners @ geom_rotations.swapaxes(-1, -2) + data.geom_xpos[:, None]
+
+
 def leg_points(leg: Leg) -> Iterator[tuple[np.ndarray, float]]:
     """Yield both ends of every link (3,) and its foot, in the torso's frame, and the radius there."""
     points = np.array(leg.points)

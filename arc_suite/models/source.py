@@ -15,7 +15,7 @@ from dm_control import mjcf
 from arc_suite.arenas import Arena
 from arc_suite.models import builder, visuals
 from arc_suite.models.mjcf_text import exact, to_mjcf
-from arc_suite.models.outline import CORNERS, outline
+from arc_suite.models.outline import geom_corners, outline
 from arc_suite.models.visuals import scene
 from arc_suite.robots import sources
 from arc_suite.robots.spec import Body, Servo, SpecError
@@ -259,12 +259,7 @@ def _riding_cameras(body: Body) -> dict[str, dict]:
     center_at_home = _center_of_mass(model, data, model.key(HOME).qpos)
     shift = center_at_zero - center_at_home
 
-    # Corners (geoms, 8, 3) of the boxes around geoms, from the torso.
-    box_centers = model.geom_aabb[:, None, :3]
-    box_half_extents = model.geom_aabb[:, None, 3:]
-    transposed_rotations = data.geom_xmat.reshape(-1, 3, 3).swapaxes(-1, -2)
-    corners = (box_centers + CORNERS * box_half_extents) @ transposed_rotations
-    corners = corners + data.geom_xpos[:, None] - data.site("torso").xpos
+    corners = geom_corners(model, data) - data.site("torso").xpos
     points = np.concatenate([outline(body), corners.reshape(-1, 3)])
     cameras = builder.cameras(body, points)
     return {name: camera | {"pos": camera["pos"] + shift} for name, camera in cameras.items()}

@@ -11,7 +11,7 @@ from arc_suite import rotations
 from arc_suite.animation import swinging
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.models import visuals
-from arc_suite.models.outline import CORNERS
+from arc_suite.models.outline import geom_corners
 from arc_suite.models.standing import standing_qpos
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
@@ -240,13 +240,10 @@ def _measure_outline(stage: _Stage, poses: Sequence[_Pose]) -> tuple[np.ndarray,
     model = stage.drawing.model.ptr
     data = stage.drawing.data
     is_body_geom = model.geom_bodyid > 0
-    boxes = model.geom_aabb[is_body_geom, None]  # centers and half-extents, in the frames of the geoms
-    corners = boxes[..., :3] + CORNERS * boxes[..., 3:]
     points_of_poses = []
     for pose in poses:
         stage.pose(pose)
-        geom_rotations = data.geom_xmat[is_body_geom].reshape(-1, 3, 3)
-        points_of_poses.append(data.geom_xpos[is_body_geom, None] + corners @ geom_rotations.swapaxes(-1, -2))
+        points_of_poses.append(geom_corners(model, data)[is_body_geom])
     points = np.concatenate(points_of_poses).reshape(-1, 3)
     return np.linalg.norm(points[:, :2], axis=-1), points[:, 2]
 

@@ -314,12 +314,12 @@ def algorithm(name: str) -> Algorithm:
         ValueError: there is none, or its hyperparameters or its source do not fit.
     """
     definition = registry.find("algorithm", name, ALGORITHMS)
-    place = f"algorithm {checks.preview(name)}"
+    part = f"algorithm {checks.preview(name)}"
     if not isinstance(definition, Algorithm):
-        raise ValueError(f"{place}: expected an Algorithm, got {type(definition).__name__}")
+        raise ValueError(f"{part}: expected an Algorithm, got {type(definition).__name__}")
     hyperparameters = definition.hyperparameters
     if isinstance(hyperparameters, type) or not dataclasses.is_dataclass(hyperparameters):
         got = checks.preview(hyperparameters)
-        raise ValueError(f"{place}: hyperparameters: expected a value of a frozen dataclass, got {got}")
+        raise ValueError(f"{part}: hyperparameters: expected a value of a frozen dataclass, got {got}")
     checks.name(definition.source, usage.SOURCES, "source of an algorithm")
     return definition

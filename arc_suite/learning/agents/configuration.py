@@ -225,7 +225,9 @@ class Configuration:
         changes = {"simulation": self.hyperparameters.simulation} if self.learns_on_device else {}
         defaults = self.default_hyperparameters
         hyperparameters = dataclasses.asdict(self.hyperparameters)
-        changes |= {n: value for n, value in hyperparameters.items() if n not in defaults or value != defaults[n]}
+        changes |= {
+            name: value for name, value in hyperparameters.items() if name not in defaults or value != defaults[name]
+        }
         words = [
             "arc-suite",
             "train",

@@ -9,8 +9,6 @@ from arc_suite import checks
 from arc_suite.learning.agents.learner import Slice
 from arc_suite.policies.graph import Graph
 
-_NUMERIC_KINDS = "fiub"  # of NumPy's arrays: floats, integers and booleans
-
 
 def check_generator(algorithm: str, slices: Any) -> Any:
     """Return what a learner has returned if it is a generator.
@@ -42,30 +40,32 @@ def next_slice(algorithm: str, slices: Iterator[Any], step: int, steps: int) -> 
         ValueError: the learner has ended, or yields something else.
     """
     learned_slice = next(slices, None)
-    place = f"algorithm {algorithm}: learn"
+    learner_name = f"algorithm {algorithm}: learn"
     if learned_slice is None:
-        raise ValueError(f"{place}: expected slices until step {steps}, got no more after step {step}")
+        raise ValueError(f"{learner_name}: expected slices until step {steps}, got no more after step {step}")
     if not isinstance(learned_slice, Slice):
-        raise ValueError(f"{place}: expected a Slice in each yield, got {_describe(learned_slice)}")
+        raise ValueError(f"{learner_name}: expected a Slice in each yield, got {_describe(learned_slice)}")
     if not isinstance(learned_slice.metrics, Mapping | None):
-        raise ValueError(f"{place}: Slice.metrics: expected a dictionary, got {_describe(learned_slice.metrics)}")
+        raise ValueError(
+            f"{learner_name}: Slice.metrics: expected a dictionary, got {_describe(learned_slice.metrics)}"
+        )
     for name, metric in (learned_slice.metrics or {}).items():
-        if np.shape(metric) != () or not (isinstance(metric, int | float) or _is_numeric(metric)):
-            raise ValueError(f"{place}: Slice.metrics[{name!r}]: expected a number, got {checks.preview(metric)}")
+        if np.shape(metric) != () or not checks.is_numeric(metric):
+            raise ValueError(
+                f"{learner_name}: Slice.metrics[{name!r}]: expected a number, got {checks.preview(metric)}"
+            )
     if not isinstance(learned_slice.policy, Graph):
         cure = "a Graph, such as policies.tracing.traced returns"
-        raise ValueError(f"{place}: Slice.policy: expected {cure}, got {_describe(learned_slice.policy)}")
+        raise ValueError(f"{learner_name}: Slice.policy: expected {cure}, got {_describe(learned_slice.policy)}")
     if not isinstance(learned_slice.checkpoint, Mapping):
         got = _describe(learned_slice.checkpoint)
-        raise ValueError(f"{place}: Slice.checkpoint: expected a dictionary of arrays, got {got}")
+        raise ValueError(f"{learner_name}: Slice.checkpoint: expected a dictionary of arrays, got {got}")
     for name, array in learned_slice.checkpoint.items():
         if getattr(getattr(array, "dtype", None), "kind", "O") == "O":
-            raise ValueError(f"{place}: Slice.checkpoint[{name!r}]: expected an array, got {checks.preview(array)}")
+            raise ValueError(
+                f"{learner_name}: Slice.checkpoint[{name!r}]: expected an array, got {checks.preview(array)}"
+            )
     return learned_slice
-
-
-def _is_numeric(value: Any) -> bool:
-    return getattr(getattr(value, "dtype", None), "kind", "O") in _NUMERIC_KINDS
 
 
 def _describe(value: Any) -> str:
