@@ -156,7 +156,7 @@ def sprite_sheet(body: Body, clips: Sequence[Clip], size: int, directions: int, 
     stage = opengl.call(lambda: _prepare_stage(body, framed_poses, transparent))
     squares = list(_render(stage, poses, size, transparent))
     columns = max(map(len, frames_of_clips))
-    empty_square = np.broadcast_to(squares[0][0, 0], squares[0].shape)
+    empty_square = np.broadcast_to(squares[0][-1, 0], squares[0].shape)  # of the ground, below the horizon
     rows = []
     first = 0
     for frames in frames_of_clips:
