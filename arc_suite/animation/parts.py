@@ -5,18 +5,17 @@ in the standing pose.
 """
 
 import itertools
-import math
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite import checks, models, rotations
-from arc_suite.models import sizing, visuals
+from arc_suite import models, rotations
+from arc_suite.models import visuals
 from arc_suite.models.direct import GEOMS
 from arc_suite.models.standing import standing_qpos
-from arc_suite.models.visuals.springs import SPRINGS
+from arc_suite.models.swinging import Swing, SwingingBone, list_bones
 from arc_suite.robots.spec import Body, Link
 
 KINDS = {int(geom): name for name, geom in GEOMS.items()}  # kinds of shapes by MuJoCo's number
@@ -57,27 +56,6 @@ class Shape(NamedTuple):
     quaternion: np.ndarray
     material: str
     hull: Hull | None = None
-
-
-class Swing(NamedTuple):
-    """How a bone of ornaments swings; see `springs.Spring`.
-
-    Attributes:
-        tip: (3,) its tip in its own frame, m.
-        mass: (3,) where its mass is, in the same frame, m.
-        frequency: rad/s.
-        damping: damping ratio.
-        limit: rad.
-        pivot_radius, tip_radius: radii of balls at both ends whose convex hull holds its shapes, m.
-    """
-
-    tip: np.ndarray
-    mass: np.ndarray
-    frequency: float
-    damping: float
-    limit: float
-    pivot_radius: float
-    tip_radius: float
 
 
 class Part(NamedTuple):
@@ -168,35 +146,24 @@ def _model_parts(model: mujoco.MjModel, body: Body) -> list[Part]:
     body_ids = [model.body(name).id for name in body.part_names]
     bone_of_geom = {model.geom(name).id: bone for name, bone in visuals.geoms_of_bones(body).items()}
     parts = [_model_part(model, body_id, body_ids, swinging_geoms=bone_of_geom.keys()) for body_id in body_ids]
-    for bone in visuals.bones(body):
+    for bone in list_bones(body):
         geoms = [geom for geom, bone_name in bone_of_geom.items() if bone_name == bone.name]
-        parts.append(_bone_part(model, body, bone, geoms))
+        parts.append(_bone_part(model, bone, geoms))
     return parts
 
 
-def _bone_part(model: mujoco.MjModel, body: Body, bone: visuals.Bone, geoms: list[int]) -> Part:
+def _bone_part(model: mujoco.MjModel, bone: SwingingBone, geoms: list[int]) -> Part:
     """Return a bone of the torso, whose frame is turned as the torso's, with the shapes of geoms."""
-    pivot = np.array(bone.pivot)
-    tip = np.array(bone.tip) - pivot
-    spring = SPRINGS[checks.name(bone.spring, SPRINGS, "spring")]
     shapes = [_shape(model, geom) for geom in geoms]
     return Part(
         name=bone.name,
         parent=0,
-        place=pivot,
+        place=bone.place,
         quaternion=_NO_TURN,
         joint=None,
         axis=None,
-        shapes=tuple(shape._replace(place=shape.place - pivot) for shape in shapes),
-        swing=Swing(
-            tip=tip,
-            mass=0.5 * tip,
-            frequency=spring.frequency / sizing.time_unit(body),
-            damping=spring.damping,
-            limit=math.radians(spring.limit),
-            pivot_radius=bone.pivot_radius,
-            tip_radius=bone.tip_radius,
-        ),
+        shapes=tuple(shape._replace(place=shape.place - bone.place) for shape in shapes),
+        swing=bone.swing,
     )
 
 

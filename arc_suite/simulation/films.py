@@ -16,6 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from arc_suite import versions
 from arc_suite.models.builder import EYE
+from arc_suite.models.swinging import Swinging, list_bones
 from arc_suite.simulation.episode_loop import play_episode
 
 _TOLERANCE = 1e-6  # control steps, of times
@@ -63,6 +64,7 @@ class Footage:
         self._episode = play_episode(environment, policy)
         self._time_step = next(self._episode)
         self._state_before = self._state()  # at the start of the latest step
+        self._swinging = Swinging(list_bones(environment.physics.body))
         self._camera = camera
         self._size = size
         self._quality = None if camera == EYE else quality
@@ -87,6 +89,7 @@ class Footage:
         """Advance by one control step."""
         if self.ended:
             return
+        self._follow_ornaments(self.steps, self._environment.physics.data.qpos)
         phase_before = self.phase
         self._state_before = self._state()
         self._time_step = next(self._episode)
@@ -103,7 +106,8 @@ class Footage:
         width, height = self._size
         physics = self._environment.physics
         qpos = physics.data.qpos if share == 1.0 else self.interpolate(share)
-        return physics.render(height, width, self._camera, quality=self._quality, qpos=qpos)
+        swings = self._follow_ornaments(self.steps - 1.0 + share, qpos)
+        return physics.render(height, width, self._camera, quality=self._quality, qpos=qpos, swings=swings)
 
     def at(self, time: float) -> np.ndarray:
         """Step until a time of the episode, s, and return the picture at that time."""
@@ -113,6 +117,16 @@ class Footage:
         share = 1.0 - (self.steps - steps)
         is_between_steps = _TOLERANCE < share < 1.0 - _TOLERANCE
         return self.view(share if is_between_steps else 1.0)
+
+    def _follow_ornaments(self, steps: float, qpos: np.ndarray) -> list[np.ndarray]:
+        """Return how bones of ornaments are turned in the torso's frame, (4,) each, as they follow the torso.
+
+        Args:
+            steps: control steps since the start of the episode; not fewer than in the last call.
+            qpos: (nq,) positions of the simulation at that time.
+        """
+        ground = float(self._environment.physics.arena.height(*qpos[:2]))
+        return self._swinging.follow(steps * self.control_timestep, qpos[:7], ground)
 
     def _state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return qpos (nq,) and qvel (nv,)."""

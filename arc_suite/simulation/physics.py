@@ -13,6 +13,7 @@ from dm_control.mujoco import wrapper
 
 from arc_suite import checks
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.models.swinging import Swinging, list_bones
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
@@ -225,10 +226,17 @@ class Physics(dm_mujoco.Physics):
         return pictures.picture(self.body, self.arena, height=height, width=width, camera_id=camera_id, **options)
 
     def decorated_pose(self) -> pictures.Decorated:
-        """Return the decorated body in the present pose, for a window; the same object at every call."""
+        """Return the decorated body in the present pose, for a window; the same object at every call.
+
+        Ornaments swing between the calls; in pictures, which depend on the present state alone, they are at rest.
+        """
         if self._decorated is None:
             self._decorated = pictures.Decorated.from_body(self.body, self.arena)
-        self._decorated.pose(**self._pose())
+            self._swinging = Swinging(list_bones(self.body))
+        qpos = self.data.qpos
+        ground = float(self.arena.height(*qpos[:2]))
+        swings = self._swinging.follow(self.data.time, qpos[:7], ground)
+        self._decorated.pose(**self._pose(), swings=swings)
         return self._decorated
 
     def _pose(self) -> dict:

@@ -1,7 +1,7 @@
 """Pictures of a body in an arena: the decorated model in the pose of a simulation."""
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -9,11 +9,12 @@ import numpy as np
 from dm_control import mujoco as dm_mujoco
 from dm_control.mujoco import wrapper
 
-from arc_suite import checks, models
+from arc_suite import checks, models, rotations
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.markers import Marker
 from arc_suite.models import visuals
 from arc_suite.models.builder import EYE
+from arc_suite.models.swinging import list_bones
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl
@@ -51,6 +52,24 @@ MAX_SCALE = 2  # of the largest picture
 # Of pictures of environments; width and height in pixels.
 _DEFAULT_OPTIONS: dict[str, Any] = {"width": 640, "height": 480, "camera_id": "tracking"}
 _FAILED_LEG_COLOR = (0.07, 0.07, 0.08, 1.0)
+_NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))
+
+
+class _SwingingGeom(NamedTuple):
+    """A geom that swings with a bone of ornaments.
+
+    Attributes:
+        number: number of the geom.
+        bone: index of the bone.
+        pivot: (3,) of the bone, m.
+        place, quaternion: of the geom at rest.
+    """
+
+    number: int
+    bone: int
+    pivot: np.ndarray
+    place: np.ndarray
+    quaternion: np.ndarray
 
 
 class Decorated(dm_mujoco.Physics):
@@ -87,6 +106,7 @@ class Decorated(dm_mujoco.Physics):
             decorated.model.geom_matid[is_of_world] = -1
             decorated.model.geom_rgba[is_of_world] = ground
         decorated._legs = _geoms_by_leg(body, decorated.model.ptr)
+        decorated._swinging_geoms = _list_swinging_geoms(body, decorated.model.ptr)
         decorated._colors = decorated.model.geom_rgba.copy()
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
         buffer = decorated.model.vis.global_
@@ -101,6 +121,7 @@ class Decorated(dm_mujoco.Physics):
         mocap_pos: np.ndarray | None = None,
         markers: Iterable[Marker] = (),
         failed_legs: Iterable[str] = (),
+        swings: Sequence[np.ndarray] | None = None,
     ) -> None:
         """Take a pose and show a reward.
 
@@ -111,10 +132,12 @@ class Decorated(dm_mujoco.Physics):
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
             markers: debug markers to show.
             failed_legs: names of legs to show dark.
+            swings: (bones, 4) how bones of ornaments are turned in the torso's frame; None for bones at rest.
         """
         self.markers = markers
         model = self.model.ptr
         data = self.data.ptr
+        self._turn_ornaments(swings)
         data.qpos[:] = qpos
         if mocap_pos is not None:
             data.mocap_pos[:] = mocap_pos
@@ -122,6 +145,14 @@ class Decorated(dm_mujoco.Physics):
             update(model, data)
         model.material("glow").rgba = self._glow if share is None else visuals.reward_color(share)
         self.darken(failed_legs)
+
+    def _turn_ornaments(self, swings: Sequence[np.ndarray] | None) -> None:
+        """Turn ornaments about their pivots; see `pose`."""
+        model = self.model.ptr
+        for geom in self._swinging_geoms:
+            turn = _NO_TURN if swings is None else swings[geom.bone]
+            model.geom_pos[geom.number] = geom.pivot + rotations.matrix(turn) @ (geom.place - geom.pivot)
+            model.geom_quat[geom.number] = rotations.product(turn, geom.quaternion)
 
     def darken(self, failed_legs: Iterable[str]) -> None:
         """Show legs dark, given their names, and all other legs in their own colors."""
@@ -172,6 +203,19 @@ def _geoms_by_leg(body: Body, model: mujoco.MjModel) -> dict[str, np.ndarray]:
     return {leg.name: np.isin(part_names, leg.part_names) for leg in body.legs}
 
 
+def _list_swinging_geoms(body: Body, model: mujoco.MjModel) -> list[_SwingingGeom]:
+    """Return the geoms of a decorated model that swing."""
+    bones = list_bones(body)
+    bone_names = [bone.name for bone in bones]
+    geoms = []
+    for geom_name, bone_name in visuals.geoms_of_bones(body).items():
+        geom = model.geom(geom_name)
+        bone = bone_names.index(bone_name)
+        model.geom_sameframe[geom.id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else MuJoCo takes the torso's frame
+        geoms.append(_SwingingGeom(geom.id, bone, bones[bone].place, geom.pos.copy(), geom.quat.copy()))
+    return geoms
+
+
 # Shared by all pictures of a body, and used in OpenGL's thread alone.
 _decorated_body = functools.lru_cache(maxsize=8)(Decorated.from_body)
 
@@ -187,6 +231,7 @@ def picture(
     mocap_pos: np.ndarray | None = None,
     markers: Iterable[Marker] = (),
     failed_legs: Iterable[str] = (),
+    swings: Sequence[np.ndarray] | None = None,
     quality: str | None = None,
     **kwargs,
 ) -> np.ndarray:
@@ -203,6 +248,7 @@ def picture(
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
         failed_legs: names of legs to show dark.
+        swings: (bones, 4) how bones of ornaments are turned in the torso's frame; None for bones at rest.
         quality: a name of `QUALITIES`. Pictures of depth or segments are not averaged, and the largest pictures less.
             "sense" has no ornaments, markers, reward or failed legs. None for "sense" through the camera `eye`, and
             for "fast" through others.
@@ -231,7 +277,7 @@ def picture(
     def draw():
         decorated = _decorated_body(body, arena, drawn_quality)
         check_camera(decorated.model.ptr, camera_id)
-        decorated.pose(qpos, share, mocap_pos, markers, failed_legs)
+        decorated.pose(qpos, share, mocap_pos, markers, failed_legs, swings)
         return decorated.render(scale * height, scale * width, camera_id, **kwargs)
 
     pixels = opengl.call(draw)

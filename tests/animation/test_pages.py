@@ -15,7 +15,8 @@ from page_data import data_of
 from PIL import Image
 
 import arc_suite
-from arc_suite.animation import pages, scenery, swinging
+from arc_suite.animation import pages, scenery
+from arc_suite.models import swinging
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compile_model

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from arc_suite import rotations
-from arc_suite.animation import pages, swinging
+from arc_suite.animation import pages
 from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.parts import describe_body
 from arc_suite.bodies.families import sound_body, varied_body
+from arc_suite.models import swinging
 from arc_suite.models.visuals.springs import SPRINGS
 from arc_suite.robots import ROBOTS
 

@@ -4,15 +4,13 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation import swinging
 from arc_suite.animation.clips.clips import Clip
-from arc_suite.models import visuals
 from arc_suite.models.outline import geom_corners
 from arc_suite.models.standing import standing_qpos
+from arc_suite.models.swinging import rest_turns
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl, pictures
@@ -49,23 +47,6 @@ class Sheet(NamedTuple):
     pixels_per_meter: float
 
 
-class _SwingingGeom(NamedTuple):
-    """A geom that swings with a bone.
-
-    Attributes:
-        number: number of the geom.
-        bone: index of the bone.
-        pivot: (3,) of the bone, m.
-        place, quaternion: of the geom at rest.
-    """
-
-    number: int
-    bone: int
-    pivot: np.ndarray
-    place: np.ndarray
-    quaternion: np.ndarray
-
-
 class _Pose(NamedTuple):
     """Positions (nq,) of a body, and turns (bones, 4) of its bones of ornaments."""
 
@@ -78,24 +59,13 @@ class _Stage(NamedTuple):
 
     Attributes:
         drawing: with the free camera on all of the body.
-        swinging_geoms: geoms that swing.
         ground_line: where the ground below the torso is in a picture, as a share of its height from the top.
         view_height: height that a picture shows at the vertical axis of the body, m.
     """
 
     drawing: pictures.Decorated
-    swinging_geoms: Sequence[_SwingingGeom]
-    ground_line: float = 0.0
-    view_height: float = 1.0
-
-    def pose(self, pose: _Pose) -> None:
-        """Take a pose."""
-        model = self.drawing.model.ptr
-        for geom in self.swinging_geoms:
-            turn = pose.swings[geom.bone]
-            model.geom_pos[geom.number] = geom.pivot + rotations.matrix(turn) @ (geom.place - geom.pivot)
-            model.geom_quat[geom.number] = rotations.product(turn, geom.quaternion)
-        self.drawing.pose(pose.qpos)
+    ground_line: float
+    view_height: float
 
 
 def film_pictures(
@@ -182,7 +152,7 @@ def _list_poses(body: Body, clip: Clip, frames, headings) -> list[_Pose]:
     poses[:, 3:7] = rotations.turn_about_z(poses[:, 3:7], headings)
     model = compile_model(body)
     positions = readings.positions(poses, readings.layout(model, body), standing_qpos(model))
-    swings = swinging.rest_turns(body, len(clip.times)) if clip.swings is None else clip.swings
+    swings = rest_turns(body, len(clip.times)) if clip.swings is None else clip.swings
     return [_Pose(qpos, swings[frame]) for qpos, frame in zip(positions, frames, strict=True)]
 
 
@@ -202,8 +172,7 @@ def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _St
     else:
         drawing = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
     model = drawing.model.ptr
-    stage = _Stage(drawing, _list_swinging_geoms(body, model))
-    radii, heights = _measure_outline(stage, poses)
+    radii, heights = _measure_outline(drawing, poses)
     height = heights.max()
     camera = model.vis.global_
     camera.azimuth = _AZIMUTH
@@ -216,34 +185,21 @@ def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _St
     # The ground is half a height below the point that the camera looks at.
     depth = distance - 0.5 * height * math.sin(math.radians(_ELEVATION))
     drop = 0.5 * height * math.cos(math.radians(_ELEVATION))
-    return stage._replace(
+    return _Stage(
+        drawing,
         ground_line=0.5 + 0.5 * drop / (depth * math.tan(half_view)),
         view_height=2.0 * distance * math.tan(half_view),
     )
 
 
-def _list_swinging_geoms(body: Body, model: mujoco.MjModel) -> list[_SwingingGeom]:
-    """Return the geoms of a decorated model that swing."""
-    bones = swinging.list_bones(body)
-    bone_names = [bone.name for bone in bones]
-    geoms = []
-    for geom_name, bone_name in visuals.geoms_of_bones(body).items():
-        geom = model.geom(geom_name)
-        bone = bone_names.index(bone_name)
-        model.geom_sameframe[geom.id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else MuJoCo takes the torso's frame
-        geoms.append(_SwingingGeom(geom.id, bone, bones[bone].place, geom.pos.copy(), geom.quat.copy()))
-    return geoms
-
-
-def _measure_outline(stage: _Stage, poses: Sequence[_Pose]) -> tuple[np.ndarray, np.ndarray]:
+def _measure_outline(drawing: pictures.Decorated, poses: Sequence[_Pose]) -> tuple[np.ndarray, np.ndarray]:
     """Return distances from the vertical axis and heights, (n,) m, of the corners of boxes around geoms in poses."""
-    model = stage.drawing.model.ptr
-    data = stage.drawing.data
+    model = drawing.model.ptr
     is_body_geom = model.geom_bodyid > 0
     points_of_poses = []
     for pose in poses:
-        stage.pose(pose)
-        points_of_poses.append(geom_corners(model, data)[is_body_geom])
+        drawing.pose(pose.qpos, swings=pose.swings)
+        points_of_poses.append(geom_corners(model, drawing.data)[is_body_geom])
     points = np.concatenate(points_of_poses).reshape(-1, 3)
     return np.linalg.norm(points[:, :2], axis=-1), points[:, 2]
 
@@ -270,8 +226,8 @@ def _find_distance(radii: np.ndarray, heights: np.ndarray, half_view: float) -> 
 
 def _render_pose(stage: _Stage, pose: _Pose, size: int, transparent: bool) -> np.ndarray:
     """Return a picture (size, size, 3 or 4), drawn larger and reduced."""
-    stage.pose(pose)
     drawing = stage.drawing
+    drawing.pose(pose.qpos, swings=pose.swings)
     quality = _TRANSPARENT_QUALITY if transparent else _OPAQUE_QUALITY
     scale = min(quality.scale, pictures.MAX_SCALE * MAX_HEIGHT // size)  # pixels drawn, for each of the picture
     colors = drawing.render(scale * size, scale * size, _FREE_CAMERA)

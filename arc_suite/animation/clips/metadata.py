@@ -3,13 +3,14 @@
 import collections
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
-from arc_suite.animation import swinging
 from arc_suite.animation.clips.catalog import WalkLoop, clip_names, clip_of
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import LIFT_OFF, TOUCH_DOWN
-from arc_suite.animation.parts import Part, Swing, describe_body
+from arc_suite.animation.parts import describe_body
+from arc_suite.models import swinging
+from arc_suite.models.swinging import Swing
 from arc_suite.robots.spec import Body
 
 # By the name that users choose: whether the root moves, for each animation of a clip.
@@ -52,7 +53,7 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
         "units": {"length": "m", "time": "s", "angle": "rad"},
         "axes": {"up": "y", "forward": "z", "left": "x"},
         "bones": _parent_of_bone(body),
-        "swinging_bones": {bone.name: _spring_metadata(bone) for bone in swinging.list_bones(body)},
+        "swinging_bones": {bone.name: _spring_metadata(bone.swing) for bone in swinging.list_bones(body)},
         "clips": metadata_of_animation,
         "blend": _make_blend_spaces(clips, roots_move),
     }
@@ -67,9 +68,8 @@ def _parent_of_bone(body: Body) -> dict[str, str | None]:
     return parents
 
 
-def _spring_metadata(bone: Part) -> dict[str, float]:
+def _spring_metadata(swing: Swing) -> dict[str, float]:
     """Return the spring of a bone, for engines that simulate it: frequency, Hz, damping ratio, and limit, rad."""
-    swing = cast(Swing, bone.swing)
     frequency = swing.frequency / (2.0 * math.pi)
     return {"frequency": round(frequency, 4), "damping": swing.damping, "limit": round(swing.limit, 4)}
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation import swinging
 from arc_suite.animation.clips.catalog import Difference, Kind, Passage, Showcase, WalkLoop
 from arc_suite.animation.clips.root_motion import ClipMotion, fade_out
-from arc_suite.animation.parts import Part
+from arc_suite.models import swinging
+from arc_suite.models.swinging import SwingingBone
 from arc_suite.robots.spec import Body
 
 _NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))
@@ -73,7 +73,7 @@ def swing_bones(
     return np.stack(quaternions, axis=1)
 
 
-def _swing_in_loop(bone: Part, motion: ClipMotion) -> _Swings:
+def _swing_in_loop(bone: SwingingBone, motion: ClipMotion) -> _Swings:
     """Return how a bone swings in a loop, as if it had gone on forever."""
     positions, orientations = _place_torso(motion)
     anchor = swinging.hold_mass(bone, positions, orientations)
@@ -91,7 +91,9 @@ def _swing_in_loop(bone: Part, motion: ClipMotion) -> _Swings:
     return _Swings(turns, begin)
 
 
-def _swing_once(bone: Part, motion: ClipMotion, before: ClipMotion | None, after: ClipMotion | None) -> np.ndarray:
+def _swing_once(
+    bone: SwingingBone, motion: ClipMotion, before: ClipMotion | None, after: ClipMotion | None
+) -> np.ndarray:
     """Return how a bone swings from rest or a loop to rest or a loop, (samples, 3)."""
     positions, orientations = _place_torso(motion)
     anchor = swinging.hold_mass(bone, positions, orientations)
@@ -104,7 +106,7 @@ def _swing_once(bone: Part, motion: ClipMotion, before: ClipMotion | None, after
     return turns + fade_out(share)[:, None] * (end_turn - turns[-1])
 
 
-def _follow(bone: Part, time_step: float, anchor: np.ndarray, state: swinging.State) -> np.ndarray:
+def _follow(bone: SwingingBone, time_step: float, anchor: np.ndarray, state: swinging.State) -> np.ndarray:
     """Return z (samples, 3) of a mass that is anchor at places (samples, 3), from a state at the first of them."""
     rings = [state.ring]
     for place in anchor[1:]:

@@ -10,7 +10,7 @@ from arc_suite import rotations
 from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.parts import Part
 from arc_suite.animation.studio.creature import Creature
-from arc_suite.animation.swinging import Swinging
+from arc_suite.models.swinging import Swinging, list_bones
 from arc_suite.tasks import readings
 
 _HANDLE_SCALE = 1.35  # radius of a handle's ball, in radii of its link
@@ -45,7 +45,7 @@ class Figure:
         self._hinge_joints = [part.joint for part in hinged_parts]  # indices of joints
         self._hinge_axes = np.array([part.axis for part in hinged_parts])  # (hinges, 3)
         self._standing_turns = np.array([part.quaternion for part in hinged_parts])  # (hinges, 4)
-        self._swinging = Swinging([part for part in creature.parts if part.swing is not None])
+        self._swinging = Swinging(list_bones(creature.setup.body))
         self._swinging_frames = [
             frame for frame, part in zip(self._frames, creature.parts, strict=True) if part.swing is not None
         ]

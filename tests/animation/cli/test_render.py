@@ -156,6 +156,21 @@ def test_poses_between_control_steps_are_those_of_the_physics():
     footage.close()
 
 
+def test_ornaments_swing_in_films_and_rest_in_single_pictures():
+    environment = arc_suite.load("queen", "walk", {"random": 0})
+    tuned = policy("cpg", "queen", "tuned", task=environment.task.definition)
+    footage = films.Footage("queen", environment, alone(tuned, 0), "profile", (96, 72))
+    for _ in range(40):
+        footage.step()
+    picture = environment.physics.render(72, 96, "profile", quality="film")
+    film = footage.view()
+    np.testing.assert_array_equal(film, footage.view())  # at the same time
+    is_moved = abs(film.astype(int) - picture).max(axis=-1) > 30
+    assert 5 < is_moved.sum() < 0.1 * is_moved.size
+    np.testing.assert_array_equal(environment.physics.render(72, 96, "profile", quality="film"), picture)
+    footage.close()
+
+
 def test_the_eye_shows_what_a_policy_sees():
     environment = arc_suite.load("bastion", "steer", {"random": 0})
     footage = films.Footage("bastion", environment, alone(policy("zero", "bastion"), 0), "eye", (64, 48))

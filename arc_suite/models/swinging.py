@@ -13,11 +13,47 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
-from arc_suite.animation.parts import Part, Swing, describe_body
+from arc_suite import checks, rotations
+from arc_suite.models import sizing, visuals
+from arc_suite.models.visuals.springs import SPRINGS
 from arc_suite.robots.spec import Body
 
 _REARWARD = 0.01  # of a unit vector: a bone that points into the ground falls to the rear
+
+
+class Swing(NamedTuple):
+    """How a bone of ornaments swings; see `springs.Spring`.
+
+    Attributes:
+        tip: (3,) its tip in its own frame, m.
+        mass: (3,) where its mass is, in the same frame, m.
+        frequency: rad/s.
+        damping: damping ratio.
+        limit: rad.
+        pivot_radius, tip_radius: radii of balls at both ends whose convex hull holds its shapes, m.
+    """
+
+    tip: np.ndarray
+    mass: np.ndarray
+    frequency: float
+    damping: float
+    limit: float
+    pivot_radius: float
+    tip_radius: float
+
+
+class SwingingBone(NamedTuple):
+    """A bone of ornaments on the torso.
+
+    Attributes:
+        name: its name.
+        place: (3,) its pivot in the torso's frame, m.
+        swing: how it swings.
+    """
+
+    name: str
+    place: np.ndarray
+    swing: Swing
 
 
 class State(NamedTuple):
@@ -35,10 +71,25 @@ class State(NamedTuple):
 
 
 @functools.lru_cache(maxsize=8)
-def list_bones(body: Body) -> tuple[Part, ...]:
-    """Return the bones of a body that swing, all of them on the torso."""
-    parts, _ = describe_body(body)
-    return tuple(part for part in parts if part.swing is not None)
+def list_bones(body: Body) -> tuple[SwingingBone, ...]:
+    """Return the bones of a body's ornaments."""
+    return tuple(_make_bone(body, bone) for bone in visuals.bones(body))
+
+
+def _make_bone(body: Body, bone: visuals.Bone) -> SwingingBone:
+    pivot = np.array(bone.pivot)
+    tip = np.array(bone.tip) - pivot
+    spring = SPRINGS[checks.name(bone.spring, SPRINGS, "spring")]
+    swing = Swing(
+        tip=tip,
+        mass=0.5 * tip,
+        frequency=spring.frequency / sizing.time_unit(body),
+        damping=spring.damping,
+        limit=math.radians(spring.limit),
+        pivot_radius=bone.pivot_radius,
+        tip_radius=bone.tip_radius,
+    )
+    return SwingingBone(bone.name, pivot, swing)
 
 
 def rest_turns(body: Body, samples: int) -> np.ndarray:
@@ -46,9 +97,9 @@ def rest_turns(body: Body, samples: int) -> np.ndarray:
     return np.tile((1.0, 0.0, 0.0, 0.0), (samples, len(list_bones(body)), 1))
 
 
-def hold_mass(bone: Part, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+def hold_mass(bone: SwingingBone, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
     """Return where the torso holds the mass of a bone, (..., 3) m, given its positions (..., 3) and matrices."""
-    return position + orientation @ (bone.place + _swing(bone).mass)
+    return position + orientation @ (bone.place + bone.swing.mass)
 
 
 def rest(anchor: np.ndarray) -> State:
@@ -56,20 +107,20 @@ def rest(anchor: np.ndarray) -> State:
     return State(anchor, np.zeros(3), np.zeros(3, complex))
 
 
-def advance(bone: Part, state: State, anchor: np.ndarray, seconds: float) -> State:
+def advance(bone: SwingingBone, state: State, anchor: np.ndarray, seconds: float) -> State:
     """Return the state after a time, s, in which the place of the mass has gone straight to another one (3,), m."""
     velocity = (anchor - state.anchor) / seconds
     ring = (state.ring - (velocity - state.velocity)) * decay(bone, seconds)
     return State(anchor, velocity, ring)
 
 
-def decay(bone: Part, seconds: float) -> complex:
+def decay(bone: SwingingBone, seconds: float) -> complex:
     """Return what z is multiplied by in a time, s."""
-    swing = _swing(bone)
+    swing = bone.swing
     return complex(np.exp(complex(-swing.damping * swing.frequency, _rate(swing)) * seconds))
 
 
-def turn_vectors(bone: Part, orientation: np.ndarray, ring: np.ndarray) -> np.ndarray:
+def turn_vectors(bone: SwingingBone, orientation: np.ndarray, ring: np.ndarray) -> np.ndarray:
     """Return the turns (..., 3) of a bone in the torso's frame, rad, without a limit.
 
     Args:
@@ -77,13 +128,13 @@ def turn_vectors(bone: Part, orientation: np.ndarray, ring: np.ndarray) -> np.nd
         orientation: (..., 3, 3) of the torso in the world.
         ring: (..., 3) z of the offset; see the module.
     """
-    swing = _swing(bone)
+    swing = bone.swing
     offset = (orientation.swapaxes(-1, -2) @ (ring.imag / _rate(swing))[..., None])[..., 0]
     return np.cross(swing.mass, offset) / (swing.mass @ swing.mass)
 
 
 def orient(
-    bone: Part, position: np.ndarray, orientation: np.ndarray, turns: np.ndarray, ground: float = 0.0
+    bone: SwingingBone, position: np.ndarray, orientation: np.ndarray, turns: np.ndarray, ground: float = 0.0
 ) -> np.ndarray:
     """Return how a bone is turned in the torso's frame, (..., 4), within its limit and above the ground.
 
@@ -94,7 +145,7 @@ def orient(
         turns: (..., 3) see `turn_vectors`.
         ground: height of the ground below the bone, m.
     """
-    swing = _swing(bone)
+    swing = bone.swing
     length = np.linalg.norm(swing.tip)
     direction = swing.tip / length
     angle = np.linalg.norm(turns, axis=-1, keepdims=True)
@@ -125,15 +176,10 @@ def _rate(swing: Swing) -> float:
     return swing.frequency * math.sqrt(1.0 - swing.damping**2)
 
 
-def _swing(bone: Part) -> Swing:
-    assert bone.swing is not None
-    return bone.swing
-
-
 class Swinging:
     """Bones of a body in a simulation, for pictures of it."""
 
-    def __init__(self, bones: Sequence[Part]):
+    def __init__(self, bones: Sequence[SwingingBone]):
         """Begin with bones at rest."""
         self._bones = bones
         self._states: list[State] = []
