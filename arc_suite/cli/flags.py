@@ -297,7 +297,7 @@ def setups_from_flags(stored: Setup | None = None, suggestions: Iterable[str] = 
 
 def _print_training_setup(trained: Setup, setups: Mapping[str, Setup]) -> None:
     """Print in which setup a policy was trained, and in which others it plays; nothing if no body suits it."""
-    suitable_setups = [setup for setup in setups.values() if trained.several or setup.body == trained.body]
+    suitable_setups = [setup for setup in setups.values() if trained.several or setup.body.moves_like(trained.body)]
     if not suitable_setups:
         return
     line = f"{FLAGS.policy}: trained on {trained}"

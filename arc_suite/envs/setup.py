@@ -181,6 +181,12 @@ class Setup:
         """Names of the tasks for people and the names of files, without modules."""
         return "+".join(task.name for task in registry.tasks_of(self.task))
 
+    def moves_like(self, other: "Setup") -> bool:
+        """Return whether another setup has the same episodes: at most name and looks of the body differ."""
+        if self.several or other.several:
+            return self == other
+        return self.body.moves_like(other.body) and dataclasses.replace(self, domain=other.domain) == other
+
     @property
     def env_id(self) -> str:
         """Gymnasium's id, `arc_suite/<robot>-<task>-v<version>`."""
@@ -332,10 +338,18 @@ class Setup:
         fields["task_version"] = task_versions[0] if len(task_versions) == 1 else task_versions
         fields["body_sha256"] = hashlib.sha256(texts.encode()).hexdigest()
         if not self.several:
-            _, model = self.prepare()
-            fields[PHYSICS] = hash_physics(model)
+            fields[PHYSICS] = self.physics_sha256()
         fields["versions"] = versions.dependency_versions()
         return fields
+
+    def physics_sha256(self) -> str:
+        """Return the hash of the model, see `hash_physics`; of several bodies that of the first.
+
+        Raises:
+            ValueError: a setting that does not fit.
+        """
+        _, model = self.prepare()
+        return hash_physics(model)
 
     def _task_kwargs_with(self, seed: int | None) -> dict[str, Any]:
         """Return the settings of the task, with the seed of an environment unless it is None."""

@@ -347,6 +347,7 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
         return registry.resolve(_UNIVERSAL_MODULE).Universal(policy_network, task)
     _check_setup(path, policy_network.setup, body, task)
     _check_joints(path, policy_network.joints, body)
+    _warn_of_other_model(path, policy_network)
     return policy_network
 
 
@@ -364,12 +365,23 @@ def _from_other_library(policy_file: PolicyFile, body: Body, task: Task | None) 
 
 def _check_setup(path: Path, setup: Setup, body: Body, task: Task | None) -> None:
     """Raise ValueError if a policy was trained for another body, or for other actions."""
-    if setup.body != body and not (is_robot(setup.body) and setup.body.name == body.name):
-        name = "another body of that name" if setup.body.name == body.name else setup.body.name
-        raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
+    is_robot_of_name = is_robot(setup.body) and setup.body.name == body.name
+    if not setup.body.moves_like(body):
+        if not is_robot_of_name:
+            name = "another body of that name" if setup.body.name == body.name else setup.body.name
+            raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
+        warnings.warn(f"policy {path}: learned with another {body.name} than this one", stacklevel=5)
     actions = setup.definition.actions
     if task is not None and actions != task.actions:
         raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
+
+
+def _warn_of_other_model(path: Path, policy_network: Network) -> None:
+    """Warn if the model of a policy's training has changed since, with its robot, its task or the suite."""
+    setup = policy_network.setup
+    if policy_network.physics_sha256 not in (None, setup.physics_sha256()):
+        text = f"policy {path}: the model of {setup.name}, {setup.task_label} has changed since its training"
+        warnings.warn(text, stacklevel=5)
 
 
 def _check_joints(path: Path, joints: int, body: Body) -> None:

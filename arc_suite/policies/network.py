@@ -6,6 +6,7 @@ A policy file is an archive of the graph's arrays with one JSON text:
     blocks                      size of every block of the observation, in the order of the input
     nodes                       [operator, input, ...] for each node of the graph; see `graph`
     training_seeds              first and last seed of each range of training episodes, or null
+    physics_sha256              hash of the model of the training; earlier files, and several bodies, lack it
 
 It holds no pickle and no code, so that reading a file runs nothing.
 """
@@ -22,6 +23,7 @@ import numpy as np
 from arc_suite import archives, checks, files, parsers, registry, seed_ranges, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.policies.graph import Graph, Node, check_graph
+from arc_suite.simulation.model_hash import PHYSICS
 
 PACKAGED = Path(__file__).with_name("packaged")  # policy files that come with the package
 
@@ -40,12 +42,14 @@ class Network(NamedTuple):
         setup: body, or bodies, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
         training_seeds: seeds of the episodes of its training; None if they are unknown.
+        physics_sha256: hash of the model of its training; None if it is unknown.
     """
 
     graph: Graph
     setup: Setup
     blocks: Mapping[str, int]
     training_seeds: seed_ranges.Ranges | None = None
+    physics_sha256: str | None = None
 
     def __repr__(self) -> str:
         return f"Network({self.setup}: {self.size} observations)"  # without the weights
@@ -107,6 +111,8 @@ def save(path: str | os.PathLike[str], network: Network) -> None:
     nodes = [[node.operator, *node.inputs] for node in network.graph.nodes]
     record = network.setup.to_dict() | {"blocks": dict(network.blocks), "nodes": nodes}
     record["training_seeds"] = seed_ranges.to_json(network.training_seeds)
+    if not network.setup.several:
+        record[PHYSICS] = network.setup.physics_sha256()
     with files.writing(path) as temporary:
         np.savez(temporary, policy=np.array(json.dumps(record)), **network.graph.arrays)  # type: ignore[arg-type]
 
@@ -168,7 +174,10 @@ def _read(path: Path) -> Network:
     graph = check_graph(Graph(nodes, arrays), sum(blocks.values()))
     setup = Setup.from_dict(record)
     _ = setup.excluded_blocks  # raises an error if they are no names
-    return Network(graph, setup, blocks, seed_ranges.from_json(record.get("training_seeds")))
+    physics_sha256 = record.get(PHYSICS)
+    if physics_sha256 is not None and not isinstance(physics_sha256, str):
+        raise ValueError(f"expected {PHYSICS} to be a str, got {checks.preview(physics_sha256)}")
+    return Network(graph, setup, blocks, seed_ranges.from_json(record.get("training_seeds")), physics_sha256)
 
 
 def checkpoint_files(folder: Path) -> list[Path]:

@@ -47,6 +47,7 @@ _MAX_LINKS = 16  # of a leg
 _MAX_SHAPES = 64  # solids of a torso, and as many shapes of ballast
 _MAX_HELD_JOINTS = 256
 _MAX_FILE_JOINTS = 1024
+_FIELDS_WITHOUT_PHYSICS = ("name", "camera", "palette", "ornaments")  # of a body
 
 # Bounds of motors and joints, in SI units. They lie beyond the results of sizing for all bodies within the other
 # bounds, so that no error is about a number that sizing has computed.
@@ -909,6 +910,11 @@ class Body(_Spec):
             feet_in_front = [other_x for other_side, other_x in feet if other_side == side and other_x > x]
             ranks.append(len(feet_in_front))
         return tuple(ranks)
+
+    def moves_like(self, other: Body) -> bool:
+        """Return whether another body has the same physics: they differ in name, camera and looks at most."""
+        fields = {name: getattr(other, name) for name in _FIELDS_WITHOUT_PHYSICS}
+        return self.replace(**fields) == other
 
     def mirrored(self) -> Body:
         """Return the mirror image of the body across the x-z plane; names and order of the parts do not change."""

@@ -80,6 +80,8 @@ def test_what_is_no_source_is_refused_before_any_work(saved):
     for body, other in ((ROBOTS["tick"], "leaper"), (ROBOTS["leaper"].replace(density=7.0), "another body")):
         with pytest.raises(ValueError, match=f"^{saved}: expected tracks of {body.name}, got those of {other}"):
             source(str(saved)).recorders(Setup.of(body), (0,))
+    colored = Setup.of(ROBOTS["leaper"].replace(palette="coral"))
+    assert len(source(str(saved)).recorders(colored, (0,))) == 1
     for arguments, text in ((("steer",), "steer"), (("walk", {"arena": "bumps"}), 'walk, {"arena": "bumps"}')):
         with refused(f"{saved}: expected tracks of leaper, {text}, got those of leaper, walk"):
             source(str(saved)).recorders(Setup.of("leaper", *arguments), (0,))

@@ -106,12 +106,12 @@ def _check_dataset(dataset, context: RunContext) -> None:
     dataset_setup = dataset.settings.setup
     setup = context.setup
     prior = checks.preview(context.prior)
-    if dataset_setup.body != setup.body:
+    if not dataset_setup.body.moves_like(setup.body):
         raise ValueError(f"prior {prior}: of {dataset_setup.body.name}, and not of {setup.body.name}")
-    if dataset_setup == setup != setup.learning():
+    if dataset_setup.moves_like(setup) and not setup.moves_like(setup.learning()):
         names = ", ".join(setup.kind.training)
         raise ValueError(f"prior {prior}: expected other {names} than those of judges; collect it anew")
-    if dataset_setup != setup.learning():
+    if not dataset_setup.moves_like(setup.learning()):
         raise ValueError(f"prior {prior}: of {dataset_setup}, and not of {setup}")
     version = dataset.metadata["arc_suite"].get("task_version")
     if version != setup.kind.version:  # of other dynamics, rewards or observations
