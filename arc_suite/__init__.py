@@ -42,4 +42,6 @@ __all__ = ["load", "symmetry", "register", "Setup", "suite", "TASKS_BY_DOMAIN", 
 
 
 def __getattr__(name: str) -> Any:
-    return getattr(suite, name)
+    if name in ("ALL_TASKS", "TASKS_BY_DOMAIN"):
+        return getattr(suite, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])

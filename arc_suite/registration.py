@@ -168,7 +168,9 @@ def _check_names(kind: str, additions: Mapping[str, Any], module: str | None) ->
     table = _TABLES[kind]
     for name, value in additions.items():
         if not (isinstance(name, str) and name.isidentifier()):
-            raise ValueError(f"{kind} {checks.preview(name)}: expected a name of letters, digits and underscores")
+            raise ValueError(
+                f"{kind} {checks.preview(name)}: expected letters, digits and underscores, without a digit first"
+            )
         is_same_value = table.get(name) is value
         is_of_same_module = module is not None and MODULE_OF_NAME.get((kind, name)) == module
         is_known = is_same_value or is_of_same_module or _is_new_version(value, table.get(name))

@@ -463,13 +463,13 @@ def check_stored_settings(settings: Mapping[str, Any]) -> None:
         refuse_import("modifier", name)
     arena = str(settings.get("arena", "flat"))
     if _ground_file(arena) is not None:
-        raise ValueError(f"arena {checks.preview(arena)}: files name no other files")
+        raise ValueError(f"arena {checks.preview(arena)}: what is stored cannot name a file")
     if names_arena(arena):
         refuse_import("arena", arena)
     for task in TASKS.values():
         for name in task.file_settings.keys() & settings.keys():
             if task.file_settings[name].names_file(settings[name]):
-                raise ValueError(f"{name} {checks.preview(settings[name])}: files name no other files")
+                raise ValueError(f"{name} {checks.preview(settings[name])}: what is stored cannot name a file")
 
 
 def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:

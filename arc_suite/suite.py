@@ -26,4 +26,4 @@ def __getattr__(name: str) -> Any:
             return registry.all_tasks()
         case "TASKS_BY_DOMAIN":
             return registry.tasks_by_domain()
-    raise AttributeError(f"module 'arc_suite' has no attribute {name!r}", name=name, obj=sys.modules["arc_suite"])
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])

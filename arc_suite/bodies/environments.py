@@ -19,7 +19,7 @@ from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_
 from arc_suite.envs.prepare import prepare_task, refuse_arguments
 from arc_suite.envs.setup import pair_with_tasks
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.contract import CURRICULUM, Task
+from arc_suite.tasks.contract import LEVEL, Task
 from arc_suite.tasks.readings import torso_qpos
 
 
@@ -302,13 +302,12 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """Set settings of some environments from their next reset on; see `VectorEnv.change_settings`."""
         self._check_open("change settings")
         mask = self._checked_mask(mask, "mask")
-        _, curriculum_setting = CURRICULUM
         checked_changes = []  # all of them, before the first setting changes
         for group, indices, _ in self._places:
             if mask[indices].any():
                 checked_changes.append((group, group._checked_changes(settings), mask[indices]))
         for group, changes, group_mask in checked_changes:
-            group._put_changes(group_mask, changes, restart=curriculum_setting in settings)
+            group._put_changes(group_mask, changes, restart=LEVEL in settings)
 
     @one_thread_at_a_time
     def rest(self, mask) -> None:

@@ -50,8 +50,8 @@ from arc_suite.tasks.scene import Inputs, Scene, Start
 STEPS = 1000  # control steps of an episode
 
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
+CURRICULUM = "curriculum"
 LEVEL = "level"
-CURRICULUM = ("curriculum", LEVEL)
 
 _CLEARANCE = 0.01  # standing heights; feet start at least so far above the ground
 _RINGS = (0.35, 0.7, 0.9)  # distances from a foot's center at which the ground is measured, shares of the ball's radius

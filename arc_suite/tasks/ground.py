@@ -19,7 +19,7 @@ from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.context import Context
-from arc_suite.tasks.contract import CURRICULUM, STEPS
+from arc_suite.tasks.contract import CURRICULUM, LEVEL, STEPS
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.parts import Grid, Rays
@@ -245,7 +245,7 @@ class Level(Ground):
     @property
     def settings(self) -> tuple[str, ...]:
         """The names of the fields that a caller may set."""
-        return ("start", *CURRICULUM, "scan")
+        return ("start", CURRICULUM, LEVEL, "scan")
 
     @property
     def blocks(self) -> Mapping[str, Block]:
@@ -258,10 +258,9 @@ class Level(Ground):
         curriculum = checks.boolean("curriculum", overrides.get("curriculum", self.curriculum))
         level = checks.integer("level", overrides.get("level", self.level), 0, LEVELS - 1)
         if curriculum and not overrides.get("commands"):
-            expected = "commands, whose ranges it widens"
-            raise ValueError(f"curriculum: expected with {expected}, got {overrides['curriculum']}")
+            raise ValueError("curriculum: needs the setting commands, whose ranges it widens")
         if level and not curriculum:
-            raise ValueError(f"level: expected with curriculum=True, got {overrides['level']}")
+            raise ValueError(f"level: needs the setting curriculum=True, got {level}")
         scan = checks.boolean("scan", overrides.get("scan", self.scan))
         return dataclasses.replace(self, start=start, curriculum=curriculum, level=level, scan=scan)
 
@@ -355,13 +354,13 @@ class Lanes(Ground):
     @property
     def settings(self) -> tuple[str, ...]:
         """The names of the fields that a caller may set; sizes where there is one kind of ground."""
-        return ("difficulty", *CURRICULUM, "terrain_seed", *terrain.sizes(self.kinds))
+        return ("difficulty", CURRICULUM, LEVEL, "terrain_seed", *terrain.sizes(self.kinds))
 
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the lanes with checked settings."""
         values = {name: overrides.get(name, getattr(self, name)) for name in self.settings}
         size_names = [name for name in terrain.sizes(self.kinds) if values[name] is not None]
-        for name in ("difficulty", *CURRICULUM):
+        for name in ("difficulty", CURRICULUM, LEVEL):
             if size_names and name in overrides:
                 size_name = size_names[0]
                 raise ValueError(f"{name}: expected none with {size_name}={values[size_name]}, got {overrides[name]}")
@@ -377,7 +376,7 @@ class Lanes(Ground):
                 f"got {overrides['difficulty']}"
             )
         if level and not curriculum:
-            raise ValueError(f"level: expected with curriculum=True, got {overrides['level']}")
+            raise ValueError(f"level: needs the setting curriculum=True, got {level}")
         return dataclasses.replace(
             self,
             difficulty=difficulty,

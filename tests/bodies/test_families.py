@@ -182,7 +182,7 @@ def test_families_of_other_packages_come_before_modules_of_their_names(tmp_path)
     assert interpreters.printed(code, folder=tmp_path) == [
         "crab_3 5",
         "family 'crab' is already registered; choose another name",
-        "family 'cr ab': expected a name of letters, digits and underscores",
+        "family 'cr ab': expected letters, digits and underscores, without a digit first",
     ]
     done = programs.arc_suite("build_model", "--robot=creatures:crab:3", "--summary", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "") and "crab_3" in done.stdout

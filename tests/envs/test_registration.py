@@ -294,7 +294,7 @@ class Misnamed(Walk):
         (presets(**PRESETS["bastion"]), "preset 'slow': preset: does not fit other: KeyError: 'knee'"),
         (presets(trot={"lead": 0.1}), "preset 'trot': preset: expected one of Preset, float, SteppingParameters"),
         ({"tasks": (Other,)}, "task 'walk' is already registered"),
-        ({"tasks": (Misnamed,)}, "task 'walk-slowly': expected a name of letters, digits and underscores"),
+        ({"tasks": (Misnamed,)}, "task 'walk-slowly': expected letters, digits and underscores, without a digit first"),
         ({"tasks": (len,)}, "tasks: expected classes by the contract of arc_suite.tasks.Task, got <built-in"),
         (walk(ROW) | {"tasks": (Other,)}, "task 'walk' is already registered"),
         ({"tasks": (Nameless,)}, "class Nameless has no name of its own: walk is that of Walk"),
@@ -313,14 +313,20 @@ class Misnamed(Walk):
         (crawl(settings_for=lambda self, *_: None), "Crawl.settings_for: expected a class method, with @classmethod "),
         (crawl(step_limit=100), "Crawl.step_limit: expected none; the setting time_limit, s, decides it"),
         ({"arenas": {"flat": lambda body: None}}, "arena 'flat' is already registered"),
-        ({"arenas": {"a-b": lambda body: None}}, "arena 'a-b': expected a name of letters, digits and underscores"),
+        (
+            {"arenas": {"a-b": lambda body: None}},
+            "arena 'a-b': expected letters, digits and underscores, without a digit first",
+        ),
         ({"arenas": {"mine": FLAT}}, "arena 'mine': expected a function from a body to an Arena, got Flat()"),
         (
             {"arenas": {"mine": lambda: FLAT}},
             "arena 'mine': expected a function from a body to an Arena called with body: too many positional arguments",
         ),
         ({"laws": {"mine": Unfitted}}, "law 'mine': expected a class called with task and preset: too many positiona"),
-        ({"laws": {"mine": Law, "a b": Law}}, "law 'a b': expected a name of letters, digits and underscores"),
+        (
+            {"laws": {"mine": Law, "a b": Law}},
+            "law 'a b': expected letters, digits and underscores, without a digit first",
+        ),
         ({"laws": {"mine": Law, "steered": Law}}, "law 'steered': the suite has presets of this name; choose another"),
         (
             {"laws": {"mine": Lacking}},
@@ -333,7 +339,7 @@ class Misnamed(Walk):
         ({"laws": {"mine": Law}} | walk(WITHOUT_BANDS), "parameters of walk: other has no healthy_range and no veloc"),
         ({"laws": {"mine": Law}} | presets(mine=3.0), "preset 'mine': froude: expected a number from -1 to 1, got 3.0"),
         ({"programs": {"mine": len}}, "program 'mine': expected the name of a module, got <built-in function len>"),
-        ({"clips": {"mine": "a:b"}, "algorithms": {3: "a:b"}}, "algorithm 3: expected a name of letters, digits and "),
+        ({"clips": {"mine": "a:b"}, "algorithms": {3: "a:b"}}, "algorithm 3: expected letters, digits and underscores"),
         ({"networks": {"mine": "a:b"}, "tasks": (Other,)}, "task 'walk' is already registered"),
     ],
 )

@@ -3,6 +3,8 @@
 import contextlib
 import graphlib
 import importlib
+import pathlib
+import re
 
 import grimp
 import gymnasium
@@ -53,6 +55,26 @@ def test_modules_of_a_former_package_are_aliases():
 @pytest.mark.parametrize("former", moved.MOVED)
 def test_former_paths_are_aliases(former):
     assert importlib.import_module(former) is importlib.import_module(moved.MOVED[former])
+
+
+def test_code_and_pages_name_modules_by_their_paths_of_today():
+    """Former paths are for what others have saved."""
+    root = pathlib.Path(__file__).parents[2]
+    patterns = []
+    for former in moved.MOVED:
+        package, _, name = former.rpartition(".")
+        patterns += [rf"{re.escape(former)}\b", rf"from {re.escape(package)} import [^\n]*\b{name}\b"]
+    is_former = re.compile("|".join(patterns))
+    folders = ("arc_suite", "tools", "tests", "docs", "examples", "studies")
+    files = [root / "README.md", *(file for folder in folders for file in (root / folder).rglob("*.*"))]
+    texts = {file: file.read_text() for file in files if file.suffix in (".py", ".md", ".ipynb")}
+    lines = [
+        f"{file.relative_to(root)}: {match[0]}" for file, text in texts.items() for match in is_former.finditer(text)
+    ]
+    former_in_use = [
+        line for line in lines if not line.startswith(("arc_suite/moved.py", "tests/house/test_layers.py"))
+    ]
+    assert former_in_use == []
 
 
 def test_saved_spec_of_different_bodies_opens():

@@ -175,7 +175,7 @@ def test_settings_hold_the_ground_and_not_its_file(tmp_path):
     assert stored == pickle.loads(pickle.dumps(setup)) == setup
     assert stored.definition.scene.arena.map.size == (13.0, 11.0, 0.5)
     assert str(setup) == 'tick, steer, {"arena": "hill"}'
-    with pytest.raises(ValueError, match=r"arena '.*hill.png:13x11x0.5': files name no other files"):
+    with pytest.raises(ValueError, match=r"arena '.*hill.png:13x11x0.5': what is stored cannot name a file"):
         Setup.from_dict({**setup.to_dict(), "task_kwargs": {"arena": word}})
 
 

@@ -198,7 +198,7 @@ def test_settings_hold_the_motion_of_a_file(tmp_path):
     assert again == setup
     first = setup.load(seed=1).reset()
     np.testing.assert_array_equal(flat(first), flat(again.load(seed=1).reset()))
-    with refused("motion '/tmp/other.npz': files name no other files"):
+    with refused("motion '/tmp/other.npz': what is stored cannot name a file"):
         Setup.from_dict({**setup.to_dict(), "task_kwargs": {"motion": "/tmp/other.npz"}})
 
 

@@ -131,7 +131,7 @@ LEVELED = [task for task in TASKS if "level" in names(task)]
 
 @pytest.mark.parametrize("task", LEVELED)
 def test_a_level_needs_a_curriculum(task):
-    with refused("level: expected with curriculum=True, got 5"):
+    with refused("level: needs the setting curriculum=True, got 5"):
         arc_suite.load("tick", task, {"level": 5})
 
 
@@ -141,7 +141,7 @@ def test_a_difficulty_is_none_of_a_curriculum(task):
     with refused(message):
         arc_suite.load("tick", task, {"curriculum": True, "difficulty": 0.3})
     environment = arc_suite.load("tick", task, {"difficulty": 0.3})
-    with refused("level: expected with curriculum=True, got 3"):
+    with refused("level: needs the setting curriculum=True, got 3"):
         environment.change_settings({"level": 3})
 
 

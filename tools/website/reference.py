@@ -11,7 +11,7 @@ from website import markdown, returns, settings
 
 # Modules that users import, by title of the page about them.
 API_MODULES = {
-    "Environments": ("arc_suite", "arc_suite.envs.vector", "arc_suite.envs.bodies", "arc_suite.envs.pixels"),
+    "Environments": ("arc_suite", "arc_suite.envs.vector", "arc_suite.bodies", "arc_suite.envs.pixels"),
     "Demonstrators and policies": ("arc_suite.cpg", "arc_suite.policies"),
     "Training and evaluation": ("arc_suite.learning", "arc_suite.evaluation", "arc_suite.evaluation.published"),
     "Style": ("arc_suite.style", "arc_suite.style.metrics"),

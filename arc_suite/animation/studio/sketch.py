@@ -231,14 +231,14 @@ def python_lines(sketch: Sketch) -> str:
 def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
     """Return a Python expression that makes the body, and the names that the lines import, by package."""
     original_body = source_body(sketch)
-    models: list[str] = []  # names of the package arc_suite.models
+    bodies: list[str] = []  # names of the package arc_suite.bodies
     robots: list[str] = []  # names of the package arc_suite.robots
     if sketch.source == LEGS:
         layout_argument = "" if sketch.layout == DEFAULT_CHOICE else f', "{sketch.layout}"'
-        robots.append("generator")
+        bodies.append("generator")
         code = f"generator.generate({sketch.legs}, {sketch.links}{layout_argument})"
     elif sketch.source == RANDOM:
-        models.append("families")
+        bodies.append("families")
         code = f"families.sound_body({sketch.seed})"
     elif sketch.source in ROBOTS:
         robots.append("ROBOTS")
@@ -250,12 +250,12 @@ def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
     shape_changes = _shape_changes(sketch, original_body)
     if shape_changes:
         arguments = ", ".join(f"{name}={value!r}" for name, value in shape_changes.items())
-        robots.append("shaping")
+        bodies.append("shaping")
         code = f"shaping.shaped({code}, {arguments})"
     looks = _changes_of_looks(sketch, original_body)
     if looks:
         code = f"{code}.replace({', '.join(f'{name}={value!r}' for name, value in looks.items())})"
-    return code, {"arc_suite": ["policies"], "arc_suite.models": models, "arc_suite.robots": robots}
+    return code, {"arc_suite": ["policies"], "arc_suite.bodies": bodies, "arc_suite.robots": robots}
 
 
 def command_line(sketch: Sketch) -> str:

@@ -146,7 +146,7 @@ class Configuration:
         """
         policy_setup = self.policy_setup
         # The difficulty is that of evaluations: levels of a curriculum have their own.
-        dropped = ("difficulty",) if self.training.get(CURRICULUM[0]) else ()
+        dropped = ("difficulty",) if self.training.get(CURRICULUM) else ()
         training_setup = policy_setup.with_settings(self.training, dropped)
         if training_setup != policy_setup:
             training_task = training_setup.definition
@@ -398,11 +398,11 @@ def _check_learns_several(setup: Setup, name: str, definition: algorithms.Algori
 
 def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Mapping[str, Any]) -> None:
     """Raise ValueError for settings of training that have no effect, and for a curriculum in evaluations."""
-    curriculum_setting = CURRICULUM[0]
-    if setup.task_kwargs.get(curriculum_setting):
+    curriculum = setup.task_kwargs.get(CURRICULUM)
+    if curriculum:
         raise ValueError(
-            f"setting {curriculum_setting}: expected among the settings of training (--train_set), as an evaluation "
-            f"would begin at the first level, got {checks.preview(setup.task_kwargs[curriculum_setting])}"
+            f"setting {CURRICULUM}: expected among the settings of training (--train_set), as an evaluation "
+            f"would begin at the first level, got {checks.preview(curriculum)}"
         )
     if training and not definition.acts:
         raise ValueError(f"training: expected no settings, as the algorithm makes no step, got {', '.join(training)}")

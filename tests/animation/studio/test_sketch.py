@@ -11,7 +11,7 @@ import programs
 import pytest
 from refusals import refused
 
-from arc_suite import registry
+from arc_suite import moved, registry
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio import states, texts
 from arc_suite.animation.studio.creature import open_creature
@@ -115,7 +115,11 @@ def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
         body_to_json(sketches.source_body(sketch))
     )
     made = {}
-    exec(sketches.python_lines(sketch), made)
+    lines = sketches.python_lines(sketch)
+    imported = re.findall(r"^from (\S+) import (.+)$", lines, re.MULTILINE)
+    paths = {f"{package}.{name}" for package, names in imported for name in names.split(", ")}
+    assert not paths & moved.MOVED.keys()
+    exec(lines, made)
     assert made["body"] == sketches.make_body(sketch)
     assert made["environment"].task_kwargs == sketches.make_setup(sketch).task_kwargs
     policy = made["policy"]
@@ -204,7 +208,10 @@ def test_legs_that_overlap_are_moved_apart():
         (Sketch(settings='{"arena": "os:path"}'), ""),
         (Sketch(settings='{"arena": "antigravity:x"}'), "arena 'antigravity:x': files import nothing"),
         (Sketch(ground="a.png"), "unknown arena ''"),
-        (Sketch(ground="a.png", ground_file="/etc/hill.png"), "arena '/etc/hill.png': files name no other files"),
+        (
+            Sketch(ground="a.png", ground_file="/etc/hill.png"),
+            "arena '/etc/hill.png': what is stored cannot name a file",
+        ),
         (Sketch(ground="a.png", ground_file="{}"), "arena: expected a name, a file or ground as JSON"),
         (Sketch(palette="mos"), "unknown palette 'mos'; did you mean 'moss'?"),
         (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),

@@ -58,7 +58,8 @@ REGISTERED = """
 import json
 import arc_suite
 from arc_suite.learning.agents.algorithms import ALGORITHMS
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.bodies import generator
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.walk import Walk
 
