@@ -68,8 +68,9 @@ class Demonstrator:
         Raises:
             ValueError: no preset suits the task, an unknown name, a value out of range, a preset that does not fit, a
                 task with `sensors_only`, or a body that cannot walk by any preset, as its feet hang far above the
-                floor.
+                floor; or a run learns that declares no demonstrator as its source.
         """
+        usage.add_source(usage.DEMONSTRATOR)
         body, body_task = _body_and_task(task)
         if body_task is None:
             body_task, _ = prepare_task(body, "walk")

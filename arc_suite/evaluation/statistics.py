@@ -74,9 +74,12 @@ def iqm_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[
 
     Returns:
         The interquartile mean, and the ends of the interval.
+
+    Raises:
+        ValueError: no strata, or one holds no value, or NaN.
     """
     random = np.random.default_rng(seed)
-    samples = [np.asarray(values, dtype=float) for values in strata]
+    samples = _samples("strata", strata)
     resamples = np.concatenate([random.choice(values, (RESAMPLES, values.size)) for values in samples], axis=-1)
     return float(interquartile_mean(np.concatenate(samples))), _interval(interquartile_mean(resamples))
 
@@ -93,9 +96,37 @@ def mean_and_interval(strata: Sequence[Sequence[float]]) -> tuple[float, tuple[f
 
     Returns:
         The mean, and the ends of the interval; they are NaN if a stratum has fewer than `MIN_RUNS` runs.
+
+    Raises:
+        ValueError: no strata, or one holds no value, or NaN.
     """
-    mean, low, high = student_interval([np.asarray(values, float) for values in strata])
+    mean, low, high = student_interval(_samples("strata", strata))
     return float(mean), (float(low), float(high))
+
+
+def difference_and_interval(
+    strata_x: Sequence[Sequence[float]], strata_y: Sequence[Sequence[float]]
+) -> tuple[float, tuple[float, float]]:
+    """Return by how much the mean of X exceeds that of Y, with its 95 % interval of Student's t.
+
+    Runs of X and Y are independent. Means and degrees of freedom are those of `mean_and_interval`. A difference whose
+    interval holds 0 may be one of seeds alone.
+
+    Args:
+        strata_x: values of X by stratum, such as the scores of runs in each place; at least one value in each.
+        strata_y: values of Y, in the same strata.
+
+    Returns:
+        The difference, and the ends of the interval; they are NaN if a stratum has fewer than `MIN_RUNS` runs.
+
+    Raises:
+        ValueError: the strata are not as many, or one holds no value, or NaN.
+    """
+    samples_x, samples_y = _sample_pairs(strata_x, strata_y)
+    # The mean over all 2 n strata of X and of -Y is half of the mean difference.
+    halves = student_interval([*samples_x, *(-values for values in samples_y)])
+    difference, low, high = (2.0 * float(value) for value in halves)
+    return difference, (low, high)
 
 
 def student_interval(strata: Sequence[np.ndarray]) -> np.ndarray:
@@ -148,12 +179,10 @@ def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float
         The probability, and the ends of the interval.
 
     Raises:
-        ValueError: the strata are not as many.
+        ValueError: the strata are not as many, or one holds no value, or NaN.
     """
-    if len(strata_x) != len(strata_y):
-        raise ValueError(f"strata: expected as many of X as of Y, got {len(strata_x)} and {len(strata_y)}")
     random = np.random.default_rng(seed)
-    pairs = [(np.asarray(x, float), np.asarray(y, float)) for x, y in zip(strata_x, strata_y, strict=True)]
+    pairs = list(zip(*_sample_pairs(strata_x, strata_y), strict=True))
     resamples = np.mean(
         [_win_rate(random.choice(x, (RESAMPLES, x.size)), random.choice(y, (RESAMPLES, y.size))) for x, y in pairs],
         axis=0,
@@ -170,17 +199,20 @@ def performance_profile(strata, thresholds, seed: int = 0) -> Curve:
         strata: scores by stratum, one for each run.
         thresholds: (points,)
         seed: seed of the resampling.
+
+    Raises:
+        ValueError: no strata, or one holds no score, or NaN.
     """
     random = np.random.default_rng(seed)
     thresholds = np.asarray(thresholds, float)
-    strata = [np.asarray(scores, float) for scores in strata]
+    samples = _samples("strata", strata)
 
-    def shares(of_strata):
-        return np.mean([[(s > t).mean(axis=-1) for t in thresholds] for s in of_strata], axis=0)
+    def shares(scores_of_strata):
+        return np.mean([[(s > t).mean(axis=-1) for t in thresholds] for s in scores_of_strata], axis=0)
 
-    resampled = shares([random.choice(scores, (RESAMPLES, scores.size)) for scores in strata])
+    resampled = shares([random.choice(scores, (RESAMPLES, scores.size)) for scores in samples])
     low, high = np.percentile(resampled, _TAILS, axis=-1, method="nearest")
-    return Curve(shares(strata), low, high)
+    return Curve(shares(samples), low, high)
 
 
 def curve(strata: Sequence[np.ndarray]) -> Curve:
@@ -190,6 +222,24 @@ def curve(strata: Sequence[np.ndarray]) -> Curve:
         strata: (runs, points) scores by stratum, such as the returns of each robot at each evaluation.
     """
     return Curve(*student_interval([np.asarray(scores, float).T for scores in strata]))
+
+
+def _samples(name: str, strata: Sequence[Sequence[float]]) -> list[np.ndarray]:
+    """Return the values (runs,) of each stratum; ValueError if there are none, or one of them is NaN."""
+    samples = [np.asarray(values, float) for values in strata]
+    if not samples:
+        raise ValueError(f"{name}: expected at least one stratum, got none")
+    for number, values in enumerate(samples):
+        if values.ndim != 1 or not values.size or np.isnan(values).any():
+            raise ValueError(f"{name}[{number}]: expected one number or more for each stratum, got {values.tolist()}")
+    return samples
+
+
+def _sample_pairs(strata_x, strata_y) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the values of the strata of X and of Y; see `_samples`."""
+    if len(strata_x) != len(strata_y):
+        raise ValueError(f"strata: expected as many of X as of Y, got {len(strata_x)} and {len(strata_y)}")
+    return _samples("strata_x", strata_x), _samples("strata_y", strata_y)
 
 
 def _win_rate(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -90,6 +90,35 @@ def test_an_interval_over_strata_is_that_of_welch():
     np.testing.assert_allclose(interval, [expected.low / 2, expected.high / 2])
 
 
+def test_a_difference_has_the_interval_of_welch():
+    stats = pytest.importorskip("scipy.stats")
+    x, y = [0.82, 0.91, 0.78, 0.95], [0.60, 0.44, 0.71]
+    difference, interval = evaluation.difference_and_interval([x], [y])
+    expected = stats.ttest_ind(x, y, equal_var=False).confidence_interval(0.95)
+    np.testing.assert_allclose((difference, *interval), (np.mean(x) - np.mean(y), expected.low, expected.high))
+    # Places count equally: twice the same place halves the variance of the mean.
+    of_two, (low, high) = evaluation.difference_and_interval([x, x], [y, y])
+    assert of_two == pytest.approx(difference) and 0.0 < high - low < 0.75 * (interval[1] - interval[0])
+    reverse, (reverse_low, reverse_high) = evaluation.difference_and_interval([y], [x])
+    np.testing.assert_allclose((reverse, reverse_high, reverse_low), (-difference, -interval[0], -interval[1]))
+    assert np.isnan(evaluation.difference_and_interval([x], [y[:2]])[1]).all()
+
+
+@pytest.mark.parametrize(
+    "strata", [[], [[]], [[1.0], [np.nan, 2.0]], [[1.0], 2.0]], ids=["none", "empty", "nan", "flat"]
+)
+def test_strata_without_numbers_are_one_line(strata):
+    for figure in (
+        evaluation.mean_and_interval,
+        evaluation.iqm_and_interval,
+        lambda strata: evaluation.performance_profile(strata, [0.5]),
+        lambda strata: evaluation.probability_of_improvement(strata, strata),
+        lambda strata: evaluation.difference_and_interval(strata, strata),
+    ):
+        with pytest.raises(ValueError, match=r"^strata(_x)?(\[[01]\])?: expected (at least one stratum|one number or)"):
+            figure(strata)
+
+
 @pytest.mark.parametrize("strata", [[[1.0]], [[1.0, 2.0]], [[1.0, 2.0, 3.0], [1.0, 2.0]]])
 def test_fewer_than_three_runs_have_no_interval(strata):
     mean, interval = evaluation.mean_and_interval(strata)

@@ -67,6 +67,9 @@ TESTS = {
     "Results of a seed are bit-identical in another process, on any number of threads, in a vector and alone.": [
         "house/test_endurance.py::test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_batch"
     ],
+    "dm_env observes in double precision, Gymnasium in single, so that a policy may earn other returns for a seed.": [
+        f"{HERE}::test_faces_observe_in_different_precision"
+    ],
     "Resets without a seed continue the random stream.": [
         "envs/test_gym.py::test_np_random_is_the_stream_of_resets",
         "envs/test_gym.py::test_seeds_of_all_kinds",
@@ -205,6 +208,16 @@ def test_seeds_and_their_ranges():
     for seed in (-1, 2**32, 0.5):
         with pytest.raises(ValueError, match=r"^seed: expected an integer from 0 to 4294967295, got "):
             gymnasium.make("arc_suite/tick-walk-v0").reset(seed=seed)
+
+
+def test_faces_observe_in_different_precision():
+    observed = arc_suite.load("tick", "walk", {"random": 0}).reset().observation
+    environment = gymnasium.make("arc_suite/tick-walk-v0")
+    seen, _ = environment.reset(seed=0)
+    environment.close()
+    blocks = list(observed.values())
+    assert {block.dtype for block in blocks} == {np.dtype(float)} and seen.dtype == np.float32
+    np.testing.assert_array_equal(seen, np.concatenate(blocks, dtype=np.float32))
 
 
 def test_what_a_policy_learned_from_is_what_its_file_says(tmp_path):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from arc_suite import parsers, seed_ranges, usage
+from arc_suite import checks, parsers, seed_ranges, usage
 from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -87,8 +87,11 @@ class RunContext(NamedTuple):
         """Count steps of a simulator that is not the suite's, or updates of an algorithm that does not act.
 
         Environments of the suite count their steps themselves. The record of the run has both numbers.
+
+        Raises:
+            ValueError: no integer, or a negative one.
         """
-        usage.count_steps_by_learner(steps)
+        usage.count_steps_by_learner(checks.integer("steps", steps, 0))
 
     def next_evaluation(self, step: int) -> int:
         """Return the environment step of the first evaluation after `step`."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from arc_suite import evaluation, parsers, usage
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import anchors, provenance
+from arc_suite.evaluation import anchors, judging, provenance
 from arc_suite.evaluation.published import CURVES
 from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, PROVENANCE_FIELDS, TRAINING_SEEDS
 from arc_suite.learning.studies import csv_files
@@ -46,6 +46,7 @@ SHARED_SEEDS = "data share seeds with evaluation"
 TEN_EPISODES = "ten episodes"
 EARLIER_MODEL = "earlier model"
 UNKNOWN_SOURCE = "source unknown"
+SAME_POLICY = "seeds with one policy"
 
 
 class RunResult(NamedTuple):
@@ -94,9 +95,10 @@ class RunResult(NamedTuple):
     def notes(self) -> tuple[str, ...]:
         """Reasons why the final return is not comparable with others."""
         reasons = list(note_few_episodes(self.finals))
-        if self.run.configuration.definition.source == usage.UNKNOWN:
+        declared_source = self.run.configuration.definition.source
+        if declared_source == usage.UNKNOWN:
             reasons.append(UNKNOWN_SOURCE)
-            reasons += [f"has used {source}" for source in self.sources]
+        reasons += [f"has used {source}" for source in self.sources if source != declared_source]
         if self.training_seeds is None:
             reasons.append(provenance.UNKNOWN)
         elif common_seeds(self.training_seeds, EVALUATION):
@@ -155,6 +157,8 @@ def _result(
     """
     evaluations = _group_by_step(episodes)
     _check_counts(run.name, [len(evaluation_rows) for evaluation_rows in evaluations])
+    _check_steps(run.name, run_row, int(evaluations[-1][0]["step"]))
+    _check_finals(run.name, finals)
 
     def curve_column(name: str) -> np.ndarray:
         """Return a column of the episodes of the curve, (evaluations, episodes)."""
@@ -217,6 +221,25 @@ def _check_counts(name: str, counts: Sequence[int]) -> None:
         raise ValueError(f"{name}: expected {few} episodes of a step, got {counts}")
 
 
+def _check_steps(name: str, run_row: Mapping[str, str], last_step: int) -> None:
+    """Check that a run's count of steps in the table of runs, if it has one, is the step of its latest evaluation."""
+    counts = [int(run_row[column]) for column in usage.STEP_COUNTS if run_row[column]]
+    if counts and sum(counts) != last_step:
+        raise ValueError(f"{name}: expected the {sum(counts):,} steps of {RUNS}, got {last_step:,}")
+
+
+def _check_finals(name: str, finals: Sequence[Mapping[str, str]]) -> None:
+    """Check that the episodes that judge a run's policy are those that follow from its hash."""
+    if not finals:
+        return
+    sha256 = finals[0]["policy_sha256"]
+    seeds = [(row["policy_sha256"], row["seed"]) for row in finals]
+    expected_seeds = judging.seeds_of(sha256)
+    if seeds != [(sha256, str(seed)) for seed in expected_seeds]:
+        expected = f"{len(expected_seeds)} episodes from seed {expected_seeds.start} on, which follow from the hash"
+        raise ValueError(f"{name}: {FINALS}: expected {expected} of one policy")
+
+
 def read_demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
     """Return the returns of standing still and of demonstrators, (episodes,), by place (`Run.place`) and policy."""
     path = published / DEMONSTRATORS
@@ -267,6 +290,9 @@ def join_notes(seeds: Sequence[RunResult]) -> str:
     """Return the notes of all results without repetitions; a dash without any."""
     notes = [note for result in seeds for note in result.notes]
     notes += note_earlier_models((result.run.configuration.setup, result.physics_sha256) for result in seeds)
+    hashes = [result.policy_sha256 for result in seeds if result.policy_sha256]
+    if len(set(hashes)) < len(hashes):
+        notes.append(SAME_POLICY)
     return "; ".join(dict.fromkeys(notes)) or "-"
 
 

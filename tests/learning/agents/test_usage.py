@@ -211,9 +211,19 @@ def read_teacher(context):
         Teacher(environment).act(environment.task.split(observation), np.zeros(ENVS))
 
 
+def read_law(context):
+    """Ask the law of a demonstrator, without its method `act`."""
+    Demonstrator("tick", "refined").law.initial(ENVS)
+
+
 @pytest.mark.parametrize(
     ("act", "source"),
-    [(imitate, "a demonstrator"), (read_teacher, "a demonstrator"), (read_packaged_policy, "a policy")],
+    [
+        (read_law, "a demonstrator"),
+        (imitate, "a demonstrator"),
+        (read_teacher, "a demonstrator"),
+        (read_packaged_policy, "a policy"),
+    ],
     ids=lambda x: getattr(x, "__name__", x),
 )
 @pytest.mark.parametrize("declared", ["nothing", "prior data"])
@@ -245,6 +255,11 @@ def test_a_learner_counts_what_the_suite_does_not_see(run):
     progress = run_folder.read_progress(folder)
     assert evaluated_steps(folder) == [8, 16]
     assert (progress["environment_steps"], progress["steps_by_learner"]) == (0, 16)
+
+
+def test_no_steps_are_taken_back(run):
+    with pytest.raises(ValueError, match=r"steps: expected an integer from 0(?: to [0-9]+)?, got -8"):
+        run(lambda context: context.count_steps(-8))
 
 
 def test_algorithms_of_the_package_declare_their_sources():

@@ -99,7 +99,7 @@ def test_demonstrators_play_where_runs_were_evaluated_alone(tmp_path, monkeypatc
 def judge(sha256):
     """Return lines of episodes that judge a policy, with the return 300.5 each."""
     fields = {"policy_sha256": sha256, "return": "300.5", "length": "9", "fell": "1.0"}
-    return [fields | {"seed": str(4_200_000_000 + index)} for index in range(100)]
+    return [fields | {"seed": str(seed)} for seed in judging.seeds_of(sha256)]
 
 
 def test_a_judged_policy_has_the_score_of_the_benchmark(tmp_path):
@@ -128,7 +128,7 @@ def test_finals_are_those_that_judge_the_policy(tmp_path):
     publication.write_finals(tmp_path, {new.name: judge(sha256)})
     first, second = results.read_results([new, old], tmp_path)
     assert first.policy_sha256 == sha256 and first.final == 300.5 and first.progress["fell"].tolist() == [1.0] * 100
-    assert list(first.seeds) == list(range(4_200_000_000, 4_200_000_100)) and first.curve_seeds == [*range(10)]
+    assert list(first.seeds) == list(judging.seeds_of(sha256)) and first.curve_seeds == [*range(10)]
     assert first.run == new and not first.other_settings
     assert second.policy_sha256 == "" and second.final == 204.5 and second.seeds == [*range(10)]
     assert second.other_settings and second.run.place == "tick, rough" != new.place
@@ -145,7 +145,42 @@ def test_what_an_algorithm_has_used_is_noted_unless_it_declares_it(tmp_path, mon
     csv_files.write(tmp_path / results.RUNS, results.RUN_COLUMNS, rows)
     mine, declared = results.read_results(runs, tmp_path)
     assert mine.notes == ("ten episodes", "source unknown", "has used a demonstrator", "has used prior data")
-    assert declared.sources == mine.sources and declared.notes == ("ten episodes",)
+    assert declared.sources == mine.sources and declared.notes == ("ten episodes", "has used a demonstrator")
+
+
+@pytest.mark.parametrize(
+    ("table", "row", "changes", "line"),
+    [
+        (
+            results.FINALS,
+            3,
+            {"seed": "7"},
+            "100 episodes from seed [0-9]+ on, which follow from the hash of one policy",
+        ),
+        (results.FINALS, 0, {"policy_sha256": "cd" * 32}, "100 episodes from seed [0-9]+ on, .* of one policy"),
+        (results.FINALS, 99, None, "100 episodes from seed [0-9]+ on, which follow from the hash of one policy"),
+        (results.RUNS, 0, {"environment_steps": "999"}, "expected the 999 steps of runs.csv, got 1,000,000"),
+    ],
+    ids=["seed", "hash", "fewer episodes", "steps"],
+)
+def test_edited_tables_are_refused(tmp_path, table, row, changes, line):
+    each = run("tick", "sac", 1_000_000)
+    publish(tmp_path, each, constant(100.0, 200.0))
+    publication.write_finals(tmp_path, {each.name: judge("ab" * 32)})
+    rows = csv_files.read(tmp_path / table)
+    columns = list(rows[0])
+    rows[row : row + 1] = [] if changes is None else [rows[row] | changes]
+    csv_files.write(tmp_path / table, columns, rows)
+    with pytest.raises(ValueError, match=f"damaged: {each.name}: .*{line}"):
+        results.read_results([each], tmp_path)
+
+
+def test_seeds_with_one_policy_are_noted(tmp_path):
+    runs = [run("tick", "sac", 1_000_000, seed) for seed in (0, 1)]
+    for each in runs:
+        publish(tmp_path, each, constant(100.0, 200.0))
+    publication.write_finals(tmp_path, {each.name: judge("ab" * 32) for each in runs})
+    assert "seeds with one policy" in results.join_notes(results.read_results(runs, tmp_path))
 
 
 def test_damaged_tables_are_one_line(tmp_path):
