@@ -25,11 +25,6 @@ def privileged_sizes(task: Task) -> dict[str, int]:
     return {name: _padding(block).size for name, block in task.privileged_blocks.items()}
 
 
-def pad_privileged_blocks(task: Task, vectors: np.ndarray) -> np.ndarray:
-    """Return privileged observations (environments, size) with 12 legs of 4 joints, 0 where there is none."""
-    return spread(privileged_padding(task), vectors)
-
-
 def privileged_padding(task: Task) -> Padding:
     """Return the indices of a task's privileged observation in that of a body of 12 legs of 4 joints."""
     return join_padding([_padding(block) for block in task.privileged_blocks.values()])

@@ -65,22 +65,10 @@ class View(NamedTuple):
         return ground
 
 
-def find_shifts(view: View, landing, along, places, height: float):
-    """Return by how much feet should land further ahead, (environments, feet) m: the least that finds ground, or 0.
-
-    Args:
-        view: view of the ground.
-        landing: (environments, feet, 2) where feet would land, m, forward and left of the torso.
-        along: (environments, feet, 2) directions of their paths, unit vectors.
-        places: (feet, 2) positions of the feet at rest, m.
-        height: the standing height, m.
-    """
-    shifts, _ = find_landings(view, landing, along, places, height)
-    return shifts
-
-
 def find_landings(view: View, landing, along, places, height: float, support_points=SUPPORT_POINTS) -> tuple:
-    """Return the shifts of `find_shifts`, m, and whether they find ground, both (environments, feet).
+    """Return by how much feet should land further ahead, m, and whether that finds ground, both (environments, feet).
+
+    It is the least shift that finds ground, or 0.
 
     Args:
         view: view of the ground.

@@ -128,9 +128,6 @@ def size_body(body: Body) -> Body:
     )
 
 
-sized = size_body  # the former name, which other packages import
-
-
 def sizing_loads(body: Body) -> np.ndarray:
     """Return the torques (joints,) that joints are sized for, N m: the largest of a stride, and never 0."""
     pose = measure_standing(body)

@@ -52,9 +52,6 @@ def measure_standing(body: Body) -> PoseMechanics:
     return pose_mechanics(body)
 
 
-standing = measure_standing  # the former name, which other packages import
-
-
 def pose_mechanics(
     body: Body, angles: np.ndarray | Sequence[float] | None = None, feet: np.ndarray | None = None
 ) -> PoseMechanics:

@@ -28,7 +28,8 @@ def shifted(seen, x):
     """By how much a foot that would land at x, ahead on the left, is shifted."""
     landing = np.array([[(x, 1.0), *PLACES[1:]]])
     along = np.tile((1.0, 0.0), (1, len(PLACES), 1))
-    return footholds.find_shifts(seen, landing, along, PLACES, HEIGHT)[0]
+    shifts, _ = footholds.find_landings(seen, landing, along, PLACES, HEIGHT)
+    return shifts[0]
 
 
 def test_level_ground_shifts_no_foot():

@@ -136,7 +136,7 @@ def test_different_bodies_have_one_padded_layout(mode):
         for index, info in enumerate(own):
             task = mixed.tasks[index]
             assert_array_equal(
-                together["privileged"][index], padding.pad_privileged_blocks(task, info["privileged"])[0]
+                together["privileged"][index], padding.spread(padding.privileged_padding(task), info["privileged"])[0]
             )
             blocks = privileged.split(padding.privileged_sizes(task), together["privileged"][index])
             legs = len(task.scene.body.legs)
@@ -144,7 +144,9 @@ def test_different_bodies_have_one_padded_layout(mode):
             assert (blocks["strength"] > 0.0).sum() == len(task.scene.body.joint_names)
             if "final_info" in info:
                 last = together["final_info"]["privileged"][index]
-                assert_array_equal(last, padding.pad_privileged_blocks(task, info["final_info"]["privileged"])[0])
+                assert_array_equal(
+                    last, padding.spread(padding.privileged_padding(task), info["final_info"]["privileged"])[0]
+                )
                 assert (last != together["privileged"][index]).any()
                 ends += 1
         infos = (
