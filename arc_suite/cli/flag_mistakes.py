@@ -65,6 +65,7 @@ _CURES_OF_PROGRAMS = {
         "background": "arc-suite animate --transparent writes a picture of a clip without a background",
         "i": "did you mean --spec or --policy?",
         "r": "did you mean --fps?",
+        "size": "did you mean --width and --height?",
         "t": "did you mean --steps?",
         "transparent": "arc-suite animate --transparent writes a picture of a clip without a background",
         "y": "files are written over",
@@ -113,7 +114,10 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
     choices = getattr(parser, "enum_values", ("true", "false"))
     expected = parser.syntactic_help or " or ".join(choices)
     hint = ""
-    if isinstance(parser, flags.IntegerParser):
+    host, colon, port = value.rpartition(":")
+    if name == "port" and colon and port.isdecimal():
+        hint = f"; did you mean --host={checks.quote(host)} --port={port}?"
+    elif isinstance(parser, flags.IntegerParser):
         hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
     raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None
 

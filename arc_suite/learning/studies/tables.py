@@ -164,6 +164,9 @@ def study(name: str) -> Study:
     """
     division, _, algorithm = name.partition("-")
     if division in DIVISIONS:
+        if "." in algorithm and ":" not in algorithm:
+            module, _, attribute = name.rpartition(".")
+            raise ValueError(f"study {checks.preview(name)}: it is a folder; did you mean {module}:{attribute}?")
         return benchmark(division, algorithm)
     if ":" not in name:
         expected = "expected module:attribute, a Study on Python's path, or <division>-<algorithm> of the benchmark"
