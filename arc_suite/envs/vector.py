@@ -34,6 +34,7 @@ from arc_suite.simulation.model import check_fields
 from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import LEVEL, Inputs
 from arc_suite.tasks.readings import root_qpos, root_qvel
+from arc_suite.tasks.scene import Start
 
 _MAX_THREADS = 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
@@ -589,17 +590,39 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         starts = [self._draw_start(index) for index in np.flatnonzero(mask).tolist()]
         self._streams_begin &= ~mask
         self._take_over_settings(mask)
-        qpos, qvel, memories, mocap_positions, models = zip(*starts, strict=True)
-        has_mocap = mocap_positions[0] is not None  # the same for all environments
-        mocap_pos = np.stack(mocap_positions) if has_mocap else None
-        layout = self._task.scene.layout
-        start_qpos = root_qpos(np.stack(qpos), layout)
-        start_qvel = root_qvel(np.stack(qvel), start_qpos, layout)
-        self.batch.reset(mask, start_qpos, start_qvel, mocap_pos, models)
+        self._reset_simulations(mask, starts)
+        memory = trees.map_leaves(lambda *leaves: np.stack(leaves), *(start.memory for start in starts))
+        memory, observation[mask] = self._begin_memory(mask, memory)
+        if self._memory is None:  # in the first reset, in which all environments start
+            self._memory = memory
+        else:
+            self._memory = _replace_entries(self._memory, mask, memory)
+        self._steps[mask] = 0
+        self._ended = self._ended & ~mask
+        self._resting = self._resting & ~mask
 
-        # A task that is the same for all environments gets those of the mask alone. A stacked task needs all of them.
+    def _reset_simulations(self, mask: np.ndarray, starts: Sequence[Start]) -> None:
+        """Put the simulations of some environments (num_envs,) into their starts, one for each."""
+        layout = self._task.scene.layout
+        qpos = root_qpos(np.stack([start.qpos for start in starts]), layout)
+        qvel = root_qvel(np.stack([start.qvel for start in starts]), qpos, layout)
+        has_mocap = starts[0].mocap_pos is not None  # the same for all environments
+        mocap_pos = np.stack([start.mocap_pos for start in starts]) if has_mocap else None
+        self.batch.reset(mask, qpos, qvel, mocap_pos, [start.model for start in starts])
+
+    def _begin_memory(self, mask: np.ndarray, memory) -> tuple[Any, np.ndarray]:
+        """Let the task begin episodes in some environments, whose simulations are reset.
+
+        A task that is the same for all environments gets those of the mask alone. A stacked task needs all of them.
+
+        Args:
+            mask: (num_envs,) booleans, the environments.
+            memory: memory of their starts.
+
+        Returns:
+            Their memory, and their observations (n, size).
+        """
         task = self._task
-        memory = trees.map_leaves(lambda *leaves: np.stack(leaves), *memories)
         task_mask = mask  # (num_envs,) the environments that the task gets
         is_stacked = task is not self._tasks[0]
         if is_stacked:
@@ -611,22 +634,15 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         readings = task.read(self.batch.part(task_mask))
         clear_qpos = task.clear_spawn(memory, readings)
         if clear_qpos is not None:
-            self.batch.place(mask, root_qpos(clear_qpos[is_starting], layout))
+            self.batch.place(mask, root_qpos(clear_qpos[is_starting], task.scene.layout))
             readings = task.read(self.batch.part(task_mask))
         memory = task.begin(memory, readings)
-        observation[mask] = task.vector(task.observe(memory, readings), np.float32)[is_starting]
-
+        observation = task.vector(task.observe(memory, readings), np.float32)[is_starting]
         if not is_starting.all():
             memory = trees.map_leaves(lambda leaf: leaf[is_starting], memory)
-        if self._memory is None:  # in the first reset, in which all environments start
-            self._memory = memory
-        else:
-            self._memory = _replace_entries(self._memory, mask, memory)
-        self._steps[mask] = 0
-        self._ended = self._ended & ~mask
-        self._resting = self._resting & ~mask
+        return memory, observation
 
-    def _draw_start(self, index: int):
+    def _draw_start(self, index: int) -> Start:
         """Return the `Start` of an environment's next episode."""
         next_task = self._next_tasks[index]
         if self._streams_begin[index]:
