@@ -9,7 +9,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from arc_suite.tasks import Task
 PYTHON_EXTENSION = ".py"  # of a file with a function that makes a policy
 _UNIVERSAL_MODULE = "arc_suite.bodies.universal"  # of policies that were trained with many bodies
 _STEPS_PER_DRAW = 256  # control steps
+_STACK_LEVEL = 5  # of warnings from a check of a network: where the function was called that calls `policy`
 
 
 def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -45,14 +46,7 @@ def _zero(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) 
 
 
 def _random(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
-    joints = len(body.joint_names)
-
-    def draw(seed):
-        random = np.random.default_rng(seed)
-        while True:
-            yield from random.uniform(-1.0, 1.0, (_STEPS_PER_DRAW, joints))
-
-    return Script(draw, num_envs, joints)
+    return _draw_actions(body, num_envs, np.random.default_rng, lambda random, shape: random.uniform(-1.0, 1.0, shape))
 
 
 def is_packaged(body: Body, task_name: str) -> bool:
@@ -72,7 +66,7 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
         names = ", ".join(sorted(file.stem for file in PACKAGED.glob(f"*{network.EXTENSION}")))
         hint = "arc-suite train makes others, and universal moves any body"
         raise ValueError(f"policy ppo: none for {path.stem} (there are: {names}); {hint}")
-    return _from_file(path, body, task)
+    return _from_network(path, body, task)
 
 
 def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -83,7 +77,8 @@ def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | N
     return universal.Universal(universal.load(universal.NAME, task), task)
 
 
-# By name: a function that makes a policy from a body, presets, a number of environments and a task or None.
+# By name: a function that makes a policy from a body, presets, a number of environments and a task or None. All take
+# the same arguments, so that `policy` calls each alike; most of them use some only.
 POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, "universal": _universal}
 _UNTRAINED = ("zero", "random")
 
@@ -137,16 +132,20 @@ def policy(
     for preset in preset_list:
         check_preset_name(preset)
     checks.number("noise", noise, 0.0)
+    source = None
     if isinstance(name, str | os.PathLike) and name not in POLICIES:
         hints.refuse_other_files(name)
-    if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
-        checkpoints = network.checkpoint_files(Path(name))
+        source = _find_source(name)
+    if isinstance(source, PolicyFile):
+        named_policy = _from_other_library(source, body, task)
+    elif isinstance(source, NetworkPath):
+        checkpoints = network.checkpoint_files(source.path)
         if checkpoints:
-            named_policy = Mixture([_from_file(path, body, task) for path in checkpoints], num_envs)
+            named_policy = Mixture([_from_network(path, body, task) for path in checkpoints], num_envs)
         else:
-            named_policy = _from_file(Path(name), body, task)
-    elif isinstance(name, str) and ":" in name:
-        named_policy = _from_function(name, body, num_envs)
+            named_policy = _from_network(source.path, body, task)
+    elif isinstance(source, FunctionName):
+        named_policy = _from_function(source, body, num_envs)
     else:
         hints.refuse_other_words(name, POLICIES)
         make = POLICIES[checks.name(name, POLICIES, "policy")]
@@ -191,42 +190,41 @@ def acting(source, task: Task, presets: str | Sequence[str] | None = None) -> Po
 
 
 def _noise(body: Body, deviation: float, num_envs: int) -> Policy:
+    def begin(seed):
+        return np.random.default_rng((seed, 1))  # another stream than that of the random policy
+
+    return _draw_actions(body, num_envs, begin, lambda random, shape: random.normal(0.0, deviation, shape))
+
+
+def _draw_actions(body: Body, num_envs: int, begin: Callable, draw: Callable) -> Policy:
+    """Return a policy of random actions.
+
+    Args:
+        body: body that acts.
+        num_envs: number of environments.
+        begin: makes the random generator of an episode, from its seed.
+        draw: draws actions of a shape with a generator.
+    """
     joints = len(body.joint_names)
 
-    def draw(seed):
-        random = np.random.default_rng((seed, 1))  # another stream than that of the random policy
+    def draw_episode(seed):
+        random = begin(seed)
         while True:
-            yield from random.normal(0.0, deviation, (_STEPS_PER_DRAW, joints))
+            yield from draw(random, (_STEPS_PER_DRAW, joints))
 
-    return Script(draw, num_envs, joints)
+    return Script(draw_episode, num_envs, joints)
 
 
 def is_file(name: str) -> bool:
     """Return whether a name is that of a folder of a run or of checkpoints, or of a file of another library."""
-    if name in POLICIES:
-        return False
-    if other_libraries.find(name):
-        return True
-    try:
-        return (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
-    except OSError:  # the text is too long for a path
-        return False
+    source = _find_source(name)
+    return isinstance(source, PolicyFile) or (isinstance(source, NetworkPath) and source.has_networks())
 
 
 def function_file(name: str) -> Path | None:
     """Return the file of the function that a policy's name gives; None for other names, and without a file."""
-    module, colon, _ = name.rpartition(":")
-    if not colon or name in POLICIES or other_libraries.find(name):
-        return None
-    if module.endswith(PYTHON_EXTENSION):
-        return Path(module)
-    try:
-        spec = importlib.util.find_spec(module)
-    except (ImportError, ValueError):
-        return None
-    if spec is None or not spec.has_location:
-        return None
-    return Path(spec.origin)
+    source = _find_source(name)
+    return source.file() if isinstance(source, FunctionName) else None
 
 
 def digest(name: str) -> str:
@@ -239,13 +237,13 @@ def digest(name: str) -> str:
         ValueError: a damaged file, or one of another library without a file that belongs to it.
         OSError: a file cannot be read.
     """
-    policy_file = other_libraries.find(name)
-    if policy_file is not None:
-        return policy_file.digest()
-    code = function_file(name)
+    source = _find_source(name)
+    if isinstance(source, PolicyFile):
+        return source.digest()
+    code = source.file() if isinstance(source, FunctionName) else None
     if code is not None:
         return hashlib.sha256(code.read_bytes()).hexdigest()
-    digests = [network.digest(network.load(path)) for path in _policy_files(Path(name))]
+    digests = [network.digest(network.load(path)) for path in NetworkPath(Path(name)).files()]
     if len(digests) == 1:
         return digests[0]
     return hashlib.sha256("".join(digests).encode()).hexdigest()
@@ -267,15 +265,12 @@ def setup_of(name) -> Setup | None:
     if name in POLICIES:
         return None
     hints.refuse_other_files(name)
-    if not (isinstance(name, os.PathLike) or _is_path(name)):
-        return None
-    policy_file = other_libraries.find(name)
-    if policy_file is not None:
-        return policy_file.setup()
-    path = Path(name)
-    if not path.exists():
-        return None
-    return network.load(_policy_files(path)[0]).setup
+    source = _find_source(name)
+    if isinstance(source, PolicyFile):
+        return source.setup()
+    if isinstance(source, NetworkPath) and source.path.exists():
+        return network.load(source.files()[0]).setup
+    return None
 
 
 def training_seeds(name) -> seed_ranges.Ranges | None:
@@ -293,20 +288,13 @@ def training_seeds(name) -> seed_ranges.Ranges | None:
     name = os.fspath(name)
     if name in POLICIES:
         return () if name in _UNTRAINED else (seed_ranges.LEARNING,)
-    if other_libraries.find(name) or not _is_path(name):
+    source = _find_source(name)
+    if not isinstance(source, NetworkPath):
         return None
-    ranges_of_files = [network.load(path).training_seeds for path in _policy_files(Path(name))]
+    ranges_of_files = [network.load(path).training_seeds for path in source.files()]
     if None in ranges_of_files:
         return None
     return tuple(dict.fromkeys(itertools.chain.from_iterable(ranges_of_files)))
-
-
-def _policy_files(path: Path) -> list[Path]:
-    """Return the policy files of a run, of all checkpoints in a folder, or the file itself."""
-    checkpoints = network.checkpoint_files(path)
-    if checkpoints:
-        return checkpoints
-    return [path / network.FILE if path.is_dir() else path]
 
 
 def load_network(name: str | os.PathLike[str]) -> Network:
@@ -317,29 +305,97 @@ def load_network(name: str | os.PathLike[str]) -> Network:
         OSError: a file cannot be read.
     """
     hints.refuse_other_files(name)
-    policy_file = other_libraries.find(name)
-    if policy_file is None:
+    source = _find_source(name)
+    if not isinstance(source, PolicyFile):
         policy_network = network.load(name)
         setup = policy_network.setup
         if setup.several:
             raise ValueError(f"policy {name}: expected one of one body, or --robot; got one of {setup.robot}")
         return policy_network
-    setup = policy_file.setup()
+    setup = source.setup()
     if setup is None:
-        raise ValueError(f"policy {policy_file.path}: {policy_file.reader.NO_SETUP}")
-    return policy_file.load().network(setup)
+        raise ValueError(f"policy {source.path}: {source.reader.NO_SETUP}")
+    return source.load().network(setup)
 
 
-def _is_path(name: str) -> bool:
-    if is_file(name) or name.endswith(network.EXTENSION):
-        return True
-    return ":" not in name and (os.sep in name or files.is_folder(name)) and name not in POLICIES
+class NetworkPath(NamedTuple):
+    """Where networks lie, if it exists.
+
+    Attributes:
+        path: a policy file, the folder of a run, or a folder of checkpoints.
+    """
+
+    path: Path
+
+    def has_networks(self) -> bool:
+        """Return whether it is the folder of a run or of checkpoints."""
+        try:
+            return (self.path / network.FILE).is_file() or bool(network.checkpoint_files(self.path))
+        except OSError:  # the text is too long for a path
+            return False
+
+    def files(self) -> list[Path]:
+        """Return the files of all checkpoints in a folder, or the path itself, which `network.load` takes."""
+        checkpoints = network.checkpoint_files(self.path)
+        if checkpoints:
+            return checkpoints
+        return [self.path]
 
 
-def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
-    policy_file = other_libraries.find(path)
+class FunctionName(NamedTuple):
+    """The name of a function that makes a policy.
+
+    Attributes:
+        text: `module:attribute` or `file.py:attribute`.
+    """
+
+    text: str
+
+    @property
+    def module(self) -> str:
+        """A module on Python's path, or a file of Python."""
+        return self.text.rpartition(":")[0]
+
+    @property
+    def is_in_file(self) -> bool:
+        """Whether the module is given as a file."""
+        return self.module.endswith(PYTHON_EXTENSION)
+
+    def file(self) -> Path | None:
+        """Return the file of the function; None without one."""
+        if self.is_in_file:
+            return Path(self.module)
+        try:
+            spec = importlib.util.find_spec(self.module)
+        except (ImportError, ValueError):
+            return None
+        if spec is None or not spec.has_location:
+            return None
+        return Path(spec.origin)
+
+
+def _find_source(name: str | os.PathLike[str]) -> PolicyFile | NetworkPath | FunctionName | None:
+    """Return what a policy's name leads to; None for a word, which is one of the suite or unknown.
+
+    All functions here learn from it of which kind a name is.
+    """
+    text = os.fspath(name)
+    if name in POLICIES:
+        return None
+    policy_file = other_libraries.find(text)
     if policy_file is not None:
-        return _from_other_library(policy_file, body, task)
+        return policy_file
+    network_path = NetworkPath(Path(text))
+    if isinstance(name, os.PathLike) or text.endswith(network.EXTENSION) or network_path.has_networks():
+        return network_path
+    if ":" in text:
+        return FunctionName(text)
+    if os.sep in text or files.is_folder(text):
+        return network_path
+    return None
+
+
+def _from_network(path: Path, body: Body, task: Task | None) -> Policy:
     policy_network = network.load(path)
     if policy_network.setup.several:
         if task is None:
@@ -355,7 +411,7 @@ def _from_other_library(policy_file: PolicyFile, body: Body, task: Task | None) 
     path = policy_file.path
     setup = policy_file.setup()
     if setup is None:
-        warnings.warn(f"policy {path}: {policy_file.reader.NO_SETUP}", stacklevel=5)
+        warnings.warn(f"policy {path}: {policy_file.reader.NO_SETUP}", stacklevel=_STACK_LEVEL - 1)
     else:
         _check_setup(path, setup, body, task)
     loaded = policy_file.load()
@@ -370,7 +426,7 @@ def _check_setup(path: Path, setup: Setup, body: Body, task: Task | None) -> Non
         if not is_robot_of_name:
             name = "another body of that name" if setup.body.name == body.name else setup.body.name
             raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
-        warnings.warn(f"policy {path}: learned with another {body.name} than this one", stacklevel=5)
+        warnings.warn(f"policy {path}: learned with another {body.name} than this one", stacklevel=_STACK_LEVEL)
     actions = setup.definition.actions
     if task is not None and actions != task.actions:
         raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
@@ -381,7 +437,7 @@ def _warn_of_other_model(path: Path, policy_network: Network) -> None:
     setup = policy_network.setup
     if policy_network.physics_sha256 not in (None, setup.physics_sha256()):
         text = f"policy {path}: the model of {setup.name}, {setup.task_label} has changed since its training"
-        warnings.warn(text, stacklevel=5)
+        warnings.warn(text, stacklevel=_STACK_LEVEL)
 
 
 def _check_joints(path: Path, joints: int, body: Body) -> None:
@@ -389,10 +445,9 @@ def _check_joints(path: Path, joints: int, body: Body) -> None:
         raise ValueError(f"policy {path}: moves {joints} joints, and {body.name} has {len(body.joint_names)}")
 
 
-def _from_function(path: str, body: Body, num_envs: int) -> Policy:
-    """Return the policy that a function makes, given the function as `module:attribute` or `file.py:attribute`."""
-    module, _, _ = path.rpartition(":")
-    resolve = _resolve_in_file if module.endswith(PYTHON_EXTENSION) else pkgutil.resolve_name
+def _from_function(function: FunctionName, body: Body, num_envs: int) -> Policy:
+    path = function.text
+    resolve = _resolve_in_file if function.is_in_file else pkgutil.resolve_name
     factory = checks.import_object(path, "policy", resolve)
     if not callable(factory):
         raise ValueError(f"policy {checks.preview(path)}: expected a function that makes a policy from a robot's name")
