@@ -67,7 +67,7 @@ def rate(name: str, updates: int, with_policy: bool, in_phase: bool = False) -> 
 
     def update(index):
         nonlocal learner_state, sums
-        learner_state, sums = off_policy.update(hp, learner_state, sums, batch, draw_noise(index), next_actions)
+        learner_state, sums = off_policy.make_update(hp, learner_state, sums, batch, draw_noise(index), next_actions)
         return sums
 
     return 1.0 / seconds(update, updates)

@@ -82,7 +82,7 @@ def program_of(hp: SoftActorCritic, context: RunContext) -> Hashable:
 
 
 class MappedUpdates:
-    """The updates of runs of one program; see `off_policy.HostUpdates`."""
+    """The updates of runs of one program; see `off_policy.Updates`."""
 
     def __init__(self, runs: Sequence[OffPolicyRun], states: Sequence[sac.SacState], all_sums: Sequence[dict]):
         """Put states and transitions of the runs on the device."""
@@ -319,4 +319,4 @@ def _observation_dtype(tables: Sequence[Sequence[Replay]]):
 @functools.partial(jax.jit, static_argnums=0)
 def _act(hp: SoftActorCritic, policies, observations, noises):
     """Return actions (runs, num_envs, *joints) of the policies of runs."""
-    return jax.vmap(functools.partial(off_policy.act, hp))(policies, observations, noises)
+    return jax.vmap(functools.partial(off_policy.policy_actions, hp))(policies, observations, noises)

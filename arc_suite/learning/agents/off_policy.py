@@ -11,8 +11,8 @@ Several runs may learn in step, with the updates of all of them in one program o
 
 import functools
 import zlib
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -23,9 +23,10 @@ from arc_suite.learning.agents import soft_actor_critic as sac
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.off_policy_run import OffPolicyRun
-from arc_suite.learning.agents.replay import Transitions
+from arc_suite.learning.agents.replay import Replay, Transitions
 from arc_suite.learning.agents.run_environments import RunEnvironments
 from arc_suite.learning.agents.stopping import Patience
+from arc_suite.tasks import Task
 
 METRICS = ("policy_loss", "critic_loss", "q", "entropy", "alpha")
 CRITIC_METRICS = ("critic_loss", "q")
@@ -46,18 +47,54 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
         yield slices[0]
 
 
+class Updates(Protocol):
+    """The networks of runs, and their updates.
+
+    Runs are named by their indices. `HostUpdates` serves a single run, so it needs no indices, and it reads the
+    transitions from the run's buffer. `mapped_updates.MappedUpdates` serves several runs.
+    """
+
+    def act(self, observations: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
+        """Return actions (num_envs, *joints) of the policy of each run."""
+        ...
+
+    def add(self, transitions: Transitions, is_last: np.ndarray) -> None:
+        """Store the transitions (runs, num_envs, ...) of a step."""
+        ...
+
+    def update(self, run_indices: Sequence[int], count: int, with_policy: bool) -> None:
+        """Make a number of updates of some runs; `with_policy` says whether the policies learn too."""
+        ...
+
+    def begin_phase(self, index: int) -> None:
+        """Prepare the updates of a phase that a run begins."""
+        ...
+
+    def state_of(self, index: int) -> sac.SacState:
+        """Return the state of a run."""
+        ...
+
+    def sums_of(self, index: int) -> dict[str, Any]:
+        """Return the sums of metrics of a run."""
+        ...
+
+    def clear_sums(self, index: int) -> None:
+        """Set the sums of metrics of a run to 0."""
+        ...
+
+
 def learn_in_step(
-    all_hp: Sequence[SoftActorCritic], contexts: Sequence[RunContext], updates_kind: Callable
+    all_hp: Sequence[SoftActorCritic], contexts: Sequence[RunContext], updates_class: Callable[..., Updates]
 ) -> Iterator[list[Slice | None]]:
     """Learn in several runs, whose environments step at the same times.
 
     Args:
         all_hp: hyperparameters of each run.
         contexts: context of each run.
-        updates_kind: `HostUpdates` for a single run, or `mapped_updates.MappedUpdates`.
+        updates_class: `HostUpdates` for a single run, or `mapped_updates.MappedUpdates`.
 
     Yields:
-        The slices of all runs; None for a run whose slice is not complete.
+        The slices of all runs; None for a run without one.
 
     Raises:
         ValueError, OSError, Diverged: as `learn`.
@@ -66,16 +103,44 @@ def learn_in_step(
     for run_hp, context in zip(all_hp, contexts, strict=True):
         priors.check_prior(context.prior, run_hp.prior != "none")
     environments = RunEnvironments(contexts, hp.num_envs)
+    runs, states, all_sums = _begin_runs(all_hp, contexts, environments.tasks)
+    observations = environments.begin()
+    updates = updates_class(runs, states, all_sums)
+    for index, run in enumerate(runs):
+        if run.phase is not None:
+            updates.begin_phase(index)
+
+    while True:
+        indices_in_phase = [index for index, run in enumerate(runs) if run.phase is not None]
+        if indices_in_phase:
+            due_indices = _advance_phases(runs, updates, indices_in_phase)
+        else:
+            observations = _step(runs, updates, environments, observations)
+            for count, with_policy in hp.update_groups():
+                updates.update(range(len(runs)), count, with_policy)
+            _begin_due_phases(runs, updates)
+            due_indices = [index for index, run in enumerate(runs) if run.is_slice_due]
+        if due_indices:
+            yield _make_slices(runs, updates, due_indices, environments.arrays())
+
+
+def _begin_runs(
+    all_hp: Sequence[SoftActorCritic], contexts: Sequence[RunContext], tasks: Sequence[Task]
+) -> tuple[list[OffPolicyRun], list[sac.SacState], list[dict]]:
+    """Return all runs, their states, and their sums of metrics, as new or as their checkpoints have them.
+
+    Runs with the same prior data share them.
+    """
     runs = []
     states = []
     all_sums = []
-    open_priors: dict = {}
-    for run_hp, context, task in zip(all_hp, contexts, environments.tasks, strict=True):
+    open_priors: dict[str | None, Replay | None] = {None: None}  # by the id of the dataset
+    for hp, context, task in zip(all_hp, contexts, tasks, strict=True):
         if context.prior not in open_priors:
-            open_priors[context.prior] = None if context.prior is None else priors.open_replay(context, task)
-        run = OffPolicyRun(run_hp, context, task, open_priors[context.prior])
+            open_priors[context.prior] = priors.open_replay(context, task)
+        run = OffPolicyRun(hp, context, task, open_priors[context.prior])
         random = generator(context.seed, "networks", 0)
-        state = sac.begin(run_hp, random, run.inputs.size, run.inputs.joints[-1])
+        state = sac.begin(hp, random, run.inputs.size, run.inputs.joints[-1])
         sums = zero_sums(METRICS)  # since the latest line of metrics
         if context.checkpoint is not None:
             with learner.restoring():
@@ -85,45 +150,12 @@ def learn_in_step(
         runs.append(run)
         states.append(state)
         all_sums.append(sums)
-    observations = environments.begin()
-    updates = updates_kind(runs, states, all_sums)
-    for index, run in enumerate(runs):
-        if run.phase is not None:
-            updates.begin_phase(index)
-
-    while True:
-        indices_in_phase = [index for index, run in enumerate(runs) if run.phase is not None]
-        if not indices_in_phase:
-            indices = list(range(len(runs)))
-            observations = _step(runs, updates, environments, observations)
-            for count, with_policy in hp.update_groups():
-                updates.update(indices, count, with_policy)
-            for index, run in enumerate(runs):
-                if run.begin_phase_if_due():
-                    updates.begin_phase(index)
-                    loss = _loss_of_phase(run, updates.state_of(index))
-                    run.phase = run.phase._replace(patience=Patience(loss or 0.0))
-        else:
-            indices = _advance_phases(runs, updates, indices_in_phase)
-
-        # Yield slices where they are due, and around phases.
-        due_indices = [index for index in indices if runs[index].is_slice_due or indices_in_phase]
-        if not due_indices:
-            continue
-        slices: list[Slice | None] = [None] * len(runs)
-        environment_arrays = environments.arrays()
-        for index in due_indices:
-            run = runs[index]
-            metrics = None
-            if run.is_line_due and run.phase is None:
-                metrics = run.end_line(updates.sums_of(index))
-                updates.clear_sums(index)
-            sums = updates.sums_of(index)
-            slices[index] = run.make_slice(metrics, sums, updates.state_of(index), environment_arrays[index])
-        yield slices
+    return runs, states, all_sums
 
 
-def _step(runs: Sequence[OffPolicyRun], updates, environments: RunEnvironments, observations: np.ndarray) -> np.ndarray:
+def _step(
+    runs: Sequence[OffPolicyRun], updates: Updates, environments: RunEnvironments, observations: np.ndarray
+) -> np.ndarray:
     """Act in the environments of all runs, store the transitions, and return the next observations.
 
     Observations are (runs, num_envs, size).
@@ -154,7 +186,17 @@ def _step(runs: Sequence[OffPolicyRun], updates, environments: RunEnvironments, 
     return step.observations
 
 
-def _advance_phases(runs: Sequence[OffPolicyRun], updates, indices_in_phase: Sequence[int]) -> list[int]:
+def _begin_due_phases(runs: Sequence[OffPolicyRun], updates: Updates) -> None:
+    """Begin the phases that follow the latest step; early stopping compares with the loss before the phase."""
+    for index, run in enumerate(runs):
+        if run.begin_phase_if_due():
+            updates.begin_phase(index)
+            loss = _loss_of_phase(run, updates.state_of(index))
+            if loss is not None:
+                run.phase = run.phase._replace(patience=Patience(loss))
+
+
+def _advance_phases(runs: Sequence[OffPolicyRun], updates: Updates, indices_in_phase: Sequence[int]) -> list[int]:
     """Update critics alone up to the next check of the validation loss; return the indices of the runs that did so.
 
     These are the runs whose phases have come least far.
@@ -171,14 +213,36 @@ def _advance_phases(runs: Sequence[OffPolicyRun], updates, indices_in_phase: Seq
 
 
 def _loss_of_phase(run: OffPolicyRun, state: sac.SacState) -> float | None:
-    """Return the loss on the validation set of the phase of a run; None if it has none."""
-    if not run.phase.held_out:
+    """Return the loss on the validation set of the phase of a run; None without early stopping, which needs none."""
+    if run.phase.held_out == 0:
         return None
     return validation_loss(run.hp, run.context.seed, run.updates, state, run.sources, run.inputs, run.phase)
 
 
+def _make_slices(
+    runs: Sequence[OffPolicyRun],
+    updates: Updates,
+    due_indices: Sequence[int],
+    environment_arrays: Sequence[Mapping[str, np.ndarray]],
+) -> list[Slice | None]:
+    """Return the slices of all runs; None where none is due.
+
+    A line of metrics that is due waits for the end of the phase.
+    """
+    slices: list[Slice | None] = [None] * len(runs)
+    for index in due_indices:
+        run = runs[index]
+        metrics = None
+        if run.is_line_due and run.phase is None:
+            metrics = run.end_line(updates.sums_of(index))
+            updates.clear_sums(index)
+        sums = updates.sums_of(index)
+        slices[index] = run.make_slice(metrics, sums, updates.state_of(index), environment_arrays[index])
+    return slices
+
+
 class HostUpdates:
-    """The updates of a single run, whose batches are gathered on the host."""
+    """The updates of a single run, whose batches are gathered on the host; see `Updates`."""
 
     def __init__(self, runs: Sequence[OffPolicyRun], states: Sequence[sac.SacState], all_sums: Sequence[dict]):
         """Begin with the state and the sums of metrics of the run."""
@@ -188,16 +252,17 @@ class HostUpdates:
         self._update_hp = sac.update_hyperparameters(self._run.hp)
 
     def act(self, observations: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return actions (num_envs, *joints) of the policy of each run."""
-        return [np.asarray(act(self._update_hp, self._state.policy, observations[0], noises[0]))]
+        """Return actions (num_envs, *joints) of the policy, as those of the only run."""
+        return [np.asarray(policy_actions(self._update_hp, self._state.policy, observations[0], noises[0]))]
 
     def add(self, transitions: Transitions, is_last: np.ndarray) -> None:
-        """Store the transitions (runs, num_envs, ...) of a step; the run has them in its buffer."""
+        """Do nothing: the run has the transitions in its buffer."""
 
     def update(self, run_indices: Sequence[int], count: int, with_policy: bool) -> None:
-        """Make a number of updates of the runs with some indices."""
+        """Make a number of updates."""
         run = self._run
-        sums = self._sums if with_policy else zero_sums(CRITIC_METRICS)  # of which no line of metrics has the latter
+        # Lines of metrics are means over updates of the policy: sums of updates without it are dropped.
+        sums = self._sums if with_policy else zero_sums(CRITIC_METRICS)
         for _ in range(count):
             indices, noise = _draw_update(
                 self._update_hp,
@@ -209,7 +274,7 @@ class HostUpdates:
                 run.index_ranges,
             )
             batch, next_actions = gather_update(run, np.asarray(indices))
-            self._state, sums = update(self._update_hp, self._state, sums, batch, noise, next_actions)
+            self._state, sums = make_update(self._update_hp, self._state, sums, batch, noise, next_actions)
             run.count_updates(1, with_policy)
         if with_policy:
             self._sums = sums
@@ -228,20 +293,20 @@ class HostUpdates:
             run.phase = run.phase._replace(next_actions=distributions)
 
     def state_of(self, index: int) -> sac.SacState:
-        """Return the state of a run."""
+        """Return the state."""
         return self._state
 
     def sums_of(self, index: int) -> dict[str, Any]:
-        """Return the sums of metrics of a run."""
+        """Return the sums of metrics."""
         return self._sums
 
     def clear_sums(self, index: int) -> None:
-        """Set the sums of metrics of a run to 0."""
+        """Set the sums of metrics to 0."""
         self._sums = zero_sums(METRICS)
 
 
 @functools.partial(jax.jit, static_argnums=0)
-def act(hp: SoftActorCritic, policy, observations, noise):
+def policy_actions(hp: SoftActorCritic, policy, observations, noise):
     """Return actions (num_envs, *joints) of the policy for standard normal noise."""
     mean, log_std = sac.action_distribution(hp, policy, observations)
     actions, _ = sac.sample_actions(mean, log_std, noise)
@@ -249,7 +314,9 @@ def act(hp: SoftActorCritic, policy, observations, noise):
 
 
 @functools.partial(jax.jit, static_argnums=0, donate_argnums=(1, 2))
-def update(hp: SoftActorCritic, state: sac.SacState, sums: dict, batch: Transitions, noise: sac.Noise, next_actions):
+def make_update(
+    hp: SoftActorCritic, state: sac.SacState, sums: dict, batch: Transitions, noise: sac.Noise, next_actions
+):
     """Make an update, and return the state and the sums of the metrics with this update's added."""
     state, metrics = sac.update(hp, state, batch, noise, next_actions)
     return state, {name: sums[name] + metric for name, metric in metrics.items()}
@@ -342,9 +409,9 @@ def _next_distributions(hp: SoftActorCritic, policy, source, inputs) -> list[np.
 
 
 @functools.partial(jax.jit, static_argnums=(0, 1, 2))
-def _draw_look(hp: SoftActorCritic, size: int, joints: tuple[int, ...], seed, updates):
+def _draw_validation_noise(hp: SoftActorCritic, size: int, joints: tuple[int, ...], seed, updates):
     """Draw noise and dropout masks of the policy's loss on a validation set; None for no masks."""
-    noise_key, mask_key = jax.random.split(make_key(seed, "look", updates))
+    noise_key, mask_key = jax.random.split(make_key(seed, "look", updates))  # the text is part of the seed
     noise = jax.random.normal(noise_key, (size, *joints))
     if not hp.dropout:
         return noise, None
@@ -361,7 +428,7 @@ def validation_loss(hp: SoftActorCritic, seed: int, updates: int, state: sac.Sac
         source.transitions_at(order[:size]).observations for source, order in zip(sources, phase.orders, strict=True)
     ]
     observations = inputs(np.concatenate(parts))
-    action_noise, policy_masks = _draw_look(hp, len(observations), inputs.joints, seed, updates)
+    action_noise, policy_masks = _draw_validation_noise(hp, len(observations), inputs.joints, seed, updates)
     update_hp = sac.update_hyperparameters(hp)
     loss, _ = _policy_loss(update_hp, state.policy, state, observations, action_noise, policy_masks)
     return float(loss)

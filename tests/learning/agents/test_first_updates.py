@@ -36,14 +36,14 @@ def of_policy(policy):
 @pytest.fixture
 def recorded(monkeypatch):
     """The inputs of the learner's updates: the state, and the arrays of batch and noise."""
-    calls, learn = [], off_policy.update
+    calls, learn = [], off_policy.make_update
 
     def recording(hp, state, sums, batch, noise, next_actions):
         copies = [None if part is None else np.array(part) for part in (*batch, *noise)]
         calls.append((jax.tree.map(np.array, state), copies))
         return learn(hp, state, sums, batch, noise, next_actions)
 
-    monkeypatch.setattr(off_policy, "update", recording)
+    monkeypatch.setattr(off_policy, "make_update", recording)
     return calls
 
 

@@ -19,21 +19,21 @@ from arc_suite.tasks import Walk
 @pytest.fixture
 def batches(monkeypatch):
     """The observations of every update, and whether the policy learned in it."""
-    calls, update = [], off_policy.update
+    calls, update = [], off_policy.make_update
 
     def recording(hp, state, sums, batch, noise, next_actions):
         calls.append((np.array(batch.observations), noise.action is not None))
         return update(hp, state, sums, batch, noise, next_actions)
 
-    monkeypatch.setattr(off_policy, "update", recording)
+    monkeypatch.setattr(off_policy, "make_update", recording)
     return calls
 
 
 @pytest.fixture
 def acted(monkeypatch):
     """An entry for each action of the policy."""
-    steps, act = [], off_policy.act
-    monkeypatch.setattr(off_policy, "act", lambda *inputs: steps.append(1) or act(*inputs))
+    steps, act = [], off_policy.policy_actions
+    monkeypatch.setattr(off_policy, "policy_actions", lambda *inputs: steps.append(1) or act(*inputs))
     return steps
 
 

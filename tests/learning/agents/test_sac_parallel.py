@@ -20,13 +20,13 @@ NAME = "sac_parallel"
 @pytest.fixture
 def drawn(monkeypatch):
     """The batches of all updates, and whether the policy learned in them."""
-    batches, update = [], off_policy.update
+    batches, update = [], off_policy.make_update
 
     def recording(hp, state, sums, batch, noise, next_actions):
         batches.append((jax.tree.map(np.array, batch), noise.action is not None))
         return update(hp, state, sums, batch, noise, next_actions)
 
-    monkeypatch.setattr(off_policy, "update", recording)
+    monkeypatch.setattr(off_policy, "make_update", recording)
     return batches
 
 

@@ -217,7 +217,7 @@ def test_another_seed_is_another_run(tiny, tmp_path):
 
 def test_a_learner_that_diverges_stops_with_one_line_and_its_last_checkpoint(tiny, tmp_path, monkeypatch):
     run = tiny("sac", steps=200)
-    update, calls = off_policy.update, []
+    update, calls = off_policy.make_update, []
 
     def poisoned(hp, state, *rest):
         calls.append(1)
@@ -226,14 +226,14 @@ def test_a_learner_that_diverges_stops_with_one_line_and_its_last_checkpoint(tin
             state = state._replace(log_alpha=state.log_alpha * np.nan)
         return state, sums
 
-    monkeypatch.setattr(off_policy, "update", poisoned)
+    monkeypatch.setattr(off_policy, "make_update", poisoned)
     with pytest.raises(Diverged, match=r"^the learner diverged: .* at step 1[5-9]\d") as caught:
         train(run, tmp_path / "run", progress=silent)
     assert "\n" not in str(caught.value)
     with np.load(tmp_path / "run" / "checkpoint.npz") as stored:
         assert stored["count"][0] == 100
         assert all(np.isfinite(stored[name]).all() for name in stored.files if name.startswith("state"))
-    monkeypatch.setattr(off_policy, "update", update)
+    monkeypatch.setattr(off_policy, "make_update", update)
     assert train(run, tmp_path / "run", progress=silent), "the checkpoint is good"
 
 
