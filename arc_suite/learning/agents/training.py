@@ -61,23 +61,24 @@ def train(
     if minutes is not None:
         checks.number("minutes", minutes, 0.0)
     algorithm = configuration.definition
-    stays_on_device = configuration.learns_on_device
     with (
-        _record(configuration, folder, threads, stays_on_device, [configuration.seed], on_metrics) as recorder,
+        _record(
+            configuration, folder, threads, configuration.learns_on_device, [configuration.seed], on_metrics
+        ) as recorder,
         contextlib.closing(
             slices.check_generator(
                 configuration.algorithm, algorithm.learn(algorithm.hyperparameters, recorder.context)
             )
         ) as learned_slices,
-        recorder.show_progress(progress),
-        _naming_flaw_of_task(recorder.context.training),
+        recorder.open_bar(progress),
+        _report_flaw_of_task(recorder.context.training),
     ):
         while not recorder.finished:
             is_time_up = minutes is not None and recorder.cpu_seconds() > 60.0 * minutes
             if (recorder.has_checkpoint and stop()) or is_time_up:
                 recorder.flush()
                 return False
-            with _naming_damage([recorder.folder]):
+            with _report_damage([recorder.folder]):
                 learned_slice = slices.next_slice(
                     configuration.algorithm, learned_slices, recorder.usage.steps, recorder.context.steps
                 )
@@ -108,9 +109,10 @@ def train_in_one_program(
     Raises:
         ValueError, Diverged, OSError: as `train`.
     """
+    if len(listeners) == 0:
+        listeners = [_ignore_metrics] * len(folders)
     with contextlib.ExitStack() as stack:
         recorders = []
-        listeners = listeners or [_ignore_metrics] * len(folders)
         run_seeds = [configuration.seed for configuration in configurations]
         for configuration, folder, on_metrics in zip(configurations, folders, listeners, strict=True):
             recording = _record(configuration, folder, usable_cores(), True, run_seeds, on_metrics)
@@ -121,10 +123,10 @@ def train_in_one_program(
             contextlib.closing(algorithms.learn_in_one_program(all_hyperparameters, contexts))
         )
         for recorder in recorders:
-            stack.enter_context(recorder.show_progress(progress))
-        stack.enter_context(_naming_flaw_of_task(contexts[0].training))
+            stack.enter_context(recorder.open_bar(progress))
+        stack.enter_context(_report_flaw_of_task(contexts[0].training))
         while not all(recorder.finished for recorder in recorders):
-            with _naming_damage(folders):
+            with _report_damage(folders):
                 next_slices = next(all_slices)
             new_slices = [
                 (recorder, learned_slice)
@@ -190,6 +192,7 @@ class _Recorder:
         self._bar = None
         self._on_metrics = on_metrics
         self._writer = _CheckpointWriter(run_files, interval)
+        # How far the run has come, which its folder keeps with a checkpoint.
         self._progress = {"evaluated": 0, "pending": [], "wall": 0.0, "cpu": 0.0} | run_files.progress
         self.usage = run_usage.begin(configuration, run_files, run_seeds)
         self._policy_step = self._progress["evaluated"]  # of the latest policy whose evaluation has begun
@@ -206,11 +209,11 @@ class _Recorder:
         """Whether the last policy has been evaluated."""
         return self._progress["evaluated"] >= self.context.steps
 
-    def show_progress(self, progress: Callable[..., Any]):
-        """Begin a progress bar, as `tqdm` does, and return it: a context."""
+    def open_bar(self, make_bar: Callable[..., Any]):
+        """Return a new progress bar, made as `tqdm` makes one: a context."""
         evaluated_step = self._progress["evaluated"]
         options = {"total": self.context.steps, "initial": evaluated_step, "unit": "step", "unit_scale": True}
-        self._bar = progress(desc=self.folder.name, **options)
+        self._bar = make_bar(desc=self.folder.name, **options)
         return self._bar
 
     def cpu_seconds(self) -> float:
@@ -320,7 +323,7 @@ def _cpu_clock() -> float:
 
 
 @contextlib.contextmanager
-def _naming_damage(folders: Sequence[Path]) -> Iterator[None]:
+def _report_damage(folders: Sequence[Path]) -> Iterator[None]:
     """Raise ValueError with the path of the checkpoint in place of `Damaged`."""
     try:
         yield
@@ -330,7 +333,7 @@ def _naming_damage(folders: Sequence[Path]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _naming_flaw_of_task(setup: Setup) -> Iterator[None]:
+def _report_flaw_of_task(setup: Setup) -> Iterator[None]:
     """Say in the error `Diverged` if the task itself gives results that are not finite, under random actions."""
     try:
         yield
