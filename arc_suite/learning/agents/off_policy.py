@@ -11,7 +11,7 @@ Several runs may learn in step, with the updates of all of them in one program o
 
 import functools
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import jax
@@ -54,7 +54,7 @@ class Updates(Protocol):
     transitions from the run's buffer. `mapped_updates.MappedUpdates` serves several runs.
     """
 
-    def act(self, observations: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
+    def act(self, observations: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> Iterable[np.ndarray]:
         """Return actions (num_envs, *joints) of the policy of each run."""
         ...
 
