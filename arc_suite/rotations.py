@@ -51,6 +51,13 @@ def product(second_turn, first_turn):
     return xp.stack(product_components, axis=-1)
 
 
+def inverse(quaternion):
+    """Return the rotations (..., 4) that undo rotations."""
+    xp = quaternion.__array_namespace__()
+    w, x, y, z = _components(quaternion)
+    return xp.stack([w, -x, -y, -z], axis=-1)
+
+
 def matrix(quaternion):
     """Return rotation matrices (..., 3, 3) from a body's frame to the world."""
     xp = quaternion.__array_namespace__()

@@ -8,8 +8,6 @@ from arc_suite import rotations
 from arc_suite.motions.ground_poses import compose, relative_pose
 from arc_suite.motions.motion import Motion
 
-_CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
-
 
 class Velocities(NamedTuple):
     """Velocities in the frames of a motion, by central differences; in the simulation's convention.
@@ -92,7 +90,7 @@ def velocities(motion: Motion) -> Velocities:
     rate = 0.5 * motion.frame_rate
     before = longer.quaternions[:-2]
     after = longer.quaternions[2:]
-    turns = rotations.product(before * _CONJUGATE, after)  # in the torso's frame
+    turns = rotations.product(rotations.inverse(before), after)  # in the torso's frame
     turns = np.where(turns[:, :1] < 0.0, -turns, turns)
     sines = np.linalg.norm(turns[:, 1:], axis=-1, keepdims=True)
     angles = 2.0 * np.arctan2(sines, turns[:, :1])

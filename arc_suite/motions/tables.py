@@ -19,7 +19,6 @@ EXTENSION = ".csv"
 
 _MAX_BYTES = 1 << 27
 _MAX_COLUMNS = 1024
-_CONJUGATE = (1.0, -1.0, -1.0, -1.0)
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _TIME = "time"
@@ -123,7 +122,7 @@ def _make(
     if body.source:
         home = source.angles_at_home(body)
         angles = angles - np.array([home[name] for name in body.joint_names])
-        quaternions = rotations.product(quaternions, source.file_orientation(body) * _CONJUGATE)
+        quaternions = rotations.product(quaternions, rotations.inverse(source.file_orientation(body)))
         place = source.torso_place(body)
         positions = positions + (rotations.matrix(quaternions) @ place[:, None])[..., 0]
     if loops:

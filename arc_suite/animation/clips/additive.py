@@ -13,7 +13,6 @@ from arc_suite.simulation.model import compile_model
 
 _MAX_SOLE_DEPTH = 0.03  # standing heights, that a sole may be below the ground
 _TRIED_PHASES = 4  # of a base loop, in which a clip that is not in step with it begins
-_CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
 
 
 def find_bases(
@@ -67,7 +66,7 @@ def add_clip(motion: ClipMotion, idle: Pose, base_motion: ClipMotion, base_frame
         base_motion: motion of the base.
         base_frames: (frames,) the frame of the base for each frame of the additive clip.
     """
-    turns = rotations.product(motion.quaternions, idle.quaternion * _CONJUGATE)
+    turns = rotations.product(motion.quaternions, rotations.inverse(idle.quaternion))
     positions = base_motion.positions[base_frames] + motion.positions - idle.position
     quaternions = rotations.product(turns, base_motion.quaternions[base_frames])
     joints = base_motion.joints[base_frames] + motion.joints - idle.joints

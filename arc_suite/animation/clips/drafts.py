@@ -43,7 +43,6 @@ from arc_suite.simulation.model import compile_model
 _MAX_CYCLES_IN_STEP = 4  # gait cycles of loops that stay in step
 _MAX_CYCLES_ALONE = 12  # gait cycles of a loop with a gait of its own
 _MIN_SPEED_SHARE = 0.25  # of its command's velocity, that a loop has at least
-_CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
 
 
 def make_drafts(
@@ -247,7 +246,7 @@ def _make_difference(draft: Draft, base: Draft, pose: Pose) -> Draft:
     base_motion = base.motion
     times = np.linspace(0.0, base_motion.seconds, len(base_motion.joints))
     motion = draft.motion.sample_at(times * draft.motion.seconds / base_motion.seconds)
-    turns = rotations.product(motion.quaternions, base_motion.quaternions * _CONJUGATE)
+    turns = rotations.product(motion.quaternions, rotations.inverse(base_motion.quaternions))
     difference = motion._replace(
         time_step=base_motion.time_step,
         root=np.zeros_like(base_motion.root),

@@ -9,8 +9,6 @@ from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.motions.ground_poses import compose, ground_poses, relative_pose, twist_to
 
-_CONJUGATE = (1.0, -1.0, -1.0, -1.0)  # times a quaternion: the inverse rotation
-
 
 class Pose(NamedTuple):
     """A pose in the root's frame, or the difference of two.
@@ -29,7 +27,7 @@ class Pose(NamedTuple):
         """Return the difference that leads from another pose to this one."""
         return Pose(
             position=self.position - origin.position,
-            quaternion=rotations.product(self.quaternion, origin.quaternion * _CONJUGATE),
+            quaternion=rotations.product(self.quaternion, rotations.inverse(origin.quaternion)),
             joints=self.joints - origin.joints,
         )
 
