@@ -260,9 +260,11 @@ def _follow_sway(body: Body, idle: Pose, poses: np.ndarray) -> ClipMotion:
         share = min(1.0, max_sway / max(sway, 1e-9))
         swaying_poses = poses * (1.0, share, share, 1.0, 1.0, 1.0)
         try:
-            motions.append(standing_legs.follow_with_legs(body, idle, swaying_poses, action="sway"))
+            motion, _ = standing_legs.follow_at_largest_size(body, idle, swaying_poses, action="sway")
         except ValueError as error:
             reason = error
+        else:
+            motions.append(motion)
     if not motions:
         raise reason
     return max(motions, key=lambda motion: round(_measure_tilt(motion.quaternions), 1))  # of equal ones the first

@@ -17,7 +17,6 @@ from arc_suite.animation.clips.standing_legs import (
     follow_at_largest_size,
     follow_exactly,
     follow_foot,
-    follow_with_legs,
     keep_feet_in_place,
     measure_belly_height,
     pose_motion,
@@ -179,7 +178,8 @@ def glance(body: Body, rest: Pose) -> ClipMotion:
     """
     times = sample_times(body, _LOOK_DURATION)
     poses = _poses_of_tracks(times, _LOOK_TRACKS) + _breathe(times, _SMALL_BREATH_DEPTH)
-    return _close_loop(follow_with_legs(body, rest, poses, action="look around"))
+    motion, _ = follow_at_largest_size(body, rest, poses, action="look around")
+    return _close_loop(motion)
 
 
 def settle(body: Body, rest: Pose) -> ClipMotion:
@@ -201,7 +201,8 @@ def settle(body: Body, rest: Pose) -> ClipMotion:
         poses[:, 1:3] += shift[:, None] * away_from_foot  # forward and left
         poses[:, 3:5] += shift[:, None] * (-left, forward)  # roll and pitch: the torso leans where its weight goes
         lifts[:, leg, 2] = _track_values(times - start, _SETTLE_LIFT_TRACK)
-    return _close_loop(follow_with_legs(body, rest, poses, action="shift its weight", lifts=lifts))
+    motion, _ = follow_at_largest_size(body, rest, poses, action="shift its weight", lifts=lifts)
+    return _close_loop(motion)
 
 
 def strike(body: Body, rest: Pose) -> ClipMotion:
@@ -245,7 +246,8 @@ def turn_torso(body: Body, rest: Pose, number: str, sign: float) -> ClipMotion:
     duration = hold_end + _TURN_EASE_DURATION
     track = ((0.0, 0.0), (_TURN_EASE_DURATION, turn), (hold_end, turn), (duration, 0.0))
     poses = _poses_of_tracks(sample_times(body, duration), {number: track})
-    return follow_with_legs(body, rest, poses, action=number)
+    motion, _ = follow_at_largest_size(body, rest, poses, action=number)
+    return motion
 
 
 def _breathe(times: np.ndarray, depth: float) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.root_motion import ClipMotion, fade_out
+from arc_suite.animation.clips.standing_legs import FOOT_WEIGHTS
 from arc_suite.models.kinematics import Legs
 from arc_suite.motions.ground_poses import integrate_twist
 from arc_suite.robots.spec import Body
@@ -17,7 +18,6 @@ _SMOOTHING_WIDTH = 0.036  # gait cycles, to either side, over which corrections 
 _LANDING_SHARE = 0.05  # of a swing: its height is corrected only so near its ends, as a foot slides near the ground
 
 # Inverse kinematics.
-_FOOT_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a foot: legs of two joints slide rather than sink
 _DAMPING = 0.005  # standing heights
 _ITERATIONS = 6  # of a round
 _MAX_ROUNDS = 5
@@ -212,7 +212,7 @@ def _bring_near(legs: Legs, angles: np.ndarray, goals: np.ndarray, damping: floa
     """Return the angles (samples, legs, links), rad, that bring feet near goals (samples, legs, 3) in the torso, m."""
     for _ in range(_MAX_ROUNDS):
         previous_angles = angles
-        angles = legs.solve_joint_angles(angles, goals, _FOOT_WEIGHTS, damping, _ITERATIONS)
+        angles = legs.solve_joint_angles(angles, goals, FOOT_WEIGHTS, damping, _ITERATIONS)
         if abs(angles - previous_angles).max() < _STILL_CHANGE:
             break
     return angles

@@ -9,6 +9,8 @@ from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.motions.ground_poses import compose, ground_poses, relative_pose, twist_to
 
+_MIN_DIVISOR = 1e-9  # of values and paths that may be 0 throughout, and stay 0
+
 
 class Pose(NamedTuple):
     """A pose in the root's frame, or the difference of two.
@@ -198,6 +200,11 @@ def fade_out(share: np.ndarray) -> np.ndarray:
     return 1.0 - share**2 * (3.0 - 2.0 * share)
 
 
+def share_of_largest(values: np.ndarray) -> np.ndarray:
+    """Return values (n,) as shares of the largest absolute one; 0 if all are 0."""
+    return values / max(abs(values).max(), _MIN_DIVISOR)
+
+
 # Motions from recordings.
 
 
@@ -244,7 +251,7 @@ def advance_straight(recording: Recording) -> ClipMotion:
     """Return a recording whose root goes below the torso on the line from its first place to its last."""
     torso = ground_poses(recording.poses)
     displacements = relative_pose(torso[0], torso) * (1.0, 1.0, 0.0)
-    course = displacements[-1] / max(np.linalg.norm(displacements[-1]), 1e-9)
+    course = displacements[-1] / max(np.linalg.norm(displacements[-1]), _MIN_DIVISOR)
     root = (displacements @ course)[:, None] * course
     motion = put_on_root(
         recording.time_step, recording.poses, root, relative_pose(root, relative_pose(torso[0], torso))

@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose, share_of_largest
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
 from arc_suite.robots.spec import Body
 
 HEIGHT = posture.POSE_NAMES.index("height")
+_FORWARD_LEFT_UP = [posture.POSE_NAMES.index(name) for name in ("forward", "left", "height")]
 
 _SAMPLES_PER_CONTROL_STEP = 4
 _SMOOTHING_ROUNDS = 3  # of a mean over three samples
@@ -25,11 +26,11 @@ _SMOOTHING_ROUNDS = 3  # of a mean over three samples
 _STAGES = 8  # in which poses grow from rest, so that no leg folds the other way
 _ITERATIONS_PER_STAGE = 6
 _PROBE_STRIDE = 8  # samples, of which one is solved first: most motions that legs cannot follow show it there
-_SOLE_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a sole: legs of two joints slide rather than sink
+FOOT_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of the error of a foot: legs of two joints slide rather than sink
 
 # A motion that the legs cannot follow is made smaller. Each size is tried as it is, then with a torso that sinks
 # more, as stretched legs cannot follow a tilt.
-_SIZES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)
+TRIED_SHARES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.15)  # shares of the full motion, largest first
 _SINK_FACTORS = (1.0, 1.6, 2.4)
 _DIPS = (0.0, 0.1, 0.2)  # h, by which a torso that follows a foot sinks where it moves most
 
@@ -48,7 +49,7 @@ class LegMotion(NamedTuple):
 
     Attributes:
         joints: (samples, joints) angles, rad.
-        misses: (samples, legs, 3) distances from feet to their goals along the root's axes, m.
+        misses: (samples, legs, 3) vectors from goals to feet, m.
     """
 
     joints: np.ndarray
@@ -74,49 +75,69 @@ def lower_torso(body: Body, rest: Pose, depths: np.ndarray) -> np.ndarray:
         rest: pose from which it sinks.
         depths: (samples,) m.
     """
-    height_only = np.eye(6)[HEIGHT]
-    poses = -depths[:, None] / body.torso.standing_height * height_only
+    poses = lower_poses(np.zeros((len(depths), 6)), depths / body.torso.standing_height)
     joints, _ = keep_feet_in_place(body, rest, poses)
     return joints
 
 
-def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | None = None) -> LegMotion:
-    """Return joint angles that hold feet in place under a torso that moves, and how far feet miss.
+def lower_poses(poses: np.ndarray, depths: np.ndarray | float) -> np.ndarray:
+    """Return poses (samples, 6) of the torso that are lower by depths (samples,) or by one depth, standing heights."""
+    lower = poses.copy()
+    lower[:, HEIGHT] -= depths
+    return lower
+
+
+def keep_feet_in_place(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray | float = 0.0) -> LegMotion:
+    """Return joint angles that hold feet in place under a torso that moves; misses are along the root's axes.
 
     Args:
         body: the spec.
         rest: pose from which the torso moves.
         poses: (samples, 6) poses of the torso from there; see `posture`.
         lifts: (samples, legs, 3) displacements by which feet leave their positions, standing
-            heights; None for feet that stay.
+            heights; 0 for feet that stay.
+    """
+    joints = np.tile(rest.joints, (len(poses), 1))
+    attitude = rotations.matrix(rest.quaternion)
+    leg_motion = move_legs_in_stages(body, joints, attitude, poses, lifts, _STAGES, _ITERATIONS_PER_STAGE)
+    turns = posture.rotation_of(poses[:, 3:])
+    return leg_motion._replace(misses=leg_motion.misses @ attitude.T @ turns.swapaxes(-1, -2))
+
+
+def move_legs_in_stages(
+    body: Body,
+    joints: np.ndarray,
+    attitudes: np.ndarray,
+    poses: np.ndarray,
+    lifts: np.ndarray | float,
+    stages: int,
+    iterations: int,
+) -> LegMotion:
+    """Return joint angles that hold feet in place under a torso that moves; misses are along the moved torso's axes.
+
+    The movement grows in stages, so that no leg folds the other way.
+
+    Args:
+        body: the spec.
+        joints: (samples, joints) angles before the torso moves, rad.
+        attitudes: (samples, 3, 3) or (3, 3) rotations of the torso before it moves.
+        poses: (samples, 6) movements of the torso; see `posture`.
+        lifts: (samples, legs, 3) displacements by which feet leave their positions, standing
+            heights; 0 for feet that stay.
+        stages: number of stages.
+        iterations: iterations of inverse kinematics in a stage.
     """
     standing_height = body.torso.standing_height
-    torso_rotation = rotations.matrix(rest.quaternion)
-    to_torso = torso_rotation  # turns rows of points from the root's axes into the torso's at rest
-    to_root = torso_rotation.T
     legs = Legs.of(body, used=1.0).to_foot_centers()
-    rest_angles = legs.by_leg(rest.joints)
-    legs = legs.widen_ranges(rest_angles[None])
-    rest_feet = legs.soles(rest_angles)[0] @ to_root  # m, from the torso
-    lift_vectors = standing_height * (np.zeros(3) if lifts is None else lifts)  # m
-
-    angles = np.tile(rest_angles, (len(poses), 1, 1))
-    for share in np.linspace(0.0, 1.0, _STAGES + 1)[1:]:
-        goals = posture.move_ground_points(rest_feet + share * lift_vectors, share * poses, standing_height) @ to_torso
-        angles = legs.solve_joint_angles(
-            angles, goals, _SOLE_WEIGHTS, posture.IK_DAMPING * standing_height, _ITERATIONS_PER_STAGE
-        )
-    attitudes = posture.rotation_of(poses[:, 3:])
-    misses = (legs.soles(angles)[0] - goals) @ to_root @ attitudes.swapaxes(-1, -2)
-    return LegMotion(joints=legs.by_joint(angles), misses=misses)
-
-
-def follow_with_legs(
-    body: Body, rest: Pose, poses: np.ndarray, action: str, lifts: np.ndarray | None = None
-) -> ClipMotion:
-    """Return the motion of `follow_at_largest_size`."""
-    motion, _ = follow_at_largest_size(body, rest, poses, action, lifts)
-    return motion
+    angles = legs.by_leg(joints)
+    legs = legs.widen_ranges(angles)
+    feet = legs.soles(angles)[0] @ attitudes.swapaxes(-1, -2)  # m, from the torso, along the root's axes
+    displacements = standing_height * lifts
+    for share in np.linspace(0.0, 1.0, stages + 1)[1:]:
+        moved_feet = posture.move_ground_points(feet + share * displacements, share * poses, standing_height)
+        goals = moved_feet @ attitudes
+        angles = legs.solve_joint_angles(angles, goals, FOOT_WEIGHTS, posture.IK_DAMPING * standing_height, iterations)
+    return LegMotion(joints=legs.by_joint(angles), misses=legs.soles(angles)[0] - goals)
 
 
 def follow_at_largest_size(
@@ -137,7 +158,7 @@ def follow_at_largest_size(
     if lifts is None:
         lifts = np.zeros((len(poses), len(body.legs), 3))
     sink_factors = _SINK_FACTORS if poses[:, HEIGHT].any() else (1.0,)
-    for size, sink_factor in itertools.product(_SIZES, sink_factors):
+    for size, sink_factor in itertools.product(TRIED_SHARES, sink_factors):
         sized_poses = size * poses
         sized_poses[:, HEIGHT] *= sink_factor
         motion = follow_exactly(body, rest, sized_poses, size * lifts)
@@ -154,9 +175,9 @@ def follow_foot(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray, ac
     Args:
         body: the spec.
         rest: pose from which the torso moves.
-        poses: see `follow_with_legs`.
-        lifts: see `follow_with_legs`.
-        action: see `follow_with_legs`.
+        poses: see `follow_at_largest_size`.
+        lifts: see `follow_at_largest_size`.
+        action: see `follow_at_largest_size`.
 
     Raises:
         ValueError: the legs cannot follow the smallest size.
@@ -164,15 +185,15 @@ def follow_foot(body: Body, rest: Pose, poses: np.ndarray, lifts: np.ndarray, ac
     motion = follow_exactly(body, rest, poses, lifts)
     if motion is not None:
         return motion
-    movement = np.linalg.norm(poses[:, HEIGHT + 1 :], axis=-1)
-    dip = movement / max(movement.max(), 1e-9)
-    sized_poses = [
-        size * poses - depth * dip[:, None] * np.eye(6)[HEIGHT] for size, depth in itertools.product(_SIZES, _DIPS)
-    ]
-    smallest_lifts = _SIZES[-1] * lifts
-    standing_poses = [sized for sized in sized_poses if follow_exactly(body, rest, sized, smallest_lifts) is not None]
-    for lift_size, standing in itertools.product(_SIZES, standing_poses):
-        motion = follow_exactly(body, rest, standing, lift_size * lifts)
+    dip = share_of_largest(np.linalg.norm(poses[:, HEIGHT + 1 :], axis=-1))
+    smallest_lifts = TRIED_SHARES[-1] * lifts
+    possible_poses = []
+    for size, depth in itertools.product(TRIED_SHARES, _DIPS):
+        lower = lower_poses(size * poses, depth * dip)
+        if follow_exactly(body, rest, lower, smallest_lifts) is not None:
+            possible_poses.append(lower)
+    for lift_size, sized_poses in itertools.product(TRIED_SHARES, possible_poses):
+        motion = follow_exactly(body, rest, sized_poses, lift_size * lifts)
         if motion is not None:
             return motion
     raise ValueError(f"the legs leave the torso no room to {action}")
@@ -218,11 +239,16 @@ def _measure_depth(body: Body, motion: ClipMotion) -> float:
 
 def pose_motion(body: Body, rest: Pose, poses: np.ndarray, joints: np.ndarray) -> ClipMotion:
     """Return a motion of the torso (samples, 6) from rest, and of joints (samples, joints), rad."""
-    up, forward, left = (poses[:, [column]] for column in range(3))
-    offsets = body.torso.standing_height * np.concatenate([forward, left, up], axis=-1)
-    quaternions = tilt(np.broadcast_to(rest.quaternion, (len(poses), 4)), poses[:, 3:])
     motion = hold_pose(rest, len(poses) - 1, time_step(body))
-    return motion._replace(positions=rest.position + offsets, quaternions=quaternions, joints=joints)
+    return move_torso(body, motion, poses)._replace(joints=joints)
+
+
+def move_torso(body: Body, motion: ClipMotion, poses: np.ndarray) -> ClipMotion:
+    """Return a motion whose torso is moved by poses (samples, 6) from where it is; its joints stay as they are."""
+    return motion._replace(
+        positions=motion.positions + body.torso.standing_height * poses[:, _FORWARD_LEFT_UP],
+        quaternions=tilt(motion.quaternions, poses[:, 3:]),
+    )
 
 
 def tilt(quaternions: np.ndarray, roll_pitch_yaw: np.ndarray) -> np.ndarray:
