@@ -71,7 +71,7 @@ def test_a_run_bounces_more_than_a_walk_and_leans_ahead():
     [("run", 1.0), ("fast", 1.0 / 3.0), ("slow", 0.0), ("walk", 0.0), ("turn_left", 0.0), ("stop", 0.0)],
 )
 def test_haste_grows_from_a_walk_to_a_run(name, haste):
-    assert weight._measure_haste(name) == pytest.approx(haste)
+    assert weight._measure_haste(clip_of(name)) == pytest.approx(haste)
 
 
 @pytest.mark.long
@@ -165,7 +165,7 @@ def test_a_sway_only_lowers_the_torso():
 
 def test_half_a_sway_is_half_of_all_but_its_sink():
     sway = weight.Sway(bob=0.02j, roll=0.04, bank=0.02, lean=0.1, sink=0.3)
-    assert sway.resize(0.5, 0.05) == weight.Sway(bob=0.01j, roll=0.02, bank=0.01, lean=0.05, sink=0.05)
+    assert sway.scale(0.5, 0.05) == weight.Sway(bob=0.01j, roll=0.02, bank=0.01, lean=0.05, sink=0.05)
 
 
 @pytest.mark.parametrize(
