@@ -6,7 +6,7 @@ torso and the feet by inverse kinematics.
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from arc_suite.models.kinematics import Legs
 from arc_suite.models.posture import find_rest_pose
 from arc_suite.models.standing import GRAVITY, measure_standing, stability_margin
 from arc_suite.motions import gait_transfer
-from arc_suite.motions import motion as values
-from arc_suite.motions.motion import Motion
+from arc_suite.motions.motion import Motion, find_rest, make
 from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
 from arc_suite.robots.spec import Body
 
@@ -41,7 +40,8 @@ _SIZES = (
 _FOOT_WEIGHTS = np.diag((1.0, 1.0, 2.0))
 _SLIDING_FOOT_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of legs with fewer than three joints: they slide rather than sink
 _DAMPING = 0.02  # standing heights
-_ITERATIONS = 40
+_ITERATIONS = 40  # from the pose at rest
+_ITERATIONS_OF_NEXT_FRAME = 6  # from the frame before
 _SEARCH_FRAMES = 24  # of a motion, for which changes are tried first
 _VERTICAL = np.array((0.0, 0.0, 1.0))
 
@@ -70,7 +70,7 @@ def retarget(motion: Motion, body: Body) -> tuple[Motion, list[str]]:
     transfer = gait_transfer.transfer if gait_transfer.count_cycles(motion) else _transfer_gesture
     paths, fit, notes = _fit_legs(body, motion, transfer)
     height = body.torso.standing_height
-    retargeted = values.make(
+    retargeted = make(
         body,
         name=motion.name,
         frame_rate=(len(paths.positions) - 1) / paths.seconds,
@@ -88,68 +88,108 @@ def retarget(motion: Motion, body: Body) -> tuple[Motion, list[str]]:
 
 def _transfer_gesture(motion: Motion, body: Body, size: Size) -> tuple[Paths, list[str]]:
     """Return the paths of a body's torso and feet in a motion without a gait; see `gait_transfer.transfer`."""
-    notes = []
     height = body.torso.standing_height
-    rest_soles, rest_height = values.find_rest(body)
+    rest_soles, rest_height = find_rest(body)  # m
     rest_soles = rest_soles / height
+    partners, notes = _choose_partners(motion, body, rest_soles)
+    soles, planted = _plan_soles(motion, rest_soles, partners, size)
+    paths = Paths(
+        seconds=motion.seconds * time_scale(motion.standing_height, height),
+        positions=_plan_torso(motion, rest_height / height, size),
+        quaternions=shrink_turns(motion.quaternions, size.all * size.side),
+        soles=soles,
+        planted=planted,
+    )
+    carried_paths, notes_of_torso = _carry_torso(body, paths)
+    return carried_paths, notes + notes_of_torso
+
+
+def _choose_partners(motion: Motion, body: Body, rest_soles: np.ndarray) -> tuple[list[int | None], list[str]]:
+    """Return for each foot of a body the foot of a motion that it follows, None for one that stays planted, and notes.
+
+    Args:
+        motion: motion of any body.
+        body: the body that is to move.
+        rest_soles: (legs, 3) its soles at rest, standing heights.
+    """
     partners = match_feet(motion.rest_soles, rest_soles)
     travel = np.linalg.norm(motion.displacement[:2]) / motion.standing_height
     flies = not motion.planted.any(axis=-1).all()
-    alone = [index for index, partner in enumerate(partners) if partner is None]
-    offsets = size.ahead_left_up * (motion.soles - motion.rest_soles)
     if travel > _MIN_TRAVEL or flies:  # feet cannot stay where they are
         nearest = np.linalg.norm(motion.rest_soles[None] - rest_soles[:, None], axis=-1).argmin(axis=-1)
         partners = [nearest[index] if partner is None else partner for index, partner in enumerate(partners)]
-        alone = []
+    notes = []
+    alone = [leg.name for leg, partner in zip(body.legs, partners, strict=True) if partner is None]
     if alone:
-        notes.append(f"without a partner, planted: {', '.join(body.legs[index].name for index in alone)}")
-    idle_feet = [name for index, name in enumerate(motion.leg_names) if index not in partners]
-    moving_feet = [name for name in idle_feet if not motion.planted[:, motion.leg_names.index(name)].all()]
-    if moving_feet:
-        notes.append(f"without a partner, left out: {', '.join(moving_feet)}")
-    lean = offsets[0, motion.planted[0], :2].mean(axis=0) if motion.planted[0].any() else np.zeros(2)
+        notes.append(f"without a partner, planted: {', '.join(alone)}")
+    left_out = [
+        name
+        for index, name in enumerate(motion.leg_names)
+        if index not in partners and not motion.planted[:, index].all()
+    ]
+    if left_out:
+        notes.append(f"without a partner, left out: {', '.join(left_out)}")
+    return partners, notes
+
+
+def _plan_soles(
+    motion: Motion, rest_soles: np.ndarray, partners: list[int | None], size: Size
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the paths (frames, legs, 3) of soles that follow their partners, and whether they stand (frames, legs).
+
+    Args:
+        motion: motion of any body.
+        rest_soles: (legs, 3) soles of the body that is to move, standing heights.
+        partners: see `_choose_partners`.
+        size: size of the paths.
+    """
     soles = np.tile(rest_soles, (motion.frames, 1, 1))
     planted = np.ones(soles.shape[:2], bool)
+    offsets = size.ahead_left_up * (motion.soles - motion.rest_soles)
+    # Feet without a partner go with those that stand in the first frame, so that the torso is over all of them.
+    first_shift = offsets[0, motion.planted[0], :2].mean(axis=0) if motion.planted[0].any() else np.zeros(2)
     for index, partner in enumerate(partners):
         if partner is None:
-            soles[:, index, :2] += lean
+            soles[:, index, :2] += first_shift
         else:
             soles[:, index] += offsets[:, partner]
             planted[:, index] = motion.planted[:, partner]
     soles[..., 2] = np.where(planted, 0.0, soles[..., 2])
+    return soles, planted
+
+
+def _plan_torso(motion: Motion, rest_height: float, size: Size) -> np.ndarray:
+    """Return positions (frames, 3) of the torso of a body with a height at rest, standing heights."""
     positions = size.ahead_left_up * motion.positions / motion.standing_height
-    heights = motion.positions[:, 2] / motion.standing_height
-    rest_height = rest_height / height
-    positions[:, 2] = rest_height + size.all * (scale_heights(heights, motion.rest_height, rest_height) - rest_height)
-    seconds = motion.seconds * time_scale(motion.standing_height, height)
-    paths = Paths(seconds, positions, shrink_turns(motion.quaternions, size.all * size.side), soles, planted)
-    return _carry_torso(body, paths, notes), notes
+    heights = scale_heights(motion.positions[:, 2] / motion.standing_height, motion.rest_height, rest_height)
+    positions[:, 2] = rest_height + size.all * (heights - rest_height)
+    return positions
 
 
-def _carry_torso(body: Body, paths: Paths, notes: list[str]) -> Paths:
-    """Return the paths with the torso shifted so that its center of mass is over the feet that carry."""
+def _carry_torso(body: Body, paths: Paths) -> tuple[Paths, list[str]]:
+    """Return the paths with the torso shifted so that its center of mass is over the feet that carry, and notes."""
     height = body.torso.standing_height
-    center = measure_standing(body).center / height
-    centers = paths.positions + (rotations.matrix(paths.quaternions) @ center[:, None])[..., 0]
+    center_in_torso = measure_standing(body).center / height
+    centers = paths.positions + (rotations.matrix(paths.quaternions) @ center_in_torso[:, None])[..., 0]
     shifts = np.zeros((len(centers), 2))
     for frame, (center, soles, planted) in enumerate(zip(centers, paths.soles, paths.planted, strict=True)):
         if planted.all() or planted.sum() < 3:  # it stands, or moves too fast to stand
             continue
         shifts[frame] = _find_shift(center[:2], soles[planted, :2])
     if not shifts.any():
-        return paths
+        return paths, []
     smooth_shifts = _spread(shifts, paths, height)
-    shifted = paths._replace(positions=paths.positions + np.pad(smooth_shifts, ((0, 0), (0, 1))))
+    shifted_paths = paths._replace(positions=paths.positions + np.pad(smooth_shifts, ((0, 0), (0, 1))))
     margins = [
         stability_margin(center[:2] + shift, soles[planted])
         for center, shift, soles, planted in zip(centers, smooth_shifts, paths.soles, paths.planted, strict=True)
         if planted.sum() >= 3
     ]
     largest_shift = np.linalg.norm(smooth_shifts, axis=-1).max()
-    notes.append(f"the torso shifts by up to {largest_shift:.2f} standing heights over the feet that carry")
+    notes = [f"the torso shifts by up to {largest_shift:.2f} standing heights over the feet that carry"]
     if min(margins) < 0.0:
         notes.append(f"the center of mass is {-min(margins):.2f} standing heights beyond the feet that carry")
-    return shifted
+    return shifted_paths, notes
 
 
 def _find_shift(center: np.ndarray, soles: np.ndarray) -> np.ndarray:
@@ -202,18 +242,11 @@ def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _F
         few_frames = np.unique(np.linspace(0, len(paths.positions) - 1, _SEARCH_FRAMES).astype(int))
         for rise in _RISES:
             shifted_paths = paths._replace(positions=paths.positions + (0.0, 0.0, rise))
-            fit = _solve(body, shifted_paths.select(few_frames), follows=False)
+            fit = _Search.along(body, shifted_paths.select(few_frames)).solve_frames()
             if (fit.misses <= max_misses).all():
-                fit = _solve(body, shifted_paths, motion.loops)
+                fit = _Search.along(body, shifted_paths).follow_frames(motion.loops)
             if (fit.misses <= max_misses).all():
-                if rise:
-                    direction = "higher" if rise > 0.0 else "lower"
-                    notes.append(f"the torso is {direction} by {abs(rise):g} standing heights, so that legs reach")
-                if size.all < 1.0:
-                    notes.append(f"steps and gestures are {size.all:g} of their size, so that legs reach")
-                if size.side < 1.0:
-                    notes.append("legs do not move sideways, and the torso does not tilt, so that legs reach")
-                return shifted_paths, fit, notes
+                return shifted_paths, fit, notes + _describe_changes(size, rise)
             excesses = (fit.misses - max_misses).max(axis=0)
             if excesses.max() < least_excess:
                 least_excess = excesses.max()
@@ -222,39 +255,88 @@ def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _F
     raise ValueError(f"motion {motion.name!r} of {motion.body}: {body.name} cannot follow it, {worst_miss}")
 
 
+def _describe_changes(size: Size, rise: float) -> list[str]:
+    """Return a line for each thing that is changed so that legs reach; see `_SIZES` and `_RISES`."""
+    lines = []
+    if rise:
+        direction = "higher" if rise > 0.0 else "lower"
+        lines.append(f"the torso is {direction} by {abs(rise):g} standing heights, so that legs reach")
+    if size.all < 1.0:
+        lines.append(f"steps and gestures are {size.all:g} of their size, so that legs reach")
+    if size.side < 1.0:
+        lines.append("legs do not move sideways, and the torso does not tilt, so that legs reach")
+    return lines
+
+
 def _has_few_joints(body: Body) -> np.ndarray:
     """Return for each leg (legs,) whether it has fewer than three joints."""
     return np.array([len(leg.joints) for leg in body.legs]) < 3
 
 
-def _solve(body: Body, paths: Paths, loops: bool = False, follows: bool = True) -> _Fit:
-    """Return the joint angles that bring feet nearest to their paths.
+class _Search(NamedTuple):
+    """A search for the joint angles that bring feet nearest to their paths.
 
-    Args:
-        body: the body that is to move.
-        paths: what it is to do.
-        loops: whether the last frame is the first one.
-        follows: whether the search in a frame starts from the frame before, so that legs do not jump.
+    Attributes:
+        legs: legs of the body, to the centers of feet.
+        goals: (frames, legs, 3) goals of these in the torso's frame, m.
+        rest_angles: (legs, links) rad.
+        weights: (legs, 3, 3) matrices that multiply the errors of feet.
+        standing_height: m.
     """
-    height = body.torso.standing_height
-    legs = Legs.of(body, used=1.0)
-    centers = legs.to_foot_centers()  # of feet
-    goals = paths.soles * height + legs.radii[:, None] * _VERTICAL - paths.positions[:, None] * height
-    goals = (rotations.matrix(paths.quaternions).swapaxes(-1, -2)[:, None] @ goals[..., None])[..., 0]
-    rest_angles = find_rest_pose(body).joint_angles
-    damping = _DAMPING * height
-    leg_weights = np.where(_has_few_joints(body)[:, None, None], _SLIDING_FOOT_WEIGHTS, _FOOT_WEIGHTS)
-    weights = np.broadcast_to(leg_weights, (*goals.shape[:2], 3, 3))
-    if not follows:
-        start = np.broadcast_to(rest_angles, (len(goals), *rest_angles.shape))
-        angles = centers.solve_joint_angles(start, goals, weights, damping, _ITERATIONS)
-    else:
-        frame_angles = centers.solve_joint_angles(rest_angles, goals[0], weights[0], damping, _ITERATIONS)
+
+    legs: Legs
+    goals: np.ndarray
+    rest_angles: np.ndarray
+    weights: np.ndarray
+    standing_height: float
+
+    @classmethod
+    def along(cls, body: Body, paths: Paths) -> Self:
+        """Return the search for the legs of a body along paths."""
+        height = body.torso.standing_height
+        legs = Legs.of(body, used=1.0)
+        goals = paths.soles * height + legs.radii[:, None] * _VERTICAL - paths.positions[:, None] * height
+        to_torso = rotations.matrix(paths.quaternions).swapaxes(-1, -2)[:, None]
+        return cls(
+            legs=legs.to_foot_centers(),
+            goals=(to_torso @ goals[..., None])[..., 0],
+            rest_angles=find_rest_pose(body).joint_angles,
+            weights=np.where(_has_few_joints(body)[:, None, None], _SLIDING_FOOT_WEIGHTS, _FOOT_WEIGHTS),
+            standing_height=height,
+        )
+
+    def solve_frames(self) -> _Fit:
+        """Return the fit of frames that do not follow each other: the search in a frame starts from the rest pose."""
+        start_angles = np.broadcast_to(self.rest_angles, (len(self.goals), *self.rest_angles.shape))
+        return self._measure_fit(self._solve(start_angles, self.goals, _ITERATIONS))
+
+    def follow_frames(self, loops: bool) -> _Fit:
+        """Return the fit of all frames: the search in a frame starts from the frame before, so that legs do not jump.
+
+        Args:
+            loops: whether the last frame is the first one.
+        """
+        angles = np.empty((len(self.goals), *self.rest_angles.shape))
+        frame_angles = self._solve(self.rest_angles, self.goals[0], _ITERATIONS)
         for _ in range(2 if loops else 1):  # of a loop, the second round begins as the first one ends
-            angles = np.empty((len(goals), *rest_angles.shape))
-            for frame, frame_goals in enumerate(goals):
-                frame_angles = centers.solve_joint_angles(frame_angles, frame_goals, weights[0], damping, 6)
-                frame_angles = centers.relax_redundant_joints(frame_angles, rest_angles, RELAXING_SHARE, damping)
+            for frame, frame_goals in enumerate(self.goals):
+                frame_angles = self._solve(frame_angles, frame_goals, _ITERATIONS_OF_NEXT_FRAME)
+                frame_angles = self.legs.relax_redundant_joints(
+                    frame_angles, self.rest_angles, RELAXING_SHARE, self._damping
+                )
                 angles[frame] = frame_angles
-    reached, _ = centers.soles(angles)
-    return _Fit(legs.by_joint(angles), np.linalg.norm(reached - goals, axis=-1) / height)
+        return self._measure_fit(angles)
+
+    @property
+    def _damping(self) -> float:
+        """Damping of inverse kinematics, m."""
+        return _DAMPING * self.standing_height
+
+    def _solve(self, angles: np.ndarray, goals: np.ndarray, iterations: int) -> np.ndarray:
+        """Return the angles (..., legs, links), rad, that bring feet near goals (..., legs, 3) from others."""
+        return self.legs.solve_joint_angles(angles, goals, self.weights, self._damping, iterations)
+
+    def _measure_fit(self, angles: np.ndarray) -> _Fit:
+        """Return angles (frames, legs, links), rad, by joint, with how far feet miss their goals."""
+        feet, _ = self.legs.soles(angles)
+        return _Fit(self.legs.by_joint(angles), np.linalg.norm(feet - self.goals, axis=-1) / self.standing_height)
