@@ -88,7 +88,7 @@ def _relative_places(soles: np.ndarray) -> np.ndarray:
     ground = soles[:, :2]
     middle = 0.5 * (ground.max(axis=0) + ground.min(axis=0))
     half_extent = 0.5 * np.ptp(ground, axis=0)
-    return (ground - middle) / np.maximum(half_extent, 1e-9)
+    return (ground - middle) / np.maximum(half_extent, 1e-9)  # feet in a line have no extent across it
 
 
 def time_scale(standing_height: float, other_height: float) -> float:

@@ -257,7 +257,7 @@ def _follow_sway(body: Body, idle: Pose, poses: np.ndarray) -> ClipMotion:
     sway = np.linalg.norm(poses[:, 1:3], axis=-1).max()  # ahead and aside
     motions = []
     for max_sway in _MAX_SWAYS:
-        share = min(1.0, max_sway / max(sway, 1e-9))
+        share = max_sway / sway if sway > max_sway else 1.0
         swaying_poses = poses * (1.0, share, share, 1.0, 1.0, 1.0)
         try:
             motion, _ = standing_legs.follow_at_largest_size(body, idle, swaying_poses, action="sway")

@@ -151,7 +151,9 @@ def idle(body: Body, rest: Pose) -> ClipMotion:
     sway = np.sin(phase) * np.sin(0.5 * phase) ** 2  # at rest at both ends
     max_depth = _MAX_BREATH_SHARE * measure_belly_height(body, rest) / body.torso.standing_height
     breaths = _breathe(times, np.clip(max_depth, 0.0, _BREATH_DEPTH))
-    breaths *= min(1.0, _MAX_IDLE_SLIDE / max(_measure_idle_slide(body, rest, breaths), 1e-9))
+    slide = _measure_idle_slide(body, rest, breaths)
+    if slide > _MAX_IDLE_SLIDE:
+        breaths *= _MAX_IDLE_SLIDE / slide
     sways = np.zeros_like(breaths)
     sways[:, _LEFT] = _SWAY * sway
     sways[:, _ROLL] = -_SWAY_ROLL * sway
@@ -279,8 +281,8 @@ def _track_values(times: np.ndarray, track: tuple) -> np.ndarray:
     else:
         previous_keys = np.zeros(len(times), int)
     next_keys = np.minimum(previous_keys + 1, len(key_times) - 1)
-    key_intervals = np.maximum(key_times[next_keys] - key_times[previous_keys], 1e-9)
-    share = (times - key_times[previous_keys]) / key_intervals
+    key_intervals = key_times[next_keys] - key_times[previous_keys]
+    share = (times - key_times[previous_keys]) / np.maximum(key_intervals, 1e-9)  # a track of one key has no interval
     previous_values = key_values[previous_keys]
     next_values = key_values[next_keys]
     return next_values + (previous_values - next_values) * fade_out(share)
