@@ -78,7 +78,8 @@ def test_the_readme_is_short():
 
 @pytest.mark.parametrize("block", BLOCKS)
 def test_code(block, dataset, monkeypatch, tmp_path):
-    (tmp_path / "examples").symlink_to(ROOT / "examples")  # whose files pages name
+    for folder in ("examples", "studies"):  # whose files pages name
+        (tmp_path / folder).symlink_to(ROOT / folder)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(pages, "viewer_script", lambda: "")  # which needs Node
     exec(compile(block, "page.md", "exec"), {})

@@ -167,14 +167,6 @@ def _result(
 
     latest = evaluations[-1]
     judged = finals or latest
-    progress = {}
-    for name in judged[0]:
-        if name not in _NOT_METRICS and not name.startswith(STYLE):
-            progress[name] = np.array([row[name] for row in judged], float)
-    style = {}
-    for name in latest[0]:
-        if name.startswith(STYLE):
-            style[name.removeprefix(STYLE)] = np.array([row[name] for row in latest if name in row], float)
     published_run = _with_settings(run, run_row["task_kwargs"])
     updates_by_step = json.loads(run_row["phases"] or "{}")
     return RunResult(
@@ -182,9 +174,9 @@ def _result(
         steps=curve_column("step")[:, 0].astype(int),
         returns=curve_column("return"),
         finals=np.array([row["return"] for row in judged], float),
-        progress=progress,
+        progress=_read_metrics(judged),
         cpu=curve_column("cpu_seconds")[:, 0],
-        style=style,
+        style=_read_style(latest),
         phases=np.array(list(updates_by_step.values())),
         training_seeds=from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
         seeds=[int(row["seed"]) for row in judged],
@@ -194,6 +186,21 @@ def _result(
         other_settings=published_run != run,
         sources=json.loads(run_row[SOURCES] or "[]"),
     )
+
+
+def _read_metrics(episodes: Sequence[Mapping[str, str]]) -> dict[str, np.ndarray]:
+    """Return the metrics of the task by name, each (episodes,)."""
+    names = [name for name in episodes[0] if name not in _NOT_METRICS and not name.startswith(STYLE)]
+    return {name: np.array([row[name] for row in episodes], float) for name in names}
+
+
+def _read_style(episodes: Sequence[Mapping[str, str]]) -> dict[str, np.ndarray]:
+    """Return the metrics of style by name, each of the episodes that have it."""
+    columns = [column for column in episodes[0] if column.startswith(STYLE)]
+    return {
+        column.removeprefix(STYLE): np.array([row[column] for row in episodes if column in row], float)
+        for column in columns
+    }
 
 
 def _group_by_step(episodes: Sequence[Mapping[str, str]]) -> list[list[Mapping[str, str]]]:
