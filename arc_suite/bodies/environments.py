@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 from arc_suite import checks, registry, rotations
 from arc_suite.bodies import padding, tokens
 from arc_suite.bodies.descriptions import Description, body_description
-from arc_suite.bodies.groups import Group, GroupSlot, Member, group_by_batch, scatter
+from arc_suite.bodies.groups import Group, Member, Place, group_by_batch, scatter
 from arc_suite.bodies.tokens import Tokens
 from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
@@ -123,7 +123,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             ValueError: an unknown name, a body with more than 12 legs or 4 joints a leg, or a value that does not fit.
         """
         self._lock = Lock()
-        self._slots: list[GroupSlot] = []
+        self._places: list[Place] = []
         self._begun = False
         refuse_arguments(others, type(self).__init__)
         has_flat_spaces = checks.boolean("flat", flat)
@@ -171,9 +171,9 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         for indices in group_by_batch(members):
             _, name = pairs[indices[0]]
             group = Group([members[index] for index in indices], name, **options)
-            self._slots.append(GroupSlot(group, np.array(indices), tokens_of_envs.select(indices)))
-        self.step_limit = float(max(np.max(slot.group.step_limit) for slot in self._slots))
-        first_group = self._slots[0].group
+            self._places.append(Place(group, np.array(indices), tokens_of_envs.select(indices)))
+        self.step_limit = float(max(np.max(place.group.step_limit) for place in self._places))
+        first_group = self._places[0].group
         self.autoreset_mode = first_group.autoreset_mode
         self.metadata = first_group.metadata
         self.render_mode = render_mode
@@ -183,7 +183,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self._set_observations(tokens_of_envs)
         if seed is not None:
             seeds = self._checked_seeds(seed)
-            for group, indices, _ in self._slots:
+            for group, indices, _ in self._places:
                 group._begin_streams([seeds[index] for index in indices], np.ones(len(indices), bool))
         self._sealed_by = __name__
 
@@ -191,7 +191,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         super().__setstate__(state)
         # Pickles of earlier versions have the observations of those.
         tokens_of_envs = Tokens.of(self.tasks)
-        self._slots = [GroupSlot(group, indices, tokens_of_envs.select(indices)) for group, indices, _ in self._slots]
+        self._places = [Place(group, indices, tokens_of_envs.select(indices)) for group, indices, _ in self._places]
         self._set_observations(tokens_of_envs)
 
     def _set_observations(self, tokens_of_envs: Tokens) -> None:
@@ -210,7 +210,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         seeds = [None] * self.num_envs if seed is None else self._checked_seeds(seed)
         info = {}
-        for group, indices, _ in self._slots:
+        for group, indices, _ in self._places:
             if mask[indices].any():
                 group_seeds = [seeds[index] for index in indices]
                 _, group_info = group.reset(seed=group_seeds, options={"reset_mask": mask[indices]})
@@ -238,15 +238,15 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         terminated = np.zeros(self.num_envs, bool)
         truncated = np.zeros(self.num_envs, bool)
         info = {}
-        for slot in self._slots:
-            indices = slot.indices
-            body_actions = slot.tokens.body_actions(checked_actions[indices])
-            _, group_reward, group_terminated, group_truncated, group_info = slot.group.step(body_actions)
+        for place in self._places:
+            indices = place.indices
+            body_actions = place.tokens.body_actions(checked_actions[indices])
+            _, group_reward, group_terminated, group_truncated, group_info = place.group.step(body_actions)
             reward[indices] = group_reward
             terminated[indices] = group_terminated
             truncated[indices] = group_truncated
             if "final_obs" in group_info:
-                group_info["final_obs"] = self._final_observations(slot, group_info["final_obs"])
+                group_info["final_obs"] = self._final_observations(place, group_info["final_obs"])
             scatter(info, group_info, indices, self.num_envs)
         return self._observation(), reward, terminated, truncated, info
 
@@ -278,7 +278,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
             values = checked_command(task, name, value, (self.num_envs,))
         if not self._begun:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
-        for group, indices, _ in self._slots:
+        for group, indices, _ in self._places:
             if mask[indices].any():
                 group.command(name, values[indices], mask[indices])
 
@@ -291,7 +291,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self._check_open("change the model")
         mask = self._checked_mask(mask, "mask")
         checked_changes = []  # all of them, before the first model changes
-        for group, indices, _ in self._slots:
+        for group, indices, _ in self._places:
             if mask[indices].any():
                 checked_changes.append((group, group._checked_fields(fields), mask[indices]))
         for group, values, group_mask in checked_changes:
@@ -303,7 +303,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         self._check_open("change settings")
         mask = self._checked_mask(mask, "mask")
         checked_changes = []  # all of them, before the first setting changes
-        for group, indices, _ in self._slots:
+        for group, indices, _ in self._places:
             if mask[indices].any():
                 checked_changes.append((group, group._checked_changes(settings), mask[indices]))
         for group, changes, group_mask in checked_changes:
@@ -314,7 +314,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """Let environments, and no others, stand still until they are reset; see `VectorEnv.rest`."""
         self._check_open("rest")
         mask = self._checked_mask(mask, "mask")
-        for group, indices, _ in self._slots:
+        for group, indices, _ in self._places:
             group._resting = mask[indices]
 
     @one_thread_at_a_time
@@ -329,8 +329,8 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """
         self._check_open("take a snapshot")
         arrays = {}
-        for number, slot in enumerate(self._slots):
-            for name, array in slot.group.snapshot().items():
+        for number, place in enumerate(self._places):
+            for name, array in place.group.snapshot().items():
                 arrays[f"{number}/{name}"] = array
         arrays["observation"] = self._flatten(self._make_tokens())
         arrays["steps"] = np.array(self._of_each(lambda group: group._steps))
@@ -350,21 +350,21 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         steps = np.asarray(arrays.get("steps", ()))
         has_steps = steps.shape == (self.num_envs,)
         checked_snapshots = []  # all of them, before the first group is restored
-        for number, slot in enumerate(self._slots):
+        for number, place in enumerate(self._places):
             prefix = f"{number}/"
             group_arrays = {}
             for name, array in arrays.items():
                 if name.startswith(prefix):
                     group_arrays[name.removeprefix(prefix)] = array
             # Steps of another shape go to the group, too: it refuses them.
-            group_arrays["steps"] = steps[slot.indices] if has_steps else steps
-            checked_snapshots.append(slot.group._checked_snapshot(group_arrays))
-        for slot, snapshot in zip(self._slots, checked_snapshots, strict=True):
-            slot.group._restore_state(*snapshot)
+            group_arrays["steps"] = steps[place.indices] if has_steps else steps
+            checked_snapshots.append(place.group._checked_snapshot(group_arrays))
+        for place, snapshot in zip(self._places, checked_snapshots, strict=True):
+            place.group._restore_state(*snapshot)
         self._begun = True
 
     def _check_process(self) -> None:
-        self._slots[0].group._check_process()
+        self._places[0].group._check_process()
 
     @one_thread_at_a_time
     def render(self, indices: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
@@ -387,8 +387,8 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
 
     def close_extras(self, **kwargs) -> None:
         """Free the simulations; `close` calls it."""
-        for slot in self._slots:
-            slot.group.close()
+        for place in self._places:
+            place.group.close()
 
     @property  # type: ignore[misc]  # of Gymnasium, which can be set and is of one environment
     def np_random(self) -> tuple[np.random.Generator, ...]:
@@ -403,7 +403,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def _of_each(self, values_of_group: Callable[[Group], Iterable]) -> tuple:
         """Return a value for each environment, given a function that returns those of a group."""
         values: list[Any] = [None] * self.num_envs
-        for group, indices, _ in self._slots:
+        for group, indices, _ in self._places:
             for index, value in zip(indices.tolist(), values_of_group(group), strict=True):
                 values[index] = value
         return tuple(values)
@@ -416,7 +416,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def _make_tokens(self) -> dict[str, np.ndarray]:
         """Return the tokens of all environments."""
         inputs = np.empty(self._tokens.input_indices.shape, np.float32)
-        for group, indices, group_tokens in self._slots:
+        for group, indices, group_tokens in self._places:
             inputs[indices] = group_tokens.gather_inputs(group._observation)
         return self._tokens.make_tokens(inputs)
 
@@ -426,11 +426,11 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         torso = self.description.torso[indices]
         return tokens.flatten_tokens(token_blocks, legs, torso)
 
-    def _final_observations(self, slot: GroupSlot, vectors: np.ndarray) -> np.ndarray:
+    def _final_observations(self, place: Place, vectors: np.ndarray) -> np.ndarray:
         """Return the final observations of a group's episodes.
 
         Args:
-            slot: the group, its indices and tokens.
+            place: the group, its indices and tokens.
             vectors: (environments of the group,) objects: observations of the bodies' own tasks, None for episodes
                 that go on.
 
@@ -441,10 +441,10 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         for index, vector in enumerate(vectors):
             if vector is None:
                 continue
-            env_tokens = slot.tokens.select([index])
+            env_tokens = place.tokens.select([index])
             token_blocks = env_tokens.make_tokens(env_tokens.gather_inputs(vector[None]))
             if self._flat:
-                observations[index] = self._flatten(token_blocks, slot.indices[[index]])[0]
+                observations[index] = self._flatten(token_blocks, place.indices[[index]])[0]
             else:
                 observations[index] = {name: array[0] for name, array in token_blocks.items()}
         return observations

@@ -43,7 +43,7 @@ class Group(VectorEnv):
         return tasks, models[0] if have_one_body else models
 
 
-class GroupSlot(NamedTuple):
+class Place(NamedTuple):
     """A group, with the indices of its environments among all, and the tokens of these."""
 
     group: Group

@@ -122,7 +122,7 @@ def test_bodies_and_tasks_take_turns_until_all_pairs_have_been():
     pairs = [(body.name, task.name) for body, task in zip(env.bodies, env.tasks, strict=True)]
     first, second = (body.name for body in FEW[:2])
     assert pairs == [(first, "walk"), (second, "steer"), (first, "steer"), (second, "walk")]
-    assert env.task.name == "walk,steer" and len(env._slots) == 2
+    assert env.task.name == "walk,steer" and len(env._places) == 2
     env.reset(seed=0)
     *_, info = env.step(np.zeros(env.action_space.shape))
     assert info["_progress_tracking"].tolist() == [False, True, True, False]
@@ -181,11 +181,11 @@ def test_other_commands_of_each(monkeypatch):
 
 def test_bodies_of_one_layout_share_a_batch():
     env = make([*LAYOUTS, *TWINS])
-    assert len(env._slots) == 27
-    assert {len(slot.indices) for slot in env._slots} == {2}
+    assert len(env._places) == 27
+    assert {len(place.indices) for place in env._places} == {2}
     again = make(FEW[:2], num_envs=5)
     assert [body.name for body in again.bodies] == [FEW[index % 2].name for index in range(5)]
-    assert [slot.indices.tolist() for slot in again._slots] == [[0, 1, 2, 3, 4]]
+    assert [place.indices.tolist() for place in again._places] == [[0, 1, 2, 3, 4]]
     assert make("random:3-4", num_envs=2).bodies == (sound_body(3), sound_body(4))
     assert len(make(["varied:0-1", "queen", FEW[0]], num_envs=4).bodies) == 4
 
@@ -327,7 +327,7 @@ def test_tokens_show_pose_and_gait_by_command():
     env.reset(seed=4)
     for _ in range(70):  # into the second command
         observation, *_ = env.step(np.zeros(env.action_space.shape))
-    task, group = env.tasks[0], env._slots[0].group
+    task, group = env.tasks[0], env._places[0].group
     blocks = task.split(env.own_observations()[0])
     phases, duty_factor = (array[0] for array in task.leg_phases(group._memory))
     count, legs, going = len(phases), observation["legs"][0], blocks["gait_clock"].any()

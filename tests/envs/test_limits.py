@@ -69,8 +69,8 @@ def simulation(environment):
     environment = environment.unwrapped
     if hasattr(environment, "batch") and environment.batch is not None:
         return environment.batch.data
-    if hasattr(environment, "_slots"):
-        return environment._slots[0].group.batch.data
+    if hasattr(environment, "_places"):
+        return environment._places[0].group.batch.data
     return environment.physics.data
 
 
