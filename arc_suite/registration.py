@@ -66,9 +66,9 @@ def register(
         module: the module that makes this call, its `__name__`. Other processes import it to register the same names.
             None if no other process needs them.
         body: the robot's body; its name becomes a domain.
-        parameters: the robot's parameters by name of the task: for walk all keys of
-            `tasks.parameters.PARAMETERS["walk"]["queen"]`, in the same units; for other tasks those that differ from
-            walk's. Noise that walk does not set, and all parameters without walk's, are fitted to the body.
+        parameters: the robot's parameters by name of the task. Walk needs all keys of
+            `tasks.parameters.PARAMETERS["walk"]["queen"]`, in the same units; another task needs those that differ from
+            walk's. Noise that walk does not set is fitted to the body; without walk's, all parameters are.
         presets: the robot's demonstrators by name: a `cpg.prescribed.Preset`, or parameters of
             another law, see `cpg.selection.LAWS`. The presets that every body has are fitted if not given.
         visuals: decorations and colors; None for those that suit any body.
@@ -87,7 +87,7 @@ def register(
         clips: values of classes of `animation.clips.catalog`, such as `Acted`, by name.
         programs: names of modules that `arc-suite` runs, by name of the program. Each module has a docstring and a
             function `main`.
-        others: unknown arguments, which are refused with what takes their place.
+        others: none; an unknown argument is refused with what takes its place.
 
     A network, an algorithm or a clip may also be a text `module:attribute`: it is then imported and checked at its
     first use.

@@ -427,8 +427,7 @@ def task_setting_names() -> set[str]:
     """Return the names of the settings of all tasks, without those of modifiers."""
     names = set(SETTINGS_OF_EVERY_TASK)
     for task in TASKS.values():
-        names_of_settings = getattr(task, "names", tuple)  # a method; tasks of other packages may lack it
-        names.update(names_of_settings())
+        names.update(task.names())
     return names
 
 
@@ -438,15 +437,14 @@ def setting_names() -> set[str]:
 
 
 def refuse_settings_of_others(task: type[Task], settings: Iterable[str]) -> None:
-    """Raise ValueError for a setting that a task lacks and others have; its class lists what it has in `names`."""
-    names_of_settings = getattr(task, "names", None)  # tasks of other packages may lack it
-    if names_of_settings is None:
+    """Raise ValueError for a setting that a task lacks and others have; none where the task does not list its own."""
+    if not task.names():
         return
+    names = (*task.names(), *SETTINGS_OF_EVERY_TASK)
     for name in settings:
-        own_names = (*names_of_settings(), *SETTINGS_OF_EVERY_TASK)
-        if name in own_names or difflib.get_close_matches(str(name), own_names, n=1, cutoff=_SAME_WORD):
+        if name in names or difflib.get_close_matches(str(name), names, n=1, cutoff=_SAME_WORD):
             continue
-        task_names = [key for key, kind in TASKS.items() if name in getattr(kind, "names", tuple)()]
+        task_names = [key for key, kind in TASKS.items() if name in kind.names()]
         if task_names:
             verb = "has" if len(task_names) == 1 else "have"
             raise ValueError(f"setting {name!r}: {task.name} has none; {', '.join(task_names)} {verb} it")

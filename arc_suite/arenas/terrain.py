@@ -21,14 +21,14 @@ from arc_suite.robots.spec import Body
 DIFFICULTY = 2.0 / 3.0  # default
 WIDTH = 24.0  # of a lane
 BACK = 4.0  # level ground behind the start
-LEVEL = 3.0  # level ground ahead of the start
+RUNWAY = 3.0  # level ground ahead of the start
 END_MARGIN = 1.0  # distance of the torso from either end of the lanes at which an episode is truncated
 SIDE_MARGIN = 2.0  # distance of the torso from the edge of the outermost lanes at which an episode is truncated
 
 # Size of an arena without a task: commands lead nowhere else in 1000 control steps.
-_LENGTH = 120.0  # of the lanes, ahead of the start
-_BACK = 60.0  # level ground behind the start
-_LANES = 5
+_LENGTH_ALONE = 120.0  # of the lanes, ahead of the start
+_BACK_ALONE = 60.0  # level ground behind the start
+_LANES_ALONE = 5
 _CELL = 0.5  # of the height field
 _GRAIN = 1.0 / 16.0  # length of a cell of stairs and trenches; it is adapted so that a width is a multiple
 _THICKNESS = 2.0  # of the ground
@@ -74,13 +74,13 @@ def sizes(kinds: Sequence[str]) -> tuple[str, ...]:
 
 def _rough(random: np.random.RandomState, obstacle: Obstacle, x: np.ndarray, rows: int) -> np.ndarray:
     """Return nodes of random height, which increases over the first two standing heights."""
-    share = ((x - LEVEL) / 2.0).clip(0.0, 1.0)
+    share = ((x - RUNWAY) / 2.0).clip(0.0, 1.0)
     return random.uniform(0.0, obstacle.rise, (rows, len(x))) * share
 
 
 def _slopes(random: np.random.RandomState, obstacle: Obstacle, x: np.ndarray, rows: int) -> np.ndarray:
     """Return ramps: six up, three level, six down, three level, and again; they begin up to one further ahead."""
-    position = (x - LEVEL - random.randint(3) * _CELL) % 18.0 * (x > LEVEL)
+    position = (x - RUNWAY - random.randint(3) * _CELL) % 18.0 * (x > RUNWAY)
     ramp = np.minimum(position, 15.0 - position).clip(0.0, 6.0)
     return np.broadcast_to(obstacle.slope * ramp, (rows, len(x)))
 
@@ -266,7 +266,7 @@ class Terrain(Arena):
     @functools.cached_property
     def _profiles(self) -> np.ndarray:
         """Heights of stairs and trenches, in units, (lanes, cells)."""
-        level_cells = math.ceil((self.back + LEVEL) / self._grain)
+        level_cells = math.ceil((self.back + RUNWAY) / self._grain)
         cells = np.arange(math.ceil((self.back + self.length) / self._grain)) - level_cells
         profiles = [
             STEPS[kind](self._random(lane), obstacle, cells, self._grain)
@@ -300,7 +300,7 @@ class Terrain(Arena):
 def make_lanes(
     body: Body,
     kinds: Mapping[str, int],
-    length: float = _LENGTH,
+    length: float = _LENGTH_ALONE,
     levels=(DIFFICULTY,),
     seed: int = 0,
     sizes_in_meters: Mapping[str, float] | None = None,
@@ -339,4 +339,4 @@ def make_lanes(
 
 def lanes_of_kind(kind: str):
     """Return a function that returns lanes of a kind for a body."""
-    return lambda body: make_lanes(body, {kind: _LANES}, back=_BACK)
+    return lambda body: make_lanes(body, {kind: _LANES_ALONE}, back=_BACK_ALONE)

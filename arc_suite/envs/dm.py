@@ -55,7 +55,7 @@ def load(
     Args:
         domain_name: a robot: queen, bastion, tick or leaper; one of another package, as `module:name`
             if the module has not been imported yet; or any body; see `registry.body_of`.
-        task_name: walk, steer, or a task of another package as `module:name`.
+        task_name: one of the suite's, see docs/tasks.md, or a task of another package as `module:name`.
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
             or `RandomState`) and `on_divergence` ("raise" an error or "truncate" the episode with
             reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers`;

@@ -48,7 +48,7 @@ def find_settings(name: str, value: Any, task: type[Task]) -> dict[str, Any]:
 
     None are known of a task of another package that does not list its settings.
     """
-    if not hasattr(task, "names"):
+    if not task.names():
         return {}
     if name in _TERMS:
         terms, sign = _TERMS[name]
@@ -76,7 +76,7 @@ def refuse_settings(settings: Mapping[str, Any], task: type[Task]) -> None:
 
     A task of another package that does not list its settings checks them itself.
     """
-    if not hasattr(task, "names"):
+    if not task.names():
         return
     for name, value in settings.items():
         if name in task.names():

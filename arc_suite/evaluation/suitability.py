@@ -99,7 +99,10 @@ def try_preset(setup: Setup, preset: str, seeds: Sequence[int], steps: int) -> T
     with warnings.catch_warnings(record=True) as caught_warnings:
         results = anchors.play_episodes(setup, preset, seeds, steps, note_falls)
     metrics = results[0].progress
-    metric = next(name for name in METRICS if name in metrics)
+    metric = next((name for name in METRICS if name in metrics), None)
+    if metric is None:
+        measures = ", ".join(metrics) or "none"
+        raise ValueError(f"task {setup.kind.name}: expected one of the metrics {', '.join(METRICS)}, got {measures}")
     is_upright = ~has_fallen
     if metric == _GOT_UP:
         is_upright = np.array([result.progress[metric] > 0.0 for result in results])

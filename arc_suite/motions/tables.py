@@ -56,7 +56,8 @@ def read_csv(path: str | os.PathLike[str], body: Body, rate: float | None, loops
             raise ValueError(f"expected at most {_MAX_COLUMNS} columns, got {len(first_words)}")
         has_names = not _is_number(first_words[0])
         names = first_words if has_names else [*_POSITION, *_QUATERNION[1:], _QUATERNION[0], *body.joint_names]
-        frames = [_read_line(line, len(names), number) for number, line in enumerate(lines, 1) if number > has_names]
+        frame_lines = list(enumerate(lines, start=1))[1 if has_names else 0 :]
+        frames = [_read_line(line, len(names), number) for number, line in frame_lines]
         table = np.array(frames)
         columns = {name: table[:, index] for index, name in enumerate(names)}
         if len(columns) < len(names):

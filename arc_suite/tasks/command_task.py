@@ -353,7 +353,7 @@ class CommandTask(Task):
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground.
 
-        Other than in `Task`, level ground is no exception.
+        `Task` leaves bodies on level ground as they start; here they are raised, too.
         """
         return self.raise_off_ground(readings)
 
@@ -384,15 +384,15 @@ class CommandTask(Task):
         gait_memory = memory.gait_and_pose
         if gait_and_pose is None:
             stance = self.clock.entries(self.clock.stance, tick)
-            crouch = 1.0  # share of the standing height that the command asks for
+            height_share = 1.0  # of the standing height, that the command asks for
         else:
             # The commanded gait advances first, as the contacts of this step are judged by it.
             gait_memory = gait_and_pose.advance(context, gait_memory, steps, is_going)
             stance = gait_and_pose.stance(gait_memory)
-            crouch = gait_and_pose.crouch(gait_memory)
+            height_share = gait_and_pose.height_share(gait_memory)
         stance = stance | ~is_going[..., None]  # at a stop, all feet stand
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
-        health = self.health.after(context, memory.health, readings, steps, crouch)
+        health = self.health.after(context, memory.health, readings, steps, height_share)
         motion = self._mean_motion(core, place)
         if gait_and_pose is not None:
             feet_in_schedule = 1.0 - schedule_errors / self.parameters.feet

@@ -218,6 +218,11 @@ class Task(Observed):
     structure: ClassVar[Hashable] = ()
 
     @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the names of the settings, which errors propose; none if the class does not list them."""
+        return ()
+
+    @classmethod
     @abstractmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Any:
         """Return the settings for a body, some of them overridden.

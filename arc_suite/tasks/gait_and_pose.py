@@ -320,7 +320,7 @@ class GaitAndPose:
         """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the present gait."""
         return _phases(memory) * (TWO_PI / CYCLE), memory.gait[..., -2] / CYCLE
 
-    def crouch(self, memory: GaitAndPoseMemory):
+    def height_share(self, memory: GaitAndPoseMemory):
         """Return the commanded height (...) of the torso as a share of that at rest, at most 1."""
         return (1.0 + memory.pose[..., 0]).clip(max=1.0)
 

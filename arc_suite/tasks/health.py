@@ -46,7 +46,7 @@ class Upright:
         """Return the memory at the start of a body that stands or lies."""
         return Condition(np.float64(1.0), np.False_, np.bool_(not lies))
 
-    def after(self, context: Context, memory: Condition, readings: Readings, steps, crouch=1.0) -> Condition:
+    def after(self, context: Context, memory: Condition, readings: Readings, steps, height_share=1.0) -> Condition:
         """Return the memory after a control step.
 
         Args:
@@ -54,9 +54,9 @@ class Upright:
             memory: before the step.
             readings: after it.
             steps: (...) since the start, this one included.
-            crouch: share (...) of its height that the torso is asked to keep.
+            height_share: share (...) of its height that the torso is asked to keep.
         """
-        is_high = readings.torso_height >= self.lowest * context.height * crouch
+        is_high = readings.torso_height >= self.lowest * context.height * height_share
         upward_force_on_torso = component(readings.contact_forces, 5)  # in the body's weight
         lies = upward_force_on_torso >= self.lying
         upright = rotations.upright(readings.torso_quaternion)

@@ -76,8 +76,7 @@ def own_settings(task: Task, task_kwargs: Mapping[str, Any] = {}) -> list[Settin
     task = task.unwrapped
     values = {"motion": "walk"} | dict(task_kwargs) | _read_values(task)
     meanings = _read_meanings(task)
-    names_of_settings = getattr(type(task), "names", tuple)  # a method; tasks of other packages may lack it
-    names = list(names_of_settings())
+    names = list(task.names())
     for name, value in _fields(task.settings).items():
         if name not in (*names, *_PARTS) and _is_plain(value):
             names.append(name)

@@ -379,7 +379,7 @@ def test_a_master_of_all_levels_spends_most_episodes_at_the_highest():
 
 def test_levels_of_gaps_differ():
     arena = prepare_task("tick", "gaps", {"curriculum": True})[0].scene.arena
-    x = np.arange(terrain.LEVEL, terrain.LEVEL + 1.0, 1.0 / 32.0) * arena.unit  # the first trench begins here
+    x = np.arange(terrain.RUNWAY, terrain.RUNWAY + 1.0, 1.0 / 32.0) * arena.unit  # the first trench begins here
     trenches = [(arena.height(x, arena.start(level) + 0.0 * x) < 0.0).mean() for level in range(LEVELS)]
     assert_allclose(trenches, np.arange(1, LEVELS + 1) / 16.0)
 
