@@ -338,12 +338,13 @@ class Setup:
         fields["task_version"] = task_versions[0] if len(task_versions) == 1 else task_versions
         fields["body_sha256"] = hashlib.sha256(texts.encode()).hexdigest()
         if not self.several:
-            fields[PHYSICS] = self.physics_sha256()
+            fields[PHYSICS] = self.physics_sha256
         fields["versions"] = versions.dependency_versions()
         return fields
 
+    @functools.cached_property
     def physics_sha256(self) -> str:
-        """Return the hash of the model, see `hash_physics`; of several bodies that of the first.
+        """The hash of the model, see `hash_physics`; of several bodies that of the first.
 
         Raises:
             ValueError: a setting that does not fit.

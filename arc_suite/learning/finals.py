@@ -40,14 +40,14 @@ def play_once(run: Configuration, folder: Path, step: int, threads: int | None =
     policy = network.load(folder / checkpoints.FOLDER / str(step))
     sha256 = network.digest(policy)
     final_lines = run_folder.lines(folder, TABLE)
-    if not _are_of(final_lines, sha256):
+    if not are_of(final_lines, sha256):
         final_lines = _play(run.validation, policy, sha256, threads)
         lines = [",".join(final_lines[0]), *(",".join(row.values()) for row in final_lines)]
         files.write(folder / f"{TABLE}.csv", "\n".join([*lines, ""]))
     return final_lines
 
 
-def _are_of(final_lines: Sequence[Mapping[str, str]], sha256: str) -> bool:
+def are_of(final_lines: Sequence[Mapping[str, str]], sha256: str) -> bool:
     """Return whether rows are the episodes that judge the policy of a hash."""
     seeds = [(row.get("policy_sha256"), row["seed"]) for row in final_lines]
     return seeds == [(sha256, str(seed)) for seed in judging.seeds_of(sha256)]

@@ -435,7 +435,7 @@ def _check_setup(path: Path, setup: Setup, body: Body, task: Task | None) -> Non
 def _warn_of_other_model(path: Path, policy_network: Network) -> None:
     """Warn if the model of a policy's training has changed since, with its robot, its task or the suite."""
     setup = policy_network.setup
-    if policy_network.physics_sha256 not in (None, setup.physics_sha256()):
+    if policy_network.physics_sha256 not in (None, setup.physics_sha256):
         text = f"policy {path}: the model of {setup.name}, {setup.task_label} has changed since its training"
         warnings.warn(text, stacklevel=_STACK_LEVEL)
 

@@ -112,7 +112,7 @@ def save(path: str | os.PathLike[str], network: Network) -> None:
     record = network.setup.to_dict() | {"blocks": dict(network.blocks), "nodes": nodes}
     record["training_seeds"] = seed_ranges.to_json(network.training_seeds)
     if not network.setup.several:
-        record[PHYSICS] = network.setup.physics_sha256()
+        record[PHYSICS] = network.setup.physics_sha256
     with files.writing(path) as temporary:
         np.savez(temporary, policy=np.array(json.dumps(record)), **network.graph.arrays)  # type: ignore[arg-type]
 

@@ -52,7 +52,6 @@ MAX_SCALE = 2  # of the largest picture
 # Of pictures of environments; width and height in pixels.
 _DEFAULT_OPTIONS: dict[str, Any] = {"width": 640, "height": 480, "camera_id": "tracking"}
 _FAILED_LEG_COLOR = (0.07, 0.07, 0.08, 1.0)
-_NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))
 
 
 class _SwingingGeom(NamedTuple):
@@ -62,13 +61,13 @@ class _SwingingGeom(NamedTuple):
         number: number of the geom.
         bone: index of the bone.
         pivot: (3,) of the bone, m.
-        place, quaternion: of the geom at rest.
+        position, quaternion: of the geom at rest.
     """
 
     number: int
     bone: int
     pivot: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     quaternion: np.ndarray
 
 
@@ -150,9 +149,14 @@ class Decorated(dm_mujoco.Physics):
         """Turn ornaments about their pivots; see `pose`."""
         model = self.model.ptr
         for geom in self._swinging_geoms:
-            turn = _NO_TURN if swings is None else swings[geom.bone]
-            model.geom_pos[geom.number] = geom.pivot + rotations.matrix(turn) @ (geom.place - geom.pivot)
-            model.geom_quat[geom.number] = rotations.product(turn, geom.quaternion)
+            position = geom.position
+            quaternion = geom.quaternion
+            if swings is not None:
+                turn = swings[geom.bone]
+                position = geom.pivot + rotations.matrix(turn) @ (position - geom.pivot)
+                quaternion = rotations.product(turn, quaternion)
+            model.geom_pos[geom.number] = position
+            model.geom_quat[geom.number] = quaternion
 
     def darken(self, failed_legs: Iterable[str]) -> None:
         """Show legs dark, given their names, and all other legs in their own colors."""

@@ -14,6 +14,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, judging, provenance
 from arc_suite.evaluation.published import CURVES
 from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, PROVENANCE_FIELDS, TRAINING_SEEDS
+from arc_suite.learning.finals import are_of
 from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
 from arc_suite.seed_ranges import EVALUATION, Ranges, common_seeds, from_json
@@ -240,9 +241,8 @@ def _check_finals(name: str, finals: Sequence[Mapping[str, str]]) -> None:
     if not finals:
         return
     sha256 = finals[0]["policy_sha256"]
-    seeds = [(row["policy_sha256"], row["seed"]) for row in finals]
-    expected_seeds = judging.seeds_of(sha256)
-    if seeds != [(sha256, str(seed)) for seed in expected_seeds]:
+    if not are_of(finals, sha256):
+        expected_seeds = judging.seeds_of(sha256)
         expected = f"{len(expected_seeds)} episodes from seed {expected_seeds.start} on, which follow from the hash"
         raise ValueError(f"{name}: {FINALS}: expected {expected} of one policy")
 
@@ -290,7 +290,7 @@ def note_earlier_models(models: Iterable[tuple[Setup, str]]) -> tuple[str, ...]:
 @functools.cache
 def hash_physics(setup: Setup) -> str:
     """Return the hash of the model of a setup, as the code makes it now; empty for several bodies."""
-    return setup.provenance().get(PHYSICS, "")
+    return "" if setup.several else setup.physics_sha256
 
 
 def join_notes(seeds: Sequence[RunResult]) -> str:
