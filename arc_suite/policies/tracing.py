@@ -3,26 +3,46 @@
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
+from arc_suite import checks
 from arc_suite.policies.graph import INPUT, Graph, Node, Shape, shape_of
 
-# Truth values are 1 and 0, so that "or" is the maximum, and "and" the product.
+# By names of NumPy. Truth values are 1 and 0, so that "or" is the maximum, and "and" the product.
 _OPERATORS = {
-    np.add: "Add",
-    np.bitwise_and: "Mul",
-    np.bitwise_or: "Max",
-    np.divide: "Div",
-    np.equal: "Equal",
-    np.greater: "Greater",
-    np.greater_equal: "GreaterOrEqual",
-    np.maximum: "Max",
-    np.multiply: "Mul",
-    np.negative: "Neg",
-    np.sqrt: "Sqrt",
-    np.subtract: "Sub",
+    "add": "Add",
+    "bitwise_and": "Mul",
+    "bitwise_or": "Max",
+    "divide": "Div",
+    "equal": "Equal",
+    "greater": "Greater",
+    "greater_equal": "GreaterOrEqual",
+    "matmul": "Product",
+    "maximum": "Max",
+    "multiply": "Mul",
+    "negative": "Neg",
+    "sqrt": "Sqrt",
+    "subtract": "Sub",
+    "tanh": "Tanh",
+}
+
+# Functions that move numbers and compute none: applied to indices, they give the indices of the moved numbers.
+_MOVES = {
+    *(np.array_split, np.broadcast_to, np.concatenate, np.expand_dims, np.flip, np.moveaxis, np.ravel, np.repeat),
+    *(np.reshape, np.roll, np.split, np.squeeze, np.stack, np.swapaxes, np.take, np.take_along_axis),
+    *(np.tile, np.transpose),
+}
+
+_CURES = {
+    "absolute": "np.maximum(x, -x)",
+    "clip": "x.clip(low, high)",
+    "dot": "x @ weight",
+    "mean": "x.sum(axis) / count",
+    "power": "x * x",
+    "sum": "x.sum(axis)",
+    "where": "mask * a + (1.0 - mask) * b",
 }
 
 
@@ -30,10 +50,13 @@ def traced(function: Callable[["Traced"], "Traced"], size: int) -> Graph:
     """Return the graph of a function, from observations (1, size) of one environment to its actions (1, joints).
 
     Raises:
-        ValueError: inputs of a node that do not fit.
+        ValueError: inputs of a node do not fit, the function asks NumPy for what no operator computes, or returns
+            something else than traced numbers.
     """
     writer = _Writer(size)
     actions = function(writer.array(INPUT))
+    if not isinstance(actions, Traced):
+        raise ValueError(f"expected actions computed from the observations, got {checks.preview(actions)}")
     if actions.name != len(writer.nodes) - 1:
         actions.node("Take", np.arange(actions.places.size))
     return Graph(tuple(writer.nodes), writer.arrays)
@@ -96,6 +119,8 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         all_places = self._writer.array(self.source).places
         if np.array_equal(all_places, self.places):
             return self.source
+        if self.places.shape[:1] != (1,):
+            raise ValueError(f"expected a first axis of length 1, of environments, got shape {self.places.shape}")
         indices = self._writer.constant(self.places[0])
         return self._writer.node("Take", self.source, indices.name).source
 
@@ -125,14 +150,25 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
     def __len__(self):
         return len(self.places)
 
+    def __bool__(self):
+        raise ValueError("traced numbers have no truth value: multiply by the comparison, which is 1 or 0")
+
     def __getitem__(self, key):
         return self._at(self.places[key])
 
     def __array_ufunc__(self, ufunc, method, *inputs, **options):
-        return self._node(_OPERATORS[ufunc], *inputs)
+        """Add the node of a function that computes each number by itself."""
+        name = ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}"
+        if name not in _OPERATORS:
+            _refuse(name)
+        if options:
+            raise ValueError(f"np.{name} of traced numbers takes no {', '.join(options)}")
+        return self._node(_OPERATORS[name], *inputs)
 
     def __array_function__(self, function, types, arguments, options):
         """Apply a function that moves numbers, such as `np.concatenate` or `np.split`, to the places."""
+        if function not in _MOVES:
+            _refuse(function.__name__)
         operand, *further_arguments = arguments
         if isinstance(operand, Traced):
             result = function(operand.places, *further_arguments, **options)
@@ -153,6 +189,12 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
     def _node(self, operator: str, *inputs: Any) -> "Traced":
         operands = [operand if isinstance(operand, Traced) else self._writer.constant(operand) for operand in inputs]
         return self._writer.node(operator, *(operand.name for operand in operands))
+
+
+def _refuse(name: str) -> NoReturn:
+    """Raise ValueError for a function of NumPy that no operator computes."""
+    cure = f"use {_CURES[name]}" if name in _CURES else f"there are: {', '.join(_OPERATORS)}, and operators by x.node"
+    raise ValueError(f"a graph does not compute np.{name}; {cure}")
 
 
 def apply_graph(graph: Graph, inputs: Traced) -> Traced:

@@ -102,6 +102,33 @@ def test_what_operators_compute():
         np.testing.assert_allclose(found, result, atol=2e-6, rtol=1e-5, err_msg=name)
 
 
+@pytest.mark.parametrize(
+    ("function", "line"),
+    [
+        (lambda x: np.clip(x, -1.0, 1.0), "a graph does not compute np.clip; use x.clip(low, high)"),
+        (lambda x: np.sum(x, axis=1), "a graph does not compute np.sum; use x.sum(axis)"),
+        (lambda x: np.mean(x, axis=1), "a graph does not compute np.mean; use x.sum(axis) / count"),
+        (lambda x: np.linalg.norm(x, axis=1), "a graph does not compute np.norm; there are: add, bitwise_and, "),
+        (lambda x: np.exp(x), "a graph does not compute np.exp; there are: add, bitwise_and, bitwise_or, "),
+        (lambda x: np.add.reduce(x, axis=1), "a graph does not compute np.add.reduce; there are: add, "),
+        (lambda x: np.add(x, 1.0, where=False), "np.add of traced numbers takes no where"),
+        (lambda x: x**2, "a graph does not compute np.power; use x * x"),
+        (lambda x: x if x > 0.0 else -x, "traced numbers have no truth value: multiply by the comparison, which is 1 "),
+        (lambda x: x[0] + 1.0, "expected a first axis of length 1, of environments, got shape (4,)"),
+        (lambda x: np.zeros((1, 4)), "expected actions computed from the observations, got array([[0., 0., 0., 0.]])"),
+    ],
+)
+def test_what_a_graph_does_not_compute_is_refused(function, line):
+    with refused(line, begins=True):
+        traced(function, 4)
+
+
+def test_a_graph_computes_products_and_hyperbolic_tangents_as_numpy_writes_them():
+    weight = np.arange(8.0).reshape(4, 2)
+    graph = traced(lambda x: np.tanh(x @ weight), 4)
+    assert [node.operator for node in graph.nodes] == ["Product", "Tanh"]
+
+
 def test_a_traced_function_computes_the_same_to_the_bit():
     def function(x):
         first, second = np.split(x.reshape(len(x), 3, 2), [1], axis=1)
