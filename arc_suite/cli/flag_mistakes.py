@@ -116,7 +116,7 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
     hint = ""
     host, colon, port = value.rpartition(":")
     if name == "port" and colon and port.isdecimal():
-        hint = f"; did you mean --host={checks.quote(host)} --port={port}?"
+        hint = f"; did you mean --host={checks.quote(host.strip('[]'))} --port={port}?"
     elif isinstance(parser, flags.IntegerParser):
         hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
     raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None

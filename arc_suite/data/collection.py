@@ -120,7 +120,7 @@ def _check_same_dataset(storage: Storage, dataset_id: str, provenance: dict, ove
         return
     difference = _difference(storage.metadata["arc_suite"], provenance)
     if difference and storage.kept and not overwrite:
-        raise ValueError(f"dataset {dataset_id!r} is another: {difference}; --overwrite replaces it")
+        raise ValueError(f"dataset {dataset_id!r} is another: {difference}; overwrite=True (--overwrite) replaces it")
     if difference:
         storage.clear()
 

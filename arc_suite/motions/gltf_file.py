@@ -151,7 +151,7 @@ def _choose_animation(animations: list[dict], clip: str | None) -> dict:
         raise ValueError("expected an animation, and there is none")
     if clip is None:
         if len(by_name) > 1:
-            raise ValueError(f"--clip: expected one of {', '.join(by_name)[:500]}")
+            raise ValueError(f"clip: expected one of {', '.join(by_name)[:500]}")
         (animation,) = by_name.values()
         return animation
     name = clip if clip in by_name else f"{clip}{LOOP_SUFFIX}"

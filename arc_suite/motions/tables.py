@@ -112,7 +112,7 @@ def _make(
                 f"columns: {checks.preview(name)} is no joint of {body.name}{checks.hint(name, expected_names)}"
             )
     if rate is None:
-        raise ValueError("--fps: expected frames a second, as the file does not say them")
+        raise ValueError("fps: expected frames a second, as the file does not say them")
     table = np.stack([columns[name] for name in expected_names], axis=-1)
     if not np.isfinite(table).all():
         frame = int(np.isfinite(table).all(axis=-1).argmin())

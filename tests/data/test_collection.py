@@ -195,7 +195,7 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(kept):
         (SETTINGS._replace(setup=Setup.of("queen", "steer")), "its task is 'walk', and not 'steer'"),
         (SETTINGS._replace(setup=WAVE), "its task_kwargs is {}, and not {'gait': 'wave'}"),
     ):
-        with refused(f"dataset {ID!r} is another: {difference}; --overwrite replaces it"):
+        with refused(f"dataset {ID!r} is another: {difference}; overwrite=True (--overwrite) replaces it"):
             collect(ID, changed, 2)
         assert digests() == before
 
@@ -216,7 +216,7 @@ def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch
     before, medium = digests(), PRESETS["queen"]["medium"]
     for changed in (medium._replace(stiffness=0.81), medium._replace(center=medium.center | {"ankle": (15, 30, -14)})):
         monkeypatch.setitem(PRESETS["queen"], "medium", changed)
-        line = "its presets slow and medium had other numbers; --overwrite replaces it"
+        line = "its presets slow and medium had other numbers; overwrite=True (--overwrite) replaces it"
         with refused(f"dataset {ID!r} is another: {line}"):
             collect(ID, settings, 3)
         assert digests() == before

@@ -186,7 +186,7 @@ def test_truncated_file_is_one_line(file, tmp_path):
 def test_several_animations_need_a_name(raised, tmp_path):
     steps = drawn_motions.step_loop(TICK)
     data = glb(TICK, [drawn_motions.clip_of(TICK, each) for each in (raised, steps)], root_motion="moving")
-    with pytest.raises(ValueError, match="--clip: expected one of raise, walk_loop"):
+    with pytest.raises(ValueError, match="clip: expected one of raise, walk_loop"):
         read(tmp_path, data)
     with pytest.raises(ValueError, match="unknown clip 'run'"):
         read(tmp_path, data, clip="run")

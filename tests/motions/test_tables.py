@@ -94,7 +94,7 @@ def test_csv_of_a_robot(robot, tmp_path):
     order = np.random.default_rng(1).permutation(len(names))
     lines = [",".join(np.array(names)[order]), *[",".join(map(repr, row[order].tolist())) for row in table]]
     path.write_text("\n".join(lines))
-    with pytest.raises(ValueError, match="--fps: expected frames a second, as the file does not say them"):
+    with pytest.raises(ValueError, match="steps.csv: fps: expected frames a second, as the file does not say them"):
         reading.read(path, robot)
     motion, _ = reading.read(path, robot, reading.Options(fps=20.0, loop=True))
     assert motion.loops and motion.name == "steps"

@@ -32,7 +32,7 @@ flags.DEFINE_integer(
 )
 
 
-_ADDRESS = re.compile(r"(?:https?://)?([^/:]*)(?::(\d{1,5}))?/?")
+_ADDRESS = re.compile(r"(?:https?://)?(\[[^\]/]*\]|[^/:]*)(?::(\d{1,5}))?/?")  # [...] is of IPv6
 _PORT_ALONE = re.compile(r"[1-9]\d{1,4}")
 
 
@@ -51,6 +51,7 @@ def _check_host(text: str) -> None:
     if _PORT_ALONE.fullmatch(host):
         port = host
         host = ""
+    host = host.strip("[]")
     if host == "*":  # of servers that listen everywhere
         host = "0.0.0.0"
     if host == text:

@@ -124,7 +124,7 @@ def check_name(name: str) -> None:
         ValueError: it has other characters than letters, digits, `_`, `-` and `.`.
     """
     if not _LEARNER_PATTERN.fullmatch(name):
-        raise ValueError(f"--name={name}: expected letters, digits, _, - and .")
+        raise ValueError(f"name {name}: expected letters, digits, _, - and .")
 
 
 def write(studies: Path, division: str, learner: str, scores: Iterable[RunScore]) -> None:

@@ -255,7 +255,7 @@ def run(*arguments, cwd):
         (["top", "--places=tick-wlak"], "unknown place 'tick-wlak'; did you mean 'tick-walk'?"),
         (["top", "--algorithm=bc"], "algorithm bc learns from prior data, and the division top takes those that "),
         (["top", "--policies=."], ".: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none"),
-        (["top", "--policies=.", "--name=a/b"], "--name=a/b: expected letters, digits, _, - and ."),
+        (["top", "--policies=.", "--name=a/b"], "name a/b: expected letters, digits, _, - and ."),
         (["top", "--policies=none"], "cannot read none: no such file or directory"),
         ([], "studies: no scores of the benchmark; run a division, or name another folder by --results"),
     ],
