@@ -24,15 +24,16 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, clock, energy, parameters, terms
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
-from arc_suite.tasks.clock import Clock
 from arc_suite.tasks.command import Command, Scheduled, WithLive
 from arc_suite.tasks.context import Context
-from arc_suite.tasks.contract import Inputs, Start, Task
+from arc_suite.tasks.contract import Inputs, Start
 from arc_suite.tasks.gait_and_pose import GaitAndPose, GaitAndPoseMemory
+from arc_suite.tasks.gait_task import GaitTask
 from arc_suite.tasks.ground import Ground, Level
 from arc_suite.tasks.health import Condition, Upright
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.parts import Part, Planar, Scalar
+from arc_suite.tasks.prescribed_gait import PrescribedGait
 from arc_suite.tasks.readings import Readings, component
 
 COST_LIMIT = 0.6  # standing costs a third of it, uniform random torques twice as much
@@ -139,7 +140,7 @@ class CommandTaskMemory(NamedTuple):
     gait_and_pose: GaitAndPoseMemory | None = None
 
 
-class CommandTask(Task):
+class CommandTask(GaitTask):
     """Following a command.
 
     Attributes:
@@ -203,7 +204,6 @@ class CommandTask(Task):
         """The paper's observation, the command and the measured motion, and the blocks that command and ground add."""
         body = self.scene.body
         gait = self.parameters
-        gait_and_pose = self.settings.gait_and_pose
         desired = _velocity("desired")
         measured = _velocity("measured")
         sensed = (True,) * len(desired) + (False,) * len(measured)
@@ -211,30 +211,30 @@ class CommandTask(Task):
             **blocks.of_gait(body, gait.phase_offsets, gait.default_angles, headed=True),
             "command": Block((*desired, *measured), sensed=sensed),
             **self.settings.command.blocks(body),
-            **({} if gait_and_pose is None else gait_and_pose.blocks(body)),
+            **self._gait.blocks(body),
             **self.settings.ground.blocks,
         }
+
+    @property
+    def _gait(self) -> GaitAndPose | PrescribedGait:
+        """The gait that feet are to follow: that by command, or else the prescribed one."""
+        gait_and_pose = self.settings.gait_and_pose
+        return PrescribedGait(self.parameters, self.clock) if gait_and_pose is None else gait_and_pose
 
     @property
     def commands(self) -> Mapping[str, int]:
         """Sizes of what may be set from outside while an episode runs, by name."""
         body = self.scene.body
-        gait_and_pose = self.settings.gait_and_pose
-        sizes = self.settings.command.live(body)
-        return sizes if gait_and_pose is None else sizes | gait_and_pose.live(body)
+        return self.settings.command.live(body) | self._gait.live(body)
 
     @property
     def command_limits(self) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
         """The lowest and highest numbers of the commands that are bounded, by name."""
-        gait_and_pose = self.settings.gait_and_pose
-        if gait_and_pose is None:
-            return {}
-        return gait_and_pose.limits(self.scene.body, self.scene.control_timestep)
+        return self._gait.limits(self.scene.body, self.scene.control_timestep)
 
     def named_command(self, name: str, value: str) -> np.ndarray | None:
         """Return the numbers of a command that is given by a name."""
-        gait_and_pose = self.settings.gait_and_pose
-        return None if gait_and_pose is None else gait_and_pose.named_command(self.scene.body, name, value)
+        return self._gait.named_command(self.scene.body, name, value)
 
     @property
     def lies(self) -> bool:
@@ -246,11 +246,6 @@ class CommandTask(Task):
         """Whether there is a curriculum."""
         return self.settings.ground.adapts
 
-    @functools.cached_property
-    def parameters(self) -> Parameters:
-        """The prescribed gait."""
-        return self.settings.parameters
-
     @property
     def cost_limit(self) -> float:
         """The bound of the weighted sum of the costs of a step."""
@@ -259,29 +254,16 @@ class CommandTask(Task):
     @functools.cached_property
     def context(self) -> Context:
         """Lengths and speeds of the body."""
-        gait_and_pose = self.settings.gait_and_pose
-        reference = None if gait_and_pose is None else gait_and_pose.reference(self.scene, self.parameters)
+        reference = self._gait.reference(self.scene, self.parameters)
         return Context.of(self.scene, self.parameters, self.step_limit, reference)
-
-    @functools.cached_property
-    def clock(self) -> Clock:
-        """The clock of the prescribed gait."""
-        gait = self.parameters
-        return Clock.make(
-            gait.gait_frequency, gait.duty_factor, gait.phase_offsets, self.scene.control_timestep, self.step_limit
-        )
 
     def phase(self, memory: CommandTaskMemory):
         """Return the phase (...) of the gait, rad."""
-        if self.settings.gait_and_pose is None:
-            return self.clock.entries(self.clock.phases, memory.core.tick)
-        return self.settings.gait_and_pose.phase(memory.gait_and_pose)
+        return self._gait.phase(memory.core.tick, memory.gait_and_pose)
 
     def leg_phases(self, memory: CommandTaskMemory) -> tuple[Any, Any]:
         """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the present gait."""
-        if self.settings.gait_and_pose is None:
-            return super().leg_phases(memory)
-        return self.settings.gait_and_pose.leg_phases(memory.gait_and_pose)
+        return self._gait.leg_phases(memory.core.tick, memory.gait_and_pose)
 
     def first(self) -> Any:
         """Return the stream state with which a new stream of episodes begins; the ground alone has one."""
@@ -305,8 +287,7 @@ class CommandTask(Task):
         schedule = self.settings.command.schedule(random, widening)
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
         command_memory = self._start_command(random, schedule)
-        gait_and_pose = self.settings.gait_and_pose
-        gait_memory = None if gait_and_pose is None else gait_and_pose.start(context, random)
+        gait_memory = self._gait.start(context, random)
         joints = len(self.scene.body.joint_names)
         no_action = np.zeros(joints)
         zero = np.float64(0.0)
@@ -345,10 +326,11 @@ class CommandTask(Task):
         forces = reading.headed_forces(data, layout, self.context.force_unit, heading)
         readings = reading.read(data, layout, self.scene.arena, forces)
         touches = self.settings.ground.touches(data)
-        if self.settings.gait_and_pose is None:
-            return Sensed(*readings, heading, touches, None)
-        feet_from_torso = data.xpos[..., layout.feet, :2] - readings.frame_position[..., None, :2]
-        return Sensed(*readings, heading, touches, rotations.to_heading_frame(feet_from_torso, heading[..., None]))
+        feet = None
+        if self._gait.needs_feet:
+            from_torso = data.xpos[..., layout.feet, :2] - readings.frame_position[..., None, :2]
+            feet = rotations.to_heading_frame(from_torso, heading[..., None])
+        return Sensed(*readings, heading, touches, feet)
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground.
@@ -380,26 +362,17 @@ class CommandTask(Task):
         steps = core.steps + 1
         is_going = core.desired.any(axis=-1)  # by the velocity that was desired during the step
         tick = core.tick + is_going
-        gait_and_pose = self.settings.gait_and_pose
-        gait_memory = memory.gait_and_pose
-        if gait_and_pose is None:
-            stance = self.clock.entries(self.clock.stance, tick)
-            height_share = 1.0  # of the standing height, that the command asks for
-        else:
-            # The commanded gait advances first, as the contacts of this step are judged by it.
-            gait_memory = gait_and_pose.advance(context, gait_memory, steps, is_going)
-            stance = gait_and_pose.stance(gait_memory)
-            height_share = gait_and_pose.height_share(gait_memory)
-        stance = stance | ~is_going[..., None]  # at a stop, all feet stand
+        # A commanded gait advances first, as the contacts of this step are judged by it.
+        gait = self._gait
+        gait_memory = gait.advance(context, memory.gait_and_pose, steps, is_going)
+        stance = gait.stance(tick, gait_memory) | ~is_going[..., None]  # at a stop, all feet stand
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
+        height_share = gait.height_share(gait_memory)  # of the standing height, that the command asks for
         health = self.health.after(context, memory.health, readings, steps, height_share)
         motion = self._mean_motion(core, place)
-        if gait_and_pose is not None:
-            feet_in_schedule = 1.0 - schedule_errors / self.parameters.feet
-            gait_memory = gait_and_pose.after(context, gait_memory, readings, feet_in_schedule)
+        gait_memory = gait.after(context, gait_memory, readings, self._share_in_schedule(schedule_errors))
         followed = self.settings.command.follow(context, memory.command, steps, core.place, place, motion, readings)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
-        efforts = readings.effort(core.action)  # (..., joints) torques as shares of the largest
         core = Core(
             steps=steps,
             tick=tick,
@@ -407,7 +380,7 @@ class CommandTask(Task):
             previous_action=core.previous_action,
             schedule_errors=schedule_errors,
             all_schedule_errors=core.all_schedule_errors + schedule_errors,
-            energy=energy.after(core.energy, self._torques, self._heat, efforts, readings.joint_angles),
+            energy=self.add_work(core.energy, core.action, readings),
             path=core.path + context.pace * xp.hypot(motion[..., 0], motion[..., 1]),
             place=place,
             motion=motion,
@@ -417,13 +390,9 @@ class CommandTask(Task):
         )
         return CommandTaskMemory(core, followed.memory, ground, health, gait_memory)
 
-    @functools.cached_property
-    def _torques(self) -> np.ndarray:
-        return energy.torques(self.scene.body)
-
-    @functools.cached_property
-    def _heat(self) -> np.ndarray:
-        return energy.heat(self.scene.body)
+    def _share_in_schedule(self, schedule_errors):
+        """Return the share (...) of the feet that follow the contact schedule, given its errors (...)."""
+        return 1.0 - schedule_errors / self.parameters.feet
 
     def _mean_motion(self, core: Core, place):
         """Return the mean velocity (..., 3); that of a step is relative to the heading at its start."""
@@ -439,9 +408,9 @@ class CommandTask(Task):
 
     def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
         """Return the memory with a live command."""
-        if name not in self.settings.command.live(self.scene.body):
-            gait_memory = self.settings.gait_and_pose.with_command(memory.gait_and_pose, name, value)
-            return memory._replace(gait_and_pose=gait_memory)
+        gait = self._gait
+        if name in gait.live(self.scene.body):
+            return memory._replace(gait_and_pose=gait.with_command(memory.gait_and_pose, name, value))
         command = memory.command._replace(live=value)
         desired = self.settings.command.desired(self.context, command, memory.core.steps, memory.core.place)
         return memory._replace(core=memory.core._replace(desired=desired), command=command)
@@ -453,15 +422,13 @@ class CommandTask(Task):
         """
         core = memory.core
         height = self.context.height
-        gait_and_pose = self.settings.gait_and_pose
-        default_angles = self.parameters.default_angles
-        feet_in_schedule = 1.0 - core.schedule_errors / self.parameters.feet
+        gait = self._gait
+        feet_in_schedule = self._share_in_schedule(core.schedule_errors)
         bonuses = self.settings.command.terms(
             memory.command, core.step_tracking, memory.health.upright, feet_in_schedule
         )
-        if gait_and_pose is not None:
-            default_angles = gait_and_pose.default_angles(self.context, memory.gait_and_pose, default_angles)
-            bonuses = gait_and_pose.terms(memory.gait_and_pose, bonuses, core.step_tracking)
+        bonuses = gait.terms(memory.gait_and_pose, bonuses, core.step_tracking)
+        default_angles = gait.default_angles(self.context, memory.gait_and_pose, self.parameters.default_angles)
         costs = terms.costs(readings, core.action, core.previous_action, core.schedule_errors, default_angles)
         return {
             **costs,
@@ -476,30 +443,19 @@ class CommandTask(Task):
         """Return the blocks relative to the heading, with a clock of zeros at a stop, and without negative zeros."""
         core = memory.core
         context = self.context
-        heading = readings.heading
         xp = core.motion.__array_namespace__()
-        posture = readings.posture
-        velocities = readings.velocities
-        quaternion = rotations.turn_about_z(readings.torso_quaternion, -heading)
-        velocity = rotations.to_heading_frame(velocities[..., :2], heading)
-        gait_and_pose = self.settings.gait_and_pose
-        if gait_and_pose is None:
-            clock_circle = self.clock.entries(self.clock.circle, core.tick)
-            gait_blocks = {}
-        else:
-            clock_circle = gait_and_pose.circle(memory.gait_and_pose)
-            gait_blocks = gait_and_pose.observe(context, memory.gait_and_pose)
+        gait = self._gait
+        is_going = core.desired.any(axis=-1)[..., None]
         observation = {
-            "posture": xp.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
-            "velocities": xp.concatenate([velocity, velocities[..., 2:]], axis=-1),
+            **reading.observe_by_heading(readings, readings.heading),
             "contact_forces": readings.contact_forces,
-            "gait_clock": clock_circle * core.desired.any(axis=-1)[..., None],
+            "gait_clock": gait.circle(core.tick, memory.gait_and_pose) * is_going,
             "command": xp.concatenate([core.desired, core.motion], axis=-1),
             **self.settings.command.observe(context, memory.command),
-            **gait_blocks,
+            **gait.observe(context, memory.gait_and_pose),
             **self.settings.ground.observe(context, memory.ground, core.place, readings),
         }
-        return {name: block + 0.0 for name, block in observation.items()}  # adding 0 makes -0 a 0
+        return reading.remove_negative_zeros(observation)
 
     def ended(self, memory: CommandTaskMemory, readings: Sensed) -> tuple:
         """Return whether the body fell, which terminates the episode; the ground may end it, and its edge truncates."""
@@ -513,15 +469,12 @@ class CommandTask(Task):
         The cost of transport divides by the length of the path, whatever its direction.
         """
         core = memory.core
-        gait_and_pose = self.settings.gait_and_pose
         judged_steps = self.judged_steps(memory)
         steps = core.steps + (core.steps == 0)  # at least 1
         target_path = self.context.pace * steps  # m, that the body would have gone at the target velocity
-        metrics_of_command = self.settings.command.progress(self.context, memory.command, judged_steps)
-        if gait_and_pose is not None:
-            metrics_of_command |= gait_and_pose.progress(memory.gait_and_pose, judged_steps)
         return {
-            **metrics_of_command,
+            **self.settings.command.progress(self.context, memory.command, judged_steps),
+            **self._gait.progress(memory.gait_and_pose, judged_steps),
             "tracking": core.all_tracking / steps,
             **self.health.progress(memory.health),
             "gait_compliance": clock.compliance(core.all_schedule_errors, steps, self.parameters.feet),
@@ -532,11 +485,8 @@ class CommandTask(Task):
     def resampled(self, memory: CommandTaskMemory) -> Any:
         """Return whether the latest step began another drawn command."""
         steps = memory.core.steps
-        gait_and_pose = self.settings.gait_and_pose
         is_resampled = self.settings.command.resampled(memory.command, steps)
-        if gait_and_pose is None:
-            return is_resampled
-        return is_resampled | gait_and_pose.resampled(memory.gait_and_pose, steps)
+        return is_resampled | self._gait.resampled(memory.gait_and_pose, steps)
 
     def judged_steps(self, memory: CommandTaskMemory):
         """Return the steps (...) over which an episode is judged: those so far, or of a full one once it ended."""

@@ -122,6 +122,7 @@ class GaitAndPose:
             for the prescribed gait alone.
         settings: names of the fields that a caller may set.
         observed: names of the blocks of the present gait and pose.
+        needs_feet: whether `after` takes the positions of the feet from the readings.
     """
 
     poses: float = 0.8
@@ -129,6 +130,7 @@ class GaitAndPose:
 
     settings: ClassVar[tuple[str, ...]] = ("poses", "gaits")
     observed: ClassVar[tuple[str, ...]] = ("pose", "gait")
+    needs_feet: ClassVar[bool] = True
 
     def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> Self:
         """Return the value with checked settings in place of its own.
@@ -304,19 +306,21 @@ class GaitAndPose:
         """Return the memory with a live pose or gait."""
         return memory._replace(**{_FIELD_OF_COMMAND[name]: value})
 
-    def phase(self, memory: GaitAndPoseMemory):
+    # The phase is in the memory. A prescribed gait takes it from the tick of the task's clock.
+
+    def phase(self, tick, memory: GaitAndPoseMemory):
         """Return the phase (...) of the gait, rad."""
         return memory.phase * (TWO_PI / CYCLE)
 
-    def circle(self, memory: GaitAndPoseMemory):
+    def circle(self, tick, memory: GaitAndPoseMemory):
         """Return sine and cosine (..., 2) of the phase."""
         return _circle(memory.phase, memory.pose)
 
-    def stance(self, memory: GaitAndPoseMemory):
+    def stance(self, tick, memory: GaitAndPoseMemory):
         """Return which feet (..., legs) the present gait has on the ground."""
         return _phases(memory) < memory.gait[..., -2:-1]
 
-    def leg_phases(self, memory: GaitAndPoseMemory) -> tuple[Any, Any]:
+    def leg_phases(self, tick, memory: GaitAndPoseMemory) -> tuple[Any, Any]:
         """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the present gait."""
         return _phases(memory) * (TWO_PI / CYCLE), memory.gait[..., -2] / CYCLE
 

@@ -24,6 +24,7 @@ from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.motions import Motion, check_body, motion_text, striding
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, parameters, parts
+from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import FileSetting, Inputs, Start, Task
 from arc_suite.tasks.fitting import reach
@@ -347,23 +348,18 @@ class Mimic(Task):
 
     def observe(self, memory: MimicMemory, readings: Readings) -> dict:
         """Return the blocks; directions are relative to the heading of the torso."""
-        posture = readings.posture
-        velocities = readings.velocities
-        xp = posture.__array_namespace__()
         heading = rotations.yaw(readings.torso_quaternion)
-        quaternion = rotations.turn_about_z(readings.torso_quaternion, -heading)
-        velocity = rotations.to_heading_frame(velocities[..., :2], heading)
         observation = {
-            "posture": xp.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
-            "velocities": xp.concatenate([velocity, velocities[..., 2:]], axis=-1),
-            "motion": self._observe_motion(memory, xp),
+            **reading.observe_by_heading(readings, heading),
+            "motion": self._observe_motion(memory, readings),
             "next_poses": self._observe_next_poses(memory, readings, heading),
         }
-        return {name: block + 0.0 for name, block in observation.items()}  # adding 0 makes -0 a 0
+        return reading.remove_negative_zeros(observation)
 
-    def _observe_motion(self, memory: MimicMemory, xp):
-        """Return where in which motion the body is."""
+    def _observe_motion(self, memory: MimicMemory, readings: Readings):
+        """Return the block `motion` (..., size): place in the cycle, side, and which of several motions is followed."""
         tables = self.tables
+        xp = readings.posture.__array_namespace__()
         circle = tables.entries(tables.circle, self._row(memory))
         sign = xp.asarray(1.0 - 2.0 * memory.side)[..., None]
         is_followed = xp.asarray(memory.motion)[..., None] == np.arange(len(tables.counts))
@@ -371,7 +367,7 @@ class Mimic(Task):
         return xp.concatenate([circle, sign, *observed_motions], axis=-1)
 
     def _observe_next_poses(self, memory: MimicMemory, readings: Readings, heading):
-        """Return the poses of the next control steps, as seen from the torso."""
+        """Return the block `next_poses` (..., size): the poses of the next control steps, as seen from the torso."""
         tables = self.tables
         xp = readings.posture.__array_namespace__()
         row = self._row(memory)

@@ -4,6 +4,7 @@
 a leading axis. Every array here keeps such leading axes, written `...`.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -285,6 +286,24 @@ def headed_forces(data, layout: Layout, unit: np.ndarray, heading):
     horizontal_torque = rotations.to_heading_frame(wrenches[..., 0:2], heading_of_parts)
     horizontal_force = rotations.to_heading_frame(wrenches[..., 3:5], heading_of_parts)
     return xp.concatenate([horizontal_torque, wrenches[..., 2:3], horizontal_force, wrenches[..., 5:6]], axis=-1)
+
+
+def observe_by_heading(readings: Readings, heading) -> dict:
+    """Return the blocks `posture` and `velocities` with the torso's directions relative to a heading (...), rad."""
+    posture = readings.posture
+    velocities = readings.velocities
+    xp = posture.__array_namespace__()
+    quaternion = rotations.turn_about_z(readings.torso_quaternion, -heading)
+    horizontal_velocity = rotations.to_heading_frame(velocities[..., :2], heading)
+    return {
+        "posture": xp.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
+        "velocities": xp.concatenate([horizontal_velocity, velocities[..., 2:]], axis=-1),
+    }
+
+
+def remove_negative_zeros(blocks: Mapping) -> dict:
+    """Return blocks by name with 0 in place of -0, which turns and reflections may give."""
+    return {name: block + 0.0 for name, block in blocks.items()}
 
 
 def component(vectors, index: int):

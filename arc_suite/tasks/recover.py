@@ -229,20 +229,13 @@ class Recover(Task):
 
     def observe(self, memory: RecoverMemory, readings: Readings) -> dict:
         """Return the blocks relative to the heading, and the world's up axis in the torso's frame."""
-        posture = readings.posture
-        velocities = readings.velocities
         heading = rotations.yaw(readings.torso_quaternion)
-        xp = heading.__array_namespace__()
-        quaternion = rotations.turn_about_z(readings.torso_quaternion, -heading)
-        velocity = rotations.to_heading_frame(velocities[..., :2], heading)
-        vertical = rotations.matrix(readings.torso_quaternion)[..., 2, :]
         observation = {
-            "posture": xp.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
-            "velocities": xp.concatenate([velocity, velocities[..., 2:]], axis=-1),
+            **reading.observe_by_heading(readings, heading),
             "contact_forces": readings.contact_forces,
-            "vertical": vertical,
+            "vertical": rotations.matrix(readings.torso_quaternion)[..., 2, :],
         }
-        return {name: block + 0.0 for name, block in observation.items()}  # adding 0 makes -0 a 0
+        return reading.remove_negative_zeros(observation)
 
     def ended(self, memory: RecoverMemory, readings: Readings) -> tuple:
         """Return that nothing ends an episode but its time."""

@@ -10,8 +10,8 @@ from arc_suite import checks
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, clock, energy, parameters, terms
 from arc_suite.tasks.blocks import Block
-from arc_suite.tasks.clock import Clock
-from arc_suite.tasks.contract import Inputs, Start, Task
+from arc_suite.tasks.contract import Inputs, Start
+from arc_suite.tasks.gait_task import GaitTask
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings, component
 
@@ -62,7 +62,7 @@ class WalkMemory(NamedTuple):
     energy: energy.Energy
 
 
-class Walk(Task):
+class Walk(GaitTask):
     """Walking forward at the target speed in the prescribed gait."""
 
     name = "walk"
@@ -104,27 +104,6 @@ class Walk(Task):
     def blocks(self) -> Mapping[str, Block]:
         """The paper's observation (Section 3)."""
         return blocks.of_gait(self.scene.body, self.parameters.phase_offsets, self.parameters.default_angles)
-
-    @functools.cached_property
-    def parameters(self) -> Parameters:
-        """The prescribed gait."""
-        return self.settings.parameters
-
-    @functools.cached_property
-    def clock(self) -> Clock:
-        """The clock of the prescribed gait."""
-        gait = self.parameters
-        return Clock.make(
-            gait.gait_frequency, gait.duty_factor, gait.phase_offsets, self.scene.control_timestep, self.step_limit
-        )
-
-    @functools.cached_property
-    def _torques(self) -> np.ndarray:
-        return energy.torques(self.scene.body)
-
-    @functools.cached_property
-    def _heat(self) -> np.ndarray:
-        return energy.heat(self.scene.body)
 
     @property
     def target_velocity(self) -> float:
@@ -173,7 +152,6 @@ class Walk(Task):
         displacement = x - memory.x
         low, high = self.settings.healthy_range
         height = readings.torso_height
-        efforts = readings.effort(memory.action)  # (..., joints) torques as shares of the largest
         return memory._replace(
             tick=tick,
             x=x,
@@ -182,7 +160,7 @@ class Walk(Task):
             distance=memory.distance + displacement,
             all_schedule_errors=memory.all_schedule_errors + schedule_errors,
             healthy=(low <= height) & (height <= high),
-            energy=energy.after(memory.energy, self._torques, self._heat, efforts, readings.joint_angles),
+            energy=self.add_work(memory.energy, memory.action, readings),
         )
 
     def terms(self, memory: WalkMemory, readings: Readings) -> dict:
