@@ -15,14 +15,14 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.command_law import Request
-from arc_suite.cpg.footholds import grid_index
+from arc_suite.cpg.footholds import find_scan_points
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.models import foot_paths, posture
 from arc_suite.models.kinematics import point_velocities, tilt_heights
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
-from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
+from arc_suite.tasks.sensors import SCAN
 
 _LOOKS_AHEAD = (0.0, 0.5, 1.0)  # shares of the look ahead at which a foot in swing sees the ground
 _MAX_STEP = 0.5  # standing heights, between the ground at a foot and that under the torso
@@ -122,7 +122,7 @@ class Climbing(Stepping):
         heights = self.fill_trenches(scan)
         # A product of matrices would round otherwise in a batch.
         plane = (heights[:, None] * self.ground_fit).sum(axis=-1)
-        leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
+        timing = self.gait_timing(request, observation)
 
         roughness = self._measure_roughness(heights, plane)
         motion = self._limit_motion(request.motion, observation["command"][:, 3:], roughness)
@@ -132,8 +132,8 @@ class Climbing(Stepping):
         foothold_shift = foothold_shift + self.tilt_shift(
             self.climbing.tilt_sum * (roughness * tilt_sum), self.climbing.tilt_rate, observation["velocities"][:, 3:5]
         )
-        soles = self.next_feet(leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration)
-        _, swing_progress = foot_paths.find_path_position(leg_phases, duty_factor)
+        soles = self.next_feet(timing, velocity, foothold_shift, request.size)
+        _, swing_progress = foot_paths.find_path_position(timing.leg_phases, timing.duty_factor)
         correction_size = roughness * request.size
         soles = self.step_on_ground(soles, swing_progress, velocity, correction_size, heights, plane, vertical)
 
@@ -204,18 +204,14 @@ class Climbing(Stepping):
         return xp.concatenate([places, sole_heights[..., None]], axis=-1)
 
     def _ground_at(self, heights, places):
-        """Return heights of the ground (environments, legs), m, between the points of a scan.
+        """Return heights of the ground (environments, legs), m, interpolated between the points of a scan.
 
         Args:
             heights: (environments, points) of the scan, m.
             places: (environments, legs, 2) forward and left of the torso, m.
         """
         xp = places.__array_namespace__()
-        row = grid_index(places[..., 0] / self._reach, FORWARD)
-        column = xp.rint(grid_index(places[..., 1] / self._reach, LEFT))
-        row_before = xp.floor(row)
-        point_before = (row_before * len(LEFT) + column).astype(int)
-        point_behind = (xp.ceil(row) * len(LEFT) + column).astype(int)
-        before = xp.take_along_axis(heights, point_before, axis=-1)
-        behind = xp.take_along_axis(heights, point_behind, axis=-1)
-        return before + (row - row_before) * (behind - before)
+        points = find_scan_points(places[..., 0] / self._reach, places[..., 1] / self._reach)
+        before = xp.take_along_axis(heights, points.before, axis=-1)
+        behind = xp.take_along_axis(heights, points.behind, axis=-1)
+        return before + points.share * (behind - before)

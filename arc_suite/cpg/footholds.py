@@ -1,6 +1,6 @@
 """Footholds: where feet that are about to land find ground, by scans of the heights about the torso."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,12 +55,8 @@ class View(NamedTuple):
             heights = self.heights[:, scan]
             moved_forward = self.moved[:, scan, 0].reshape(-1, *extra_axes)
             moved_left = self.moved[:, scan, 1].reshape(-1, *extra_axes)
-            # The points of a scan lie on a grid, in rows by FORWARD and columns by LEFT, as one list.
-            row = grid_index((x + moved_forward) / self.reach, FORWARD)
-            column = xp.rint(grid_index((y + moved_left) / self.reach, LEFT))
-            point_before = (xp.floor(row) * len(LEFT) + column).astype(int)
-            point_behind = (xp.ceil(row) * len(LEFT) + column).astype(int)
-            bound = xp.minimum(heights[environments, point_before], heights[environments, point_behind])
+            points = find_scan_points((x + moved_forward) / self.reach, (y + moved_left) / self.reach)
+            bound = xp.minimum(heights[environments, points.before], heights[environments, points.behind])
             ground = xp.maximum(ground, bound)
         return ground
 
@@ -92,6 +88,36 @@ def find_landings(view: View, landing, along, places, height: float, support_poi
     first_safe = is_safe.argmax(axis=-1)
     shifts = height * xp.where(has_ground, xp.asarray(LANDING_SHIFTS)[first_safe], 0.0)
     return shifts, has_ground
+
+
+class ScanPoints(NamedTuple):
+    """Points of a scan next to places: those before and behind each, in the nearest column.
+
+    Attributes:
+        before: (...) index of the point before, or of that at the place.
+        behind: (...) index of the point behind, or of that at the place.
+        share: (...) of the way from the first to the second at which the place is.
+    """
+
+    before: Any
+    behind: Any
+    share: Any
+
+
+def find_scan_points(x, y) -> ScanPoints:
+    """Return the points of a scan next to places forward (...) and left (...) of the torso, in R.
+
+    The points lie on a grid, in rows by `FORWARD` and columns by `LEFT`, as one list.
+    """
+    xp = x.__array_namespace__()
+    row = grid_index(x, FORWARD)
+    column = xp.rint(grid_index(y, LEFT))
+    row_before = xp.floor(row)
+    return ScanPoints(
+        before=(row_before * len(LEFT) + column).astype(int),
+        behind=(xp.ceil(row) * len(LEFT) + column).astype(int),
+        share=row - row_before,
+    )
 
 
 def grid_index(coordinate, grid):

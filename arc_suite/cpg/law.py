@@ -95,6 +95,10 @@ class Drive(NamedTuple):
     damping: np.ndarray
     reach: np.ndarray | None = None
 
+    def stiffen(self, multiple: float) -> "Drive":
+        """Return the drive with a multiple of the stiffness; critical damping stays critical."""
+        return self._replace(stiffness=multiple * self.stiffness, damping=np.sqrt(multiple) * self.damping)
+
     def actions(self, targets, speeds, angles, velocities, feedforward=0.0):
         """Return the actions (..., joints) in [-1, 1] by which joints follow targets.
 

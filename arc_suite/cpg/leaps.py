@@ -6,7 +6,6 @@ Control steps of a leap count from 1.
 """
 
 import functools
-import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -16,7 +15,7 @@ from arc_suite import rotations
 from arc_suite.cpg.drives import drive
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
-from arc_suite.models.sizing import GRAVITY, control_timestep, simulation, size_body
+from arc_suite.models.sizing import control_timestep, simulation, size_body, time_unit
 from arc_suite.models.standing import pose_mechanics, standing_qpos
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.batch import Batch
@@ -98,7 +97,7 @@ class Movement(NamedTuple):
 def lay_out_movement(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap) -> Movement:
     """Return the plan of a leap from a pose (legs, links), rad, in which soles are level."""
     standing_height = body.torso.standing_height
-    steps_per_time_unit = math.sqrt(standing_height / GRAVITY) / control_timestep(body)
+    steps_per_time_unit = time_unit(body) / control_timestep(body)
 
     def count_steps(duration: float) -> int:
         return max(1, round(steps_per_time_unit * duration))
@@ -157,7 +156,11 @@ def _solve_leg_angles(legs: Legs, start_angles, sole_goals, standing_height: flo
 
 def leap_targets(body: Body, legs: Legs, rest_angles: np.ndarray, leap: Leap) -> np.ndarray:
     """Return the targets (steps, joints) of joints in the control steps of a leap from a pose (legs, links), rad."""
-    movement = lay_out_movement(body, legs, rest_angles, leap)
+    return follow_movement(body, legs, rest_angles, lay_out_movement(body, legs, rest_angles, leap))
+
+
+def follow_movement(body: Body, legs: Legs, rest_angles: np.ndarray, movement: Movement) -> np.ndarray:
+    """Return the targets (steps, joints) of joints in the control steps of a movement; see `leap_targets`."""
     rest_soles, _ = legs.soles(rest_angles)
     sole_goals = rest_soles + movement.sole_offsets[:, None]
     start_angles = np.tile(rest_angles, (len(sole_goals), 1, 1))
@@ -188,6 +191,16 @@ class Flight(NamedTuple):
     lowest: float
     rise: float
     landed: bool
+
+    @property
+    def stays_high(self) -> bool:
+        """Whether the torso never sinks as low as that of a body that has fallen."""
+        return self.lowest > _MIN_HEIGHT
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether all feet leave the ground as far as in a jump."""
+        return self.clearance >= MIN_CLEARANCE
 
 
 def simulate_flights(
@@ -344,12 +357,10 @@ def jumps_that_stay(body: Body, rest_angles: tuple[float, ...]) -> Iterator[Leap
     for slant in _JUMP_SLANTS:
         jumps = _slant_jumps(slant)
         flights = _try_leaps(body, rest_angles, jumps)
-        good_jumps = [
-            (flight.clearance, jump)
-            for jump, flight in zip(jumps, flights, strict=True)
-            if flight.landed and flight.clearance >= MIN_CLEARANCE and flight.drift <= MAX_DRIFT
-            if flight.lowest > _MIN_HEIGHT
-        ]
+        good_jumps = []
+        for jump, flight in zip(jumps, flights, strict=True):
+            if flight.landed and flight.stays_high and flight.is_clear and flight.drift <= MAX_DRIFT:
+                good_jumps.append((flight.clearance, jump))
         for _, jump in sorted(good_jumps, reverse=True):
             yield jump
 
@@ -361,18 +372,17 @@ def _slant_jumps(slant: float) -> tuple[Leap, ...]:
 
 def _why_no_jump(flights: Sequence[Flight]) -> str:
     """Return what is wrong with jumps of which none is good: with that which is nearest to a good one."""
-    landed = [flight for flight in flights if flight.landed]
-    if not landed:
+    landings = [flight for flight in flights if flight.landed]
+    if not landings:
         return _DOES_NOT_LAND
-    landed = [flight for flight in landed if flight.lowest > _MIN_HEIGHT]
-    if not landed:
+    upright_landings = [flight for flight in landings if flight.stays_high]
+    if not upright_landings:
         return f"its torso sinks to {_MIN_HEIGHT} standing heights or less"
-    high = [flight for flight in landed if flight.clearance >= MIN_CLEARANCE]
-    if not high:
-        clearance = max(flight.clearance for flight in landed)
+    clear_flights = [flight for flight in upright_landings if flight.is_clear]
+    if not clear_flights:
+        clearance = max(flight.clearance for flight in upright_landings)
         return f"the clearance of its feet is {clearance:.2f} standing heights, less than {MIN_CLEARANCE}"
-    drift = min(flight.drift for flight in high)
-    return describe_drift(drift)
+    return describe_drift(min(flight.drift for flight in clear_flights))
 
 
 def describe_drift(drift: float) -> str:
@@ -385,8 +395,9 @@ def _try_leaps(body: Body, rest_angles: tuple[float, ...], choice: tuple[Leap, .
     """Return the flights of leaps from angles (joints,), rad."""
     legs = Legs.of(size_body(body))
     leg_angles = legs.by_leg(np.array(rest_angles))
-    targets_of_leaps = [leap_targets(body, legs, leg_angles, leap) for leap in choice]
-    crouch_ends = [lay_out_movement(body, legs, leg_angles, leap).crouch_end for leap in choice]
+    movements = [lay_out_movement(body, legs, leg_angles, leap) for leap in choice]
+    targets_of_leaps = [follow_movement(body, legs, leg_angles, movement) for movement in movements]
+    crouch_ends = [movement.crouch_end for movement in movements]
     return simulate_flights(body, np.array(rest_angles), _pad_and_stack(targets_of_leaps), crouch_ends)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.command_law import Request
-from arc_suite.cpg.stepping import Stepping, SteppingParameters, SteppingState
+from arc_suite.cpg.stepping import GaitTiming, Stepping, SteppingParameters, SteppingState
 from arc_suite.tasks.contract import Task
 
 _MEMORY_CYCLES = 0.1  # cycles over which the squares of errors are averaged
@@ -85,15 +85,10 @@ class Limping(Stepping):
             return super().follow_request(state, request, observation)
         vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
         failure = find_failure(state.squared_errors)
-        leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
-        # Legs other than the one that fails stand longer.
-        leg_duty_factors = duty_factor + self.limping.linger * (1.0 - duty_factor) * _sum_of_others(failure)
-        leg_stance_durations = stance_duration * (leg_duty_factors / duty_factor)[..., None]
+        timing = self._linger(self.gait_timing(request, observation), failure)
 
         velocity, foothold_shift = self.balance(request.motion, vertical, observation)
-        soles = self.next_feet(
-            leg_phases, velocity, foothold_shift, request.size, leg_duty_factors, leg_stance_durations
-        )
+        soles = self.next_feet(timing, velocity, foothold_shift, request.size)
         tilt_sum = self.add_tilt(state.tilt_sum, vertical[:, :2], request.size)
         feet_shift = self.tilt_shift(
             self.limping.tilt_sum * tilt_sum, self.limping.tilt_rate, observation["velocities"][:, 3:5]
@@ -106,6 +101,13 @@ class Limping(Stepping):
         squares = self._square_errors(state.joint_angles, joint_angles, observation)
         squared_errors = state.squared_errors + self._error_memory * (squares - state.squared_errors)
         return LimpingState(joint_angles, tilt_sum, squared_errors), target_angles, angle_changes
+
+    def _linger(self, timing: GaitTiming, failure) -> GaitTiming:
+        """Return the timing with longer stances of the legs other than the one that fails; see `find_failure`."""
+        swing_share = 1.0 - timing.duty_factor
+        duty_factor = timing.duty_factor + self.limping.linger * swing_share * _sum_of_others(failure)
+        stance_duration = timing.stance_duration * (duty_factor / timing.duty_factor)[..., None]
+        return timing._replace(duty_factor=duty_factor, stance_duration=stance_duration)
 
     def _square_errors(self, planned_angles, next_angles, observation: Mapping):
         """Return the squares (environments, legs) of the errors of each leg's joints, rad^2, a little ahead of time.

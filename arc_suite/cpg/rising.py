@@ -33,11 +33,7 @@ class Rising:
     def __init__(self, task: Task, parameters: RisingParameters):
         """Fit the law to the body of a task."""
         body = size_body(task.scene.body)
-        control = drive(body, measure_standing(body).inertias)
-        self._drive = control._replace(
-            stiffness=parameters.stiffness * control.stiffness,
-            damping=np.sqrt(parameters.stiffness) * control.damping,
-        )
+        self._drive = drive(body, measure_standing(body).inertias).stiffen(parameters.stiffness)
 
     def constants(self) -> dict[str, Any]:
         """Return the constants of the law, as pages take them."""

@@ -16,7 +16,7 @@ inverted pendulum (Pratt et al., "Capture point: a step toward humanoid push rec
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,20 @@ class SteppingParameters(NamedTuple):
     lean: float = 0.5
     capture: float = 0.3
     lift_by_pace: bool = False
+
+
+class GaitTiming(NamedTuple):
+    """When the feet of a gait stand, in the next control step.
+
+    Attributes:
+        leg_phases: (environments, legs) cycles.
+        duty_factor: a number or (environments, 1); (environments, legs) where it differs between legs.
+        stance_duration: s, a number or (environments, 1, 1); (environments, legs, 1) where it differs between legs.
+    """
+
+    leg_phases: Any
+    duty_factor: Any
+    stance_duration: Any
 
 
 def observes_gait_and_pose(task: Task) -> bool:
@@ -173,15 +187,13 @@ class Stepping(CommandLaw):
             pose = observation["pose"]
             balance_vertical = (posture.rotation_of(pose[:, 3:]) @ vertical[..., None])[..., 0]
 
-        leg_phases, duty_factor, stance_duration = self.gait_timing(request, observation)
+        timing = self.gait_timing(request, observation)
         velocity, foothold_shift = self.balance(request.motion, balance_vertical, observation)
         lift_factor = state.lift_factor
         if self.parameters.lift_by_pace:
             desired_factor = gaits.lifts_under_commands(observation["command"][:, :3])[:, None]
             lift_factor = lift_factor + self.smoothing * (desired_factor - lift_factor)
-        soles = self.next_feet(
-            leg_phases, velocity, foothold_shift, request.size, duty_factor, stance_duration, lift_factor
-        )
+        soles = self.next_feet(timing, velocity, foothold_shift, request.size, lift_factor)
         pose_integral = state.pose_integral
         if self.directed:
             pose_integral, corrected_pose = self._correct_pose(pose_integral, pose, torso_height, vertical)
@@ -208,16 +220,11 @@ class Stepping(CommandLaw):
         target_angles = self.legs.by_joint(joint_angles)
         return next_angles, target_angles, self.legs.by_joint(next_angles) - target_angles
 
-    def gait_timing(self, request: Request, observation: Mapping) -> tuple:
-        """Return when feet stand, by the command where there is one, else by the task.
-
-        Returns:
-            The phases (environments, legs) of the legs in the next control step, cycles; the duty factor; and the
-            duration of a stance, s. Both are numbers, or arrays (environments, 1) and (environments, 1, 1).
-        """
+    def gait_timing(self, request: Request, observation: Mapping) -> GaitTiming:
+        """Return when feet stand, by the command where there is one, else by the task."""
         if not self.directed:
             leg_phases = (request.phase[:, None] + self.phase_offsets + request.advance[:, None]) % 1.0
-            return leg_phases, self.duty_factor, self.stance_duration
+            return GaitTiming(leg_phases, self.duty_factor, self.stance_duration)
         gait = observation["gait"]  # sines and cosines of the phases of all legs, the duty factor and the frequency
         xp = gait.__array_namespace__()
         leg_count = len(self.phase_offsets)
@@ -229,7 +236,7 @@ class Stepping(CommandLaw):
         is_walking = request.advance[:, None] > 0.0
         advance = frequency * self.control_timestep * is_walking
         leg_phases = (commanded_phases + self.parameters.lead + advance) % 1.0
-        return leg_phases, duty_factor, (duty_factor / frequency)[..., None]
+        return GaitTiming(leg_phases, duty_factor, stance_duration=(duty_factor / frequency)[..., None])
 
     def balance(self, motion, vertical, observation: Mapping) -> tuple:
         """Return the velocity (environments, 3) that feet give the torso, m/s and rad/s, and shifts of footholds.
@@ -274,22 +281,20 @@ class Stepping(CommandLaw):
         zero = xp.zeros_like(height)  # of the numbers without feedback: forward, left and yaw
         return pose_integral, pose + xp.concatenate([height, zero, zero, roll_and_pitch, zero], axis=-1)
 
-    def next_feet(self, leg_phases, velocity, foothold_shift, gait_size, duty_factor, stance_duration, lift_factor=1.0):
+    def next_feet(self, timing: GaitTiming, velocity, foothold_shift, gait_size, lift_factor=1.0):
         """Return positions (environments, legs, 3) of the soles in the next control step, m, under a level torso.
 
         Args:
-            leg_phases: (environments, legs) in the next control step, cycles.
+            timing: when feet stand, in the next control step.
             velocity: (environments, 3) requested of the torso, m/s and rad/s.
             foothold_shift: (environments, 2) shift of all footholds for balance, m.
             gait_size: (environments, 1) from 0 to 1.
-            duty_factor: a number or (environments, 1).
-            stance_duration: s, a number or (environments, 1, 1).
             lift_factor: multiple of the height of a foot in mid-swing, a number or (environments, 1).
         """
-        xp = leg_phases.__array_namespace__()
-        path_position, swing_progress = foot_paths.find_path_position(leg_phases, duty_factor)
+        xp = timing.leg_phases.__array_namespace__()
+        path_position, swing_progress = foot_paths.find_path_position(timing.leg_phases, timing.duty_factor)
         path_position = path_position[..., None]
-        half_path = 0.5 * stance_duration * point_velocities(velocity, self.rest_soles)
+        half_path = 0.5 * timing.stance_duration * point_velocities(velocity, self.rest_soles)
         longest_half_path = xp.hypot(half_path[..., 0], half_path[..., 1]).max(axis=-1)[:, None, None]  # of any foot
         half_path = half_path * (self._longest_half_path / longest_half_path.clip(_MIN_PATH_LENGTH)).clip(max=1.0)
         shift_share = _TAKE_OFF_SHARE + (1.0 - _TAKE_OFF_SHARE) * 0.5 * (1.0 + path_position)

@@ -41,11 +41,7 @@ class Tracked:
         if not isinstance(tables, MotionTables):
             raise ValueError(f"task {task.name}: `tracked` follows the motion of a task, such as mimic")
         body = size_body(task.scene.body)
-        control = drive(body, measure_standing(body).inertias)
-        self._drive = control._replace(
-            stiffness=parameters.stiffness * control.stiffness,
-            damping=np.sqrt(parameters.stiffness) * control.damping,
-        )
+        self._drive = drive(body, measure_standing(body).inertias).stiffen(parameters.stiffness)
         self._tables = tables
         self._control_timestep = task.scene.control_timestep
         torques = np.array([joint.torque for joint in body.joints])

@@ -10,7 +10,7 @@ from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import presets_of
-from arc_suite.cpg.stepping import Stepping
+from arc_suite.cpg.stepping import GaitTiming, Stepping
 from arc_suite.robots import ROBOTS
 
 
@@ -35,7 +35,8 @@ def test_leaper_lifts_its_rear_feet():
     body, law = ROBOTS["leaper"], fitted(ROBOTS["leaper"])
     cycle = np.tile(np.linspace(0.0, 1.0, 21)[:, None], (1, len(body.legs)))
     rest = np.zeros((len(cycle), 3))
-    feet = law.next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), law.duty_factor, law.stance_duration)
+    timing = GaitTiming(cycle, law.duty_factor, law.stance_duration)
+    feet = law.next_feet(timing, rest, rest[:, :2], np.ones((len(cycle), 1)))
     weights = np.tile(np.eye(3), (len(body.legs), 1, 1))
     angles = np.tile(law.rest_angles, (len(cycle), 1, 1))
     soles, _ = law.legs.soles(law.legs.solve_joint_angles(angles, feet, weights, 0.01, 20))
